@@ -1,4 +1,4 @@
-"""Runs `kickstand demo`: the firmware on the simulated board, drawn in a terminal or printed frame by frame."""
+"""Runs the firmware on the simulated board, and draws its display in a terminal or prints it frame by frame."""
 
 import contextlib
 import io
@@ -16,8 +16,8 @@ from .keyboard import BIKE_KEYS, keyboard
 from .score import Score, table
 from .screen import lcd_lines, lean_text, oled_lines, screen
 
-SCRIPT_SPEED, HAND_SPEED = 1.5, 1.0  # simulated seconds per second when drawn in a terminal
-FRAME_S = 0.25  # shortest time between two printed frames of the same page
+SCRIPT_SPEED, HAND_SPEED = 1.5, 1.0  # simulated seconds per second while the display is drawn in a terminal
+FRAME_S = 0.25  # least time between two printed frames of the same page
 _KEYS = {"b": "short", "B": "long", " ": "long", "p": "pause", "q": "quit"}
 _HELP = "b button  B long press  p pause  q quit"
 _HAND_HELP = "b button  B long press  a/d lean  k kickstand  u upright  p pause  q quit"
@@ -59,7 +59,7 @@ def _print(device: DeviceProcess, score: Score, console: bool) -> None:
             live_page = state["lcd"][0][:4] == said[0][:4]
             if state["lcd"] == said or (live_page and state["t_s"] - said_s < FRAME_S):
                 continue
-            between = state["lcd"][0].startswith("?")  # an OLED, whose new picture may be incomplete
+            between = state["lcd"][0].startswith("?")  # the new picture of an OLED may be incomplete
             if between and state["t_s"] - said_s < FRAME_S:
                 continue
             said, said_s = state["lcd"], state["t_s"]
@@ -70,10 +70,16 @@ def _print(device: DeviceProcess, score: Score, console: bool) -> None:
 def demo(hand: bool = False, cpython: bool = False, display: str = "lcd", user: Path | None = None) -> None:
     """Run the demo until it ends or the user quits, then print the score.
 
-    hand: the user steers the bike with keys. cpython: run on CPython, not on MicroPython. display: "lcd", "ssd1306" or
-    "sh1106". user: the user's code for the board; with it, the board's console is printed too.
-    Raises InputError if steering has no terminal, and if the user's code is not a program. Raises DeviceStopped if the
-    device ended early.
+    Args:
+        hand: True if the user steers the bike with keys.
+        cpython: True to run on CPython instead of MicroPython.
+        display: "lcd", "ssd1306" or "sh1106".
+        user: File with the user's code for the board. None for no code. With a file, the board's console is printed
+            too.
+
+    Raises:
+        InputError: If the user should steer but there is no terminal, and if the user's code is not a program.
+        DeviceStopped: If the device ended too early.
     """
     watched = sys.stdin.isatty() and sys.stdout.isatty()
     if hand and not watched:

@@ -2,10 +2,15 @@
 
     device.py script|hand SPEED DISPLAY
 
-SPEED: simulated seconds per second; 0 means as fast as possible. DISPLAY: "lcd", "ssd1306" or "sh1106". Every 50
-simulated ms it prints a line of JSON (see score.State); other lines are the firmware's console. It reads commands from
-standard input, one per line: short, long (presses of the button), left, right, kickstand, upright (to steer the bike by
-hand), pause, quit.
+SPEED: Simulated seconds per second. 0 means as fast as possible.
+DISPLAY: "lcd", "ssd1306" or "sh1106".
+
+Every 50 simulated ms the program prints a line of JSON (see score.State). All other lines of its output are the
+firmware's console. It reads one command per line from standard input:
+
+    short, long                         press the button
+    left, right, kickstand, upright     steer the bike by hand
+    pause, quit
 """
 
 import json
@@ -22,13 +27,13 @@ from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 
 TICK_S = 0.05
 PART_SEED = 1
-PART_SHARE = 0.5  # the sensor's errors as a share of the data sheet's limits: an ordinary sensor
+PART_SHARE = 0.5  # limits of the sensor's errors as a share of the data sheet's limits, as for an ordinary sensor
 HAND_LIMIT_S = 3600.0
 BATTERY_V = 12.6 / 11  # voltage at GPIO 26, after the divider in firmware/examples/user_battery.py
 LONG_PRESS_S = 1.2
 
 # The rider presses the button once on the kickstand and once upright, and switches to two other pages after the ride.
-# With a user.py the rider also switches to its first page, after the first turn
+# If there is a user.py, the rider also switches to its first page, after the first turn
 SCRIPT = (
     kickstand(8.0),
     upright(7.5),
@@ -50,7 +55,7 @@ _real_sleep = time.sleep  # kept before Board.install() replaces `time`
 
 
 class Commands:
-    """Lines of standard input, read without waiting."""
+    """Reads lines from standard input without waiting."""
 
     def __init__(self):
         self._waiting = []
@@ -61,7 +66,7 @@ class Commands:
 
             self._poll = select.poll()
             self._poll.register(sys.stdin, select.POLLIN)
-        else:  # on Windows select does not work with pipes
+        else:  # a thread reads, because select does not work with pipes on Windows
             import threading
 
             threading.Thread(target=self._read_all, daemon=True).start()
@@ -72,11 +77,11 @@ class Commands:
         self._waiting.append("quit")
 
     def next(self):
-        """The next command, or None."""
+        """Return the next command, or None."""
         while self._poll and self._poll.poll(0):
             character = sys.stdin.read(1)
             if not character:
-                self._waiting.append("quit")  # end of input: the other process has ended
+                self._waiting.append("quit")  # the input ends when the other process has ended
                 self._poll = None
             elif character == "\n":
                 self._waiting.append(self._partial)
@@ -87,7 +92,10 @@ class Commands:
 
 
 def seen(board, bike, of_s=None):
-    """A dictionary with the fields of score.State, except an OLED's pixels."""
+    """Return a dictionary with the fields of score.State, except an OLED's pixels.
+
+    of_s: duration of the run, or None.
+    """
     t_s = board.clock.now_us / 1e6
     lean_deg, speed_mps, _, phase = bike.truth(t_s)
     return {
@@ -102,7 +110,7 @@ def seen(board, bike, of_s=None):
 
 
 class Demo:
-    """Bike and board, and the communication with the process that draws."""
+    """The bike and the board, and the communication with the process that draws."""
 
     def __init__(self, by_hand, speed, display):
         self._commands = Commands()
@@ -127,7 +135,7 @@ class Demo:
         self.board.every(TICK_S, self._tick)
 
     def run(self):
-        """Switch on, and restart after every reset, until the time is over or "quit" arrives."""
+        """Switch the board on, and restart it after every reset, until the time is over or "quit" arrives."""
         self.board.install()
         from kickstand.start import main  # after install(), which replaces `machine` and `time`
         from kickstand.ui.page_ring import MOTORCYCLE  # the pages of user.py come after these
@@ -176,7 +184,7 @@ class Demo:
 
 
 def run(kind, speed, display="lcd"):
-    """Run the demo's device. kind: "script" or "hand". speed, display: see the module."""
+    """Run the demo's device. kind: "script" or "hand". speed, display: see the module's docstring."""
     Demo(kind == "hand", float(speed), display).run()
 
 

@@ -15,10 +15,13 @@ from .score import State
 
 
 class DeviceProcess:
-    """The firmware on the simulated board. Use it in a `with` statement and call ticks() until ended.
+    """The process that runs the firmware on the simulated board.
 
-    engine: "micropython" or "cpython". kind, speed, display: the arguments of device.py. user: the file that becomes
-    the board's user.py.
+    Use it in a `with` statement, and call ticks() until `ended` is true.
+
+    engine: "micropython" or "cpython".
+    kind, speed, display: Arguments of device.py.
+    user: File that becomes the board's user.py, or None.
     """
 
     def __init__(self, engine: str, kind: str, speed: float, display: str = "lcd", user: Path | None = None) -> None:
@@ -49,7 +52,7 @@ class DeviceProcess:
             text=True,
             encoding="utf-8",
             errors="replace",
-            start_new_session=True,  # Ctrl-C must reach only this process
+            start_new_session=True,  # so Ctrl-C reaches only this process
         )
         threading.Thread(target=self._read, daemon=True).start()
 
@@ -90,7 +93,7 @@ class DeviceProcess:
         return self.ended and self._outcome != "off"
 
     def ticks(self, wait_s: float) -> list[State]:
-        """The ticks that have arrived. Waits up to wait_s for the first. Sets `ended` after the last tick."""
+        """Return the ticks that have arrived. Wait up to wait_s for the first tick. Set `ended` after the last tick."""
         ticks = []
         with contextlib.suppress(queue.Empty):
             line = self._lines.get(timeout=wait_s)

@@ -22,20 +22,22 @@ LEAN_STEP_DEG = 5.0
 MAX_LEAN_DEG = 50.0
 
 _STEP_S = 0.005
-_ROLL_RATE = 4.0  # rad/s: the lean follows the commanded lean with this natural frequency, critically damped
-_SPEED_RATE = 1.5  # 1/s: the speed approaches the commanded speed at this rate
+_ROLL_RATE = 4.0  # natural frequency in rad/s with which the lean follows the commanded lean, critically damped
+_SPEED_RATE = 1.5  # rate in 1/s at which the speed approaches the commanded speed
 _MAX_ACCELERATION, _MAX_BRAKING = 3.0, 5.0  # m/s2
 _SWAY_RADPS = 2.0 * pi * 0.4
 
 
 class HandBike:
-    """A bike that starts on the kickstand. Steer it with command(), or with stand(), ride() and lean_to(). motion() and
-    truth() return the same values as those of script.Ride, but t_s must not decrease."""
+    """A bike that starts on the kickstand. Steer it with command(), or with stand(), ride() and lean_to().
+
+    motion() and truth() return the same values as in script.Ride, but their argument t_s must not decrease.
+    """
 
     def __init__(self, vibration_g=0.05):
         self._vibration_g = vibration_g
         self._t_s = 0.0
-        self._pose = "kickstand"  # or "upright", "riding"
+        self._pose = "kickstand"  # "kickstand", "upright" or "riding"
         self._lean_wish = 0.0
         self._cruise = CRUISE_MPS
         self._lean, self._lean_rate = radians(KICKSTAND_DEG), 0.0
@@ -43,8 +45,11 @@ class HandBike:
         self._sway = 0.0  # amplitude, rad
 
     def command(self, name):
-        """Carry out a command. left, right: set off, then lean 5 degrees further. upright, kickstand: stop, and stand
-        in this pose."""
+        """Carry out a command.
+
+        "left" and "right" set off. If the bike is riding already, they lean it by 5 degrees more to that side.
+        "upright" and "kickstand" stop the bike in this pose.
+        """
         if name in ("kickstand", "upright"):
             self.stand(name)
         elif name in ("left", "right") and self._pose != "kickstand":
@@ -54,19 +59,20 @@ class HandBike:
             self._pose = "riding"
 
     def stand(self, pose):
-        """Stop, and stand on the "kickstand" or "upright"."""
+        """Stop, and stand in this pose, "kickstand" or "upright"."""
         self._pose = pose
         self._lean_wish = 0.0
 
     def ride(self, speed_mps):
-        """Set off, or change speed, to this speed in m/s. It must be over script.RIDING_MPS; at lower speeds
-        the bike does not lean."""
+        """Set off, or change the speed. speed_mps must be over script.RIDING_MPS. The bike does not lean below it."""
         self._pose = "riding"
         self._cruise = speed_mps
 
     def lean_to(self, lean_deg):
-        """Lean to this angle in degrees, > 0 to the right, at most 50. The bike stays upright while it stands or sets
-        off."""
+        """Lean to this angle, positive to the right, at most 50 degrees.
+
+        The bike stays upright while it stands or sets off.
+        """
         self._lean_wish = max(-MAX_LEAN_DEG, min(MAX_LEAN_DEG, lean_deg))
 
     def _advance(self, t_s):
@@ -92,21 +98,24 @@ class HandBike:
             self._sway += (radians(sway) - self._sway) * step
 
     def _attitude(self, t_s):
-        """(lean, lean rate, yaw rate) in rad and rad/s."""
+        """Return the lean in rad, its rate in rad/s, and the yaw rate in rad/s."""
         self._advance(t_s)
         lean = self._lean + self._sway * sin(_SWAY_RADPS * t_s)
         lean_rate = self._lean_rate + self._sway * _SWAY_RADPS * sin(_SWAY_RADPS * t_s + pi / 2.0)
         return lean, lean_rate, yaw_rate_in_balance(lean, STANDARD_GRAVITY, self._speed)
 
     def motion(self, t_s):
-        """Specific force (g) along left, up, forward, and rates (deg/s) about these, including vibration."""
+        """Return the six readings of a perfect sensor, including vibration.
+
+        They are the specific force along left, up, forward in g, then the rates about these axes in deg/s.
+        """
         lean, lean_rate, yaw_rate = self._attitude(t_s)
         clean = body_motion(lean, lean_rate, self._speed, self._acceleration, yaw_rate)
         engine = min(1.0, self._speed / 2.0)
         return shaken(clean, t_s, self._vibration_g, self._speed, self._distance, engine)
 
     def truth(self, t_s):
-        """(lean_deg, speed_mps, yaw_rate_dps, phase)"""
+        """Return (lean_deg, speed_mps, yaw_rate_dps, phase)."""
         lean, _, yaw_rate = self._attitude(t_s)
         return degrees(lean), self._speed, degrees(yaw_rate), self._phase()
 

@@ -1,4 +1,4 @@
-"""Reads single key presses from the terminal, without waiting for Enter: Linux, macOS and Windows."""
+"""Reads single key presses from the terminal, without waiting for Enter, on Linux, macOS and Windows."""
 
 import contextlib
 import os
@@ -6,14 +6,15 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 
-# Key for steering a bike, and the command of hand_bike.HandBike
+# Each key that steers a bike, with its command of hand_bike.HandBike
 BIKE_KEYS = {"a": "left", "left": "left", "d": "right", "right": "right", "k": "kickstand", "u": "upright"}
 
-_LEFT, _RIGHT = ("\x1b[D", "\x1bOD", "\xe0K"), ("\x1b[C", "\x1bOC", "\xe0M")  # the last of each is from Windows
+# Codes of the arrow keys. The last one of each key is from Windows
+_LEFT, _RIGHT = ("\x1b[D", "\x1bOD", "\xe0K"), ("\x1b[C", "\x1bOC", "\xe0M")
 
 
 def split(text: str) -> list[str]:
-    """Split typed text into keys: characters, and "left" and "right" for arrows. Other special keys are dropped."""
+    """Split typed text into keys. Arrow keys become "left" and "right". Other special keys are dropped."""
     keys = []
     while text:
         size = 3 if text[:2] in ("\x1b[", "\x1bO") else 2 if text[0] in "\xe0\0" else 1
@@ -30,7 +31,7 @@ if sys.platform == "win32":
 
     @contextlib.contextmanager
     def keyboard() -> Iterator[Callable[[float], list[str]]]:
-        """A context with a function that waits for that many seconds and returns the keys pressed."""
+        """A context that yields a function keys(wait_s). It waits for wait_s, and returns the keys pressed."""
 
         def keys(wait_s: float) -> list[str]:
             time.sleep(wait_s)
@@ -48,7 +49,7 @@ else:
 
     @contextlib.contextmanager
     def keyboard() -> Iterator[Callable[[float], list[str]]]:
-        """A context with a function that waits up to that many seconds for a key and returns the keys pressed."""
+        """A context that yields a function keys(wait_s). It waits up to wait_s for a key, and returns the keys."""
         terminal = sys.stdin.fileno()
 
         def keys(wait_s: float) -> list[str]:

@@ -12,9 +12,17 @@ _STANDING = ("kickstand", "upright", "moving", "wait")
 
 
 class State(TypedDict):
-    """One tick of the device. of_s: duration of the run, None if steered by hand. lcd: both lines. lean_deg: the true
-    lean, > 0 to the right. phase: what the bike is doing. pressed: True while the button is pressed. pixels: the pixels
-    of an OLED as hex, 64 rows of 128, 8 pixels per byte, the leftmost in bit 7."""
+    """One tick of the device.
+
+    t_s: Simulated time.
+    of_s: Duration of the run. None if the bike is steered by hand.
+    lcd: Both lines of the display.
+    lean_deg: True lean, positive to the right.
+    speed_mps: True speed.
+    phase: Name of the bike's present manoeuvre.
+    pressed: True while the button is pressed.
+    pixels: Pixels of an OLED as hex, 64 rows of 128 pixels. A byte has 8 pixels, the leftmost in bit 7.
+    """
 
     t_s: float
     of_s: float | None
@@ -27,7 +35,7 @@ class State(TypedDict):
 
 
 class Figures(NamedTuple):
-    """Shown and true lean in one part of the ride, degrees. Errors: shown minus true."""
+    """Shown and true lean in one part of the ride, in degrees. An error is the shown lean minus the true lean."""
 
     samples: int
     true_mean: float
@@ -37,11 +45,13 @@ class Figures(NamedTuple):
 
 
 class Score:
-    """Collects the true and the shown lean (degrees, > 0 to the right) while the page of the lean is shown, by part of
-    the ride. figures() summarises them."""
+    """Collects the true and the shown lean for each part of the ride, in degrees; positive to the right.
+
+    Only ticks at which the display shows a lean count. figures() summarises them.
+    """
 
     def __init__(self) -> None:
-        self._pairs: dict[str, list[tuple[float, float]]] = {}  # part of the ride: (true, shown) in degrees
+        self._pairs: dict[str, list[tuple[float, float]]] = {}  # true and shown lean, by part of the ride
         self._phase = ""
         self._turns = 0
 
@@ -62,8 +72,10 @@ class Score:
         return "standing" if phase in _STANDING else "straight on"
 
     def figures(self) -> dict[str, Figures]:
-        """The Figures of each part of the ride, held turns first, and of the whole ride as "all". Empty if no lean was
-        shown."""
+        """Return the Figures of each part of the ride, held turns first, and of the whole ride as "all".
+
+        The result is empty if no lean was shown.
+        """
         names = sorted(self._pairs, key=lambda name: not name.startswith("held"))
         if not names:
             return {}
@@ -72,7 +84,10 @@ class Score:
 
 
 def table(figures: dict[str, Figures]) -> Table | str:
-    """Show the result of Score.figures() in a terminal: one row per part of the ride, then a row for the whole ride."""
+    """Format the result of Score.figures() for a terminal.
+
+    The table has one row per part of the ride, then a row for the whole ride.
+    """
     if not figures:
         return "The lean was not shown yet."
     table = Table(

@@ -1,4 +1,4 @@
-"""Draws the demo in a terminal, 78 columns wide: the LCD, the bike from behind, true and shown lean."""
+"""Draws the demo in a terminal, 78 columns wide: the display, the bike from behind, true and shown lean."""
 
 from itertools import groupby
 from math import cos, radians, sin
@@ -24,14 +24,14 @@ _BRAILLE = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # the bit o
 
 
 def lean_text(lean_deg: float, digits: int = 1) -> str:
-    """A lean in words: "12.3° left"."""
+    """Return a lean in words, such as "12.3° left"."""
     size = f"{abs(lean_deg):.{digits}f}"
     side = "" if float(size) == 0.0 else "left" if lean_deg < 0.0 else "right"
     return f"{size}° {side}".rstrip()
 
 
 def lcd_lines(lcd: list[str]) -> list[str]:
-    """The two lines in a frame of plain text."""
+    """Return the two lines of the display in a frame of plain text."""
     edge = "+" + "-" * 16 + "+"
     return [edge, *(f"|{line:16}|" for line in lcd), edge]
 
@@ -43,7 +43,7 @@ def _lcd(lcd: list[str]) -> RenderableType:
 
 
 def oled_lines(pixels: str) -> list[str]:
-    """An OLED's pixels as 16 lines of 64 braille characters. pixels: see score.State."""
+    """Return an OLED's pixels as 16 lines of 64 braille characters. pixels: see score.State."""
     data = bytes.fromhex(pixels)
     return [
         "".join(
@@ -64,7 +64,11 @@ def _oled(pixels: str) -> RenderableType:
 
 
 def _on_bike(x: float, y: float) -> bool:
-    """True if a point is on the bike or the rider, seen from behind. x, y: right of and above the contact point, m."""
+    """True if a point is on the bike or the rider, seen from behind.
+
+    x: Distance to the right of the contact point, in m.
+    y: Height above the contact point, in m.
+    """
     return (
         (abs(x) < 0.08 and 0.0 <= y < 0.62)  # tyre
         or (abs(x) < 0.17 and 0.5 <= y < 0.85)  # tail
@@ -75,7 +79,7 @@ def _on_bike(x: float, y: float) -> bool:
 
 
 def bike(lean_deg: float, shown_deg: float | None) -> Text:
-    """The bike from behind at its true lean, with a dashed line at the shown lean."""
+    """Draw the bike from behind at its true lean, with a dashed line at the shown lean."""
     picture = Text(no_wrap=True)
     middle, ground = _BIKE_COLUMNS, 4 * _BIKE_ROWS - 3  # in dots of braille
     c, s = cos(radians(lean_deg)), sin(radians(lean_deg))
@@ -121,7 +125,12 @@ def _figures(state: State) -> Table:
 
 
 def screen(state: State, title: str, keys: str, paused: bool) -> RenderableType:
-    """The whole picture for one tick of the device."""
+    """Draw the whole picture for one tick of the device.
+
+    title: Text above the picture.
+    keys: Text below the picture, which explains the keys.
+    paused: True to show that the demo is paused.
+    """
     of_s = state["of_s"]
     head = Table.grid(expand=True)
     head.add_column(no_wrap=True)

@@ -1,4 +1,4 @@
-"""Checks that the user's code for the simulated board is a program, before the ride of a minute starts."""
+"""Checks that the user's code for the simulated board is a program, before the demo's ride starts."""
 
 import subprocess
 import warnings
@@ -7,7 +7,8 @@ from pathlib import Path
 from ..common import unix_port
 from ..common.errors import InputError
 
-# MicroPython has fewer statements than CPython, so MicroPython checks the program: prints nothing, or "line: fault"
+# MicroPython runs this code to check the user's program, because it accepts less than CPython. The code prints nothing
+# if the program is right, otherwise "line:fault"
 _COMPILE = """
 import io, sys
 try:
@@ -22,8 +23,10 @@ except Exception as error:
 
 
 def check(program: Path, engine: str) -> None:
-    """Raise InputError if a file is not a program for this engine, "CPython" or "MicroPython". Raise OSError if it
-    cannot be read."""
+    """Raise InputError if a file is not a program for this engine, "CPython" or "MicroPython".
+
+    Raises OSError if the file cannot be read.
+    """
     source = program.read_bytes()
     wrong = _by_micropython(program) if engine == "MicroPython" else _by_cpython(source)
     if wrong:
@@ -43,6 +46,6 @@ def _by_cpython(source: bytes) -> str:
             compile(source, "user.py", "exec", dont_inherit=True)
     except SyntaxError as error:
         return f"{error.lineno or ''}:{error.msg}"
-    except ValueError as error:  # raised for characters that no source has
+    except ValueError as error:  # compile() raises it for characters that are not allowed in a source file
         return f":{error}"
     return ""

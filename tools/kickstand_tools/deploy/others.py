@@ -1,4 +1,4 @@
-"""Finds another project's main.py, boot.py and config.py on a used board, to rename and keep them."""
+"""Finds another project's main.py, boot.py and config.py on a used board. They are renamed and kept."""
 
 import ast
 import hashlib
@@ -20,9 +20,10 @@ from .firmware_files import CONFIG, MAIN, PACKAGE
 
 BOOT = "/boot.py"
 _KEPT = "-before-kickstand"
-_MANY = 3  # a file with this many of Kickstand's settings is Kickstand's; one alone, such as DISPLAY, proves nothing
+# A file with this many of Kickstand's settings is Kickstand's. Another project may also have one such as DISPLAY
+_MANY = 3
 _ON_THE_BOARD = "config.py on the board"
-# The first digits of the SHA-256 of every released main.py of Kickstand, with \n as line end
+# The first 16 digits of the SHA-256 of every released main.py of Kickstand, with \n as line end
 _OWN_MAIN = {
     "390e716171ec58a6",
     "863631249d4a19b6",
@@ -47,9 +48,13 @@ _CORRECT_OR_REPLACE = Remedy(
 
 @dataclass(frozen=True)
 class Others:
-    """The files that were on a board. files: its files and folders. moves: the new name of each file to rename, by
-    path. config: the content that the user's config.py on the board should have; None without one, or if it is renamed.
-    mended: True if config differs from the current content."""
+    """The files that were on a board, and the decisions about them.
+
+    files: Files and folders of the board, after renaming.
+    moves: New path of each file to rename, by its present path.
+    config: Content that the user's config.py should have. None if there is no such file, or if it is renamed.
+    mended: True if this content differs from the present content.
+    """
 
     files: BoardFiles
     moves: dict[str, str]
@@ -57,13 +62,17 @@ class Others:
     mended: bool
 
     def words(self) -> list[str]:
-        """One line per file to rename."""
+        """Return one line of text for each file to rename."""
         return [f"{path[1:]} on the board is another project's: kept as {to[1:]}" for path, to in self.moves.items()]
 
 
 @dataclass(frozen=True)
 class Contents:
-    """files: the board's files and folders. texts: the content of MAIN, BOOT and CONFIG, if they exist."""
+    """The contents of a board.
+
+    files: Files and folders of the board.
+    texts: Content of those of the files MAIN, BOOT and CONFIG that exist, by path.
+    """
 
     files: BoardFiles
     texts: dict[str, bytes]
@@ -77,8 +86,14 @@ def read(transport: SerialTransport) -> Contents:
 
 
 def find(there: Contents, judge: Callable[[Path], Judged], replace_config: bool) -> Others:
-    """Decide which files to rename. judge: checks a config.py for this board. replace_config: True if the user's
-    config.py will be replaced. Raises InputError if the user's config.py would stop the firmware."""
+    """Decide which files to rename.
+
+    there: The contents of the board.
+    judge: Function that checks a config.py for this board.
+    replace_config: True if the user's config.py will be replaced.
+
+    Raises InputError if the user's config.py would stop the firmware.
+    """
     installed = PACKAGE in there.files.folders
     leave = []
     if MAIN in there.texts and not _is_own_main(there.texts[MAIN]):
@@ -109,7 +124,7 @@ def find(there: Contents, judge: Callable[[Path], Judged], replace_config: bool)
 
 
 def _check_config(content: bytes, judge: Callable[[Path], Judged]) -> tuple[bytes, str | None]:
-    """The content in the encoding that MicroPython reads, and its fault or None."""
+    """Return the content of a config.py in the encoding that MicroPython reads, and its fault or None."""
     try:
         content = cleaned(content)
     except InputError as error:
@@ -128,7 +143,7 @@ def _is_own_main(content: bytes) -> bool:
 
 
 def _settings_named(content: bytes) -> int:
-    """The number of Kickstand's settings in a config.py, including those behind a '#'."""
+    """Return the number of Kickstand's settings in a config.py, including settings behind a '#'."""
     shipped = (firmware_path.directory() / "config.py").read_text(encoding="utf-8")
     setting = r"^(?:# )?([A-Z][A-Z_0-9]+) = "
     text = content.decode("utf-8", "replace").replace("\r\n", "\n")
@@ -136,7 +151,8 @@ def _settings_named(content: bytes) -> int:
 
 
 def _does_something(content: bytes) -> bool:
-    """True if the file has more than comments and strings. MicroPython's own boot.py on an ESP32 has only these."""
+    """True if the file contains more than comments and strings. The boot.py that MicroPython puts on an ESP32 does not
+    contain more."""
     try:
         body = ast.parse(content).body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -145,7 +161,7 @@ def _does_something(content: bytes) -> bool:
 
 
 def _free_name(path: str, taken: set[str]) -> str:
-    """The first unused name of main-before-kickstand.py, main-before-kickstand-2.py and so on."""
+    """Return the first unused name of main-before-kickstand.py, main-before-kickstand-2.py and so on."""
     stem = path.removesuffix(".py") + _KEPT
     names = [f"{stem}.py", *(f"{stem}-{n}.py" for n in range(2, len(taken) + 3))]
     return next(name for name in names if name not in taken)

@@ -1,9 +1,10 @@
 """Plans an update of a board: which files and folders to remove and to create. Also checks the free space.
 
-A file takes whole flash blocks. The blocks are freed when the file is removed, or when its replacement is closed. Each
-block after the first begins with pointers of 4 bytes to earlier blocks (littlefs, DESIGN.md, "CTZ skip-lists"). A small
-file, of up to an eighth of a block or less on some boards, may be stored in the blocks of its folder. A folder takes
-two blocks, and two more if its entries do not fit.
+The free space is computed from the rules of the file system littlefs. A file takes whole flash blocks. The blocks are
+freed when the file is removed, or when its replacement is closed. Each block after the first begins with pointers of
+4 bytes to earlier blocks (littlefs, DESIGN.md, "CTZ skip-lists"). A small file may be stored in the blocks of its
+folder. The limit for this is an eighth of a block, or less on some boards. A folder takes two blocks, and two more if
+its entries do not fit.
 """
 
 from dataclasses import dataclass, field
@@ -15,12 +16,13 @@ from .board_files import BoardFiles, fingerprint
 from .firmware_files import CONFIG, MAIN, MODULE_ENDINGS, PACKAGE, unfinished
 
 FOLDER_BLOCKS = 2
-SPARE_BLOCKS = 4  # a folder may need more than two blocks, and littlefs writes a new block before it frees a worn block
+# Blocks that must stay free. A folder may need more than two, and littlefs replaces a worn block before freeing it
+SPARE_BLOCKS = 4
 _POINTER = 4
 
 
 def most_blocks(size: int, block: int) -> int:
-    """The largest number of flash blocks that a file of this many bytes can take."""
+    """Return the largest number of flash blocks that a file can take. size, block: bytes of the file and of a block."""
     count = 1
     while size > block * count - _POINTER * (2 * (count - 1) - (count - 1).bit_count()):
         count += 1
@@ -28,18 +30,24 @@ def most_blocks(size: int, block: int) -> int:
 
 
 def least_blocks(size: int, block: int) -> int:
-    """The number of flash blocks that are certainly freed when a file of this many bytes is removed."""
+    """Return the number of flash blocks that are certainly freed when a file of this size is removed."""
     return most_blocks(size, block) if size > block // 8 else 0
 
 
 @dataclass(frozen=True)
 class Update:
-    """The steps of an update, in this order. For a board that is up to date, there are no steps.
+    """The steps of an update. A board that is up to date needs no steps.
 
-    remove: files, main.py first.  remove_folders: folders, then empty.  make_folders: folders to create.
-    copy: contents by path, main.py last.  obsolete: files in `remove` that belong to no module of this version.
-    keep: files that stay unchanged. moves: the new names of files of another project, by their paths; they are renamed
-    first. config_differs: True if the user's config.py, which is kept, is not this version's.
+    These are the steps in their order:
+        moves: New paths of files of another project, by their present paths. They are renamed.
+        remove: Files to remove, main.py first.
+        remove_folders: Folders to remove. They are empty by then.
+        make_folders: Folders to create.
+        copy: Contents of the files to copy, by path, main.py last.
+
+    obsolete: Files in `remove` that belong to no module of this version.
+    keep: Files that stay unchanged.
+    config_differs: True if the user's config.py is kept and differs from this version's.
     """
 
     remove: list[str]
@@ -56,13 +64,19 @@ def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> U
     """Plan the Update that gives the board the wanted files. The user's own files are kept.
 
     Files to replace are removed first, which frees their blocks. An interruption is harmless, because a board without
-    main.py starts nothing and can be flashed again. Raises InputError if a file of the user's is in the way.
+    main.py starts nothing and can be flashed again.
+
+    wanted: Contents of the wanted files, by path.
+    board: The files that are on the board.
+    replace_config: Also replace the user's config.py.
+
+    Raises InputError if a file of the user is in the way.
     """
     copy = {path: data for path, data in wanted.items() if board.files.get(path) != fingerprint(data)}
     config_differs = CONFIG in copy and CONFIG in board.files and not replace_config
     if config_differs:
         del copy[CONFIG]
-    left_over = {unfinished(MAIN), unfinished(CONFIG)}  # left by an interrupted update
+    left_over = {unfinished(MAIN), unfinished(CONFIG)}  # an interrupted update leaves these files
     stale = [path for path in board.files if path in left_over or (_is_module(path) and path not in wanted)]
     kept = board.files.keys() - set(stale)
     folders = {folder for path in wanted for folder in _folders(path)}
@@ -84,7 +98,7 @@ def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> U
 
 
 def needed_blocks(update: Update, board: BoardFiles) -> int:
-    """The number of flash blocks that must be free for an update."""
+    """Return the number of flash blocks that must be free for an update."""
     if not update.copy:
         return 0
     takes = sum(most_blocks(len(data), board.block) for data in update.copy.values())
@@ -99,7 +113,7 @@ def refuse_without_room(update: Update, board: BoardFiles) -> None:
     if blocks <= board.free_blocks:
         return
     remedy = Remedy("remove files of your own from it")
-    if board.has_rides and f"{PACKAGE}/rides" in board.folders:  # older firmware, up to 0.4, cannot be pulled from
+    if board.has_rides and f"{PACKAGE}/rides" in board.folders:  # firmware up to 0.4 cannot send its rides
         remedy = Remedy(
             "pull the rides with kickstand pull --delete, then flash again",
             "save the rides with the page Live, delete them on the board by its menu, then install again",
@@ -117,13 +131,15 @@ def _module(path: str) -> str:
 
 
 def _folders(path: str) -> list[str]:
-    """All folders that contain path, except the root."""
+    """Return all folders that contain this path, except the root."""
     return [str(folder) for folder in PurePosixPath(path).parents[:-1]]
 
 
 def _refuse_in_the_way(wanted: dict[str, bytes], folders: set[str], kept: set[str]) -> None:
-    """Raise InputError if MicroPython would import a user's file instead of a wanted file: a folder lean/ instead of
-    lean.py, or lean.py instead of lean.mpy."""
+    """Raise InputError if MicroPython would import a user's file instead of a wanted file.
+
+    It would import a folder lean/ instead of lean.py, and lean.py instead of lean.mpy.
+    """
     modules = {_module(path) for path in wanted}
     for path in sorted(kept):
         if path in folders or modules.intersection(_folders(path)):

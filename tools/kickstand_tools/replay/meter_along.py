@@ -1,7 +1,7 @@
 """Replays blocks of a log on this Python, and computes Nicolae's formula on arrays.
 
-Values that do not depend on earlier samples are computed for a whole block with numpy. An hour at 200 Hz takes 4.0 s,
-with Replay.step() 7.2 s. A test compares both.
+numpy computes the values that do not depend on earlier samples, for a whole block at once. An hour at 200 Hz takes
+4.0 s, and 7.2 s with Replay.step(). A test compares the results of both.
 """
 
 from collections.abc import Iterable, Iterator
@@ -16,7 +16,7 @@ from ..logs.log import Block
 from ..signals import Array, Bools
 from .replay_engine import NOT_SHOWN, ODD, Replay
 
-TOO_SMALL = 0.01  # g2, as in kickstand.lean: in free fall the force has no direction
+TOO_SMALL = 0.01  # g2, as in kickstand.lean. A smaller force has no direction, for example in free fall
 
 
 class MeterAlong(Replay):
@@ -26,19 +26,19 @@ class MeterAlong(Replay):
         super().__init__(calibration.to_firmware(), delay_s=calibration.delay_s())
 
     def in_vehicle(self, block: Block) -> tuple[list[Array], list[Array]]:
-        """Force (g) and rate (rad/s) along left, up, forward: three arrays of n each."""
+        """Return force in g and rate in rad/s along left, up and forward. Each is a list of three arrays, shape (n)."""
         force, rate = [np.zeros(0)] * 3, [np.zeros(0)] * 3
         self.meter.in_vehicle(block.readings.T, force, rate)
         return force, rate
 
     def after_each(self, block: Block, force: list[Array], rate: list[Array]) -> Iterator[LeanMeter]:
         """Yield the meter, always the same object, after each sample of the block. force, rate: from in_vehicle()."""
-        # Tuples that live for one sample, because Python's garbage collector would track lists of lists.
+        # zip() makes short-lived tuples. Python's garbage collector would spend time on lists of lists
         forces, rates = (zip(*(axis.tolist() for axis in vector)) for vector in (force, rate))
         return self.follow(zip(block.time_us.tolist(), forces, rates, block.speed_mps.tolist()))
 
     def columns(self, block: Block) -> Array:
-        """(n, replay_engine.COLUMNS): what Replay.step() returns for the samples of the block."""
+        """Return the results of Replay.step() for all samples of the block, one column per replay_engine.COLUMNS."""
         force, rate = self.in_vehicle(block)
         leans, variances = [], []
         for meter in self.after_each(block, force, rate):
@@ -60,8 +60,11 @@ class MeterAlong(Replay):
 
 @dataclass(frozen=True)
 class ReadingsMisfit(Message):
-    """The meter repeatedly reported readings that contradict each other. first_s: time of the first report. seconds:
-    total duration."""
+    """The meter repeatedly reported readings that contradict each other.
+
+    seconds: Total duration of the reports.
+    first_s: Time of the first report.
+    """
 
     seconds: float
     first_s: float
@@ -76,33 +79,42 @@ class ReadingsMisfit(Message):
 
 @dataclass
 class Misfit:
-    """Adds up the time in which the meter reports contradicting readings. first_s: time of the first report. seconds:
-    total duration."""
+    """Adds up the time in which the meter reports contradicting readings.
+
+    first_s: Time of the first report.
+    seconds: Total duration of the reports.
+    """
 
     first_s: float = 0.0
     seconds: float = 0.0
 
     def add(self, t_s: Array, odd: Bools) -> None:
-        """Add a part of the ride. t_s (n): times, s. odd (n): True where the meter reports contradicting readings."""
+        """Add a part of the ride.
+
+        t_s: Time of each sample, shape (n).
+        odd: True for samples at which the meter reports contradicting readings, shape (n).
+        """
         if np.any(odd):
             self.first_s = self.first_s if self.seconds else float(t_s[np.argmax(odd)])
             self.seconds += float(np.sum(np.diff(t_s, prepend=t_s[0])[odd])) or 1e-6
 
     def remarks(self, known: Iterable[Message]) -> list[Message]:
-        """The notice about contradicting readings. It is left out if `known` contains the reason."""
+        """Return the notice about contradicting readings. Returns none if a notice in `known` explains them."""
         if not self.seconds or is_explained(known):
             return []
         return [ReadingsMisfit(self.seconds, self.first_s)]
 
 
 def static_lean_deg(left: Array, up: Array) -> Array:
-    """The lean of a standing bike, degrees, > 0 to the right: Nicolae's equation (21) with a sign."""
+    """Compute the lean of a standing bike by Nicolae's equation (21), in degrees; positive to the right."""
     return np.degrees(np.arctan2(left, up))
 
 
 def formula_lean_deg(left: Array, up: Array, yaw_rate: Array) -> Array:
-    """The lean from each single reading, degrees, > 0 to the right: Nicolae's equations (25)-(26), as in
-    kickstand.lean.formula."""
+    """Compute the lean from each single reading by Nicolae's equations (25) and (26).
+
+    The lean is in degrees, positive to the right. kickstand.lean.formula does the same for one reading.
+    """
     square = left * left + up * up
     size = np.sqrt(np.maximum(0.0, square - 1.0))
     sine = (left - np.sign(yaw_rate) * size * up) / np.maximum(square, TOO_SMALL)

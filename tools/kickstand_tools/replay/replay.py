@@ -23,12 +23,13 @@ from ..signals import Array
 from . import replay_engine
 from .meter_along import MeterAlong, Misfit
 
-_LONG_BYTES = 20 << 20  # a quarter of an hour at 200 Hz; below this size a second process costs more than it saves
+# Size of a log of a quarter of an hour at 200 Hz. For a smaller log, a second process costs more time than it saves
+_LONG_BYTES = 20 << 20
 
 _RESULT_BYTES = struct.calcsize(replay_engine.RESULT)
 
-# Runs replay_engine.run() on another Python. Arguments: the records and the progress. Returns a context with the
-# results' file. May raise InputError
+# A function that runs replay_engine.run() on another Python. It gets the records and the progress. It returns a context
+# that yields a file with the results. It may raise InputError
 Engine = Callable[[Iterator[bytes], Progress | None], contextlib.AbstractContextManager[IO[bytes]]]
 
 _SIGMA = replay_engine.COLUMNS.index("lean_sigma_deg")
@@ -36,14 +37,21 @@ _SIGMA = replay_engine.COLUMNS.index("lean_sigma_deg")
 
 @dataclass(eq=False)
 class LeanTable(Table):
-    """The board's results for a log: n samples, axes left, up, forward; lean > 0 to the right.
+    """The board's results for a log of n samples. Each array has shape (n). A lean is positive to the right.
 
-    t_s: seconds since the first sample. All other values are NaN for frozen readings. lean_deg: the meter's lean. The
-    display shows it if lean_sigma_deg is not NaN.
-    lean_formula_deg: Nicolae's (25)-(26) unchanged.
-    left_g, up_g, forward_g: specific force. static_lean_deg: the lean of a vehicle at rest with this force.
-    lean_sigma_deg: the lean's standard deviation, estimated by the firmware; NaN if the display shows no lean. notices:
-    remarks about the ride.
+    All values except t_s are NaN for frozen readings.
+
+    t_s: Seconds since the first sample.
+    lean_deg: The meter's lean. The display shows this lean if lean_sigma_deg is not NaN.
+    lean_formula_deg: Lean by Nicolae's equations (25) and (26).
+    left_g: Specific force to the left.
+    up_g: Specific force upward along the bike.
+    forward_g: Specific force forward.
+    static_lean_deg: Lean of a vehicle at rest with this force.
+    yaw_rate_dps: Rate about the bike's up axis.
+    roll_rate_dps: Rate about the forward axis.
+    lean_sigma_deg: The firmware's standard deviation of the lean. NaN if the display shows no lean.
+    notices: Remarks about the ride.
     """
 
     t_s: Array
@@ -61,7 +69,7 @@ class LeanTable(Table):
 
 @dataclass(frozen=True)
 class CarReplayed(Message):
-    """The log is a car's, and a car does not lean."""
+    """The log comes from a car, and a car does not lean."""
 
     code = "car-replayed"
     text = (
@@ -75,8 +83,12 @@ def replay(
 ) -> LeanTable:
     """Run the firmware's own lean meter over a recorded log.
 
-    log: see read_log. engine: "cpython", "micropython" (the unix port) or "rp2040" (an emulated Pico, slow). progress:
-    called with (done, total). Raises InputError, also if the engine is not installed.
+    log: The log, see read_log().
+    calibration: Calibration of the sensor.
+    engine: "cpython", "micropython" (its unix port) or "rp2040" (an emulated Pico, slow).
+    progress: Function that is called with (done, total).
+
+    Raises InputError if the log cannot be used, and if the engine is not installed.
 
     >>> from kickstand_tools.api import Log, fit_two_positions, simulate_ride
     >>> ride = simulate_ride("street", seed=1, seconds=30.0)
@@ -96,14 +108,17 @@ def replay(
 def replay_to_csv(
     log: Source, calibration: CalibrationFile, engine: str, out: Path, progress: Progress | None = None
 ) -> tuple[int, list[Message]]:
-    """Write LEAN.csv: the log's own times, then replay_engine.COLUMNS. Returns the number of samples and the notices.
+    """Replay a log and write LEAN.csv. Its columns are the log's own times, then replay_engine.COLUMNS.
 
-    A long log uses two processes. Memory does not grow with its length, except on the emulated Pico, which is too slow
-    for long logs. Raises InputError.
+    A long log uses two processes. Memory does not grow with the length of the log, except with the engine rp2040, which
+    is too slow for long logs.
+
+    Returns the number of samples and the notices. Raises InputError if the log cannot be used.
     """
     notices: list[Message] = []
     whole = log.source if isinstance(log, Stretch) else log
-    # Only the command uses a second process, which imports the main program again: other programs may not allow that
+    # Only the command uses a second process. This process imports the main program again, and programs other than the
+    # command may not allow that
     long = not isinstance(whole, Log) and total_bytes(whole) > _LONG_BYTES
     run = "two processes" if engine == "cpython" and long else engine
     rows = replay_blocks(log, calibration, run, progress, notices)
@@ -113,9 +128,11 @@ def replay_to_csv(
 def replay_blocks(
     log: Source, calibration: CalibrationFile, engine: str, progress: Progress | None, notices: list[Message]
 ) -> Iterator[tuple[Block, Array]]:
-    """Yield each block of the log with the engine's results (n, COLUMNS). They are NaN for frozen readings, which are a
-    gap for the engine. A car's display shows no lean, so lean_sigma_deg is always NaN. notices: remarks are appended at
-    the end."""
+    """Yield each block of the log with the engine's results, one column per replay_engine.COLUMNS.
+
+    Frozen readings are a gap for the engine, and their results are NaN. For a car, lean_sigma_deg is always NaN,
+    because its display shows no lean. At the end, remarks are appended to notices.
+    """
     car = calibration.vehicle == "car"
     whole, stretch = split_stretch(log)
     misfit = Misfit()
@@ -132,7 +149,7 @@ def replay_blocks(
 def _replayed(
     log: Source, calibration: CalibrationFile, engine: str, progress: Progress | None, notices: list[Message]
 ) -> Iterator[tuple[Block, Array]]:
-    """Yield each block with the results (n, COLUMNS) for its rows that are not frozen."""
+    """Yield each block with the results for its rows that are not frozen, one column per replay_engine.COLUMNS."""
     log = read_twice(log) if engine in _BY_RECORDS else log
     shown = None if engine == "rp2040" else progress
     blocks = read_blocks(log, 2, shown, notices, calibration=calibration)
@@ -140,7 +157,7 @@ def _replayed(
         meter = MeterAlong(calibration)
         return ((block, meter.columns(block.measured)) for block in blocks)
     if engine == "two processes":
-        from . import second_process  # Python in a browser cannot import it
+        from . import second_process  # imported here, because Python in a browser cannot import it
 
         return second_process.columns_of(blocks, calibration)
     run = _BY_RECORDS[engine] or plugins.part(plugins.ENGINES, engine)
@@ -148,7 +165,7 @@ def _replayed(
 
 
 def _with_frozen(block: Block, results: Array) -> Array:
-    """(n, COLUMNS) results for all rows of the block, NaN for frozen rows."""
+    """Return results for all rows of the block. They are NaN for frozen rows. results: those of the other rows."""
     found = np.full((len(block.time_us), len(replay_engine.COLUMNS)), np.nan)
     found[~block.frozen] = results
     sigma = found[:, _SIGMA]
@@ -159,7 +176,7 @@ def _with_frozen(block: Block, results: Array) -> Array:
 def _by_records(
     run: contextlib.AbstractContextManager[IO[bytes]], blocks: Iterator[Block]
 ) -> Iterator[tuple[Block, Array]]:
-    """Replay with replay_engine.run() on another Python, which reads records and writes results."""
+    """Yield each block with its results. Another Python reads records and writes results with replay_engine.run()."""
     with run as results:
         for block in blocks:
             wanted = _RESULT_BYTES * int(np.count_nonzero(~block.frozen))
@@ -171,7 +188,7 @@ def _by_records(
 
 @contextlib.contextmanager
 def micropython(records: Iterator[bytes], _progress: Progress | None) -> Iterator[IO[bytes]]:
-    """The results of MicroPython's unix port. Raises InputError if it is not installed."""
+    """Replay on MicroPython's unix port. Yields a file with the results. Raises InputError if it is not installed."""
     if not unix_port.available():
         raise InputError("engine micropython has no package for this system: use --engine cpython")
     with tempfile.TemporaryDirectory() as directory:
@@ -184,17 +201,18 @@ def micropython(records: Iterator[bytes], _progress: Progress | None) -> Iterato
             yield process.stdout
 
 
-# Engines on another Python. rp2040, an emulated Pico, is in the package kickstand_emulator: see pyproject.toml
+# Engines on another Python. The engine rp2040, an emulated Pico, is in the package kickstand_emulator. pyproject.toml
+# names it
 _BY_RECORDS: dict[str, Engine | None] = {"micropython": micropython, "rp2040": None}
 
 
 def _last_words(traceback: bytes) -> str:
-    """The last line of MicroPython's traceback, which it prints to standard output."""
+    """Return the last line of MicroPython's traceback. MicroPython prints it to standard output."""
     return traceback.decode(errors="replace").strip().rpartition("\n")[2]
 
 
 def _records(blocks: Iterable[Block], calibration: CalibrationFile) -> Iterator[bytes]:
-    """The bytes that replay_engine.run reads."""
+    """Yield the bytes that replay_engine.run() reads."""
     yield struct.pack(
         replay_engine.CALIBRATION, *calibration.parameters(), *calibration.matrices(), calibration.delay_s()
     )

@@ -1,12 +1,16 @@
-"""Runs the firmware's LeanMeter over a recording, on CPython or MicroPython: reads records, writes results.
+"""Runs the firmware's LeanMeter over a recording, on CPython or MicroPython. It reads records and writes results.
 
     micropython replay_engine.py RECORDS > RESULTS
 
-RECORDS starts with the calibration (46 doubles, Calibration.parameters() and matrices()) and the gyro's delay in
-seconds (a double), then one record per sample:
-its time in microseconds (int64), seven readings in the chip's order (doubles; g, C, deg/s) and the speed in m/s,
-negative for no new one. RESULTS has the doubles of COLUMNS for each. Both are binary, because printing and reading a
-number may change it.
+RECORDS begins with 46 doubles, the calibration's parameters() and matrices(), and a double, the gyro's delay in s. One
+record per sample follows:
+
+    int64          time in microseconds
+    7 doubles      readings in the chip's order, in g, C and deg/s
+    double         new speed in m/s, negative if there is none
+
+RESULTS has the doubles of COLUMNS for each sample. Both files are binary, because converting a number to text and back
+may change it.
 """
 
 import struct
@@ -32,31 +36,37 @@ COLUMNS = (
 CALIBRATION = "<47d"
 RECORD = "<q8d"
 RESULT = "<9d"
-# lean_sigma_deg if the display shows no lean, and if it also reports that readings repeatedly contradict each other
+# Values of lean_sigma_deg while the display shows no lean. ODD means that it also reports contradicting readings
 NOT_SHOWN, ODD = -1.0, -2.0
-NO_SPEED = -1.0  # not NaN, because a board's struct does not read NaN as NaN
+NO_SPEED = -1.0  # negative instead of NaN, because the module struct on a board does not read NaN correctly
 
 
 class ReplayMeter(LeanMeter):
     """The firmware's meter for single readings in g and deg/s. On a board it processes sums of counts."""
 
     def use(self, calibration, posed=False):
-        """Use a calibration: see LeanMeter.use()."""
+        """Use a calibration (see LeanMeter.use())."""
         LeanMeter.use(self, calibration, posed)
         self._force_matrix, self._force_offset, rate_matrix, rate_offset = calibration.in_vehicle()
         self._rate_matrix = [radians(value) for value in rate_matrix]
         self._rate_offset = [radians(value) for value in rate_offset]
 
     def update(self, reading, dt_us):
-        """Process a reading: 7 numbers in the chip's order (g, C, deg/s). dt_us: microseconds since the previous one, 0
-        for the first."""
+        """Process a reading.
+
+        reading: 7 numbers in the chip's order, in g, C and deg/s. dt_us: microseconds since the previous reading, 0 for
+        the first reading.
+        """
         force, rate = [0.0] * 3, [0.0] * 3
         self.in_vehicle(reading, force, rate)
         self.update_in_vehicle(force, rate, dt_us)
 
     def in_vehicle(self, reading, force, rate):
-        """Write the force (g) and the rate (rad/s) of a reading to force (3) and rate (3). A reading may also be seven
-        arrays of n numbers; then the results are arrays."""
+        """Compute the force in g and the rate in rad/s along the vehicle's axes.
+
+        reading: 7 numbers in the chip's order, or 7 arrays of n numbers for n readings.
+        force, rate: lists of 3 values, which receive the results: numbers for one reading, otherwise arrays.
+        """
         m, c = self._force_matrix, self._force_offset
         x, y, z = reading[0], reading[1], reading[2]
         force[0] = m[0] * x + m[1] * y + m[2] * z + c[0]
@@ -69,7 +79,7 @@ class ReplayMeter(LeanMeter):
         rate[2] = m[6] * x + m[7] * y + m[8] * z + c[2]
 
     def update_in_vehicle(self, force, rate, dt_us):
-        """update() with force and rate from in_vehicle(), three numbers each."""
+        """Process a reading like update(). force, rate: the results of in_vehicle(), three numbers each."""
         self.force, self.rate = force, rate
         self._follow(dt_us)
 
@@ -77,8 +87,10 @@ class ReplayMeter(LeanMeter):
 class Replay:
     """Runs the meter over one recording. All engines and streamed rides use this loop.
 
-    calibration: the firmware's own, for readings in g and deg/s.  delay_s: delay of the gyro's low-pass.
-    leans: False for a car. since_us: time of the sample before the first one, if any.
+    calibration: The firmware's Calibration, for readings in g and deg/s.
+    delay_s: Delay of the gyro's low-pass.
+    leans: False for a car.
+    since_us: Time of the sample before the first one, or None.
     """
 
     def __init__(self, calibration, delay_s=DELAY_S, leans=True, since_us=None):
@@ -86,8 +98,11 @@ class Replay:
         self._before_us = since_us
 
     def follow(self, samples):
-        """Yield the meter after each sample, always the same object. samples: tuples (time_us, force, rate, speed_mps),
-        force and rate from in_vehicle(), 3 each; the speed is NaN or negative for no new one."""
+        """Yield the meter after each sample, always the same object.
+
+        samples: tuples (time_us, force, rate, speed_mps). Force and rate are the results of in_vehicle(). The speed is
+        NaN or negative if there is no new speed.
+        """
         meter = self.meter
         for time_us, force, rate, speed_mps in samples:
             if speed_mps >= 0.0:
@@ -97,14 +112,16 @@ class Replay:
             yield meter
 
     def take(self, time_us, reading, speed_mps=NO_SPEED):
-        """Process a sample and return the meter, always the same object. reading: 7 numbers in the chip's order (g, C,
-        deg/s)."""
+        """Process a sample, and return the meter, always the same object.
+
+        reading: 7 numbers in the chip's order, in g, C and deg/s.
+        """
         force, rate = [0.0] * 3, [0.0] * 3
         self.meter.in_vehicle(reading, force, rate)
         return next(self.follow(((time_us, force, rate, speed_mps),)))
 
     def step(self, time_us, reading, speed_mps=NO_SPEED):
-        """Process a sample and return the values of COLUMNS; arguments as for take()."""
+        """Process a sample, and return the values of COLUMNS. The arguments are those of take()."""
         meter = self.take(time_us, reading, speed_mps)
         force, rate = meter.force, meter.rate
         return (
@@ -121,7 +138,7 @@ class Replay:
 
 
 def run(source, sink):
-    """Read records from source until its end and write results to sink, both binary files."""
+    """Read records from the binary file `source` until its end, and write results to the binary file `sink`."""
     calibration = Calibration()
     *numbers, delay_s = struct.unpack(CALIBRATION, source.read(struct.calcsize(CALIBRATION)))
     calibration.set_parameters(numbers[:19])

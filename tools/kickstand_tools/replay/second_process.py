@@ -1,5 +1,8 @@
-"""Runs MeterAlong in a second process. An hour at 200 Hz takes 6.3 s of processor time in one process. With two, the
-second takes 4.0 s, while the first reads and writes for 2.2 s."""
+"""Runs MeterAlong in a second process.
+
+An hour at 200 Hz takes 6.3 s of processor time in one process. With two processes, the second computes for 4.0 s, while
+the first reads and writes for 2.2 s.
+"""
 
 import multiprocessing
 import signal
@@ -15,15 +18,17 @@ from ..logs.log import Block
 from ..signals import Array
 from .meter_along import MeterAlong
 
-_AHEAD = 3  # blocks that are read but not yet yielded, to keep the second process busy
+_AHEAD = 3  # number of blocks that are read before their turn, which keeps the second process busy
 
-_along: MeterAlong  # set in the second process only
+_along: MeterAlong  # exists only in the second process
 
 
 def columns_of(blocks: Iterator[Block], calibration: CalibrationFile) -> Iterator[tuple[Block, Array]]:
-    """Yield each block with MeterAlong.columns() of its measured rows. Raises InputError, also if the second process
-    ends."""
-    spawn = multiprocessing.get_context("spawn")  # a process with threads (progress bar) must not be forked
+    """Yield each block with MeterAlong.columns() of its measured rows.
+
+    Raises InputError if the log cannot be used, and if the second process ends.
+    """
+    spawn = multiprocessing.get_context("spawn")  # a process must not be forked if the progress bar runs in a thread
     waiting: deque[tuple[Block, Future[Array]]] = deque()
     try:
         with ProcessPoolExecutor(1, spawn, _begin, (calibration,)) as pool:

@@ -1,4 +1,4 @@
-"""Converts the legs of a ride, which contain the rider's actions, to signals over time."""
+"""Converts the legs of a ride to signals over time. A leg is a part of the ride with one action of the rider."""
 
 from dataclasses import dataclass
 
@@ -11,12 +11,19 @@ _SPEED_SMOOTHING_S = 0.15  # time in which a hand changes throttle or brake
 
 @dataclass
 class Leg:
-    """A part of a ride. None keeps the value of the previous leg.
+    """A part of a ride. A value of None keeps the value of the previous leg.
 
-    speed_mps: reached at the end, at constant acceleration. lean_deg: lean of the centre of mass, > 0 to the right,
-    reached within roll_s of the start, then held. slope_percent: slope of the road at the end of the leg. hang_m:
-    offset of the centre of mass to the right of the bike's plane. lift_deg: pitch of a wheelie. engine: 0 off, 1
-    running. crosswind_mps2: acceleration to the right caused by wind. bank_deg: tilt of the road to the right.
+    phase: Name of the rider's action.
+    seconds: Duration of the leg.
+    speed_mps: Speed at the end of the leg. The acceleration is constant.
+    lean_deg: Lean of the centre of mass, positive to the right. It is reached within roll_s of the start, then held.
+    roll_s: Time for the change of lean.
+    slope_percent: Slope of the road at the end of the leg.
+    hang_m: Offset of the centre of mass to the right of the bike's plane.
+    lift_deg: Pitch caused by a wheelie.
+    engine: 0 off, 1 running.
+    crosswind_mps2: Acceleration to the right caused by wind.
+    bank_deg: Tilt of the road to the right.
     """
 
     phase: str
@@ -34,7 +41,10 @@ class Leg:
 
 @dataclass
 class RiderCommands:
-    """Signals of n samples each, in s, m, m/s, rad. phase: index into `phases` of each sample."""
+    """The commands of a ride as signals of n samples, in s, m, m/s, m/s2 and rad. See Leg for their meaning.
+
+    phase: Index of each sample's phase in the list `phases`.
+    """
 
     rate_hz: float
     time: Signal
@@ -52,7 +62,7 @@ class RiderCommands:
 
 
 def commands(legs: list[Leg], rate_hz: float) -> RiderCommands:
-    """The signals of successive legs from t = 0. The ride starts with the values of the first leg."""
+    """Compute the signals of successive legs from t = 0. The ride starts with the values of the first leg."""
     ends = np.cumsum([leg.seconds for leg in legs])
     starts = ends - [leg.seconds for leg in legs]
     time = np.arange(int(ends[-1] * rate_hz)) / rate_hz
@@ -63,7 +73,10 @@ def commands(legs: list[Leg], rate_hz: float) -> RiderCommands:
     distance = integral(speed, rate_hz)
 
     def stepped(name: str, settle_s: float | None = 1.0) -> Signal:
-        """The signal of a value that each leg reaches within settle_s, then holds. None: within the leg's roll_s."""
+        """Return the signal of a value that changes smoothly at the start of each leg, and is then held.
+
+        settle_s: duration of a change. None uses the leg's roll_s.
+        """
         values = _fill_in(legs, name)
         result = np.full_like(time, values[0])
         for leg, start, before, after in zip(legs[1:], starts[1:], values, values[1:]):
@@ -93,7 +106,7 @@ def commands(legs: list[Leg], rate_hz: float) -> RiderCommands:
 
 
 def _fill_in(legs: list[Leg], name: str) -> list[float]:
-    """One value per leg. The previous leg's value replaces None; in the first leg 0 does."""
+    """Return one value per leg. None is replaced by the previous leg's value, in the first leg by 0."""
     kept, now = [], 0.0
     for leg in legs:
         value = getattr(leg, name)
@@ -103,8 +116,14 @@ def _fill_in(legs: list[Leg], name: str) -> list[float]:
 
 
 def _slope(distance: Signal, ends: Signal, percent: list[float]) -> Signal:
-    """The road's slope, rad, smooth between the ends of legs. The slope depends on distance, so it stays constant while
-    the bike stands."""
+    """Compute the road's slope at each sample, in rad. It changes smoothly between the ends of legs.
+
+    The slope depends on the distance, so it stays constant while the bike stands.
+
+    distance: Distance at each sample, in m.
+    ends: Distance at the end of each leg, in m.
+    percent: Slope at the end of each leg.
+    """
     knots, values = [0.0], [percent[0]]
     for end, value in zip(ends, percent):
         if end > knots[-1] + 1.0:

@@ -16,7 +16,7 @@ from .ride import SimulatedRide, ride
 
 _LOG = (*COLUMNS, "temp_c")
 _FORMATS = ["%.3f", *["%.6f"] * 6, "%.2f"]
-START = 47.6, 8.0  # degrees north and east, heading east
+START = 47.6, 8.0  # the ride starts here, in degrees north and east, and heads east
 START_UTC_S = 1_779_008_400.0  # 09:00 on 17 May 2026
 _DEGREE_M = np.radians(6_371_000.0)
 _TRACK_S = 1  # time between two fixes, as from a GPS receiver
@@ -31,11 +31,26 @@ def simulate(
     speed: bool = False,
     **conditions: Any,
 ) -> SimulatedRide:
-    """Simulate a ride of exactly this length and write it to out_dir. conditions: see ride.ride. Raises InputError.
+    """Simulate a ride and write it to a directory.
 
-    Logs: POSE_1.csv to POSE_7.csv (the last one slanted), SIX.csv (seven poses in one log, with the turns between
-    them), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv. TRUTH.csv has one row per row of RIDE.csv. A RIDE.cal.json in out_dir
-    is removed. speed: RIDE.csv gets a speed and a position once per second.
+    These files are written:
+        POSE_1.csv to POSE_7.csv: Six poses with each side up once, then a slanted pose.
+        SIX.csv: Seven poses in one log, with the turns between them.
+        KICKSTAND.csv, UPRIGHT.csv: The poses of the bike.
+        RIDE.csv: The ride.
+        TRUTH.csv: The truth, with one row per row of RIDE.csv.
+
+    An old RIDE.cal.json in the directory is removed.
+
+    Args:
+        profile: A key of profiles.PROFILES.
+        seed: Each seed gives another ride.
+        out_dir: The directory.
+        seconds: Exact length of RIDE.csv.
+        speed: True to add a speed and a position to RIDE.csv once per second.
+        conditions: Other arguments of ride.ride().
+
+    Raises InputError if the profile is unknown or the directory cannot be written.
     """
     check_profile(profile)
     directory = Path(out_dir)
@@ -55,7 +70,7 @@ def simulate(
 
 
 def _cut(made: SimulatedRide, seconds: float) -> SimulatedRide:
-    """The first seconds of a ride."""
+    """Return the first `seconds` of a ride."""
     n = min(len(made.time), round(seconds * made.rate_hz))
     truth = {name: values[:n] for name, values in made.truth.items()}
     return replace(made, time=made.time[:n], readings=made.readings[:n], truth=truth, phase=made.phase[:n])
@@ -75,8 +90,13 @@ def _write_readings(path: Path, readings: NDArray, rate_hz: float) -> None:
 
 
 def positions(made: SimulatedRide) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Latitude, longitude (degrees north and east) and Universal Time (s since 1970) of each reading, by integrating
-    the true speed and yaw rate."""
+    """Compute the position of each reading by integrating the true speed and yaw rate.
+
+    Returns:
+        Latitude of each reading, in degrees north.
+        Longitude of each reading, in degrees east.
+        Universal Time of each reading, in s since 1970.
+    """
     course = np.cumsum(np.radians(made.truth["yaw_rate_dps"])) / made.rate_hz  # rad from east, > 0 to the left
     speed = made.truth["speed_mps"] / made.rate_hz
     lat = START[0] + np.cumsum(speed * np.sin(course)) / _DEGREE_M
@@ -98,7 +118,7 @@ def _write(path: Path, names: Iterable[str], formats: list[str], table: NDArray,
 
 
 def write_ride(path: Path, made: SimulatedRide, speed: bool) -> None:
-    """Write the log of a ride. speed: add a speed and a position once per second."""
+    """Write the log of a ride. speed: True to add a speed and a position once per second."""
     log = _log(made.time, made.readings)
     if not speed:
         _write(path, _LOG, _FORMATS, log)

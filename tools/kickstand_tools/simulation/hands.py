@@ -14,9 +14,12 @@ from .physics.signals import band_noise, smoothstep
 class Hand:
     """The movements of a hand that turns a sensor.
 
-    still_s, turn_s: (least, most) time for holding still and for a turn by 90 degrees; a half turn takes 1.6 times as
-    long. heading_deg: largest rotation about the vertical during a turn. detour_deg: deviation from the shortest
-    rotation. push_g: rms acceleration during a turn."""
+    still_s: Range of the time for holding still, as (least, most).
+    turn_s: Range of the time for a turn by 90 degrees. A half turn takes 1.6 times as long.
+    heading_deg: Largest rotation about the vertical during a turn.
+    detour_deg: Deviation from the shortest rotation.
+    push_g: Acceleration during a turn, rms.
+    """
 
     still_s: tuple[float, float] = (4.5, 6.0)
     turn_s: tuple[float, float] = (0.9, 2.0)
@@ -28,12 +31,17 @@ class Hand:
 def procedure(
     chance: np.random.Generator, chip: Chip, ups: NDArray[np.float64], temp_c: float, hand: Hand | None = None
 ) -> NDArray[np.float64]:
-    """Readings (n, 7) of still poses and the turns between them, in the form of Chip.read().
+    """Simulate one recording of still poses and the turns between them.
 
-    ups: (poses, 3), the unit vector upward in the sensor's axes in each pose.
+    chip: The sensor.
+    ups: The vertical in each pose, as unit vectors in the sensor's axes, shape (poses, 3).
+    temp_c: Temperature of the sensor.
+    hand: Movements of the hand. None uses the defaults of Hand.
+
+    Returns the readings in the form of Chip.read(), shape (n, 7).
     """
     hand = hand or Hand()
-    attitude = _turn_between(ups[0], np.array([0.0, 0.0, 1.0]))  # from the sensor's axes to the world's, z up
+    attitude = _turn_between(ups[0], np.array([0.0, 0.0, 1.0]))  # rotation from the sensor's axes to the world's, z up
     forces, rates = [], []
 
     def hold() -> None:
@@ -49,7 +57,7 @@ def procedure(
         turned = np.linalg.norm(way)
         n = max(2, int(chance.uniform(*hand.turn_s) * (0.25 + 0.75 * turned / (np.pi / 2)) ** 0.7 * RATE_HZ))
         u = np.arange(n + 1) / n
-        # a hand starts and ends slowly
+        # The turn starts and ends slowly, like the movement of a hand
         detour = np.radians(hand.detour_deg) * chance.standard_normal(3) / np.sqrt(3.0)
         share = u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
         stray = np.sin(np.pi * smoothstep(u)) ** 2
@@ -67,7 +75,7 @@ def procedure(
 
 
 def _turn_between(a: NDArray, b: NDArray) -> NDArray:
-    """The smallest rotation that takes unit vector a to unit vector b."""
+    """Return the smallest rotation from the unit vector a to the unit vector b, shape (3, 3)."""
     axis = np.cross(a, b)
     size = np.linalg.norm(axis)
     if size < 1e-9:
@@ -78,7 +86,10 @@ def _turn_between(a: NDArray, b: NDArray) -> NDArray:
 
 
 def _rotations(vectors: NDArray) -> NDArray:
-    """(n, 3, 3) rotation matrices of rotation vectors (n, 3), rad: O. Rodrigues' formula."""
+    """Convert rotation vectors to rotation matrices, shape (n, 3, 3), by the formula of O. Rodrigues.
+
+    vectors: rotation vectors, shape (n, 3), in rad.
+    """
     angle = np.linalg.norm(vectors, axis=1)[:, None, None]
     k = np.zeros((len(vectors), 3, 3))
     k[:, 2, 1], k[:, 0, 2], k[:, 1, 0] = vectors.T
@@ -87,7 +98,7 @@ def _rotations(vectors: NDArray) -> NDArray:
 
 
 def _rotation_vector(m: NDArray) -> NDArray:
-    """The rotation vector of a rotation matrix, by its quaternion."""
+    """Convert a rotation matrix to a rotation vector in rad, by the quaternion of the rotation."""
     _, vectors = np.linalg.eigh(
         np.array(
             [

@@ -1,4 +1,4 @@
-"""Builds a ride from a rider's actions: set off, ride straight ahead, turn, stop."""
+"""Builds a ride from a rider's actions, such as set off, ride straight ahead, turn, and stop."""
 
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -10,7 +10,7 @@ from kickstand.units import STANDARD_GRAVITY
 from .commands import Leg
 from .physics.road import CLASS_B
 
-_SHORTEST_S = 3.0  # least duration of a shortened leg
+_SHORTEST_S = 3.0  # a leg is not shortened below this duration
 _CLOSING_S = 45.0  # time for the straight and the stop at the end of every ride
 
 
@@ -18,26 +18,37 @@ _CLOSING_S = 45.0  # time for the straight and the stop at the end of every ride
 class Conditions:
     """Road, engine, weather and sensor of a ride. The defaults describe an ordinary day.
 
-    slip_deg: rms of the angle between the bike's heading and its motion. bumps: (phase, spacing m, height m, length m)
-    of bumps in the road, which are present during this phase of the ride.
+    roughness: Roughness of the road in m3, see road.CLASS_A.
+    engine_rms_g: Engine vibration at 6000/min, rms.
+    shift_rpm: Engine speed at which the rider changes up.
+    unrest_deg: Random changes of the lean at speed, rms.
+    gust_mps2: Changes of the crosswind, rms.
+    sway_m: Movement of the centre of mass from side to side, rms.
+    slip_deg: Angle between the bike's heading and its motion, rms.
+    start_c: Temperature of the chip at power-on.
+    rise_c: Rise of the temperature while the chip warms up, most of it within 10 to 15 minutes.
+    drift: Factor on an ordinary sensor's change of the biases with temperature.
+    creep_deg: Angle by which the sensor's mount has rotated at the end of the ride.
+    bumps: Bumps in the road, each as (phase, spacing in m, height in m, length in m). The road has them during this
+        phase of the ride.
     """
 
-    roughness: float = CLASS_B  # see road.CLASS_A, m3
-    engine_rms_g: float = 0.1  # engine vibration at 6000/min
-    shift_rpm: float = 5000.0  # engine speed at which the rider changes up
-    unrest_deg: float = 0.4  # rms of the lean's random changes at speed
-    gust_mps2: float = 0.0  # rms of the crosswind's changes
-    sway_m: float = 0.0  # rms of the centre of mass moving from side to side
-    slip_deg: float = 0.0  # rms of the tyres' side slip
-    start_c: float = 22.0  # temperature of the chip at power-on
-    rise_c: float = 7.0  # its rise while warming up, most of it within 10 to 15 minutes
-    drift: float = 1.0  # factor on an ordinary sensor's change of the biases with temperature
-    creep_deg: float = 0.0  # angle by which the sensor's mount has rotated by the end
+    roughness: float = CLASS_B
+    engine_rms_g: float = 0.1
+    shift_rpm: float = 5000.0
+    unrest_deg: float = 0.4
+    gust_mps2: float = 0.0
+    sway_m: float = 0.0
+    slip_deg: float = 0.0
+    start_c: float = 22.0
+    rise_c: float = 7.0
+    drift: float = 1.0
+    creep_deg: float = 0.0
     bumps: list[tuple[str, float, float, float]] = field(default_factory=list)
 
 
 class Plan:
-    """Collects the legs of a ride. chance: source of random numbers, which make rides different."""
+    """Collects the legs of a ride. chance: source of the random numbers that make rides different."""
 
     def __init__(self, chance: np.random.Generator, seconds: float) -> None:
         self.chance = chance
@@ -45,8 +56,8 @@ class Plan:
         self.speed = 0.0
         self._seconds = 0.0
         self._until = max(seconds - _CLOSING_S, 20.0)
-        self.slope_percent = 3.0  # limit of random_slope()
-        self.roll_dps = 60.0  # mean roll rate of the fastest change of lean; its peak is nearly twice as high
+        self.slope_percent = 3.0  # largest slope of random_slope()
+        self.roll_dps = 60.0  # mean roll rate of the fastest change of lean. The peak roll rate is nearly twice as high
 
     @property
     def going_on(self) -> bool:
@@ -55,12 +66,14 @@ class Plan:
 
     @property
     def seconds(self) -> float:
-        """Duration of the legs so far."""
+        """Total duration of the legs that are planned so far."""
         return self._seconds
 
     def fit(self, seconds: float) -> None:
-        """Adjust the duration of the ride by changing its longest legs at constant speed. No leg gets shorter than
-        _SHORTEST_S, so the ride may stay longer than `seconds`."""
+        """Adjust the duration of the ride by changing its longest legs at constant speed.
+
+        No leg gets shorter than _SHORTEST_S, so the ride may stay longer than `seconds`.
+        """
         steady = [leg for before, leg in pairwise(self.legs) if leg.speed_mps in (None, before.speed_mps)]
         while steady and (over := sum(leg.seconds for leg in self.legs) - seconds):
             longest = max(steady, key=lambda leg: leg.seconds)
@@ -82,7 +95,7 @@ class Plan:
         return self.uniform(-self.slope_percent, self.slope_percent)
 
     def add(self, phase: str, seconds: float, speed_mps: float | None = None, **more: float | None) -> None:
-        """Add a leg. Its slope at the end is random unless slope_percent is given."""
+        """Add a leg. The slope at its end is random, unless slope_percent is in more. more: other fields of Leg."""
         if "slope_percent" not in more:
             more["slope_percent"] = self.random_slope()
         self.legs.append(Leg(phase, seconds, speed_mps, **more))  # type: ignore[arg-type]
@@ -93,7 +106,7 @@ class Plan:
         return next((leg.lean_deg for leg in reversed(self.legs) if leg.lean_deg is not None), 0.0)
 
     def begin(self) -> None:
-        """Stand on the kickstand, upright, then start the engine."""
+        """Stand on the kickstand, lift the bike upright, then start the engine."""
         self.legs.append(Leg("kickstand", self.uniform(4.0, 12.0), 0.0, self.uniform(-13.0, -8.0), engine=0.0))
         self.legs.append(Leg("lifting", 2.0, 0.0, 0.0, roll_s=2.0))
         self.legs.append(Leg("standing", self.uniform(3.0, 8.0), 0.0))
@@ -101,7 +114,7 @@ class Plan:
         self._seconds = sum(leg.seconds for leg in self.legs)
 
     def to_speed(self, speed_mps: float, mps2: float) -> None:
-        """Speed up or brake, upright."""
+        """Speed up or brake to this speed, upright. mps2: size of the acceleration."""
         name = "braking" if speed_mps < self.speed else "speeding up"
         self.add(name, max(1.0, abs(speed_mps - self.speed) / mps2), speed_mps, lean_deg=0.0, roll_s=1.0)
 
@@ -118,8 +131,16 @@ class Plan:
         phase: str = "turn",
         **more: float | None,
     ) -> None:
-        """Roll to lean_deg within roll_s, but no faster than roll_dps, and hold it for `seconds`, or until the heading
-        has changed by about heading_deg."""
+        """Roll to lean_deg, and hold this lean.
+
+        lean_deg: Lean, positive to the right.
+        speed_mps: Speed at the end.
+        heading_deg: About the change of heading, if `seconds` is None.
+        seconds: Time for which the lean is held.
+        roll_s: Time for the change of lean. It is longer if the roll rate would exceed roll_dps.
+        phase: Name of the leg.
+        more: Other fields of Leg.
+        """
         roll_s = max(roll_s, abs(lean_deg - self._lean_now()) / self.roll_dps)
         if seconds is None:
             rate = degrees(STANDARD_GRAVITY * tan(radians(abs(lean_deg))) / max(speed_mps, 1.0))
@@ -127,13 +148,13 @@ class Plan:
         self.add(phase, roll_s + seconds, speed_mps, lean_deg=lean_deg, roll_s=roll_s, **more)
 
     def out_of_turn(self, speed_mps: float, mps2: float, roll_s: float = 1.4) -> None:
-        """Speed up while the bike comes upright."""
+        """Speed up or brake to this speed while the bike comes upright. mps2: size of the acceleration."""
         roll_s = max(roll_s, abs(self._lean_now()) / self.roll_dps)
         seconds = max(roll_s, abs(speed_mps - self.speed) / mps2)
         self.add("out of turn", seconds, speed_mps, lean_deg=0.0, roll_s=roll_s)
 
     def into_turn(self, lean_deg: float, speed_mps: float, mps2: float) -> None:
-        """Brake, and lean in during the last third."""
+        """Brake to this speed, and lean in during the last third. mps2: size of the deceleration."""
         seconds = max(1.2, abs(speed_mps - self.speed) / mps2)
         between = speed_mps + 0.35 * (self.speed - speed_mps)
         self.add("braking", 0.65 * seconds, between, lean_deg=0.0, roll_s=0.8)
@@ -141,18 +162,18 @@ class Plan:
         self.add("trail braking", rolled, speed_mps, lean_deg=0.5 * lean_deg, roll_s=rolled)
 
     def stop(self, seconds: float, mps2: float) -> None:
-        """Brake to a stop, then stand on one foot, usually the left one."""
+        """Brake to a stop, then stand on one foot, usually the left one. seconds: time on this foot."""
         self.to_speed(0.0, mps2)
         foot = self.uniform(-4.0, -0.5) if self.likely(0.8) else self.uniform(0.5, 3.0)
         self.add("stopped", seconds, 0.0, lean_deg=foot, roll_s=min(1.5, seconds / 2))
         self.add("stopped", 1.5, 0.0, lean_deg=0.0, roll_s=1.2)
 
     def walk(self, seconds: float, speed_mps: float) -> None:
-        """Creep along at walking pace."""
+        """Ride straight ahead at walking pace."""
         self.add("walking pace", seconds, speed_mps, lean_deg=0.0, roll_s=1.0)
 
     def finish(self, speed_mps: float, mps2: float) -> None:
-        """Ride straight ahead to the end of the ride, and stop."""
+        """Ride straight ahead at this speed to the end of the ride, and stop."""
         self.to_speed(speed_mps, mps2)
         self.straight(_CLOSING_S - 15.0)
         self.to_speed(0.0, mps2)
@@ -160,5 +181,5 @@ class Plan:
 
 
 def lean_for(speed_mps: float, radius_m: float) -> float:
-    """The lean in degrees that balances a turn of this radius."""
+    """Return the lean in degrees that balances a turn of this radius at this speed."""
     return degrees(atan(speed_mps * speed_mps / (STANDARD_GRAVITY * radius_m)))

@@ -9,25 +9,31 @@ from .physics.chip import RATE_HZ, Chip
 from .physics.signals import band_noise
 
 POSE_S = 4.0
-_ASKEW_DEG = 4.0  # largest tilt of a box that a hand puts on its side
-_MOVE_DEG = 0.05  # rms lean of a bike held upright by hand
+_ASKEW_DEG = 4.0  # largest tilt of a sensor that a hand puts on one of its sides
+_MOVE_DEG = 0.05  # rms of the lean's changes while the rider holds the bike upright
 
 
 def still(chance: np.random.Generator, chip: Chip, up: NDArray, temp_c: float) -> NDArray[np.float64]:
-    """Readings of a sensor at rest with `up` (3, or (n, 3); unit vectors in the sensor's axes) pointing up."""
+    """Simulate the readings of a sensor at rest.
+
+    up: The vertical as a unit vector in the sensor's axes, shape (3), or one per row, shape (n, 3).
+    temp_c: Temperature of the sensor.
+    """
     n = int(POSE_S * RATE_HZ)
     force = np.broadcast_to(up, (n, 3))
     return chip.read(chance, force, np.zeros((n, 3)), np.full(n, temp_c))
 
 
 def seven(chance: np.random.Generator, chip: Chip, temp_c: float) -> list[NDArray[np.float64]]:
-    """Readings of the seven poses of ups()."""
+    """Simulate the readings of the seven poses of ups(), a list with an array per pose."""
     return [still(chance, chip, up, temp_c) for up in ups(chance)]
 
 
 def ups(chance: np.random.Generator) -> Iterator[NDArray[np.float64]]:
-    """Yield the upward unit vector (3) in the sensor's axes for seven poses: each of the six sides up once, in random
-    order and up to 4 degrees askew, then a slanted pose."""
+    """Yield the vertical in each of seven poses, as a unit vector in the sensor's axes, shape (3).
+
+    The first six poses have each side up once, in random order and tilted by up to 4 degrees. The seventh is slanted.
+    """
     for side in chance.permutation(6):
         up = chance.standard_normal(3)
         axis = np.zeros(3)
@@ -41,7 +47,10 @@ def ups(chance: np.random.Generator) -> Iterator[NDArray[np.float64]]:
 
 
 def up_seen(lean_deg: float | NDArray, pitch_deg: float) -> NDArray[np.float64]:
-    """The upward unit vector along left, up, forward. lean_deg: > 0 to the right. pitch_deg: > 0 nose up."""
+    """Return the vertical as a unit vector along the bike's left, up and forward.
+
+    lean_deg: positive to the right. pitch_deg: positive if the nose is up.
+    """
     lean, pitch = np.radians(lean_deg), np.radians(pitch_deg)
     left, up = np.sin(lean) * np.cos(pitch), np.cos(lean) * np.cos(pitch)
     return np.stack((left, up, np.full_like(np.asarray(left, dtype=float), np.sin(pitch))), axis=-1)
@@ -56,7 +65,10 @@ def standing(
     temp_c: float,
     held: bool,
 ) -> NDArray[np.float64]:
-    """Readings of the bike at rest. held: True if a rider, who is never quite still, holds the bike upright."""
+    """Simulate the readings of a bike at rest.
+
+    held: True if a rider holds the bike. The lean then changes a little, because no rider stands quite still.
+    """
     n = int(POSE_S * RATE_HZ)
     lean = np.full(n, lean_deg)
     if held:

@@ -1,6 +1,6 @@
-"""The profiles (kinds of ride): normal rides, and hard rides with one extreme condition each.
+"""Defines the profiles, which are kinds of ride: ordinary rides, and hard rides with one extreme condition each.
 
-A profile adds its legs to a plan and returns the conditions of the ride.
+A profile is a function. It adds the legs of a ride to a plan, and returns the conditions of the ride.
 """
 
 from collections.abc import Callable
@@ -34,7 +34,7 @@ def street(plan: Plan) -> Conditions:
 
 
 def track(plan: Plan) -> Conditions:
-    """A race track: leans of 35 to 55 degrees, from side to side within a second, 0.5 g speeding up, 0.95 g braking."""
+    """A race track: leans of 35 to 55 degrees, from side to side in a second, acceleration 0.5 g, braking 0.95 g."""
     plan.begin()
     plan.slope_percent, plan.roll_dps = 4.0, 100.0
     plan.to_speed(30.0, 4.0)
@@ -44,7 +44,7 @@ def track(plan: Plan) -> Conditions:
         if plan.speed > corner + 4.0:
             plan.into_turn(lean, corner, plan.uniform(6.0, 9.3))
         plan.turn(lean, corner, heading_deg=plan.uniform(40.0, 150.0), roll_s=plan.uniform(0.7, 1.2))
-        while plan.likely(0.35):  # over to the other side
+        while plan.likely(0.35):  # another turn, to the other side
             lean = -lean * plan.uniform(0.85, 1.1)
             lean = max(-49.0, min(49.0, lean))
             roll_s = plan.uniform(0.7, 1.2)
@@ -96,7 +96,7 @@ def city(plan: Plan) -> Conditions:
             if plan.likely(0.4):
                 plan.turn(plan.side() * plan.uniform(4.0, 9.0), 2.2, heading_deg=150.0, phase="turning round")
             plan.to_speed(plan.uniform(7.0, 12.0), 2.5)
-        elif what < 0.8:  # a roundabout: lean out, in, out again
+        elif what < 0.8:  # a roundabout: lean to one side, to the other, and back
             speed, side = plan.uniform(6.0, 9.0), plan.side()
             lean = lean_for(speed, plan.uniform(12.0, 22.0))
             plan.into_turn(-side * lean * 0.6, speed, 2.5)
@@ -118,7 +118,7 @@ def hills(plan: Plan) -> Conditions:
     while plan.going_on:
         climb = -climb if plan.likely(0.1) else climb
         before, after = climb * plan.uniform(3.0, 12.0), climb * plan.uniform(2.0, 12.0)
-        if plan.likely(0.4):  # a hairpin, flatter or steeper inside
+        if plan.likely(0.4):  # a hairpin with another slope in its middle
             speed, lean = plan.uniform(5.5, 9.0), plan.side() * plan.uniform(22.0, 40.0)
             plan.into_turn(lean, speed, plan.uniform(2.5, 5.0))
             roll_s, inside = plan.uniform(1.0, 1.6), plan.uniform(-2.0, 12.0) * climb
@@ -141,7 +141,7 @@ def hills(plan: Plan) -> Conditions:
 
 
 def _bends(plan: Plan, lean_deg: float, speeds: tuple[float, float], linked: float) -> None:
-    """Add a bend, and with the probability `linked` a further bend to the other side, repeatedly."""
+    """Add a bend, then further bends to alternate sides. Each further bend follows with the probability `linked`."""
     lean, speed = plan.side() * lean_deg, plan.uniform(*speeds)
     if plan.speed > speed + 2.0:
         plan.into_turn(lean, speed, plan.uniform(2.0, 5.0))
@@ -184,7 +184,7 @@ def wheelie(plan: Plan) -> Conditions:
 
 
 def bumps(plan: Plan) -> Conditions:
-    """Hard braking, 6 to 9 m/s2, over braking bumps of 15 mm every 1.2 m, on a poor road; then a turn."""
+    """A poor road: hard braking, 6 to 9 m/s2, over bumps of 15 mm every 1.2 m, then a turn."""
     plan.begin()
     while plan.going_on:
         plan.to_speed(plan.uniform(20.0, 32.0), plan.uniform(3.0, 5.0))
@@ -229,14 +229,14 @@ def weight(plan: Plan) -> Conditions:
 def held(plan: Plan) -> Conditions:
     """Turns of 60 s at 38 degrees to alternate sides without a break, by a rider who moves around.
 
-    No straight shows the upright direction. For a minute the sensor's errors alone determine the error of the lean.
+    No straight shows the upright direction. So for a minute, the error of the lean depends only on the sensor's errors.
     """
     plan.begin()
     plan.slope_percent = 1.5
     speed = plan.uniform(18.0, 25.0)
     plan.to_speed(speed, 2.5)
     plan.straight(5.0)
-    lean = plan.side() * 35.0  # of the centre of mass; with the tyres' width the chassis leans 3 degrees more
+    lean = plan.side() * 35.0  # lean of the centre of mass. On wide tyres the chassis leans 3 degrees more
     while plan.going_on:
         plan.turn(lean, speed, seconds=60.0, roll_s=2.0)
         lean = -lean
@@ -245,7 +245,7 @@ def held(plan: Plan) -> Conditions:
 
 
 def corners(plan: Plan) -> Conditions:
-    """Corners of 30 to 55 degrees and 3 to 7 s, with few, short straights, by a rider who moves around."""
+    """Corners of 30 to 55 degrees for 3 to 7 s, with few and short straights, by a rider who moves around."""
     plan.begin()
     plan.slope_percent, plan.roll_dps = 3.0, 80.0
     plan.to_speed(28.0, 4.0)
@@ -275,7 +275,7 @@ def creep(plan: Plan) -> Conditions:
 
 
 def temperature(plan: Plan) -> Conditions:
-    """From a cold garage into the sun: 25 C warmer, with three times an ordinary sensor's drift."""
+    """A ride from a cold garage into the sun. The sensor warms up by 25 C, and drifts three times as much as usual."""
     conditions = street(plan)
     conditions.start_c, conditions.rise_c, conditions.drift = 8.0, 25.0, 3.0
     return conditions

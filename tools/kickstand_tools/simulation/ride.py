@@ -20,7 +20,8 @@ from .plan import Conditions, Plan
 from .profiles import PROFILES
 
 _WARMING_S = 300.0  # time constant of the chip's temperature
-_SLIP_DEG, _CAMBER_DEG, _SWAY_M = 0.3, 1.5, 0.006  # with `road`: rms of side slip, camber and the rider's sway
+# The option `road` uses these rms values of side slip, camber and the rider's sway
+_SLIP_DEG, _CAMBER_DEG, _SWAY_M = 0.3, 1.5, 0.006
 _IMPACT_G = 4.0  # peak of the impact at the end of a fall
 
 
@@ -28,10 +29,23 @@ _IMPACT_G = 4.0  # peak of the impact at the end of a fall
 class SimulatedRide:
     """A simulated ride: the sensor's readings and the truth.
 
-    poses, kickstand, upright, readings: each (n, 7) at rate_hz, in the chip's order: force (g), temperature (C), rate
-    (deg/s). poses: six sides in random order, then a slanted pose. time (s), truth (by name) and phase: (n,), one entry
-    per row of readings. vehicle_from_sensor: (3, 3), rows left, up, forward. stand_deg: lean in the kickstand pose; at
-    the start of the ride the bike stands at another lean.
+    Arrays of readings have shape (n, 7), with rate_hz rows per second. A row has the chip's order: force in g,
+    temperature in C, rate in deg/s.
+
+    rate_hz: Number of readings per second.
+    poses: Readings of each of seven poses: six sides in random order, then a slanted pose.
+    kickstand: Readings of the kickstand pose.
+    upright: Readings of the upright pose.
+    time: Time of each reading of the ride, shape (n), in s.
+    readings: Readings of the ride.
+    truth: True values at each reading of the ride, by name, shape (n) each.
+    phase: Name of the rider's action at each reading of the ride, shape (n).
+    vehicle_from_sensor: Rotation from sensor to vehicle axes, shape (3, 3). Its rows are left, up, forward.
+    chip: The sensor.
+    bike: The bike.
+    stand_deg: Lean in the kickstand pose. At the start of the ride the bike stands at another lean.
+    seed: Seed of the property `procedure`.
+    home_c: Temperature during the poses of the sensor.
     """
 
     rate_hz: float
@@ -46,12 +60,12 @@ class SimulatedRide:
     chip: Chip
     bike: Bike
     stand_deg: float
-    seed: tuple[int, ...]  # of the procedure
+    seed: tuple[int, ...]
     home_c: float
 
     @cached_property
     def procedure(self) -> NDArray[np.float64]:
-        """(n, 7) at rate_hz: seven other poses in one recording, with the turns between them."""
+        """Readings of seven other poses in one recording, with the turns between them, shape (n, 7)."""
         chance = np.random.default_rng(self.seed)
         return hands.procedure(chance, self.chip, np.array(list(poses.ups(chance))), self.home_c)
 
@@ -70,12 +84,18 @@ def ride(
 ) -> SimulatedRide:
     """Simulate a ride of about this length. The same profile and seed always give the same ride.
 
-    upright_error_deg: lean of the bike to the right in the upright pose. pitch_change_deg: pitch on the kickstand minus
-    that in the upright pose; None: random within 1 degree. share: factor on the sensor's tolerances.
-    road: a class of ISO 8608 instead of the profile's own road; such a road is cambered, the rider moves around and the
-    bike slips a little. mount: one of MOUNTS instead of a firm mount. dive: pitch on the springs, (nose down in
-    braking, nose up in acceleration), degrees per g; None: random, about 3 and 1.4. exact: make the ride exactly this
-    long if there is enough time to set off and stop.
+    profile: A key of PROFILES.
+    seed: Seed of the random numbers.
+    seconds: Length of the ride.
+    upright_error_deg: Lean of the bike to the right in the upright pose.
+    pitch_change_deg: Pitch on the kickstand minus pitch in the upright pose. None for a random value within 1 degree.
+    share: Factor on the sensor's tolerances.
+    road: A class of ISO 8608. None uses the profile's own road. A road of a class is cambered, the rider moves around,
+        and the tyres slip a little.
+    mount: A key of MOUNTS. None for a firm mount.
+    dive: Pitch on the springs in degrees per g, as (nose down in braking, nose up in acceleration). None for random
+        values, about 3 and 1.4.
+    exact: True to make the ride exactly this long, if there is enough time to set off and stop.
 
     >>> made = ride("parked", seed=1, seconds=20.0)
     >>> made.rate_hz, len(made.poses), made.readings.shape == (len(made.time), 7)
@@ -90,7 +110,8 @@ def ride(
     mounting = random_rotation(chance)
     if dive is not None:
         bike = replace(bike, dive_deg_per_g=dive[0], squat_deg_per_g=dive[1])
-    # The options use a separate random source, so that without them a seed gives the same ride as in earlier versions
+    # The options use a separate source of random numbers. So a seed without options gives the same ride as in earlier
+    # versions
     more = np.random.default_rng([seed, *profile.encode(), 1])
     if road is not None:
         _rough(more, plan, conditions, CLASSES[road])
@@ -101,7 +122,7 @@ def ride(
     command = commands(plan.legs, RATE_HZ)
     slip = _slip(more, command, conditions)
     motion, extra = _motion(chance, command, bike, conditions)
-    # An hour at 1 kHz takes 29 MB per column. To free arrays early, no array may be a view of another.
+    # An hour at 1 kHz takes 29 MB per column, so arrays are freed early. For this, no array may be a view of another.
     temp = conditions.start_c + conditions.rise_c * (1.0 - np.exp(-command.time / _WARMING_S))
     time, phase = command.time[::DIVIDER].copy(), np.array(command.phases)[command.phase[::DIVIDER]]
     del command
@@ -147,7 +168,7 @@ def ride(
 
 
 def _truth(motion: Motion) -> dict[str, NDArray[np.float64]]:
-    """The truth, by name, for each reading."""
+    """Return the true values at each reading, by name."""
     return {
         "lean_deg": np.degrees(motion.lean[::DIVIDER]),
         "speed_mps": motion.speed[::DIVIDER].copy(),
@@ -158,7 +179,7 @@ def _truth(motion: Motion) -> dict[str, NDArray[np.float64]]:
 
 
 def random_rotation(chance: np.random.Generator) -> NDArray[np.float64]:
-    """A random mounting: (3, 3) vehicle from sensor, rows left, up, forward. Every rotation is equally likely."""
+    """Return a random rotation from sensor to vehicle axes, shape (3, 3). Every rotation is equally likely."""
     q, r = np.linalg.qr(chance.standard_normal((3, 3)))
     q = q * np.sign(np.diag(r))
     return q * np.linalg.det(q)
@@ -169,7 +190,7 @@ def _motion(
 ) -> tuple[Motion, Shaking]:
     n, rate = len(command.time), command.rate_hz
     command.crosswind += conditions.gust_mps2 * band_noise(chance, n, 0.05, 0.5, rate)
-    # A rider who moves around makes a riding bike lean, but not a bike that stands
+    # A rider who moves around makes a moving bike lean, but not a standing bike
     command.hang += conditions.sway_m * band_noise(chance, n, 0.02, 0.3, rate) * smoothstep(command.speed / 5.0)
     rolled = roll(command, bike, weave(chance, command, conditions.unrest_deg))
     surface = profile_slope(chance, float(command.distance[-1]) + 10.0, conditions.roughness)
@@ -193,7 +214,7 @@ def _motion(
 
 
 def _rough(chance: np.random.Generator, plan: Plan, conditions: Conditions, roughness: float) -> None:
-    """Make road and rider realistic: each leg is cambered or tilted to a random side, and the rider moves around."""
+    """Make road and rider realistic. Each leg is tilted to a random side, and the rider moves around."""
     conditions.roughness, conditions.slip_deg = roughness, _SLIP_DEG
     conditions.sway_m = max(conditions.sway_m, _SWAY_M)
     for leg in plan.legs:
@@ -201,7 +222,10 @@ def _rough(chance: np.random.Generator, plan: Plan, conditions: Conditions, roug
 
 
 def _slip(chance: np.random.Generator, command: RiderCommands, conditions: Conditions) -> NDArray[np.float64]:
-    """(n) acceleration to the left, m/s^2, caused by side slip: a bike does not move exactly where it points."""
+    """Simulate the acceleration to the left that side slip causes, shape (n), in m/s2.
+
+    With side slip, a bike does not move exactly in the direction in which it points.
+    """
     if not conditions.slip_deg:
         return np.zeros(len(command.time))
     angle = np.radians(conditions.slip_deg) * band_noise(chance, len(command.time), 0.05, 1.0, command.rate_hz)
@@ -209,12 +233,12 @@ def _slip(chance: np.random.Generator, command: RiderCommands, conditions: Condi
 
 
 def _sideways(lean: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3) a horizontal acceleration to the left, expressed along left, up, forward of a leaning bike."""
+    """Convert a horizontal acceleration to the left to the axes left, up, forward of a leaning bike, shape (n, 3)."""
     return np.column_stack((left * np.cos(lean), -left * np.sin(lean), np.zeros_like(left)))
 
 
 def _distances_in_phase(command: RiderCommands, phase: str, spacing_m: float) -> list[float]:
-    """The multiples of spacing_m at which the ride is in this phase."""
+    """Return the distances at which the ride is in this phase. They are multiples of spacing_m."""
     if phase not in command.phases:
         return []
     met = command.distance[command.phase == command.phases.index(phase)]
@@ -222,7 +246,7 @@ def _distances_in_phase(command: RiderCommands, phase: str, spacing_m: float) ->
 
 
 def _impact(chance: np.random.Generator, command: RiderCommands) -> NDArray[np.float64]:
-    """The impact at the end of a fall: (n, 3), m/s^2."""
+    """Simulate the impact at the end of a fall. Returns the additional force, shape (n, 3), in m/s2."""
     force = np.zeros((len(command.time), 3))
     if "lying" in command.phases:
         since = command.time - command.time[np.argmax(command.phase == command.phases.index("lying"))]
@@ -234,7 +258,10 @@ def _impact(chance: np.random.Generator, command: RiderCommands) -> NDArray[np.f
 
 
 def _creep(chance: np.random.Generator, n: int, degrees: float) -> NDArray[np.float64]:
-    """The rotation of a yielding mount: rotation vectors (n, 3), rad. Most of the rotation is slow, the rest sudden."""
+    """Simulate the rotation of a yielding mount. Most of the rotation is slow, the rest is sudden.
+
+    degrees: rotation at the end. Returns rotation vectors, shape (n, 3), in rad.
+    """
     axis = chance.standard_normal(3)
     at_once = np.zeros(n)
     at_once[int(n * chance.uniform(0.3, 0.7)) :] = 1.0
@@ -243,8 +270,12 @@ def _creep(chance: np.random.Generator, n: int, degrees: float) -> NDArray[np.fl
 
 
 def _to_sensor(vectors: NDArray, mounting: NDArray, turned: NDArray) -> NDArray[np.float64]:
-    """Rotate vectors (n, 3) from the vehicle's axes to the sensor's. turned: small rotations of the mount (n, 3),
-    applied to second order."""
+    """Rotate vectors from the vehicle's axes to the sensor's axes.
+
+    vectors: The vectors, shape (n, 3).
+    mounting: Rotation from sensor to vehicle axes, shape (3, 3).
+    turned: Small rotations of the mount, shape (n, 3), in rad. They are applied to second order.
+    """
     if turned.any():
         first = np.cross(turned, vectors)
         vectors = vectors + first + 0.5 * np.cross(turned, first)

@@ -1,4 +1,4 @@
-"""The physics of a simulated ride, with numpy: bike, balance, road, engine and sensor.
+"""Simulates the physics of a ride with numpy: bike, balance, road, engine and sensor.
 
 ../ride.py combines them.
 """

@@ -1,8 +1,8 @@
-"""A two-wheeler: its dimensions, the place of the sensor, and how it leans and yaws.
+"""Simulates how a two-wheeler leans and yaws. Also has its dimensions and the position of the sensor.
 
-The rider commands a lean, and the bike stays in roll balance. Lean > 0 to the right, yaw rate > 0 in a left turn. The
-balance lean b is that of the line from the contact point to the centre of mass. The chassis leans more than b, because
-wide tyres touch the road beside their middle.
+The rider commands a lean, and the bike stays in roll balance. The lean is positive to the right, the yaw rate is
+positive in a left turn. The balance lean b is the lean of the line from the contact point to the centre of mass. The
+chassis leans more than b, because wide tyres touch the road beside their middle.
 """
 
 from dataclasses import dataclass, replace
@@ -13,9 +13,9 @@ from kickstand.units import STANDARD_GRAVITY
 from ..commands import RiderCommands
 from .signals import Signal, band_noise, derivative, second_order, smoothed, smoothstep
 
-_STEERING_S = 0.04  # smoothing of the steering, because its rate is limited
+_STEERING_S = 0.04  # the steering is smoothed over this time, because its rate is limited
 _WANDER = 0.06  # rms of the lean's changes in a bend, as a share of the lean
-_STANDS_MPS, _RIDES_MPS = 0.4, 1.5  # below the first the feet hold the bike, above the second steering balances it
+_STANDS_MPS, _RIDES_MPS = 0.4, 1.5  # feet hold the bike below the first speed, steering balances it above the second
 
 
 @dataclass(frozen=True)
@@ -25,20 +25,21 @@ class Bike:
     The defaults describe an average naked bike with its rider. random() varies them within the range of real bikes.
     """
 
-    mass_height: float = 0.62  # centre of mass of bike and rider together, above the ground
+    mass_height: float = 0.62  # height of the centre of mass of bike and rider together
     roll_gyration: float = 0.27  # radius of gyration about the roll axis through the centre of mass
     tyre_radius: float = 0.06  # radius of the tyres' cross-section, mean of front and rear
-    wheel_inertia: float = 0.024  # both wheels' I/r over mass * mass_height: their gyroscopic moment in a turn
+    # Gyroscopic moment of the wheels in a turn: I/r of both wheels, divided by mass * mass_height
+    wheel_inertia: float = 0.024
     wheelbase: float = 1.43
     sensor_height: float = 0.70
     sensor_forward: float = 0.75  # distance of the sensor in front of the rear contact point
     sensor_left: float = 0.0
-    # Pitch caused by the springs, from a superbike's suspension sensors. The wheels do not rise during it.
-    dive_deg_per_g: float = 2.8  # nose down in braking, for a telescopic fork; an anti-dive fork has less than 0
+    # Pitch caused by the springs, from a superbike's suspension sensors. The wheels stay on the road.
+    dive_deg_per_g: float = 2.8  # nose down in braking, for a telescopic fork. An anti-dive fork has less than 0
     squat_deg_per_g: float = 1.3  # nose up in acceleration
     dive_hz: float = 1.7
     dive_damping: float = 0.45
-    max_curvature: float = 0.4  # 1/m: the steering lock
+    max_curvature: float = 0.4  # curvature of the tightest turn in 1/m, limited by the steering lock
 
     @staticmethod
     def random(chance: np.random.Generator) -> "Bike":
@@ -58,21 +59,28 @@ class Bike:
         return replace(bike, squat_deg_per_g=0.46 * bike.dive_deg_per_g)
 
     def dive(self, acceleration: Signal, rate_hz: float) -> Signal:
-        """Pitch of the chassis on its springs, rad, > 0 nose up. acceleration: forward, m/s^2."""
+        """Compute the pitch of the chassis on its springs in rad, positive if the nose is up.
+
+        acceleration: acceleration forward, in m/s2.
+        """
         per_g = np.where(acceleration < 0.0, self.dive_deg_per_g, self.squat_deg_per_g)
         pushed = np.radians(per_g) * acceleration / STANDARD_GRAVITY
         return second_order(pushed, self.dive_hz, self.dive_damping, rate_hz)
 
     @property
     def pendulum(self) -> float:
-        """Length of the equivalent pendulum in roll, m. A longer pendulum falls into a lean more slowly."""
+        """The length of the equivalent pendulum in roll, in m. A longer pendulum falls into a lean more slowly."""
         return (self.mass_height**2 + self.roll_gyration**2) / self.mass_height
 
 
 @dataclass
 class Roll:
-    """Motion in roll and yaw. lean: of the chassis, rad. balance: lean of the centre of mass, rad. yaw_rate: about the
-    vertical, rad/s."""
+    """Motion in roll and yaw.
+
+    lean: Lean of the chassis, in rad.
+    balance: Lean of the centre of mass, in rad.
+    yaw_rate: Rate about the vertical, in rad/s.
+    """
 
     lean: Signal
     balance: Signal
@@ -80,9 +88,13 @@ class Roll:
 
 
 def chassis_lean(balance: Signal, bike: Bike, bank: Signal | float = 0.0, hang: Signal | float = 0.0) -> Signal:
-    """Lean of the chassis for a lean of the centre of mass (Cossalter (4.4), with road and rider added), rad.
+    """Compute the lean of the chassis from the lean of the centre of mass, in rad.
 
-    bank: the road's tilt to the right. hang: the centre of mass to the right of the bike's plane, m.
+    This is Cossalter's equation (4.4), with road and rider added.
+
+    balance: Lean of the centre of mass, in rad.
+    bank: Tilt of the road to the right, in rad.
+    hang: Distance of the centre of mass to the right of the bike's plane, in m.
     """
     arm = bike.mass_height - bike.tyre_radius
     flank = np.arcsin(bike.tyre_radius * np.sin(balance - bank) / np.hypot(arm, hang))
@@ -90,10 +102,12 @@ def chassis_lean(balance: Signal, bike: Bike, bank: Signal | float = 0.0, hang: 
 
 
 def weave(chance: np.random.Generator, command: RiderCommands, riding_deg: float) -> Signal:
-    """Random changes of the lean by the rider, rad.
+    """Simulate the rider's random changes of the lean, in rad.
 
-    riding_deg: rms at speed. The changes are larger at walking pace and small with the feet down. In bends they include
-    the rider's corrections of the line.
+    The changes are larger at walking pace, and small while the feet are on the ground. In bends they include
+    corrections of the line.
+
+    riding_deg: rms of the changes at speed.
     """
     n, rate = len(command.time), command.rate_hz
     v = command.speed
@@ -105,11 +119,16 @@ def weave(chance: np.random.Generator, command: RiderCommands, riding_deg: float
 
 
 def roll(command: RiderCommands, bike: Bike, unrest: Signal) -> Roll:
-    """Lean and yaw rate for the commanded lean. The yaw rate p follows from the pendulum's roll equation:
+    """Compute lean and yaw rate from the commanded lean.
 
-    pendulum * b'' = g_n sin b + ((1 + wheels) v p + wind) cos b
+    The pendulum's roll equation gives the yaw rate p:
 
-    So a quick roll to the right begins with a yaw to the left: countersteering. unrest: from weave().
+        pendulum * b'' = g_n sin b + ((1 + wheels) v p + wind) cos b
+
+    b is the balance lean, g_n the acceleration perpendicular to the road, v the speed. According to this equation, a
+    quick roll to the right begins with a yaw to the left. This is countersteering.
+
+    unrest: the result of weave().
     """
     rate, v = command.rate_hz, command.speed
     normal_g = STANDARD_GRAVITY * np.cos(command.slope) + v * derivative(command.slope, rate)

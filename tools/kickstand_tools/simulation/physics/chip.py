@@ -1,7 +1,7 @@
 """Simulates the readings of an MPU6050 from the motion of its own axes.
 
-Data sheet PS-MPU-6000A rev 3.4, sections 6.1 and 6.2. The chip converts at 1 kHz and filters (DLPF 3: 44 Hz, 4.9 ms);
-every fifth result is read. Frequencies above 100 Hz that pass the filter alias.
+The figures are from the data sheet PS-MPU-6000A rev 3.4, sections 6.1 and 6.2. The chip converts at 1 kHz, and filters
+with DLPF 3 (44 Hz, delay of 4.9 ms). Every fifth result is read. Frequencies above 100 Hz that pass the filter alias.
 """
 
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ from ..scripted.sensor_errors import MAX_GYRO_BIAS_DPS, MAX_OFFSET_G, MAX_SCALE_
 RATE_HZ = 1000
 DIVIDER = 5  # 200 Hz
 _COUNTS = 32768.0
-_GYRO_COUNTS = 32750.0  # counts at the end of a range: the sheet has 65.5 counts per deg/s at 500 deg/s
+_GYRO_COUNTS = 32750.0  # counts at the end of a range, from the data sheet's 65.5 counts per deg/s at 500 deg/s
 _ACCEL_NOISE_G = 400e-6 * np.sqrt(RATE_HZ / 2)  # rms of a conversion, from 400 ug/sqrt(Hz)
 _GYRO_NOISE_DPS = 0.005 * np.sqrt(RATE_HZ / 2)
 _CROSS_AXIS = 0.02  # sensitivity of an axis to its neighbours
 GYRO_DPS_PER_G = 0.1  # sensitivity to linear acceleration
 CALIBRATED_C = 25.0
 
-# A Bessel low-pass of second order with -3 dB at 44 Hz has the sheet's 4.9 ms of delay.
+# The filter is a Bessel low-pass of second order with -3 dB at 44 Hz. Its delay is the data sheet's 4.9 ms.
 _DLPF_NATURAL_HZ, _DLPF_DAMPING = 44.0 * 1.272, 0.866
 
 
@@ -38,30 +38,43 @@ _DLPF = _dlpf()
 
 @dataclass(frozen=True)
 class Chip:
-    """One sensor: its errors at 25 C along x, y, z in g and deg/s, and how they change with temperature.
+    """The errors of one sensor along x, y, z at 25 C, and their changes with temperature.
 
-    low_pass: False if nothing filters before the sampling.
+    accel_matrix: Readings divided by true forces, shape (3, 3). The diagonal has the scale factors, the other elements
+        are cross-axis sensitivities.
+    accel_offset: Offset, shape (3), in g.
+    gyro_matrix: The same as accel_matrix for the rates.
+    gyro_bias: Bias, shape (3), in deg/s.
+    accel_per_c: Change of the offset per C, shape (3), in g.
+    gyro_per_c: Change of the bias per C, shape (3), in deg/s.
+    gyro_walk: Random walk of the bias, in deg/s per sqrt(s).
+    accel_range_g: Range of the accelerometer.
+    gyro_range_dps: Range of the gyro.
+    low_pass: False if no filter precedes the sampling.
     """
 
-    accel_matrix: NDArray[np.float64]  # (3, 3) reading over true value: scale factors on the diagonal, else cross-axis
+    accel_matrix: NDArray[np.float64]
     accel_offset: NDArray[np.float64]
     gyro_matrix: NDArray[np.float64]
     gyro_bias: NDArray[np.float64]
     accel_per_c: NDArray[np.float64]
     gyro_per_c: NDArray[np.float64]
-    gyro_walk: float = 0.004  # deg/s per sqrt(s): random walk of the bias
+    gyro_walk: float = 0.004
     accel_range_g: float = 8.0
     gyro_range_dps: float = 500.0
     low_pass: bool = True
 
     @staticmethod
     def random(chance: np.random.Generator, share: float = 1.0, drift: float = 1.0) -> "Chip":
-        """A random sensor. share: factor on the data sheet's tolerances; drift: factor on an ordinary sensor's drift
-        with temperature.
+        """Return a random sensor.
 
-        Offsets and biases are uniformly distributed within the sheet's limits. Scale and cross-axis sensitivity are
-        normally distributed, with the limit at two standard deviations. Over temperature the sheet allows 35..60 mg and
-        20 deg/s for 45..60 C; an ordinary sensor has a third of the former and a fifth of the latter.
+        share: Factor on the data sheet's tolerances.
+        drift: Factor on an ordinary sensor's drift with temperature.
+
+        Offsets and biases are uniformly distributed within the data sheet's limits. Scale and cross-axis sensitivity
+        are normally distributed, with the limit at two standard deviations. For a change of 45 to 60 C, the data sheet
+        allows a drift of 35 to 60 mg and of 20 deg/s. An ordinary sensor has a third of the drift in mg, and a fifth
+        of the drift in deg/s.
         """
 
         def near_one(scale: float, cross: float) -> NDArray[np.float64]:
@@ -84,9 +97,14 @@ class Chip:
         rates: NDArray[np.float64],
         temp_c: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Readings (n / 5, 7) at 200 Hz in the chip's order: g, C, deg/s. The first reading is from the first row.
+        """Simulate the readings of a motion. Every fifth row of the motion is read, beginning with the first.
 
-        force (n, 3) in g and rates (n, 3) in deg/s: true values along the sensor's axes at 1 kHz. temp_c (n,).
+        chance: Source of random numbers.
+        force: True force along the sensor's axes at 1 kHz, shape (n, 3), in g.
+        rates: True rates about the sensor's axes at 1 kHz, shape (n, 3), in deg/s.
+        temp_c: Temperature, shape (n).
+
+        Returns the readings at 200 Hz in the chip's order, in g, C and deg/s. Their shape is (n / 5, 7).
         """
         n = len(force)
         warm = (temp_c - CALIBRATED_C)[:, None]
@@ -113,7 +131,10 @@ class Chip:
         return np.column_stack((accel, temp, rate))
 
     def _sampled(self, values: NDArray[np.float64], limit: float, lsb: float) -> NDArray[np.float64]:
-        """Clip at the range, filter, take every fifth value, round to whole counts."""
+        """Clip values at the range, filter them, take every fifth value, and round it to whole counts.
+
+        limit: end of the range. lsb: counts per unit of the values.
+        """
         columns = []
         for column in values.T:
             column = np.clip(column, -limit, limit)

@@ -1,4 +1,4 @@
-"""Engine vibration: harmonics of the crankshaft's speed, which follows from the road speed and the gear."""
+"""Simulates engine vibration: harmonics of the crankshaft's speed, computed from the road speed and the gear."""
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
@@ -6,17 +6,21 @@ from numpy.typing import NDArray
 
 from .signals import Signal, integral, smoothed
 
-_RPM_PER_MPS = (370.0, 260.0, 205.0, 170.0, 150.0, 135.0)  # by gear
-_ORDERS = (0.5, 1.0, 2.0)  # a four-stroke twin's multiples of the crankshaft's speed: firing, primary, secondary
-_IDLE_SHARE = 0.25  # vibration at idle over that at _FULL_RPM
+_RPM_PER_MPS = (370.0, 260.0, 205.0, 170.0, 150.0, 135.0)  # engine speed per road speed in each gear
+# Frequencies of the vibration as multiples of the crankshaft's speed: firing, primary, secondary of a four-stroke twin
+_ORDERS = (0.5, 1.0, 2.0)
+_IDLE_SHARE = 0.25  # vibration at idle, divided by the vibration at _FULL_RPM
 _IDLE_RPM, _FULL_RPM = 1250.0, 6000.0
 _MAX_G = 0.5
-_BLOCK = 100_000  # rows computed at a time, to limit memory
-_DPS_PER_G = 15.0  # rms of the vibration's rates over rms of its force
+_BLOCK = 100_000  # number of rows that are computed at a time, to limit memory
+_DPS_PER_G = 15.0  # rms of the vibration's rates, divided by the rms of its force
 
 
 def crank_rpm(speed: Signal, shift_rpm: float, rate_hz: float) -> Signal:
-    """Speed of the crankshaft, 1/min, in the lowest gear that keeps it under shift_rpm. Below idle the clutch slips."""
+    """Compute the speed of the crankshaft at each sample, in 1/min.
+
+    The rider uses the lowest gear with an engine speed under shift_rpm. Below idle speed the clutch slips.
+    """
     rpm = speed * _RPM_PER_MPS[-1]
     for ratio in reversed(_RPM_PER_MPS[:-1]):
         rpm = np.where(speed * ratio < shift_rpm, speed * ratio, rpm)
@@ -26,10 +30,19 @@ def crank_rpm(speed: Signal, shift_rpm: float, rate_hz: float) -> Signal:
 def vibration(
     chance: np.random.Generator, speed: Signal, running: Signal, rms_g: float, shift_rpm: float, rate_hz: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The vibration: specific force (n, 3) in m/s2 and rates (n, 3) in rad/s along left, up, forward.
+    """Simulate the vibration along the bike's left, up and forward.
 
-    rms_g: rms along each axis at 6000/min, before the chip's filter. shift_rpm: engine speed at which the rider
-    changes up.
+    Args:
+        chance: Source of random numbers.
+        speed: Speed of the bike, shape (n), in m/s.
+        running: 1 while the engine is running, otherwise 0, shape (n).
+        rms_g: Vibration along each axis at 6000/min, rms, before the chip's filter.
+        shift_rpm: Engine speed at which the rider changes up.
+        rate_hz: Number of samples per second.
+
+    Returns:
+        The specific force, shape (n, 3), in m/s2.
+        The rates, shape (n, 3), in rad/s.
     """
     rpm = crank_rpm(speed, shift_rpm, rate_hz)
     turns = integral(rpm / 60.0, rate_hz)

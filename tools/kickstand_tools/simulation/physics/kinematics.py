@@ -1,7 +1,8 @@
 """Computes exact rates and specific force on a moving rigid body, from its attitude.
 
-Vehicle axes: left, up, forward. The attitude is heading about the vertical, then pitch about the lateral axis, then
-lean about the forward axis. So at rest the lean is atan2(left, up) of the specific force.
+The vehicle's axes are left, up and forward. The attitude consists of three rotations in this order: heading about the
+vertical, pitch about the lateral axis, lean about the forward axis. So at rest the lean is atan2(left, up) of the
+specific force.
 """
 
 from dataclasses import dataclass
@@ -13,14 +14,20 @@ from numpy.typing import NDArray
 from .bike import Bike
 from .signals import Signal, derivative
 
-_BLOCK = 100_000  # rows computed at a time, to limit memory
+_BLOCK = 100_000  # number of rows that are computed at a time, to limit memory
 
 
 @dataclass
 class Motion:
-    """Motion of the rear contact point and attitude of the chassis, in m/s, rad, rad/s.
+    """The motion of the rear contact point, and the attitude of the chassis.
 
-    heave: vertical acceleration of the rear of the chassis against the road, m/s^2.
+    rate_hz: Number of samples per second.
+    speed: In m/s.
+    slope: Slope of the road, in rad.
+    yaw_rate: Rate about the vertical, in rad/s.
+    lean: Lean of the chassis, in rad.
+    pitch: Pitch of the chassis against the horizontal, in rad, positive if the nose is up.
+    heave: Vertical acceleration of the rear of the chassis against the road, in m/s2.
     """
 
     rate_hz: float
@@ -28,12 +35,12 @@ class Motion:
     slope: Signal
     yaw_rate: Signal
     lean: Signal
-    pitch: Signal  # of the chassis against the horizontal, > 0 nose up
+    pitch: Signal
     heave: Signal
 
 
 def body_rates(motion: Motion) -> NDArray[np.float64]:
-    """Rates (n, 3) in rad/s about left, up, forward."""
+    """Compute the rates about left, up and forward, shape (n, 3), in rad/s."""
     lean_rate = derivative(motion.lean, motion.rate_hz)
     pitch_rate = derivative(motion.pitch, motion.rate_hz)
     c, s = np.cos(motion.lean), np.sin(motion.lean)
@@ -48,9 +55,10 @@ def body_rates(motion: Motion) -> NDArray[np.float64]:
 
 
 def specific_force(motion: Motion, bike: Bike) -> NDArray[np.float64]:
-    """Specific force (n, 3) in m/s^2 along left, up, forward at the sensor: its acceleration minus gravity.
+    """Compute the specific force at the sensor along left, up and forward, shape (n, 3), in m/s2.
 
-    The body rotates about the centre of the rear tyre's cross-section, a tyre radius above the road.
+    The specific force is the sensor's acceleration minus gravity. The body rotates about the centre of the rear tyre's
+    cross-section, which is a tyre radius above the road.
     """
     rate, v, slope = motion.rate_hz, motion.speed, motion.slope
     left = v * motion.yaw_rate * np.cos(slope)

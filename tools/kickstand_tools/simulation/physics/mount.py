@@ -12,15 +12,17 @@ from numpy.typing import NDArray
 from .chip import Chip
 from .signals import Signal, derivative, through
 
-_SAG_LIMIT = np.radians(3.0)  # largest sag of a holder, because a spring is linear only up to here
+_SAG_LIMIT = np.radians(3.0)  # largest sag of a holder, because springs are only linear for a small sag
 
 
 @dataclass(frozen=True)
 class Holder:
-    """A soft holder: sensor and holder are a mass on springs along and about each axis.
+    """A soft holder. Sensor and holder are a mass on springs along and about each axis.
 
-    hz, damping (3): natural frequency and damping ratio along left, up, forward, and the same about these axes. sag
-    (3, rad per g): rotation about left by a forward force, about up (0), about forward by a force to the left.
+    hz: Natural frequency along and about left, up and forward, shape (3).
+    damping: Damping ratio along and about these axes, shape (3).
+    sag: Rotation per g of force, shape (3), in rad per g. A forward force rotates the holder about left. A force to the
+        left rotates it about forward. No force rotates it about up.
     """
 
     hz: NDArray[np.float64]
@@ -36,8 +38,17 @@ class Holder:
     def shaken(
         self, force: NDArray[np.float64], rates: NDArray[np.float64], rate_hz: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return force (n, 3, g) and rates (n, 3, deg/s) of the sensor in its holder. The arguments are those of the
-        bike. All are along left, up, forward."""
+        """Compute the motion of the sensor in its holder from the motion of the bike, along left, up and forward.
+
+        Args:
+            force: Force of the bike, shape (n, 3), in g.
+            rates: Rates of the bike, shape (n, 3), in deg/s.
+            rate_hz: Number of samples per second.
+
+        Returns:
+            The force of the sensor, shape (n, 3), in g.
+            The rates of the sensor, shape (n, 3), in deg/s.
+        """
         held = np.column_stack([self._by_spring(column, k, rate_hz) for k, column in enumerate(force.T)])
         turned = np.zeros_like(held)
         turned[:, 0] = (self.sag[0] * held[:, 2]).clip(-_SAG_LIMIT, _SAG_LIMIT)
@@ -49,7 +60,7 @@ class Holder:
         return held - np.cross(turned, held), turning
 
     def _by_spring(self, x: Signal, axis: int, rate_hz: float) -> Signal:
-        """x, filtered by a mass on a spring whose base is shaken."""
+        """Return the motion of a mass on a spring whose base moves by x."""
 
         def transfer(f: Signal) -> NDArray:
             damped = 2j * self.damping[axis] * f / self.hz[axis]
@@ -60,7 +71,12 @@ class Holder:
 
 @dataclass(frozen=True)
 class Mount:
-    """The sensor's mount, and the logger that reads the sensor. rise_c: replaces Conditions.rise_c unless None."""
+    """The sensor, its mount, and the logger that reads it.
+
+    chip: The sensor.
+    holder: The soft holder. None for a firm mount.
+    rise_c: Replaces Conditions.rise_c, unless None.
+    """
 
     chip: Chip
     holder: Holder | None = None
@@ -68,23 +84,25 @@ class Mount:
 
 
 def holder(chance: np.random.Generator, chip: Chip) -> Mount:
-    """A holder that resonates at 5 to 40 Hz with a damping of 0.02 to 0.1. It sags by about a fifth of a degree per g,
-    a softer holder by more."""
+    """Return a holder that resonates at 5 to 40 Hz with a damping of 0.02 to 0.1.
+
+    A holder of 10 Hz sags by about a fifth of a degree per g, a softer holder by more.
+    """
     return Mount(chip, Holder.random(chance))
 
 
 def aliasing(chance: np.random.Generator, chip: Chip) -> Mount:
-    """No low-pass before the sampling: engine vibration appears at other frequencies."""
+    """Return a logger without a low-pass before the sampling. Engine vibration then appears at other frequencies."""
     return Mount(replace(chip, low_pass=False))
 
 
 def clipping(chance: np.random.Generator, chip: Chip) -> Mount:
-    """Ranges of 2 g and 250 deg/s: bumps and the engine exceed them."""
+    """Return a logger with ranges of 2 g and 250 deg/s. Bumps and the engine exceed them."""
     return Mount(replace(chip, accel_range_g=2.0, gyro_range_dps=250.0))
 
 
 def warming(chance: np.random.Generator, chip: Chip) -> Mount:
-    """The accelerometer's offset drifts by up to 1.5 mg per C, and the sensor gets 15 to 25 C warmer."""
+    """Return a sensor that warms up by 15 to 25 C. Its accelerometer's offset drifts by up to 1.5 mg per C."""
     drift = chance.uniform(-0.0015, 0.0015, 3)
     return Mount(replace(chip, accel_per_c=drift), rise_c=chance.uniform(15.0, 25.0))
 

@@ -1,8 +1,8 @@
 """Simulates how a rough road shakes the bike through tyres and suspension.
 
-The road is a random profile of ISO 8608, whose slope is white noise over distance. So the same road shakes more at
-higher speed, and the rear wheel meets the same bumps as the front wheel, later. Each end of the bike is a quarter-car
-model: the wheel on its tyre, the chassis on its spring.
+The road is a random profile of ISO 8608. Its slope is white noise over distance. So the same road shakes the bike more
+at higher speed. The rear wheel meets the same bumps as the front wheel, but later. Each end of the bike is a
+quarter-car model: the wheel moves on its tyre, and the chassis on its spring.
 """
 
 from dataclasses import dataclass
@@ -13,24 +13,28 @@ from numpy.typing import NDArray
 from .bike import Bike
 from .signals import Signal, band_noise, smoothed, through
 
-# Roughness in the middle of each class of ISO 8608: PSD of displacement at 0.1 cycles/m, m3
+# Roughness in the middle of each class of ISO 8608, as the PSD of the displacement at 0.1 cycles/m, in m3
 CLASSES = {"A": 16e-6, "B": 64e-6, "C": 256e-6, "D": 1024e-6}
 CLASS_A, CLASS_B, CLASS_C, _ = CLASSES.values()
 _STEP_M = 0.02
 _CONTACT_M = 0.10  # length of a tyre's contact patch, which averages out shorter waves
 
-# One end of a motorcycle with half of its rider: kg, kg, N/m, Ns/m, N/m
+# One end of a motorcycle with half of its rider: two masses in kg, spring in N/m, damper in Ns/m, tyre in N/m
 _SPRUNG, _UNSPRUNG, _SPRING, _DAMPER, _TYRE = 120.0, 15.0, 17e3, 1100.0, 150e3
-_LATERAL = 0.35  # rms along left and along forward over the vertical rms
-# rms rates about left, up, forward per 9.8 m/s^2 of vertical rms. 0 about left, because pitch is simulated separately
+_LATERAL = 0.35  # rms of the force along left and along forward, divided by the vertical rms
+# rms of the rates about left, up and forward, in deg/s per 9.8 m/s2 of vertical rms. The rate about left is 0, because
+# pitch is simulated separately
 _RATE_DPS = np.array([0.0, 8.0, 14.0])
 
 
 @dataclass
 class Shaking:
-    """The motion of the chassis caused by the road. heave: vertical acceleration of the rear, m/s^2; pitch: rad.
+    """The motion of the chassis that the road causes.
 
-    force (n, 3) in m/s^2 and rates (n, 3) in rad/s: additional, along and about left, up, forward.
+    heave: Vertical acceleration of the rear, shape (n), in m/s2.
+    pitch: Pitch, shape (n), in rad.
+    force: Additional force along left, up and forward, shape (n, 3), in m/s2.
+    rates: Additional rates about left, up and forward, shape (n, 3), in rad/s.
     """
 
     heave: Signal
@@ -40,15 +44,17 @@ class Shaking:
 
 
 def transmitted(f: Signal) -> NDArray:
-    """Complex transfer function of the quarter-car model at frequencies f (Hz): displacement of the chassis over that
-    of the road."""
+    """Compute the complex transfer function of the quarter-car model.
+
+    It is the displacement of the chassis divided by the displacement of the road. f: frequencies in Hz.
+    """
     w = 2.0 * np.pi * f
     strut = _SPRING + 1j * w * _DAMPER
     return _TYRE * strut / ((strut - _SPRUNG * w * w) * (strut + _TYRE - _UNSPRUNG * w * w) - strut * strut)
 
 
 def profile_slope(chance: np.random.Generator, length_m: float, roughness: float) -> Signal:
-    """The slope dz/ds of a random road, every _STEP_M. roughness: PSD like CLASS_A, m3."""
+    """Return the slope dz/ds of a random road at every _STEP_M. roughness: PSD in m3, like CLASS_A."""
     density = (2.0 * np.pi * 0.1) ** 2 * roughness
     white = chance.standard_normal(int(length_m / _STEP_M) + 200) * np.sqrt(density / (2.0 * _STEP_M))
     taps = round(_CONTACT_M / _STEP_M)
@@ -56,7 +62,7 @@ def profile_slope(chance: np.random.Generator, length_m: float, roughness: float
 
 
 def add_bumps(slope: Signal, places_m: list[float], height_m: float, length_m: float) -> None:
-    """Add bumps of the shape 1 - cos to a profile's slope, in place."""
+    """Add bumps to a profile's slope, in place. A bump has the shape 1 - cos. places_m: distance of each bump."""
     n = int(length_m / _STEP_M)
     shape = np.pi * height_m / length_m * np.sin(2.0 * np.pi * np.arange(n) / n)
     for place in places_m:
@@ -68,8 +74,15 @@ def add_bumps(slope: Signal, places_m: list[float], height_m: float, length_m: f
 def shaking(
     chance: np.random.Generator, distance: Signal, speed: Signal, slope: Signal, bike: Bike, rate_hz: float
 ) -> Shaking:
-    """The Shaking caused by driving over a profile. distance: way of the rear wheel until each sample, m. slope: see
-    profile_slope()."""
+    """Simulate driving over a profile.
+
+    chance: Source of random numbers.
+    distance: Distance of the rear wheel at each sample, in m.
+    speed: Speed at each sample, in m/s.
+    slope: Slope of the profile, see profile_slope().
+    bike: The bike.
+    rate_hz: Number of samples per second.
+    """
     height = np.cumsum(slope) * _STEP_M
     at = np.arange(len(slope)) * _STEP_M
     front = distance + bike.wheelbase

@@ -1,4 +1,4 @@
-"""Signals on a regular time grid: smooth steps, filters by FFT, coloured noise."""
+"""Functions for signals on a regular time grid: smooth steps, filters by FFT, coloured noise."""
 
 from collections.abc import Callable
 
@@ -6,32 +6,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 Signal = NDArray[np.float64]
-_NOISE_MARGIN_S = 10.0  # noise is computed with this margin at both ends, which is then cut, because through() pads
-_BLOCK = 100_000  # frequencies computed at a time, to limit memory
-_PAD_S = 4.0  # padding with the first and the last value, because an FFT joins the end to the start
+_NOISE_MARGIN_S = 10.0  # noise is computed with a margin at both ends. It is cut off, because it contains padding
+_BLOCK = 100_000  # number of frequencies that are computed at a time, to limit memory
+_PAD_S = 4.0  # a signal is padded with its first and last value for this time, because an FFT joins end and start
 
 
 def smoothstep(u: Signal) -> Signal:
-    """A step from 0 to 1 while u goes from 0 to 1, constant outside. Value, first and second derivative have no
-    jumps."""
+    """Return a step from 0 to 1 while u goes from 0 to 1. The step is constant outside.
+
+    Its value and its first and second derivative have no jumps.
+    """
     u = np.clip(u, 0.0, 1.0)
     return u * u * u * (10.0 + u * (6.0 * u - 15.0))
 
 
 def derivative(x: Signal, rate_hz: float) -> Signal:
-    """The derivative of x per second, by central differences."""
+    """Return the derivative of x per second, by central differences."""
     return np.gradient(x, 1.0 / rate_hz)
 
 
 def integral(x: Signal, rate_hz: float) -> Signal:
-    """The integral of x over time by the trapezoidal rule, 0 at the start."""
+    """Return the integral of x over time, by the trapezoidal rule. It is 0 at the start."""
     return np.concatenate(([0.0], np.cumsum((x[1:] + x[:-1]) / (2.0 * rate_hz))))
 
 
 def through(x: Signal, transfer: Callable[[Signal], NDArray], rate_hz: float) -> Signal:
-    """x filtered by FFT. transfer: called with frequencies in Hz, returns the complex gains."""
+    """Filter x by FFT. transfer: function that returns the complex gain for each frequency in Hz."""
     pad = int(_PAD_S * rate_hz)
-    size = -(-(len(x) + 2 * pad) // 16384) * 16384  # few small prime factors: a fast FFT
+    size = -(-(len(x) + 2 * pad) // 16384) * 16384  # an FFT is fast for a size with small prime factors
     padded = np.pad(x, (pad, size - len(x) - pad), mode="edge")
     spectrum = np.fft.rfft(padded)
     del padded
@@ -44,12 +46,12 @@ def through(x: Signal, transfer: Callable[[Signal], NDArray], rate_hz: float) ->
 
 
 def smoothed(x: Signal, seconds: float, rate_hz: float) -> Signal:
-    """x smoothed with a Gaussian of this standard deviation, without delay."""
+    """Smooth x with a Gaussian, without delay. seconds: standard deviation of the Gaussian."""
     return through(x, lambda f: np.exp(-0.5 * (2.0 * np.pi * f * seconds) ** 2), rate_hz)
 
 
 def second_order(x: Signal, natural_hz: float, damping: float, rate_hz: float) -> Signal:
-    """x filtered by a low-pass of second order with gain 1 at 0 Hz, including the filter's delay."""
+    """Filter x with a low-pass of second order, which delays the signal. Its gain is 1 at 0 Hz."""
 
     def transfer(f: Signal) -> NDArray:
         s = 1j * f / natural_hz
@@ -59,7 +61,10 @@ def second_order(x: Signal, natural_hz: float, damping: float, rate_hz: float) -
 
 
 def band_noise(chance: np.random.Generator, n: int, low_hz: float, high_hz: float, rate_hz: float) -> Signal:
-    """Normally distributed noise of rms 1 between two frequencies. Outside them its amplitude falls by second order."""
+    """Return n samples of normally distributed noise between two frequencies, with an rms of 1.
+
+    Outside these frequencies, the amplitude falls with the second order of the frequency.
+    """
 
     def transfer(f: Signal) -> NDArray:
         low = (f / low_hz) ** 2

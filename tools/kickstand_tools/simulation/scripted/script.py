@@ -1,11 +1,12 @@
 """Simulates a motorcycle in balance whose lean is known at every instant, and a perfect sensor on it.
 
-Plain Python for CPython and MicroPython. It does not use the firmware's mathematics, because it tests them.
+This is plain Python for CPython and MicroPython. It does not use the firmware's mathematics, because it tests them.
 
-Vehicle frame: left, up, forward (right-handed). Lean > 0 to the right, yaw rate > 0 in a left turn, slope > 0
-uphill. The attitude is heading about the vertical, then slope about the lateral axis, lean about forward.
-Leaning to the right turns left towards up, a positive rotation: w_forward = d(lean)/dt on a level road.
-The sensor sits on the roll axis; the tyres have no width.
+The vehicle's axes are left, up and forward (right-handed). The lean is positive to the right, the yaw rate in a left
+turn, the slope uphill. The attitude consists of three rotations in this order: heading about the vertical, slope about
+the lateral axis, lean about the forward axis. A lean to the right turns the left axis upward, which is a positive
+rotation about forward. So on a level road the rate about forward is d(lean)/dt. The sensor is on the roll axis, and
+the tyres have no width.
 
     ride = Ride([kickstand(8), upright(8), accelerate(15, 5), turn(-30, 5), brake(0, 4)])
     ride.motion(20.0)   # (left, up, forward in g, then rates about left, up, forward in deg/s)
@@ -16,24 +17,26 @@ from math import cos, degrees, pi, radians, sin, sqrt, tan
 
 from kickstand.units import STANDARD_GRAVITY
 
-KICKSTAND_DEG = -12.0  # to the left, as on most bikes
-MOVE_S = 2.0  # from the kickstand to upright, or back
+KICKSTAND_DEG = -12.0  # lean on the kickstand, to the left as on most bikes
+MOVE_S = 2.0  # time for moving the bike from the kickstand to upright, or back
 STANDING_SWAY_DEG = 0.1  # amplitude of the lean's changes while the rider holds the bike upright
 RIDING_SWAY_DEG = 0.5  # amplitude of the lean's changes at speed
-WALKING_MPS, RIDING_MPS = 1.0, 4.0  # below the first only feet balance the bike, above the second only steering
+WALKING_MPS, RIDING_MPS = 1.0, 4.0  # only feet balance the bike below the first speed, only steering above the second
 
-_SWAY = ((0.31, 0.6, 0.0), (0.73, 0.4, 1.0))  # Hz, share, phase
+_SWAY = ((0.31, 0.6, 0.0), (0.73, 0.4, 1.0))  # frequency in Hz, share and phase of each part of the sway
 _ROAD_HZ = (2.3, 5.9, 11.7, 19.3, 31.1)
 _ROAD_G = (0.5, 1.0, 0.5)  # shares of vibration_g along left, up, forward
-_ROAD_DPS = (25.0, 10.0, 15.0)  # deg/s per g of vibration
+_ROAD_DPS = (25.0, 10.0, 15.0)  # rates about left, up, forward, in deg/s per g of vibration
 _IDLE_HZ = 20.0
-_ENGINE_CYCLES_PER_M = 3.7  # 20 Hz at idle, 75 Hz at 15 m/s
+_ENGINE_CYCLES_PER_M = 3.7  # additional cycles, which make 75 Hz at 15 m/s
 _ENGINE_SHARE = 0.5  # the engine's share of vibration_g
 
 
 class Segment:
-    """A part of the ride in which lean, speed, slope, sway and engine change smoothly to new values (None: no
-    change)."""
+    """A part of the ride, in which lean, speed, slope, sway and engine change smoothly to new values.
+
+    A value of None stays unchanged.
+    """
 
     def __init__(self, phase, seconds, lean_deg=None, speed_mps=None, slope_deg=None, sway_deg=None, engine=None):
         self.phase = phase
@@ -42,7 +45,10 @@ class Segment:
 
 
 def kickstand(seconds, lean_deg=KICKSTAND_DEG, slope_deg=None):
-    """Lean the bike onto its kickstand and leave it there, engine off. lean_deg > 0: the kickstand is on the right."""
+    """Lean the bike onto its kickstand and leave it there, with the engine off.
+
+    lean_deg: lean on the kickstand, positive if the kickstand is on the right.
+    """
     return (
         Segment("moving", MOVE_S, lean_deg, 0.0, slope_deg, 0.0, 0.0),
         Segment("kickstand", seconds),
@@ -50,7 +56,7 @@ def kickstand(seconds, lean_deg=KICKSTAND_DEG, slope_deg=None):
 
 
 def upright(seconds, lean_deg=0.0, slope_deg=None):
-    """Bring the bike upright, where the rider holds it, engine off. lean_deg: error of the upright pose."""
+    """Bring the bike upright, where the rider holds it, with the engine off. lean_deg: error of the upright pose."""
     return (
         Segment("moving", MOVE_S, lean_deg, 0.0, slope_deg, STANDING_SWAY_DEG, 0.0),
         Segment("upright", seconds),
@@ -68,7 +74,7 @@ def straight(seconds, slope_deg=None):
 
 
 def turn(lean_deg, seconds, roll_s=1.5):
-    """Roll to lean_deg within roll_s, hold it for seconds (phase "held turn"), roll back within roll_s."""
+    """Roll to lean_deg within roll_s, hold this lean for `seconds`, and roll back within roll_s."""
     return (
         Segment("roll in", roll_s, lean_deg),
         Segment("held turn", seconds),
@@ -88,7 +94,10 @@ def brake(speed_mps, seconds):
 
 
 def _glide(start, end, u, seconds):
-    """(value, derivative per second) at 0 <= u <= 1 of a change whose first two derivatives have no jumps."""
+    """Compute a smooth change from start to end, at 0 <= u <= 1. Its first two derivatives have no jumps.
+
+    Returns the value and its derivative per second.
+    """
     change = end - start
     if change == 0.0:
         return start, 0.0
@@ -97,10 +106,13 @@ def _glide(start, end, u, seconds):
 
 
 def yaw_rate_in_balance(lean, lift_mps2, speed_mps):
-    """Yaw rate about the road's normal, rad/s, that balances a lean (rad, > 0 to the right): negative in a right turn.
-    lift_mps2: specific force perpendicular to the road, m/s2.
+    """Return the yaw rate that balances a lean, in rad/s about the road's normal. It is negative in a right turn.
 
     Below RIDING_MPS the feet help to balance, so the yaw rate is smaller. Below WALKING_MPS it is 0.
+
+    lean: Lean in rad, positive to the right.
+    lift_mps2: Specific force perpendicular to the road.
+    speed_mps: Speed.
     """
     if speed_mps <= WALKING_MPS:
         return 0.0
@@ -111,11 +123,12 @@ def yaw_rate_in_balance(lean, lift_mps2, speed_mps):
 
 
 def body_motion(lean, lean_rate, speed, acceleration, yaw_rate, slope=0.0, slope_rate=0.0):
-    """Specific force along the bike's own axes (left, up, forward) in g, and rates about them in deg/s.
+    """Compute what a perfect sensor measures in the bike's own axes.
 
-    Angles in rad, rates in rad/s, speed in m/s, acceleration in m/s2 along the road.
+    The arguments are angles in rad, rates in rad/s, the speed in m/s, and the acceleration along the road in m/s2.
+    Returns six numbers: specific force along left, up, forward in g, then the rates about these axes in deg/s.
     """
-    # In the road's axes: forward along the road, left level, up perpendicular to both.
+    # First compute in the road's axes: forward is along the road, left is level, up is perpendicular to both
     left = speed * yaw_rate * cos(slope)
     up = STANDARD_GRAVITY * cos(slope) + speed * slope_rate
     forward = acceleration + STANDARD_GRAVITY * sin(slope)
@@ -134,10 +147,11 @@ def body_motion(lean, lean_rate, speed, acceleration, yaw_rate, slope=0.0, slope
 
 
 class Ride:
-    """A scripted ride. segments: from the functions above, in order from t = 0. The ride starts with the values of the
-    first segment.
+    """A scripted ride. It starts with the values of its first segment.
 
-    vibration_g: rms of road and engine together along the up axis at 10 m/s or more, before the chip's filter.
+    segments: Results of the functions above, in order from t = 0.
+    vibration_g: Vibration of road and engine together along the up axis at 10 m/s or more, rms, before the chip's
+        filter.
     """
 
     def __init__(self, segments, vibration_g=0.05):
@@ -160,7 +174,7 @@ class Ride:
         self._at = 0
 
     def _find(self, t_s):
-        """The segment at t_s. Before the start this is the first one, after the end the last one."""
+        """Return the segment at t_s. Before the start this is the first segment, after the end the last."""
         i = self._at
         while i > 0 and t_s < self._segments[i][0]:
             i -= 1
@@ -170,8 +184,11 @@ class Ride:
         return self._segments[i]
 
     def state(self, t_s):
-        """(phase, lean, lean rate, speed, acceleration, yaw rate, slope, slope rate, distance, engine 0 to 1), in rad,
-        m and s."""
+        """Return the state at t_s, in rad, m and s.
+
+        It is (phase, lean, lean rate, speed, acceleration, yaw rate, slope, slope rate, distance, engine). The engine
+        is 0 (off) to 1 (running).
+        """
         start, segment, before, after, distance = self._find(t_s)
         seconds = segment.seconds
         u = min(1.0, max(0.0, (t_s - start) / seconds)) if seconds else 1.0
@@ -186,7 +203,7 @@ class Ride:
             lean_rate += share * (sway_rate * sin(angle) + sway * 2.0 * pi * hz * cos(angle))
         lean, lean_rate = radians(lean), radians(lean_rate)
         slope, slope_rate = radians(slope), radians(slope_rate)
-        # the integral of the glide: u^6 - 3 u^5 + 2.5 u^4
+        # The distance needs the integral of _glide(), which is u^6 - 3 u^5 + 2.5 u^4
         glided = u * u * u * u * (2.5 + u * (u - 3.0))
         distance += seconds * (before[1] * u + (after[1] - before[1]) * glided)
         if t_s > self.seconds:
@@ -196,12 +213,15 @@ class Ride:
         return segment.phase, lean, lean_rate, speed, acceleration, yaw, slope, slope_rate, distance, engine
 
     def truth(self, t_s):
-        """(lean_deg, speed_mps, yaw_rate_dps, phase)"""
+        """Return (lean_deg, speed_mps, yaw_rate_dps, phase) at t_s."""
         state = self.state(t_s)
         return degrees(state[1]), state[3], degrees(state[5]), state[0]
 
     def motion(self, t_s):
-        """Specific force in g (left, up, forward) and rates in deg/s about these axes, with vibration."""
+        """Return what a perfect sensor measures at t_s, with vibration.
+
+        These are six numbers: specific force along left, up, forward in g, then the rates about these axes in deg/s.
+        """
         state = self.state(t_s)
         speed, distance, engine = state[3], state[8], state[9]
         return shaken(body_motion(*state[1:8]), t_s, self.vibration_g, speed, distance, engine)
@@ -213,7 +233,7 @@ def shaken(motion, t_s, vibration_g, speed_mps, distance_m, engine):
     firing = vibration_g * engine * _ENGINE_SHARE
     if road == 0.0 and firing == 0.0:
         return motion
-    peak = sqrt(2.0 / len(_ROAD_HZ))  # amplitude of each of the equal sines that add up to an rms of 1
+    peak = sqrt(2.0 / len(_ROAD_HZ))  # amplitude of each sine wave. Their sum has an rms of 1
     turns = 2.0 * pi * (_IDLE_HZ * t_s + _ENGINE_CYCLES_PER_M * distance_m)
     sums = []
     for axis in range(6):

@@ -1,27 +1,27 @@
-"""Simulates the readings of an MPU6050 with factory errors, mounted at any angle, for a given motion.
+"""Simulates the readings of an MPU6050 with factory errors, mounted at any angle, during a motion.
 
-Plain Python for CPython and MicroPython. Random numbers depend only on the seed and the time, not on earlier readings.
-So CPython and MicroPython get the same reading at the same time.
+This is plain Python for CPython and MicroPython. Random numbers depend only on the seed and the time, not on earlier
+readings. So CPython and MicroPython get the same reading at the same time.
 
     world = Sensor(seed=3).world(ride.motion)
-    world(20.0)         # (fx, fy, fz, wx, wy, wz, temp_c): g and deg/s in the sensor's axes, errors included
+    world(20.0)         # (fx, fy, fz, wx, wy, wz, temp_c) in g, deg/s and C, with errors, in the sensor's axes
 """
 
 from math import atan2, cos, degrees, pi, sin, sqrt
 
 # Tolerances, data sheet PS-MPU-6000A rev 3.4, sections 6.1 and 6.2
-MAX_OFFSET_G = (0.05, 0.05, 0.08)  # bias of the accelerometer along x, y, z
+MAX_OFFSET_G = (0.05, 0.05, 0.08)  # offset of the accelerometer along x, y, z
 MAX_SCALE_ERROR = 0.03  # scale error of accelerometer and gyro
 MAX_GYRO_BIAS_DPS = 20.0
-ACCEL_NOISE_G = 0.0033  # rms: 400 ug/sqrt(Hz) behind the 44 Hz low-pass
-GYRO_NOISE_DPS = 0.041  # rms: 0.005 deg/s/sqrt(Hz) behind the 42 Hz low-pass
+ACCEL_NOISE_G = 0.0033  # rms noise after the low-pass of 44 Hz, from 400 ug/sqrt(Hz)
+GYRO_NOISE_DPS = 0.041  # rms noise after the low-pass of 42 Hz, from 0.005 deg/s/sqrt(Hz)
 
 UNTURNED = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-_NOISE_STEP_S = 0.0001  # the noise is constant for this time
+_NOISE_STEP_S = 0.0001  # the noise is constant during this time
 
 
 def scrambled(number):
-    """The 32-bit hash of an integer: the only source of random numbers here."""
+    """Return a 32-bit hash of an integer. This module has no other source of random numbers."""
     number = (number ^ (number >> 16)) & 0xFFFFFFFF
     number = (number * 0x45D9F3B) & 0xFFFFFFFF
     number ^= number >> 16
@@ -30,7 +30,10 @@ def scrambled(number):
 
 
 def normal(number):
-    """A nearly normal number of mean 0 and rms 1 from a 32-bit hash: the sum of its four bytes."""
+    """Compute a random number from a 32-bit hash, as the sum of its four bytes.
+
+    Its distribution is nearly normal, with the mean 0 and the rms 1.
+    """
     total = (number & 255) + (number >> 8 & 255) + (number >> 16 & 255) + (number >> 24)
     return (total - 510) / 147.8
 
@@ -48,7 +51,10 @@ class Chance:
 
 
 def random_mounting(seed):
-    """Vehicle from sensor (9, rows left, up, forward); every rotation is equally likely (K. Shoemake, 1992)."""
+    """Return a random rotation from sensor to vehicle axes, as 9 numbers in the rows left, up, forward.
+
+    Every rotation is equally likely (K. Shoemake, 1992).
+    """
     chance = Chance(seed)
     u = chance.uniform(0.0, 1.0)
     a, b = chance.uniform(0.0, 2.0 * pi), chance.uniform(0.0, 2.0 * pi)
@@ -62,12 +68,15 @@ def random_mounting(seed):
 
 
 class Sensor:
-    """The errors and the mounting of one sensor. Without a seed its only error is noise, and its axes are the
-    vehicle's.
+    """The errors and the mounting of one sensor.
 
-    reading = scale * true + offset for the accelerometer, scale * true + bias for the gyro, each with noise.
-    share: factor on the data sheet's limits of offsets, scale errors and biases. noise: factor on the data sheet's
-    noise.
+    A reading of the accelerometer is scale * true + offset + noise. A reading of the gyro is scale * true + bias +
+    noise. Without a seed the only error is noise, and the sensor's axes are the vehicle's.
+
+    seed: Seed of the errors and of the mounting, or None.
+    mounting: Rotation from sensor to vehicle axes, as in random_mounting(). None for the default.
+    share: Factor on the data sheet's limits of offsets, scale errors and biases.
+    noise: Factor on the data sheet's noise.
     """
 
     def __init__(self, seed=None, mounting=None, share=1.0, noise=1.0):
@@ -90,12 +99,15 @@ class Sensor:
             self.gyro_scale = tuple([1.0 + chance.uniform(-error, error) for _ in range(3)])
 
     def read(self, motion, t_s):
-        """The seven numbers of world() for a motion: left, up, forward in g, and the rates about them in deg/s."""
+        """Return the reading at the time t_s, the seven numbers of world().
+
+        motion: true specific force along left, up, forward in g, and rates about these axes in deg/s.
+        """
         m = self.vehicle_from_sensor
         left, up, forward, w_left, w_up, w_forward = motion
         instant = self._seed + int(t_s / _NOISE_STEP_S + 0.5) * 6
         values = []
-        for i in range(3):  # the transpose: sensor from vehicle
+        for i in range(3):  # the transposed matrix rotates from vehicle to sensor axes
             true = m[i] * left + m[3 + i] * up + m[6 + i] * forward
             noise = self.accel_noise_g * normal(scrambled(instant + i))
             values.append(self.accel_scale[i] * true + self.accel_offset_g[i] + noise)
@@ -107,12 +119,12 @@ class Sensor:
         return tuple(values)
 
     def world(self, motion):
-        """Returns the function world(t_s) for the simulated board. motion: a function of t_s, such as Ride.motion."""
+        """Return the function world(t_s) for the simulated board. motion: function of t_s, such as Ride.motion."""
         return lambda t_s: self.read(motion(t_s), t_s)
 
 
 def resting(sensor, up):
-    """Returns the function world(t_s) of a sensor at rest. up: the vector up in the sensor's axes, of any length."""
+    """Return the function world(t_s) of a sensor at rest. up: vertical vector of any length, in the sensor's axes."""
     m = sensor.vehicle_from_sensor
     size = sqrt(up[0] * up[0] + up[1] * up[1] + up[2] * up[2])
     force = [(m[3 * i] * up[0] + m[3 * i + 1] * up[1] + m[3 * i + 2] * up[2]) / size for i in range(3)]
@@ -121,8 +133,13 @@ def resting(sensor, up):
 
 
 def turning(sensor, before, after, begin_s, end_s):
-    """Returns the function world(t_s) of a sensor that a hand turns from one pose to the next by the shortest rotation,
-    slowly at both ends. before, after: vectors up in the sensor's axes, of any length."""
+    """Return the function world(t_s) of a sensor that a hand turns from one pose to the next.
+
+    The hand takes the shortest rotation, and turns slowly at both ends.
+
+    before, after: Vertical vectors of any length in the sensor's axes, in the two poses.
+    begin_s, end_s: Times at which the turn begins and ends.
+    """
     m = sensor.vehicle_from_sensor
     a, b = _unit(before), _unit(after)
     n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
@@ -140,7 +157,7 @@ def turning(sensor, before, after, begin_s, end_s):
         at = angle * u * u * u * (10.0 + u * (6.0 * u - 15.0))
         rate = angle * 30.0 * u * u * (1.0 - u) * (1.0 - u) / (end_s - begin_s)
         up = [cos(at) * a[i] + sin(at) * across[i] for i in range(3)]
-        turn = [-degrees(rate) * n[i] for i in range(3)]  # in the sensor's axes `up` turns the other way
+        turn = [-degrees(rate) * n[i] for i in range(3)]  # negative, because `up` turns against the sensor's rotation
         return tuple(
             [m[3 * i] * v[0] + m[3 * i + 1] * v[1] + m[3 * i + 2] * v[2] for v in (up, turn) for i in range(3)]
         )
