@@ -1,10 +1,14 @@
 """Checks in the bends of a motorcycle ride that the angular rates of a log are in deg/s and have the right sign.
 
-In a bend, the rate of a leaning bike about its own left axis is the yaw rate times the sine of the lean. All three are
-computed from the log's rates. If these are in rad/s, they are 57 times too small: the product is then 57 x 57 times too
-small, but the rate about left only 57 times. If all rates have the opposite sign, or all axes are left-handed, the
-product keeps its sign, but the rate about left changes its sign. Logs of a car, which does not lean, and of a parked
-vehicle are never judged.
+In a bend, the rate of a leaning bike about its own left axis is the yaw rate times the sine of the lean. The log's
+rates give the rate about left, the yaw rate and the lean. This shows two mistakes:
+
+* Rates in rad/s are 57 times too small. The product is then 57 x 57 times too small, but the rate about left only 57
+  times.
+* All rates have the opposite sign, or all axes are left-handed. The rate about left then has the opposite sign, but the
+  product keeps its sign.
+
+Logs of a parked vehicle are never judged, nor logs of a car, because it does not lean.
 """
 
 from dataclasses import dataclass
@@ -16,22 +20,26 @@ from ..signals import Array
 from ..signals.leaning import LIKENESS, WINDOW_S, leaning_of, leans, speed_in_radians, unrest
 from .cells import CELL_S, LogCells
 
-KEPT_S, RIDING_S = 1800.0, 15.0  # the last half hour is judged; it needs this much riding
-MOVES_S, MOVES = 1.6, 0.1  # riding: the deviation of the rates over MOVES_S is over MOVES times its 95th percentile
+KEPT_S, RIDING_S = 1800.0, 15.0  # the last KEPT_S are judged if they have RIDING_S of riding
+# The bike is riding if the standard deviation of its rates over MOVES_S is over MOVES times its 95th percentile.
+MOVES_S, MOVES = 1.6, 0.1
 # The gyro has the opposite sign if Leaning.share is under AGAINST and differs from 0 by over SURE standard deviations.
-# With the opposite sign the share is -1.6 to -1.0
+# With the opposite sign, the share was -1.6 to -1.0.
 AGAINST, SURE = -0.5, 5.0
-# The calmest seconds are the share CALMEST of all seconds, at least LEAST. CALM_G scales their standard deviation of
-# the force
+# The calmest seconds are the share CALMEST of all seconds, but at least LEAST seconds. A standard deviation CALM_G of
+# the force counts as much as the limit of the rates.
 CALMEST, LEAST, CALM_G = 0.2, 3, 0.02
-# The bias is known if AGREE of these seconds, or else of the FEW calmest, are within KNOWN_DPS. In a ride that is
-# mostly one long, steady bend, the FEW calmest seconds are a standstill
+# The gyro's bias is known if the share AGREE of the calmest seconds is within KNOWN_DPS. Otherwise the FEW calmest
+# seconds are tried. In a ride that is mostly one long, steady bend, they are a standstill.
 AGREE, FEW, KNOWN_DPS = 0.8, 5, 3.0
 
 
 @dataclass(frozen=True)
 class RatesInRadians(WrongAxes):
-    """As deg/s, the rates would mean a very slow bike. speed_mps: the speed that they would mean."""
+    """The rates seem to be in rad/s.
+
+    speed_mps: the impossible speed in bends that these rates would mean in deg/s.
+    """
 
     speed_mps: float
 
@@ -53,8 +61,10 @@ class LeftHanded(WrongAxes):
 
 
 def bends(cells: LogCells) -> Message | None:
-    """A notice if the rates seem to be in rad/s or to have the opposite sign; None if they seem right, or if the log
-    does not show it."""
+    """Return a notice if the rates seem to be in rad/s, or to have the opposite sign.
+
+    Returns None if the rates seem right, or if the log is not enough to judge them.
+    """
     force, rate, _ = cells.means(round(WINDOW_S / CELL_S))
     there = np.flatnonzero(~np.isnan(force[:, 0]))[-round(KEPT_S / WINDOW_S) :]
     force, rate = force[there], np.radians(rate[there])
@@ -79,7 +89,10 @@ def bends(cells: LogCells) -> Message | None:
 
 
 def calm_bias(calm: Array) -> Array | None:
-    """(3) deg/s: the gyro's bias, from calm_rates() in deg/s; None if these rates differ too much."""
+    """Return the gyro's bias, shape (3), in deg/s; None if the rates differ too much.
+
+    calm: the result of calm_rates(), in deg/s.
+    """
     for some in (calm, calm[:FEW]):
         bias = np.median(some, axis=0)
         if np.mean(np.linalg.norm(some - bias, axis=1) < KNOWN_DPS) > AGREE:
@@ -88,7 +101,11 @@ def calm_bias(calm: Array) -> Array | None:
 
 
 def calm_rates(force: Array, rate: Array, calm_rate: float) -> Array:
-    """The mean rates (k, 3) of the calmest of m seconds, calmest first. force, rate (m, cells, 3). calm_rate: the
-    standard deviation of the rates that weighs as much as a standard deviation CALM_G of the force."""
+    """Return the mean rates in the k calmest of m seconds, the calmest second first.
+
+    force, rate: shape (m, cells, 3).
+    calm_rate: the standard deviation of the rates that counts as much as a standard deviation CALM_G of the force.
+    Returns shape (k, 3).
+    """
     changes = np.sum(np.std(force, axis=1), axis=1) / CALM_G + np.sum(np.std(rate, axis=1), axis=1) / calm_rate
     return np.mean(rate, axis=1)[np.argsort(changes)[: max(LEAST, round(CALMEST * len(changes)))]]

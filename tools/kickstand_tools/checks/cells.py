@@ -7,16 +7,22 @@ import numpy as np
 
 from ..signals import Array, Bools, Cells, EvenCells, cell_numbers, runs, stretches
 
-CELL_S = 0.1  # length of a cell: faster changes are vibration
-KEPT = 36_000  # number of cells with samples that are kept: an hour
-GAP_CELLS = 3  # this many successive cells without samples are unknown; fewer are interpolated
+CELL_S = 0.1  # length of a cell; faster changes are vibration
+KEPT = 36_000  # number of cells with samples that are kept: one hour
+GAP_CELLS = 3  # number of successive cells without samples that make a gap; fewer cells are interpolated
 
 
 @dataclass
 class LogCells:
-    """n successive cells of CELL_S. first_s: the time at which the first begins. force (n, 3, g), rate (n, 3, deg/s):
-    means, in the sensor's axes; 0 where known (n) is False. speeds (m, 2: s, m/s), places (m, 3: s, degrees): the first
-    value of each second that has one."""
+    """n successive cells of CELL_S. Vectors are along the sensor's axes.
+
+    even: the cells as averaged.
+    force: mean forces, shape (n, 3), in g; 0 where unknown.
+    rate: mean rates, shape (n, 3), in deg/s; 0 where unknown.
+    known: False in gaps, shape (n).
+    speeds: the first speed of each second, shape (m, 2): time in s, speed in m/s.
+    places: the first position of each second, shape (m, 3): time in s, latitude and longitude in degrees.
+    """
 
     even: EvenCells
     force: Array
@@ -30,8 +36,12 @@ class LogCells:
         return self.even.first * CELL_S
 
     def integrals(self, at_s: Array) -> Array:
-        """The integrals (k, 7) up to the times at_s (k): force (3, g s), rate (3, degrees), duration of known cells
-        (s)."""
+        """Integrate from the first cell to each of k times.
+
+        at_s: the times, shape (k), in s.
+        Returns shape (k, 7): the integral of the force (3 columns, g s), the integral of the rate (3 columns, degrees),
+        and the duration of known cells (s).
+        """
         edges_s = self.first_s + np.arange(len(self.known) + 1) * CELL_S
         return np.column_stack([np.interp(at_s, edges_s, sums) for sums in self._sums])
 
@@ -43,28 +53,40 @@ class LogCells:
         return sums
 
     def means(self, over: int) -> tuple[Array, Array, Array]:
-        """Mean force (k, 3), mean rate (k, 3) and first speed (k, m/s) of each group of `over` cells; NaN for
-        missing values."""
+        """Average groups of `over` cells. Missing values are NaN.
+
+        Returns:
+            force: mean force of each group, shape (k, 3), in g.
+            rate: mean rate of each group, shape (k, 3), in deg/s.
+            speed: first speed in each group, shape (k), in m/s.
+        """
         merged = self.even.merged(over)
         return merged.means[:, :3], merged.means[:, 3:], merged.latest[:, 1]
 
 
 class CellTable:
-    """Collects LogCells. add() takes a log's samples block by block."""
+    """Averages the samples of a log to LogCells. Call add() block by block."""
 
     def __init__(self) -> None:
         self._cells = Cells(CELL_S, KEPT)
 
     def add(self, time_s: Array, force: Array, rate: Array, speed_mps: Array, *place: Array) -> None:
-        """Take n samples. force (n, 3, g), rate (n, 3, deg/s): in the sensor's axes. speed_mps (n) and, if the log
-        has positions, latitude and longitude (n, degrees): NaN for no new value."""
+        """Add n samples.
+
+        time_s: shape (n), in s.
+        force: along the sensor's axes, shape (n, 3), in g.
+        rate: along the sensor's axes, shape (n, 3), in deg/s.
+        speed_mps: shape (n); NaN for no new value.
+        place: latitude and longitude, each of shape (n), in degrees; NaN for no new value. Leave both out if the log
+            has no positions.
+        """
         lat, lon = place or np.full((2, len(time_s)), np.nan)
         speed_s, place_s = (np.where(np.isnan(values), np.nan, time_s) for values in (speed_mps, lat))
         latest = np.column_stack((speed_s, speed_mps, place_s, lat, lon))
         self._cells.add(time_s, np.column_stack((force, rate)), latest)
 
     def cells(self) -> LogCells | None:
-        """The cells so far. None without cells, or if gaps make their time too long for a ride."""
+        """Return the cells so far; None without cells, or if gaps make the log too long for a ride."""
         even = self._cells.evenly(10 * KEPT)
         if even is None:
             return None
@@ -85,6 +107,6 @@ class CellTable:
 
 
 def _once_a_second(values: Array) -> Array:
-    """The first known row of each second. values: the first column is the time."""
+    """Return the first row of each second without a NaN. The first column of `values` is the time."""
     values = values[np.all(np.isfinite(values), axis=1)]
     return values[runs(cell_numbers(values[:, 0], 1.0))] if len(values) else values

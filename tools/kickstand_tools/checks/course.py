@@ -1,8 +1,8 @@
-"""Checks the sign of a log's accelerations by its track: the gyro's rate about up and the rate of the course must have
-the same sign.
+"""Checks the sign of a log's accelerations by its track.
 
-If only the accelerations have the opposite sign, the log is an exact mirror image of the ride, with left and right
-exchanged. The motion of the sensor cannot show this, but the positions can.
+The gyro's rate about up and the rate at which the course changes must have the same sign. If only the accelerations
+have the opposite sign, the log is an exact mirror image of the ride, with left and right exchanged. The motion of the
+sensor cannot show this, but the positions can.
 """
 
 import numpy as np
@@ -10,18 +10,21 @@ import numpy as np
 from ..signals import Array, best_lag, distance_m
 from .cells import CellTable, LogCells
 
-SLOWEST_MPS = 3.0  # at a lower speed, positions do not show the course
-TURNING_DPS = 4.0  # seconds count if the course changes faster than this
-FASTEST_DPS = 90.0  # if the course changes faster, the positions jumped
-ENOUGH = 8  # this many seconds must count
+SLOWEST_MPS = 3.0  # least speed at which positions show the course
+TURNING_DPS = 4.0  # a second counts if the course changes faster than this
+FASTEST_DPS = 90.0  # if the course changes faster than this, the positions have jumped
+ENOUGH = 8  # least number of seconds that count
 CLEAR = 0.6  # least correlation of course and gyro, of either sign
-LAGS_S = np.arange(0.0, 2.1, 0.25)  # tried delays of the positions
+LAGS_S = np.arange(0.0, 2.1, 0.25)  # delays of the positions that are tried
 LONGEST_S = 2.5  # longest time between two positions
 
 
 def course_agrees(cells: LogCells) -> bool | None:
-    """True if the rate about up and the rate of the course have the same sign, False if they have opposite signs. None
-    if there are too few bends to both sides."""
+    """Compare the signs of the rate about up and of the rate at which the course changes.
+
+    Returns True if the signs are equal, and False if they are opposite. Returns None if the log has too few bends to
+    both sides.
+    """
     if len(cells.places) < ENOUGH:
         return None
     at_s, lat, lon = cells.places.T
@@ -45,7 +48,12 @@ def course_agrees(cells: LogCells) -> bool | None:
 
 
 def log_agrees(time_s: Array, accel_g: Array, gyro_dps: Array, lat_deg: Array, lon_deg: Array) -> bool | None:
-    """course_agrees() for n samples. accel_g, gyro_dps (n, 3); lat_deg, lon_deg (n): NaN for no new position."""
+    """Call course_agrees() for n samples.
+
+    time_s: shape (n).
+    accel_g, gyro_dps: shape (n, 3).
+    lat_deg, lon_deg: shape (n); NaN for no new position.
+    """
     table = CellTable()
     table.add(time_s, accel_g, gyro_dps, np.full(len(time_s), np.nan), lat_deg, lon_deg)
     cells = table.cells()

@@ -1,15 +1,17 @@
-"""Checks that the angular rates of a log fit its accelerations: if the sensor turns, gravity turns in the sensor's
-axes.
+"""Checks that the angular rates of a log fit its accelerations.
 
-In a correct log, the axis that points up reads +1 g at rest, and axes and rates are right-handed. The direction u of
-gravity then turns in the sensor's axes by du/dt = -rate x u. This equation fails for left-handed axes, for a gyro of
-the opposite sign, and for axes exchanged or reversed in only one of the sensors. Left-handed axes in both sensors look
-like a gyro of the opposite sign, because a rate is an axial vector. Accelerations of the opposite sign are the mirror
-image of another ride, so no motion shows them.
+If the sensor turns, gravity turns in the sensor's axes. In a correct log, the axis that points up reads +1 g at rest,
+and axes and rates are right-handed. The direction u of gravity then turns in the sensor's axes by du/dt = -rate x u.
+
+This equation shows left-handed axes, a gyro of the opposite sign, and axes exchanged or reversed in only one of the
+sensors. Left-handed axes in both sensors look like a gyro of the opposite sign, because a rate is an axial vector. A
+log in which all accelerations have the opposite sign is the mirror image of another ride, so the motion cannot show
+this mistake.
 
 The force in a ride is hardly ever gravity alone: in a balanced bend it keeps its direction along the bike. Therefore
 each window is judged as a whole (see turning.py). The hypotheses are the 48 signed permutations of the gyro's axes,
-here called exchanges. The best exchange is reported if it explains the forces clearly better than the axes as they are.
+called exchanges in this module. The best exchange is reported if it explains the forces clearly better than the log's
+own axes.
 """
 
 import itertools
@@ -24,25 +26,27 @@ from .bends import KNOWN_DPS, LeftHanded, calm_bias, calm_rates
 from .cells import CELL_S, LogCells
 from .turning import Turning
 
-WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # short windows are used if the log has no stretch for a long one
+WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # short windows are used if the log has no long window without a gap
 MOST_WINDOWS = 16  # number of judged windows, those with the largest rates
-CALM_DPS = 2.0  # scales the standard deviation of the rates in calm seconds: see calm_rates()
-TRIED = 6  # number of exchanges that are fitted, those that are best without velocity and bias
+CALM_DPS = 2.0  # the argument calm_rate of calm_rates(), in deg/s
+TRIED = 6  # number of exchanges that are fitted; they are the best ones before velocity and bias are fitted
 
-# The factor by which an exchange must reduce the mean square (g2) of the residual force. In correct logs, simulated and
-# recorded, no exchange reaches more than 1.1. If the gyro has the opposite sign, the factor is 1.7 to 470.
+# An exchange must reduce the mean square of the residual force (g2) by this factor. In correct logs, simulated and
+# recorded, the factor is at most 1.1 for every exchange. If the gyro has the opposite sign, the factor is 1.7 to 470.
 CLEARLY = 2.0
-# the factor LIKELY is enough if the mean reduction in the windows is over SIGMAS standard errors
+# The factor LIKELY is enough if the mean reduction in the windows is over SIGMAS standard errors.
 LIKELY, SIGMAS = 1.25, 3.0
-FEW_WINDOWS, FEW_CLEARLY = 3, 5.0  # up to FEW_WINDOWS windows need FEW_CLEARLY, and a bias near 0 such as a phone's
-LEAST_G2 = 0.001  # the mean square must fall by this in any case; in a parked vehicle, drift reduces it by under 0.0002
-# Factors on the residual of an exchange. If several fit about equally well, the likeliest mistake wins: first all axes
-# reversed (or none), then some reversed, then axes exchanged
+# With at most FEW_WINDOWS windows, the factor must be FEW_CLEARLY, and the gyro's bias must be near 0, as in a phone.
+FEW_WINDOWS, FEW_CLEARLY = 3, 5.0
+# Least reduction of the mean square, whatever the factor. In a parked vehicle, drift reduces it by under 0.0002.
+LEAST_G2 = 0.001
+# Factors on the residual of an exchange. If several exchanges fit about equally well, the likeliest mistake is chosen.
+# All axes reversed (or none) are more likely than some axes reversed, and these are more likely than exchanged axes.
 PENALTY = 1.0, 1.3, 1.6
 
 
 def _exchanges() -> Array:
-    """(48, 3, 3) signed permutations: the identity first, then all axes reversed."""
+    """Return the signed permutations, shape (48, 3, 3): first the identity, second all axes reversed."""
     found = []
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1.0, -1.0), repeat=3):
@@ -50,13 +54,16 @@ def _exchanges() -> Array:
     return np.array(sorted(found, key=lambda exchange: -abs(np.trace(exchange)) - 0.5 * (np.trace(exchange) == 3.0)))
 
 
-EXCHANGES = _exchanges()  # rate = exchange @ reading of the gyro
+EXCHANGES = _exchanges()  # true rate = exchange @ reading of the gyro
 
 
 @dataclass(frozen=True)
 class RatesMisfit(WrongAxes):
-    """The gyro's axes are not those of the accelerometer. The fields are the rows (3 numbers each) of a signed
-    permutation: multiplied by the rates of the log it gives the rates about x, y and z."""
+    """The gyro's axes are not those of the accelerometer.
+
+    The fields are the rows of a signed permutation, 3 numbers each. This matrix times the rates of the log gives the
+    true rates about x, y and z.
+    """
 
     about_x: tuple[int, ...]
     about_y: tuple[int, ...]
@@ -67,8 +74,8 @@ class RatesMisfit(WrongAxes):
     def sentence(self) -> str:
         """See Message.
 
-        Reversing one axis of the accelerometer has the same effect as reversing the two others in the gyro, because the
-        check cannot see the sign of all accelerations. Exchanging two axes also has the same effect in either sensor.
+        The check cannot see the sign of all accelerations. So one reversed axis of the accelerometer looks like the
+        other two axes reversed in the gyro. Two exchanged axes look the same in either sensor.
         """
         exchange = self.about_x, self.about_y, self.about_z
         kept = [axis for k, axis in enumerate(AXES) if exchange[k][k] == 1]
@@ -94,7 +101,10 @@ class RatesMisfit(WrongAxes):
 
 
 def handedness(cells: LogCells) -> Message | None:
-    """A notice that says what is wrong with the axes; None if they seem right, or if the log does not show it."""
+    """Return a notice that says what is wrong with the axes.
+
+    Returns None if the axes seem right, or if the log is not enough to judge them.
+    """
     turning = liveliest(cells)
     found = None if turning is None else better_exchange(turning)
     if found is None:
@@ -105,9 +115,9 @@ def handedness(cells: LogCells) -> Message | None:
 
 
 def better_exchange(turning: Turning) -> int | None:
-    """The index of an exchange in EXCHANGES that fits clearly better than the first; None without such an exchange."""
+    """Return the index in EXCHANGES of an exchange that fits clearly better than the identity; None without one."""
     near = np.argsort(turning.rough(EXCHANGES))[:TRIED]
-    # always fit the identity and the likeliest mistake
+    # Always fit the identity, and all axes reversed, which is the likeliest mistake.
     places = {0, 1, *(int(k) for k in near)}
     left = {k: turning.unexplained(EXCHANGES[k]) for k in places}
     best = min(left, key=lambda k: float(np.mean(left[k])) * _penalty(EXCHANGES[k]))
@@ -123,7 +133,7 @@ def better_exchange(turning: Turning) -> int | None:
 
 
 def liveliest(cells: LogCells) -> Turning | None:
-    """The windows of the log with the largest rates; None without a window, or if the gyro's bias is unknown."""
+    """Return the windows of the log with the largest rates; None without a window, or if the gyro's bias is unknown."""
     places = _windows(cells.known, WINDOW_S)
     places = places if len(places) else _windows(cells.known, SHORT_WINDOW_S)
     bias = _bias(cells)
@@ -138,15 +148,22 @@ def liveliest(cells: LogCells) -> Turning | None:
 
 
 def _windows(known: Bools, seconds: float) -> Ints:
-    """The indices (windows, cells) of the cells of each window. A window has this many seconds and no unknown cell."""
+    """Find the windows of this many seconds without an unknown cell.
+
+    Returns the indices of the cells of each window, shape (windows, cells).
+    """
     length = round(seconds / CELL_S)
     starts = [k for begin, end in stretches(known) for k in range(begin, end - length + 1, length)]
     return np.array(starts, dtype=int).reshape(-1, 1) + np.arange(length)
 
 
 def _bias(cells: LogCells) -> Array | None:
-    """(3) deg/s: the gyro's bias, its mean reading in the calmest seconds, which are mostly straight. If the
-    rates of these seconds differ: 0 if the log's mean rate allows it (a phone subtracts its bias), else None."""
+    """Return the gyro's bias, shape (3), in deg/s; None if it is unknown.
+
+    It is the median of the gyro's readings in the calmest seconds, in which the bike mostly rides straight. If their
+    rates differ too much, the bias is 0, because a phone subtracts its bias. If the log's mean rate is too large for a
+    bias of 0, the bias is unknown.
+    """
     seconds = _windows(cells.known, 1.0)
     if not len(seconds):
         return None

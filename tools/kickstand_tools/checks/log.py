@@ -17,7 +17,7 @@ from .handedness import handedness
 from .units import speed_unit
 
 _LIMITS = np.array(3 * [MOST_G] + [np.inf] + 3 * [MOST_DPS])  # limits of readings; a log made in Python may exceed them
-_AGAIN_S = 20.0  # while a log is read, the unit of its speed is checked again after each such period of the log
+_AGAIN_S = 20.0  # period of the log after which the unit of its speed is checked again
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,10 @@ class Mirrored(WrongAxes):
 
 
 class Checks:
-    """Collects a log, part by part, with add(); remarks() then judges all of it. name: the log's, for messages."""
+    """Checks a log. Call add() for each part of it, then remarks().
+
+    name: the log's name, for messages.
+    """
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -38,8 +41,10 @@ class Checks:
         self._judged_s = 0.0
 
     def add(self, part: Block | Log) -> None:
-        """Take a part of the log without frozen readings. Raises RefusedInput as soon as the speed is
-        certainly not in m/s."""
+        """Add a part of the log without frozen readings.
+
+        Raises RefusedInput as soon as the speed is certainly not in m/s.
+        """
         there = ~np.any(np.abs(part.readings) > _LIMITS, axis=1)
         part = part if np.all(there) else part.part(there)  # a single huge reading would outweigh a whole ride
         readings = part.readings
@@ -49,8 +54,12 @@ class Checks:
             self._judge_speed(self._table.cells())
 
     def remarks(self, axes: bool = True, calibration: CalibrationFile | None = None) -> list[Message]:
-        """The remarks: at most one about the log's axes (only if `axes`), and one if the log contradicts the
-        calibration. Raises RefusedInput if the speed is not in m/s."""
+        """Return at most one remark about the log's axes, and one if the log contradicts the calibration.
+
+        axes: False for no remark about the axes.
+        calibration: None for no remark about the calibration.
+        Raises RefusedInput if the speed is not in m/s.
+        """
         cells = self._table.cells()
         if cells is None:
             return []
@@ -70,7 +79,7 @@ class Checks:
 
 
 def remarks(log: Log, calibration: CalibrationFile | None = None, axes: bool = True) -> list[Message]:
-    """Checks.remarks() for a log in memory. Raises RefusedInput.
+    """Return Checks.remarks() for a log in memory. Raises RefusedInput.
 
     >>> import numpy as np
     >>> from kickstand_tools.api import simulate_ride

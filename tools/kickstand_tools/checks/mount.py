@@ -1,9 +1,11 @@
 """Checks that a calibration fits the mount of a ride. Force, rates and speed show where up and forward are.
 
-Up: on a balanced bike, the force while riding points along the bike's own up axis; in a car it nearly does. Forward:
-braking and speeding up in a straight line change the force along the forward axis, so it correlates with the changes of
-the log's speed. The bends of a motorcycle show forward without a speed: leaning to the right means yawing more to the
-right, so minus the change of the yaw rate correlates with the rate about forward.
+* The force shows up. On a balanced bike, the force while riding points along the bike's own up axis. In a car it nearly
+  does.
+* The speed shows forward. Braking and speeding up in a straight line change the force along the forward axis. So this
+  force correlates with the changes of the log's speed.
+* The bends of a motorcycle show forward without a speed. A bike that leans further to the right also yaws faster to the
+  right. So the rate about forward correlates with minus the change of the yaw rate.
 
 If `calibrate two` got the wrong side of the kickstand, or if two poses were swapped, forward and backward are
 exchanged, and so are left and right. The force alone does not show this, because braking then looks like speeding up.
@@ -21,28 +23,28 @@ from ..common.messages import AT_REST, OPPOSITE_SIGN, Message, Remedy, WrongMoun
 from ..signals import Array, Lag, best_lag, correlation, rotated, rotation_vector
 from .cells import CELL_S, LogCells
 
-MEAN_S = 0.5  # up and the bends are judged by means over this time
+MEAN_S = 0.5  # length of the means by which up and the bends are judged
 UP_DEG, FORWARD_DEG = 15.0, 20.0  # if up or forward differs by more, the calibration belongs to another mount
-# if the two poses were swapped, "up" is the bike's up on the kickstand, which leans by up to this angle
+# If the two poses were swapped, "up" is the up axis of the bike on the kickstand. It then leans by up to this angle.
 LEANED_DEG = 25.0
-BACKWARD_DEG = 150.0  # if forward differs by more, forward and backward are exchanged
-TURNING_DPS, TURNING_S = 5.0, 10.0  # up is judged where the rates are over TURNING_DPS, for at least TURNING_S
-STRAIGHT_DPS = 8.0  # forward is judged by the speed where the rates are lower
+BACKWARD_DEG = 150.0  # if forward differs by more than this, forward and backward are exchanged
+TURNING_DPS, TURNING_S = 5.0, 10.0  # up is judged if the rates are over TURNING_DPS for at least TURNING_S in all
+STRAIGHT_DPS = 8.0  # the speed shows forward where the rates are under this
 SPEEDS, SPEED_MPS = 20, 0.5  # least number of changes of speed from second to second, and their standard deviation
-LATE_S = (0, 1, 2)  # tried delays of the speed
-BENDS, BENDS_DPS = 120, 1.0  # least number of means, and the standard deviation of the changes of their yaw rate
-# Forward is certain above these correlations, by the speed and by the bends. Correct calibrations have over 0.85 and
-# 0.6
+LATE_S = (0, 1, 2)  # delays of the speed that are tried
+BENDS, BENDS_DPS = 120, 1.0  # least number of means, and least standard deviation of the changes of their yaw rate
+# Forward is certain if its correlation is over SURE_SPEED (by the speed) or SURE_BENDS (by the bends). Correct
+# calibrations have over 0.85 and 0.6.
 SURE_SPEED, SURE_BENDS = 0.8, 0.55
-# If the correlation of the force along forward with all changes of speed is lower, forward is certainly reversed. A
-# correct calibration has over 0.8, even on slopes of 12 %
+# Forward is certainly reversed if the force along forward has a lower correlation than this with all changes of speed.
+# A correct calibration has over 0.8, even on slopes of 12 %.
 SURE_REVERSED = -0.6
-UPSIDE_DOWN = 0.87  # cosine of the angle to straight down: within 30 degrees
-ANOTHER_MOUNT_DEG = 10.0  # if two alignments differ by more, they belong to different mounts
+UPSIDE_DOWN = 0.87  # cosine of 30 degrees: an axis closer than this to straight down points down
+ANOTHER_MOUNT_DEG = 10.0  # if two alignments differ by more than this, they belong to different mounts
 
 
-SWAPPED_DEG = 4.0  # an upright pose is hardly ever so far off, but a pose on the kickstand always is
-UPSIDE_DOWN_DEG = 150.0  # an up that is further off may come from accelerations of the opposite sign
+SWAPPED_DEG = 4.0  # an upright pose is hardly ever this far from upright, but a pose on the kickstand always is
+UPSIDE_DOWN_DEG = 150.0  # if up differs by more than this, the accelerations may have the opposite sign
 # The remedies for a motorcycle, and for a car
 AGAIN = Remedy(
     "is it another mount's? Calibrate again: calibrate two, or calibrate ride",
@@ -72,8 +74,12 @@ class UpOff(WrongMount):
 
 @dataclass(frozen=True)
 class ForwardOff(WrongMount):
-    """Forward differs between the calibration and the ride. angle_deg: from the calibration's forward to the ride's, >
-    0 to the left. by: "speed" or "bends"."""
+    """Forward differs between the calibration and the ride.
+
+    angle_deg: angle from the calibration's forward to the ride's forward; positive to the left.
+    by: how forward was found in the ride, "speed" or "bends".
+    car: True for a car, False for a motorcycle.
+    """
 
     angle_deg: float
     by: str
@@ -97,8 +103,12 @@ class ForwardOff(WrongMount):
 
 @dataclass(frozen=True)
 class ForwardExchanged(WrongMount):
-    """Forward and backward are exchanged. side: of the kickstand in the calibration by two poses, "" if unknown.
-    roll_deg: error of up, None if unknown; it shows whether the two poses were swapped."""
+    """Forward and backward are exchanged.
+
+    car: True for a car, False for a motorcycle.
+    side: side of the kickstand in the calibration by two poses; "" if unknown.
+    roll_deg: roll error of up; None if unknown. It shows whether the two poses were swapped.
+    """
 
     car: bool
     side: str
@@ -126,7 +136,10 @@ class ForwardExchanged(WrongMount):
 
 @dataclass(frozen=True)
 class UpsideDown(WrongMount):
-    """The sensor is upside down, or its accelerations have the opposite sign. axis: the axis that points down."""
+    """The sensor is upside down, or its accelerations have the opposite sign.
+
+    axis: the axis that points down.
+    """
 
     axis: str
 
@@ -149,7 +162,10 @@ class AnotherMount(WrongMount):
 
 
 def contradiction(cells: LogCells, calibration: CalibrationFile) -> Message | None:
-    """A notice that says how a log contradicts a calibration. None without a contradiction or an alignment."""
+    """Return a notice that says how a log contradicts a calibration.
+
+    Returns None without a contradiction, or if the calibration is not aligned.
+    """
     if not calibration.aligned:
         return None
     ride = _Ride(cells, calibration)
@@ -168,11 +184,14 @@ def contradiction(cells: LogCells, calibration: CalibrationFile) -> Message | No
 
 
 def of_calibration(found: CalibrationFile, before: CalibrationFile | None = None) -> list[Message]:
-    """Notices about a new alignment `found`, and about the calibration `before` on which it should build.
+    """Return notices about a new alignment.
 
-    upside-down: accelerations of the opposite sign look like a sensor upside down, and no log shows which of the two
-    it is. (A phone's x axis may point down, because a phone can lie on its side.) another-mount: only offset and slope
-    of `before` are used.
+    Accelerations of the opposite sign look like a sensor upside down. A log does not show which of the two it is, so
+    the user is asked. An x axis that points down gives no notice, because a phone can lie on its side.
+
+    found: the calibration with the new alignment.
+    before: the calibration on which it should build. If it belongs to another mount, only its offset and slope are
+        used.
     """
     notices: list[Message] = []
     up = found.vehicle_from_sensor[1]
@@ -192,8 +211,13 @@ class _Ride:
 
     def __init__(self, cells: LogCells, calibration: CalibrationFile) -> None:
         def along(over_s: float) -> tuple[Array, Array, Array]:
-            """Mean force (n, 3, g), mean rate (n, 3, deg/s) minus its median, and first speed (n, m/s) of
-            each over_s."""
+            """Average n stretches of over_s seconds.
+
+            Returns:
+                force: mean force, shape (n, 3), in g.
+                rate: mean rate minus its median over the ride, shape (n, 3), in deg/s.
+                speed: first speed, shape (n), in m/s.
+            """
             accel, gyro, speed = cells.means(round(over_s / CELL_S))
             force, rate = rotated(calibration.vehicle_from_sensor, *calibration.in_sensor(accel, gyro))
             return force, rate - np.nanmedian(rate, axis=0), speed
@@ -203,7 +227,7 @@ class _Ride:
         self._change_g = np.diff(speed) / STANDARD_GRAVITY
 
     def up_deg(self) -> float | None:
-        """The angle between the calibration's up and the ride's; None if there are hardly any bends."""
+        """Return the angle between the calibration's up and the ride's up; None if the ride has hardly any bends."""
         turning = np.linalg.norm(self._rate, axis=1) > TURNING_DPS
         if np.count_nonzero(turning) * MEAN_S < TURNING_S:
             return None
@@ -211,21 +235,28 @@ class _Ride:
         return float(np.degrees(np.arctan2(np.hypot(left, forward), up)))
 
     def forward_by_speed(self) -> float | None:
-        """The angle from the calibration's forward to the ride's, degrees, found from the log's speed. > 0 to the left;
-        None if uncertain."""
+        """Find forward from the changes of the log's speed.
+
+        Returns the angle from the calibration's forward to the ride's forward, in degrees, positive to the left.
+        Returns None if it is uncertain.
+        """
         straight = np.linalg.norm(self._second_rate, axis=1) < STRAIGHT_DPS
         found = self._pushed(np.where(straight[:, None], self._second_force[:, [0, 2]], np.nan))
         return _angle_deg(found.direction) if found and found.value > SURE_SPEED else None
 
     def speed_correlation(self) -> float | None:
-        """Correlation, -1 to 1, of the force along the calibration's forward with the changes of speed. None without
-        enough speeds."""
+        """Correlate the force along the calibration's forward with the changes of speed.
+
+        Returns -1 to 1; None without enough speeds.
+        """
         found = self._pushed(self._second_force[:, 2:])
         return found.value * float(found.direction[0]) if found else None
 
     def _pushed(self, force: Array) -> Lag | None:
-        """The Lag of the changes of speed behind the force (n, k; NaN where it must not be used). None if there are too
-        few changes."""
+        """Find the Lag of the changes of speed behind the force; None if there are too few changes.
+
+        force: shape (n, k); NaN where it must not be used.
+        """
 
         def earlier(by: float) -> tuple[Array, Array] | None:
             change = self._change_g[int(by) :]
@@ -237,7 +268,7 @@ class _Ride:
         return best_lag(LATE_S, earlier, whole=True)
 
     def forward_by_bends(self) -> float | None:
-        """Like forward_by_speed(), but found from the way a motorcycle leans into bends; None if uncertain."""
+        """Find forward from the way a motorcycle leans into bends. For the result see forward_by_speed()."""
         if len(self._rate) < BENDS:
             return None
         turned = _smooth(self._rate[2:, 1] - self._rate[:-2, 1])
@@ -250,7 +281,10 @@ class _Ride:
 
 
 def _angle_deg(direction: Array) -> float:
-    """The angle from forward to a direction (2: left, forward), > 0 to the left."""
+    """Return the angle from forward to a direction, in degrees, positive to the left.
+
+    direction: left and forward component, shape (2).
+    """
     return float(np.degrees(np.arctan2(*direction)))
 
 

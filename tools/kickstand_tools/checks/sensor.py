@@ -1,9 +1,11 @@
 """Finds faults of the sensor: dead axes, and sensors at the end of their range.
 
-Noise changes every reading of a working axis within a second. An axis is dead if it stays the same to the last digit
-while other axes of its sensor change. A rate that stays the same above SATURATED_DPS means that the gyro is at the end
-of its range, so the true rate is unknown. The lean must not be computed from either. If vibration clips the
-accelerometer, the force between the shocks is nearly right, so these readings are used, with a remark.
+* Noise changes the readings of a working axis within a second. An axis is dead if it stays the same to the last digit
+  while other axes of its sensor change. The readings are left out.
+* If a rate above SATURATED_DPS stays the same, the gyro is at the end of its range, so the true rate is unknown. The
+  readings are left out.
+* Vibration may clip the accelerometer. The force between the shocks is nearly right, so the readings are used, with a
+  remark.
 """
 
 from dataclasses import dataclass
@@ -14,28 +16,36 @@ from kickstand.units import AXES
 from ..common.messages import Message, Remedy
 from ..signals import Array, Bools, Ints, cell_numbers
 
-DEAD_S = 1.0  # an axis is judged in each stretch of this length
-LEAST_SAMPLES = 10  # least number of samples in such a stretch
-# The other axes must change by this much, and by OTHER_STEPS of their last digits: rounding hides the noise of a phone
+DEAD_S = 1.0  # length of the stretches in which an axis is judged
+LEAST_SAMPLES = 10  # least number of samples in a stretch that is judged
+# An axis is judged only if the others change by OTHER_G or OTHER_DPS, and by OTHER_STEPS of their last digits. Smaller
+# changes do not prove noise, because a phone's rounding may hide it.
 OTHER_G, OTHER_DPS, OTHER_STEPS = 0.01, 0.3, 20.0
-# Least share of samples at which the readings change direction: noise gives two thirds, a log without noise less
+# An axis has noise if at least this share of its samples changes direction. White noise gives two thirds, and a log
+# without noise less than NOISY.
 NOISY = 0.15
-# If no axis of a sensor ever changes, the sensor is judged over a part of the log of this length
+# If all axes of a sensor are constant, the sensor is judged only in a part of the log that is longer than this.
 DEAD_ALL_S = 20.0
-DEAD_FROM_S = 2.0  # shorter stretches are kept, because rounding may hide the noise for a second
+DEAD_FROM_S = 2.0  # least time of a dead axis; for one second, rounding alone may hide the noise
 SATURATED_DPS, SATURATED_S, SATURATED_SAMPLES = 100.0, 0.1, 5
-# An accelerometer is clipped if its largest reading, over CLIPPED_G, is repeated to the last digit
+# An accelerometer is clipped if CLIPPED_SAMPLES have the same largest reading, over CLIPPED_G. CLIPPED_STEPS is the
+# least size of this reading in last digits.
 CLIPPED_G, CLIPPED_SAMPLES, CLIPPED_STEPS = 1.1, 10, 200.0
 NAMES = tuple(f"{sensor} {axis}" for sensor in ("accelerometer", "gyro") for axis in AXES)
 
 _SENSORS = slice(0, 3), slice(3, 6)
-_MOTION = [0, 1, 2, 4, 5, 6]  # columns in the chip's order, without the temperature
+_MOTION = [0, 1, 2, 4, 5, 6]  # columns of forces and rates, in the chip's order, without the temperature
 _LEAST = np.repeat([OTHER_G, OTHER_DPS], 3)
 
 
 @dataclass(frozen=True)
 class AxisDead(Message):
-    """An axis stays the same while others change. name: "gyro x"."""
+    """The readings of an axis do not change while those of others do.
+
+    name: sensor and axis, such as "gyro x".
+    seconds: how long the axis was dead, in all.
+    begin_s: time in the log at which this began.
+    """
 
     name: str
     seconds: float
@@ -51,7 +61,12 @@ class AxisDead(Message):
 
 @dataclass(frozen=True)
 class GyroSaturated(Message):
-    """The gyro was at the end of its range. begin_s: when this first happened."""
+    """The gyro was at the end of its range.
+
+    times: how often this happened.
+    seconds: how long this lasted, in all.
+    begin_s: time in the log at which this first happened.
+    """
 
     axis: str
     times: int
@@ -68,7 +83,12 @@ class GyroSaturated(Message):
 
 @dataclass(frozen=True)
 class AccelClipped(Message):
-    """Vibration clipped the accelerometer. end_g: the end of its range. begin_s: time of the first such sample."""
+    """Vibration clipped the accelerometer.
+
+    end_g: the end of its range.
+    samples: number of clipped samples.
+    begin_s: time in the log of the first clipped sample.
+    """
 
     axis: str
     end_g: float
@@ -84,20 +104,25 @@ class AccelClipped(Message):
 
 
 class SensorHealth:
-    """Finds faulty readings. mark() takes a log part by part."""
+    """Finds faulty readings. Call mark() for each part of a log, then notices()."""
 
     def __init__(self) -> None:
-        self._step = np.full(6, np.inf)  # smallest change seen on each axis: the last digit
+        self._step = np.full(6, np.inf)  # smallest change seen on each axis, which is one step of its last digit
         self._dead_s = np.zeros(6)
-        self._run_s = np.zeros(6)  # for each axis, how long it has been dead at the end of the last stretch
+        self._run_s = np.zeros(6)  # time for which each axis has been dead at the end of the last stretch
         self._begin_s = np.full(6, np.nan)
-        self._saturated: list[list[float]] = [[], [], []]  # begin of the first case, number of cases, seconds
-        # for each axis and sign: largest reading in g, number of samples with it, time of the first
+        self._saturated: list[list[float]] = [[], [], []]  # per axis: time of the first case, number of cases, seconds
+        # For each axis and sign: largest reading (g), number of samples with this reading, time of the first of them.
         self._ends: list[tuple[float, int, float]] = [(0.0, 0, 0.0)] * 6
-        self._alive = np.zeros(2, dtype=bool)  # True once noise was seen: accelerometer, gyro
+        self._alive = np.zeros(2, dtype=bool)  # True once noise was seen on the accelerometer, and on the gyro
 
     def mark(self, time_us: Ints, readings: Array) -> Bools:
-        """(n) True where readings (n, 7), as in a Block, are faulty. The memory must hold a whole part."""
+        """Find the faulty readings in the next part of a log.
+
+        time_us: times of the samples, shape (n).
+        readings: as in a Block, shape (n, 7).
+        Returns shape (n), True where the readings are faulty.
+        """
         time_s, values = time_us.astype(float) * 1e-6, readings[:, _MOTION]
         sick = np.zeros(len(time_s), dtype=bool)
         if len(time_s) < LEAST_SAMPLES:
@@ -115,7 +140,7 @@ class SensorHealth:
             constant = np.array([np.all(change[:, sensor] == 0.0) for sensor in _SENSORS])
         else:
             constant = np.zeros(2, dtype=bool)
-        before = 0  # begin of the previous stretch: the first second of a dead axis is faulty too
+        before = 0  # begin of the previous stretch, because the first second of a dead axis is faulty too
         for begin, end, spreads, noise in zip(begins.tolist(), ends.tolist(), spread, noisy):
             if end - begin >= LEAST_SAMPLES:
                 dead = self._dead(spreads, noise, constant)
@@ -129,7 +154,7 @@ class SensorHealth:
         return sick
 
     def notices(self) -> list[Message]:
-        """The notices about the log so far."""
+        """Return the notices about the log so far."""
         found: list[Message] = [
             AxisDead(name, float(seconds), float(begin))
             for name, seconds, begin in zip(NAMES, self._dead_s, self._begin_s)
@@ -144,15 +169,20 @@ class SensorHealth:
         return found
 
     def _dead(self, spread: Array, noisy: Bools, constant: Bools) -> Bools:
-        """(6) True for the dead axes of a stretch in which the readings change by `spread` (6). noisy (6): True for
-        axes with noise. constant (2): True for a sensor that does not change in a long part of the log."""
+        """Find the dead axes in a stretch.
+
+        spread: largest minus smallest reading of each axis, shape (6).
+        noisy: True for axes with noise, shape (6).
+        constant: True for a sensor whose axes do not change in a long part of the log, shape (2).
+        Returns shape (6), True for dead axes.
+        """
         step = np.where(np.isfinite(self._step), self._step, 0.0)
         moves = noisy & (spread >= np.maximum(_LEAST, OTHER_STEPS * step))
         still = spread <= 0.0
         others = [bool(np.any(moves[sensor])) for sensor in reversed(_SENSORS)]
         for k, sensor in enumerate(_SENSORS):
             if np.all(still[sensor]):
-                # In simulated logs a gyro may have no noise, so it does not change on straights
+                # In simulated logs a gyro may have no noise, so its readings do not change on straights.
                 still[sensor] &= others[k] and (self._alive[k] or constant[k])
             else:
                 still[sensor] &= np.any(moves[sensor])
@@ -179,7 +209,7 @@ class SensorHealth:
             self._saturated[axis] = [at[0], at[1] + 1.0, at[2] + seconds]
 
     def _find_clipped(self, axis: int, time_s: Array, force: Array) -> None:
-        """Count the samples with the axis' largest and smallest readings so far."""
+        """Count the samples with the largest and the smallest reading of an axis so far."""
         for at, values in ((axis, force), (axis + len(AXES), -force)):
             end, count, first = self._ends[at]
             most = float(np.max(values))
@@ -191,5 +221,5 @@ class SensorHealth:
                 self._ends[at] = (most, count + int(np.count_nonzero(there)), first)
 
     def _is_clipped(self, axis: int, end: tuple[float, int, float]) -> bool:
-        """True if the axis is clipped, and not merely a log with few digits that repeats its largest reading."""
+        """True if the axis is clipped. A log with few digits may repeat its largest reading without clipping."""
         return end[1] >= CLIPPED_SAMPLES and end[0] > CLIPPED_STEPS * self._step[axis]

@@ -1,10 +1,13 @@
 """Measures how well the rates of a log explain its forces, window by window.
 
-The rates of a window are integrated to a rotation C, from the sensor's axes at each instant to the axes at the window's
-beginning. In the latter axes, the specific force f (g) is a constant vector `up` plus the change of a velocity V, which
-is given in the sensor's rotating axes: C f = up + C (dV/dt + rate x V) / g. V is the log's speed times a constant
-direction. Without a speed, V is a velocity that changes slowly. up, V and the gyro's bias are fitted by least squares,
-with a prior for V and the bias. The residual shows how well the rates fit the forces.
+The rates of a window are integrated to a rotation C. It leads from the sensor's axes at each instant to the sensor's
+axes at the beginning of the window. In the axes at the beginning, the specific force f (in g) is a constant vector `up`
+plus the acceleration. The acceleration follows from the velocity V, which is given in the sensor's rotating axes:
+
+    C f = up + C (dV/dt + rate x V) / g
+
+V is the log's speed times a constant direction. Without a speed, V is a velocity that changes slowly. Least squares fit
+`up`, V and the gyro's bias, with a prior for V and the bias. The residual shows how well the rates fit the forces.
 """
 
 from dataclasses import dataclass
@@ -16,25 +19,30 @@ from ..signals import Array, Ints, cross_matrix, rotation_matrix
 from .cells import CELL_S
 
 KNOT_S = 5.0  # time between the knots of an unknown velocity
-EVENED = 10  # number of cells over which forces in common axes are averaged to suppress vibration
-FORCE_G = 0.1  # measurement noise of these means, standard deviation
-# Standard deviations of the prior: of an unknown velocity, of a component of the direction of a known speed, and of the
-# correction of the gyro's bias
-VELOCITY_MPS, DIRECTION, BIAS_DPS = 20.0, 1.0, 3.0
+EVENED = 10  # number of cells over which the rotated forces are averaged, to remove vibration
+FORCE_G = 0.1  # standard deviation of the noise of these means
+# Standard deviations of the prior
+VELOCITY_MPS = 20.0  # of an unknown velocity
+DIRECTION = 1.0  # of each component of the constant direction
+BIAS_DPS = 3.0  # of the correction of the gyro's bias
 BIAS_STEPS, MOST_DPS = 2, 5.0  # number of steps that correct the bias, and largest change in one step
-LATE_S = (0.0, 0.5, 1.0, 1.5)  # tried delays of the speed, because a satellite receiver's speed is late
+LATE_S = (0.0, 0.5, 1.0, 1.5)  # delays of the speed that are tried, because a satellite receiver's speed is late
 
 
 class Turning:
-    """Fits rates to forces. force (w, n, 3, g), rate (w, n, 3, deg/s): w windows of n cells of CELL_S. bias (3, deg/s):
-    a first guess of the gyro's bias.
+    """Fits rates to forces in w windows of n cells of CELL_S.
 
-    speed (m, 2): index of the cell and m/s, or None; places (w, n): the indices of the windows' cells.
+    force: shape (w, n, 3), in g.
+    rate: shape (w, n, 3), in deg/s.
+    bias: a first guess of the gyro's bias, shape (3), in deg/s.
+    speed: index of the cell, and speed in m/s, shape (m, 2); None if unknown.
+    places: indices of the windows' cells, shape (w, n).
     """
 
     def __init__(self, force: Array, rate: Array, bias: Array, speed: Array | None, places: Ints) -> None:
         self._force, self._rate, self._bias = force, rate, bias
-        # for each delay: k functions of time, of which the velocity is a sum, and their derivatives: (k, w, n)
+        # The velocity is a sum of k functions of time. Each entry of this list, one per delay of the speed, holds these
+        # functions and their derivatives, both of shape (k, w, n).
         self._velocities = [_knots(*places.shape)]
         self._usual = VELOCITY_MPS
         if speed is not None:
@@ -47,23 +55,29 @@ class Turning:
         return bool(np.max(np.abs(self._bias)) < BIAS_DPS)
 
     def rough(self, exchanges: Array) -> Array:
-        """The mean square (k, g2) of the force that the integrated rates do not explain, if the vehicle's velocity is
-        not fitted. exchanges (k, 3, 3): rate = exchange @ reading."""
+        """Compute the residual of each of k exchanges without fitting the velocity.
+
+        exchanges: shape (k, 3, 3). Rate = exchange @ reading.
+        Returns the mean square of the force that the integrated rates do not explain, shape (k), in g2.
+        """
         sizes = np.mean(np.sum(self._force**2, axis=2))
         left = np.empty(len(exchanges))
         for sign in 1.0, -1.0:
             turn = _turn(sign * np.radians(self._rate - self._bias))
             both = np.einsum("wnij,wnk->wijk", turn, self._force) / turn.shape[1]
             right = np.linalg.det(exchanges) * sign > 0.0
-            # rotating the gyro's readings is the same as rotating the forces by the inverse
+            # To rotate the gyro's readings is the same as to rotate the forces by the inverse.
             up = np.einsum("wijk,qkj->qwi", both, sign * exchanges[right])
             left[right] = sizes - np.mean(np.sum(up**2, axis=2), axis=1)
         return left
 
     def unexplained(self, exchange: Array) -> Array:
-        """(w): mean square in each window, g2, of the force that the rates exchange @ reading do not explain."""
+        """Compute the residual of one exchange in each window. Rate = exchange @ reading.
+
+        Returns the mean square of the force that the rates do not explain, shape (w), in g2.
+        """
         sign = np.linalg.det(exchange)
-        force = self._force @ (sign * exchange)  # permuting the force instead of the rates leaves only a sign for these
+        force = self._force @ (sign * exchange)  # the force is permuted instead of the rates, which keep only a sign
         bias, velocity = self._bias, self._velocities[0]
         if len(self._velocities) > 1:
             turned = self._turned(force, sign, bias)
@@ -74,7 +88,13 @@ class Turning:
         return self._fit(*self._turned(force, sign, bias), velocity).left
 
     def _turned(self, force: Array, sign: float, bias: Array) -> tuple[Array, Array, Array]:
-        """(w, n, 3) the rate, rad/s; (w, n, 3, 3) C, the rotation integrated from it; (w, n, 3) C times the force."""
+        """Integrate the rates minus a bias, and rotate the force.
+
+        Returns:
+            rate: shape (w, n, 3), in rad/s.
+            turn: the rotation C, integrated from the rate, shape (w, n, 3, 3).
+            turned: C times the force, shape (w, n, 3).
+        """
         rate = sign * np.radians(self._rate - bias)
         turn = _turn(rate)
         return rate, turn, np.einsum("wnij,wnj->wni", turn, force)
@@ -92,13 +112,15 @@ class Turning:
         return _Fit(along, moved, inverse, found, left)
 
     def _bias_change(self, sign: float, rate: Array, turn: Array, turned: Array, fit: "_Fit") -> Array:
-        """(3) deg/s: the correction of the bias by one linear least-squares step. A change of the bias rotates the
-        force by the integral of this change from the middle of the window."""
+        """Return the correction of the bias by one step of linear least squares, shape (3), in deg/s.
+
+        A change of the bias rotates the force by the integral of this change from the middle of the window.
+        """
         angle = np.cumsum(turn, axis=1) * CELL_S
         angle -= angle[:, rate.shape[1] // 2, None]
         by_bias = _evened(-sign * np.radians(1.0) * cross_matrix(turned) @ angle)
         mixed = np.einsum("wnij,wnik->wjk", fit.along, by_bias)
-        # the windows' velocities are eliminated from the normal equations (Schur complement)
+        # Eliminate the velocities of the windows from the normal equations (Schur complement).
         square = np.einsum("wnij,wnik->jk", by_bias, by_bias) - np.einsum("wji,wjk,wkl->il", mixed, fit.inverse, mixed)
         vector = np.einsum("wnij,wni->j", by_bias, fit.moved) - np.einsum("wji,wj->i", mixed, fit.found)
         change = np.linalg.solve(square + (FORCE_G / BIAS_DPS) ** 2 * np.eye(3), vector)
@@ -107,9 +129,14 @@ class Turning:
 
 @dataclass
 class _Fit:
-    """The least squares of each window: along (w, m, 3, k), derivatives of the force `moved` (w, m, 3) by the
-    velocity's k coefficients; found (w, k), these coefficients; inverse (w, k, k), the inverse of their normal matrix;
-    left (w), the residual's mean square."""
+    """The result of the least squares in each of w windows. The velocity has k coefficients.
+
+    along: derivatives of the force by the coefficients, shape (w, m, 3, k).
+    moved: the averaged force, shape (w, m, 3).
+    inverse: inverse of the normal matrix of the coefficients, shape (w, k, k).
+    found: the coefficients, shape (w, k).
+    left: mean square of the residual, shape (w).
+    """
 
     along: Array
     moved: Array
@@ -119,10 +146,14 @@ class _Fit:
 
 
 def _turn(rate: Array) -> Array:
-    """(w, n, 3, 3): the rotation from the axes in the middle of each cell to those at the window's beginning,
-    integrated from rate (w, n, 3, rad/s)."""
+    """Integrate rates to rotations.
+
+    rate: shape (w, n, 3), in rad/s.
+    Returns the rotation from the axes in the middle of each cell to the axes at the beginning of the window, shape
+    (w, n, 3, 3).
+    """
     half = rotation_matrix(rate * (CELL_S / 2.0))
-    after = half @ half  # each pass below multiplies twice as many cells
+    after = half @ half  # each pass of the loop combines twice as many cells
     reach = 1
     while reach < rate.shape[1]:
         after[:, reach:] = after[:, :-reach] @ after[:, reach:]
@@ -131,14 +162,19 @@ def _turn(rate: Array) -> Array:
 
 
 def _evened(values: Array) -> Array:
-    """Average values (w, n, ...) over EVENED cells, and subtract each window's mean to remove the constant vector
-    `up`."""
+    """Average values over EVENED cells, and subtract each window's mean to remove the constant vector `up`.
+
+    values: shape (w, n, ...).
+    """
     means = np.mean(values.reshape(len(values), -1, EVENED, *values.shape[2:]), axis=2)
     return means - np.mean(means, axis=1, keepdims=True)
 
 
 def _knots(windows: int, cells: int) -> tuple[Array, Array]:
-    """The functions of an unknown velocity, one per knot: 1 at that knot, 0 at the others, linear between them."""
+    """Return the functions of an unknown velocity, one per knot, and their derivatives.
+
+    Each function is 1 at its own knot and 0 at the other knots. Between knots it is linear.
+    """
     time = (np.arange(cells) + 0.5) * CELL_S
     count = round(cells * CELL_S / KNOT_S) + 1
     knots = np.arange(count) * KNOT_S
@@ -149,9 +185,9 @@ def _knots(windows: int, cells: int) -> tuple[Array, Array]:
 
 
 def _given(speed: Array, places: Ints, late_s: float) -> tuple[Array, Array]:
-    """The functions for a velocity that is the log's speed, delayed by late_s, times a constant direction."""
+    """Return the function of a known speed, delayed by late_s, and its derivative."""
     second = round(1.0 / CELL_S)
     cells = np.arange(-second, places.max() + 1 + second)
     values = np.interp(cells + late_s / CELL_S, *speed.T)
-    changes = (values[second:] - values[:-second]) / (second * CELL_S)  # over the second around each cell
+    changes = (values[second:] - values[:-second]) / (second * CELL_S)  # mean change during the second around each cell
     return values[places + second][None], changes[places + second // 2][None]

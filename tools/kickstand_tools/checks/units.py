@@ -1,9 +1,9 @@
 """Checks the units of a log. The first samples show the usual mistakes: m/s2 instead of g, ms instead of s.
 
-A wrong unit of the speed shows later, when changes of the speed are compared with the specific force that caused them.
-From one second to the next, the speed changes by the acceleration along the vehicle. The mounting of the sensor does
-not matter: the direction along the vehicle is the one in which force and change of speed correlate best. Turns, slopes
-and a moving rider add to the force only, so the speed can seem to change too little because of them, never too much.
+A wrong unit of the speed is found later. From one second to the next, the speed changes by the acceleration along the
+vehicle. So the changes of the speed are compared with the specific force that caused them. The mounting of the sensor
+does not matter: forward is the direction in which force and change of speed correlate best. Turns, slopes and a moving
+rider add to the force only. They can make the change of speed seem too small, but never too large.
 """
 
 from dataclasses import dataclass
@@ -17,22 +17,22 @@ from ..common.messages import Message, Remedy
 from ..signals import Array, Ints, best_lag
 from .cells import LogCells
 
-LEAST_G = 0.4  # a smaller median force means that gravity is missing; even a pose with an offset of 0.6 g has more
+LEAST_G = 0.4  # if the median force is smaller, gravity is missing; a pose with an offset of 0.6 g still has 0.4 g
 MPS2_G = 5.0, 20.0  # a median force between these is in m/s2; larger values are not readings, and are left out later
 MILLISECONDS_US = 4e6  # samples this far apart have times in ms that were read as s, at 250 samples per second or fewer
-# Largest ratio of the observed change of speed to the change that the force explains. Speeds in knots give 1.94, speeds
-# in m/s at most 1.1
+# Largest ratio of the logged change of speed to the change that the force explains. Speeds in knots give 1.94, and
+# speeds in m/s at most 1.1.
 MOST_RATIO = 1.5
-PUSH_G = 0.15  # a stronger force cannot come from the slope of an ordinary road
-ENOUGH = 10  # seconds of such forces: two or three braking events
+PUSH_G = 0.15  # least force that is used; an ordinary road's slope causes less
+ENOUGH = 10  # least number of seconds with this force: two or three braking events
 SIGMAS = 5.0  # the correlation of force and change of speed must exceed chance by this many standard deviations
 LAGS_S = np.arange(0.0, 2.1, 0.25)  # possible delays of a satellite receiver's speed
-SHORTEST_S, LONGEST_S = 0.5, 2.2  # between two speeds
+SHORTEST_S, LONGEST_S = 0.5, 2.2  # least and largest time between two speeds
 
 
 @dataclass(frozen=True)
 class SpeedUnit(Message):
-    """The speed is not in m/s. factor: its changes divided by the changes that the force explains."""
+    """The speed is not in m/s. factor: the changes of the speed divided by the changes that the force explains."""
 
     factor: float
 
@@ -59,8 +59,12 @@ class SpeedStuck(Message):
 
 
 def check_units(name: str, time_us: Ints, accel_g: Array) -> None:
-    """Raise InputError for accelerations without gravity or in m/s2, and for times in ms. time_us (n), accel_g (n, 3):
-    the first samples of the log."""
+    """Raise InputError for accelerations without gravity or in m/s2, and for times in ms.
+
+    name: the log's name, for the message.
+    time_us: times of the first samples of the log, shape (n).
+    accel_g: accelerations of the same samples, shape (n, 3).
+    """
     usual_g = np.median(np.linalg.norm(accel_g, axis=1))
     said = f"{name}: accelerations are usually {usual_g:.2f} g, where gravity makes it 1"
     if usual_g < LEAST_G:
@@ -74,8 +78,10 @@ def check_units(name: str, time_us: Ints, accel_g: Array) -> None:
 
 
 def speed_unit(cells: LogCells) -> SpeedUnit | None:
-    """The refusal if the speed changes too much during most of the strong forces. None if it does not, or if the log
-    does not show it."""
+    """Return a refusal if the speed changes too much during most of the strong forces.
+
+    Returns None if the speed seems right, or if the log is not enough to judge it.
+    """
     time_s, mps = cells.speeds.T
     seconds = np.diff(time_s)
     good = (seconds > SHORTEST_S) & (seconds < LONGEST_S)
@@ -96,5 +102,5 @@ def speed_unit(cells: LogCells) -> SpeedUnit | None:
     strong = np.abs(push) > PUSH_G
     if np.count_nonzero(strong) < ENOUGH or np.median(change[strong] / push[strong]) <= MOST_RATIO:
         return None
-    # the same regression as in the firmware
+    # The firmware computes the factor by the same regression.
     return SpeedUnit(*speed_unit_problem(float(change @ push / (change @ change))).values)
