@@ -76,7 +76,7 @@ def _write_ms():
 
 
 def _sensor(sensor, settings):
-    """Print the sensor and the other devices on its bus. Return the sensor's WHO_AM_I, or 0 without a sensor."""
+    """Print the sensor and the other devices on its bus. Return the sensor's WHO_AM_I, or 0 without a usable sensor."""
     chip = sensor.chip
     fault = None
     try:

@@ -31,7 +31,9 @@ def turned(matrix, left=0.0, up=0.0, forward=0.0):
 
 
 def made(profile, speed=True):
-    """Return a simulated log with 50 samples per second, and its calibration by six positions and two poses."""
+    """Return a simulated log with 50 samples per second, and its calibration by six positions and two poses.
+
+    speed: False for a log without a speed."""
     log = simulated(profile)
     return log if speed else silent(log), calibrated_by_poses(made_up(profile))
 

@@ -40,7 +40,7 @@ def mounted(log, rotation):
 
 
 def errors_deg(found, true):
-    """Return the errors of pitch, yaw and roll, which are the rotations about left, up and forward."""
+    """Return the sizes of the errors of pitch, yaw and roll, which are the rotations about left, up and forward."""
     return np.abs(np.degrees(rotation_vector(found.calibration.vehicle_from_sensor @ true.T)))
 
 

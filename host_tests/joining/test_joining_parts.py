@@ -221,7 +221,7 @@ def test_a_tracks_change_of_course_is_over_four_seconds():
 
 def test_a_rides_change_of_course_is_over_four_seconds():
     there = np.ones(600, dtype=bool)
-    there[300:307] = False  # 0.35 of 4 s is accepted
+    there[300:307] = False  # a gap of 0.35 s; the limit is 0.4 s in 4 s
     moved = cells(np.tile([0.0, 9.0, 0.0], (600, 1)), there)
     change, known = match._changes_of_ride(moved)
     assert change[20] == pytest.approx(36.0)

@@ -19,9 +19,9 @@ from .evidence import Intervals
 SENSOR_DEG = 0.3  # standard deviation of forward caused by scale errors of 1 % between the sensor's axes
 CORRELATION = 0.5  # correlation between the errors of the two methods, which use the same braking
 APART_SIGMAS = 2.0  # if the two methods differ by more standard deviations, the standard error of forward grows
-# Number of terms of evidence.py that are used: level, forward and left. The arm only helps to compare parts of a drive.
-# Over a whole drive it absorbs other effects too. With the arm, forward was 2 degrees off in one of three recorded
-# drives. Without the arm, it was at most 0.6 degrees off.
+# Number of terms of evidence.py that are used: level, forward and left. The fourth term, `arm`, only helps to compare
+# parts of a drive. Over a whole drive, `arm` absorbs other effects too: with it, forward was 2 degrees off in one of
+# three recorded drives, and without it at most 0.6 degrees.
 _TERMS = 3
 _LEAST_BLOCKS = 4
 

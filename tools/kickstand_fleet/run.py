@@ -122,7 +122,7 @@ def run_fleet(
 
 
 def write_results(directory: str, results: Iterable[PeriodResult], expected: int) -> Glance:
-    """Write the tables and the page of the results so far.
+    """Write the tables and the page of the results so far. Return the summary that the page shows.
 
     expected: number of results at the end of the run. Raises InputError if a file cannot be written.
     """

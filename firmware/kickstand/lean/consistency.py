@@ -30,7 +30,7 @@ from math import sqrt
 from ..units import const
 
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
-_SHORT_S = const(3.0)  # s: time constant of the short means. Larger: fewer leans are hidden, and later.
+_SHORT_S = const(3.0)  # s: time constant of the short means. Larger: fewer leans are hidden, and wrong ones later.
 _LONG_S = const(10.0)  # s: time constant of the other means. Larger: as for the short means.
 _MOST = const(4.0)  # standard deviations: larger innovations are limited to this. Larger: a blow counts for more.
 # Limits of the means. Larger: fewer leans are hidden, both right and wrong ones. The comments give the largest mean of

@@ -205,7 +205,7 @@ def sensorlog(ride: Riding, separator: str = ",", accelerometer: bool = True) ->
 
 
 def sensor_kinetics(ride: Riding, semicolon: bool = False) -> dict[str, str]:
-    """Write NAME_accm.csv, NAME_gyrm.csv, NAME_lacm.csv and NAME_grvm.csv.
+    """Return the texts of Ride_accm.csv, Ride_gyrm.csv, Ride_lacm.csv and Ride_grvm.csv, by file name.
 
     Times have four decimals, and some times occur twice.
     """

@@ -44,7 +44,9 @@ class Reduced:
 
 
 def reduce_windows(jacobian: Array, states: int) -> Reduced:
-    """Eliminate the inner states of B blocks of K windows. Raises LinAlgError.
+    """Eliminate the states of each block except its first and its last one. Raises LinAlgError.
+
+    There are B blocks of K windows.
 
     jacobian: derivatives of each window's r residuals, shape (B, K, r, s + s + m + 1). The columns are the state at the
         window's start, the state at its end, the parameters, and the residual itself.

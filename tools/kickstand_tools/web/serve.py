@@ -34,8 +34,8 @@ TYPES = {
 
 
 class Server(ThreadingHTTPServer):
-    """Ignores a browser that disconnects. If there are more than MOST connections, it ends the oldest, which may be
-    stuck."""
+    """Ignores a browser that disconnects. If there are more than MOST connections, it ends an old one: the oldest that
+    has sent no request, or otherwise the oldest of all."""
 
     request_queue_size = 128
     daemon_threads = True

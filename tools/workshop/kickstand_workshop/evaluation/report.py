@@ -28,7 +28,7 @@ _UNKNOWN = "--"
 def pooled(scores: list[LeanScore]) -> dict[str, float]:
     """Pool the scores of one estimator on one profile over the seeds.
 
-    Returns the figures by name, in degrees, the lag in ms. A figure is NaN if no ride can show it.
+    Returns the figures by name, in degrees, the lag in ms. A figure is NaN if no ride can give it.
     """
     rms = np.array([s.rms_deg for s in scores])
     slopes, lags, biases = (
@@ -113,7 +113,7 @@ def _table(title: str, caption: str) -> Table:
 
 
 def document(evaluation: Evaluation) -> dict[str, Any]:
-    """Return all figures for a JSON file. A figure that the rides cannot show is null."""
+    """Return all figures for a JSON file. A figure that cannot be computed from the rides is null."""
     rides = [
         {"profile": r.job.profile, "seed": r.job.seed, "refusal": r.refusal, "scores": _scores(r.scores)}
         for r in evaluation.results
