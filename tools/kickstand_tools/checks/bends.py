@@ -71,7 +71,7 @@ def bends(cells: LogCells) -> Message | None:
     if len(rate) * WINDOW_S < RIDING_S:
         return None
     changes = unrest(rate, MOVES_S)
-    moves = MOVES * np.percentile(changes, 95)  # relative, because the unit is unknown
+    moves = MOVES * np.percentile(changes, 95)  # the limit is relative, because the unit of the rates is unknown
     if np.count_nonzero(changes > moves) * WINDOW_S < RIDING_S:
         return None
     whole = len(rate) // 5 * 5  # in whole seconds
