@@ -60,8 +60,9 @@ ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
 #
 # The misfit is a factor on the standard deviation of the velocities. To compute it, take the means of CLIMBING over
 # LASTING_MISFIT_S, and multiply their rms by the root of the number of windows in a mean. Divide the result by
-# USUAL_MISFIT, its value in an ordinary ride. The misfit is the square of this ratio. A mount's error in m/s is the same
-# in town as on a motorway. Therefore CLIMBING is first divided by its standard deviation at MISFIT_MPS, at any speed.
+# USUAL_MISFIT, its value in an ordinary ride. The misfit is the square of this ratio. A mount's error in m/s is the
+# same in town as on a motorway. Therefore, at any speed, CLIMBING is first divided by its standard deviation at
+# MISFIT_MPS.
 LASTING_MISFIT_S, MISFIT_MPS, USUAL_MISFIT, MOST_MISFIT = 2.0, 25.0, 0.25, 6.0
 # If the misfit is over 1, the roughness is at least MISFIT_ROUGHNESS times the misfit. The residuals alone would give
 # less, because lasting errors have small residuals.

@@ -223,7 +223,7 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
 
 
 def _acceleration(part: Channels, rest: int) -> tuple[Array, Array, Array]:
-    """Compute the motion, minus its values at standstill.
+    """Compute acceleration and rates. The values at standstill are subtracted.
 
     Returns:
         acceleration: along the road, shape (n), in m/s2.
