@@ -1,9 +1,10 @@
 """Estimates from a ride how far the aligned axes are from the bike's own axes.
 
-`roll`: on a straight a balanced bike is upright, so the mean force points along the bike's own up axis. `yaw`: braking
-and speeding up on a straight push along the bike's own forward axis. `pitch`: between two standstills on level ground,
-speeding up and braking cancel out, so the remaining mean forward force shows the pitch error. `gravity`: at standstill
-the force must be 1 g.
+* roll: on a straight, a balanced bike is upright, so the mean force points along the bike's own up axis.
+* yaw: on a straight, braking and speeding up push along the bike's own forward axis.
+* pitch: between two standstills on level ground, speeding up and braking cancel out. The remaining mean forward force
+  shows the pitch error.
+* gravity: at standstill, the force must be 1 g.
 """
 
 from dataclasses import dataclass
@@ -14,27 +15,30 @@ from kickstand.lean.upright_trim import MAX_TRIM
 from ..signals import Array, Bools
 from .channels import Channels, spacing_s
 
-# The rms error of the shown lean caused by each error, measured with simulated rides and rotated calibrations. With
-# a yaw error, pitching looks like rolling: roll rate' = roll rate cos(yaw) + pitch rate sin(yaw), and the lean's error
-# is the bike's pitching times sin(yaw). With a pitch error, yawing looks like rolling in the same way; the filter
-# corrects most of that. A roll error adds to the lean, but riding corrects up to MAX_TRIM of it.
+# Each error of the axes causes an error of the shown lean, measured with simulated rides and rotated calibrations.
+# * With a yaw error, pitching looks like rolling: measured roll rate = roll rate cos(yaw) + pitch rate sin(yaw). The
+#   error of the lean is then the bike's pitching times sin(yaw).
+# * With a pitch error, yawing looks like rolling in the same way, but the filter corrects most of this error.
+# * A roll error adds to the lean, but the filter corrects up to MAX_TRIM of it while riding.
 YAW_COSTS_DEG, PITCH_COSTS_DEG = 3.0, 5.0  # rms error of the lean, divided by the sine of the angle
 
 SMOOTH_S = 0.5
-STRAIGHT_DPS, STRAIGHT_DEG = 2.0, 8.0  # riding straight: yaw rate and lean are smaller
-ENOUGH_S = 10.0  # straight riding must last at least this long
-LEVEL_S = 60.0  # over this time of riding, hills even out
-ENOUGH_G = 0.05  # least rms of braking and speeding up on straights
+STRAIGHT_DPS, STRAIGHT_DEG = 2.0, 8.0  # largest yaw rate and largest lean on a straight
+ENOUGH_S = 10.0  # least time of straight riding, in all
+LEVEL_S = 60.0  # least time of riding in which uphill and downhill cancel out
+ENOUGH_G = 0.05  # least standard deviation of braking and speeding up on straights
 
 
 @dataclass
 class Quality:
-    """Angles in degrees by which the aligned axes seem to be off; None if the ride does not show an angle.
+    """Angles by which the aligned axes seem to be off, and their data. Angles are None if the ride does not show them.
 
-    roll > 0: "up" leans to the right of the bike's own. pitch > 0: "forward" points up. yaw > 0: "forward" points
-    to the right of the direction in which the bike speeds up. gravity_g: mean force at rest. straight_s: seconds
-    of straight riding, which give roll and yaw. lateral_g, forward_g: the forces during this riding, means over
-    SMOOTH_S.
+    roll_deg: positive if "up" leans to the right of the bike's own up.
+    pitch_deg: positive if "forward" points up.
+    yaw_deg: positive if "forward" points to the right of the direction in which the bike speeds up.
+    gravity_g: mean force at rest; None without a standstill.
+    straight_s: seconds of straight riding, which show roll and yaw.
+    lateral_g, forward_g: forces during straight riding, averaged over SMOOTH_S.
     """
 
     roll_deg: float | None
@@ -48,7 +52,7 @@ class Quality:
 
 @dataclass
 class LeanCost:
-    """The approximate rms error of the shown lean caused by each angle, degrees; None for an unknown angle."""
+    """The approximate rms error of the shown lean that each angle causes, in degrees; None for an unknown angle."""
 
     roll_deg: float | None
     pitch_deg: float | None
@@ -56,7 +60,7 @@ class LeanCost:
 
 
 def lean_cost(found: Quality) -> LeanCost:
-    """The errors of a motorcycle's shown lean that these errors of the axes cause.
+    """Return the errors of a motorcycle's shown lean that these errors of the axes cause.
 
     >>> cost = lean_cost(Quality(0.2, None, 5.1, 1.0, 60.0, np.zeros(1), np.zeros(1)))
     >>> cost.roll_deg, cost.pitch_deg, round(cost.yaw_deg, 2)
@@ -72,13 +76,16 @@ def lean_cost(found: Quality) -> LeanCost:
 
 
 def yaw_cost_deg(yaw_deg: float) -> float:
-    """The average rms error of the shown lean, degrees, caused by a yaw error of the alignment."""
+    """Return the average rms error of the shown lean that a yaw error of the alignment causes, in degrees."""
     return YAW_COSTS_DEG * abs(float(np.sin(np.radians(yaw_deg))))
 
 
 def quality(ride: Channels, standing: Bools) -> Quality:
-    """The Quality from a whole ride with evenly spaced samples (see downsampled()). standing (n): True where the
-    vehicle stands still."""
+    """Compute the Quality from a whole ride.
+
+    ride: evenly spaced samples (see downsampled()).
+    standing: True where the vehicle stands still, shape (n).
+    """
     step_s = spacing_s(ride)
     n = min(max(1, round(SMOOTH_S / step_s)), len(ride.t_s))
     count = len(ride.t_s) // n
@@ -92,7 +99,7 @@ def quality(ride: Channels, standing: Bools) -> Quality:
     still = means(standing.astype(float)) == 1.0
     static = np.degrees(np.arctan2(left, up))
     ahead = moving & (np.abs(yaw_rate) < STRAIGHT_DPS)
-    usual = float(np.median(static[ahead])) if np.any(ahead) else 0.0  # the upright lean, even if "up" is wrong
+    usual = float(np.median(static[ahead])) if np.any(ahead) else 0.0  # measured lean of an upright bike
     straight = ahead & (np.abs(static - usual) < STRAIGHT_DEG)
     straight_s = float(np.count_nonzero(straight)) * n * step_s
     roll = pitch = yaw = None

@@ -11,11 +11,12 @@ from .stops.brake_test import RATE_S, Stop, find_stops
 
 
 def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
-    """Find every stop of a log from over 10 km/h and measure it by UN Regulation No. 13 (see find_stops). Raises
-    InputError.
+    """Find every stop of a log from over 10 km/h, and measure it by UN Regulation No. 13 (see find_stops).
 
-    calibration: must be aligned. A car has no lean, so the firmware's lean filter, which takes most of the time, runs
-    only for motorcycles.
+    The firmware's lean filter takes most of the time. It runs only for motorcycles, because a car has no lean.
+
+    calibration: must be aligned.
+    Raises InputError.
 
     >>> from kickstand_tools.api import Log, fit_two_positions, simulate_ride
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)
@@ -32,7 +33,7 @@ def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
 
 
 def car_channels(log: Source, calibration: CalibrationFile) -> list[Channels]:
-    """The channels of a car's log, block by block: in the vehicle's axes, without a lean."""
+    """Return the channels of a car's log in the vehicle's axes, without a lean, one item per block."""
     found = []
     for whole in read_blocks(log):
         block = whole.measured

@@ -1,7 +1,7 @@
 """Converts a ride to the vehicle's axes for plot, report and export, and averages it to a lower sample rate.
 
-The lean is the firmware's own for each sample, or the smoothed one. numpy computes everything that does not depend on
-earlier samples; a test compares it with the firmware.
+The lean of each sample is the firmware's lean or the smoothed lean. numpy computes everything that does not depend on
+earlier samples. A test compares these values with the firmware's.
 """
 
 from collections.abc import Iterable, Iterator
@@ -20,15 +20,25 @@ _LAST = ("lat_deg", "lon_deg", "utc_s")
 
 @dataclass(eq=False)
 class Channels(Table):
-    """A ride in the vehicle's axes left, up, forward: n samples each; NaN for a missing value.
+    """A ride of n samples in the vehicle's axes left, up, forward. A missing value is NaN.
 
-    t_s: seconds since the log's first sample. lean_deg: > 0 to the right; lean_formula_deg: by Nicolae's formulas
-    (25)-(26) alone. left_g, up_g, forward_g: specific force; lateral_g: acceleration to the left in the road's plane,
-    (23). pitch_rate_dps: > 0 nose up; yaw_rate_dps: > 0 in a left turn; roll_rate_dps: > 0 to the right. shown_g: the
-    forward force, smoothed as on the display. lean_sigma_deg: standard deviation of the lean. These are 1 or 0:
-    resting: the meter has detected a standstill; rolling: its estimated speed is surely not 0; sure: it trusts its
-    lean; doubtful: from smooth(), 0 if the lean is not smoothed. lat_deg, lon_deg (degrees north and east) and utc_s (s
-    since 1970) are given only for new values.
+    t_s: seconds since the log's first sample.
+    lean_deg: lean, positive to the right.
+    lean_formula_deg: lean by Nicolae's formulas (25)-(26) alone.
+    left_g, up_g, forward_g: specific force.
+    lateral_g: acceleration to the left in the plane of the road, by formula (23).
+    pitch_rate_dps: positive if the nose goes up.
+    yaw_rate_dps: positive in a left turn.
+    roll_rate_dps: positive to the right.
+    speed_mps, temp_c: speed and temperature in the log.
+    shown_g: forward force, smoothed as on the display.
+    lean_sigma_deg: standard deviation of the lean.
+    resting: 1 if the meter has detected a standstill, otherwise 0.
+    rolling: 1 if the speed that the meter estimates is surely not 0, otherwise 0.
+    sure: 1 if the meter trusts its lean, otherwise 0.
+    doubtful: 1 if smooth() says so, otherwise 0; also 0 if the lean is not smoothed.
+    lat_deg, lon_deg: degrees north and east; NaN if not new.
+    utc_s: seconds since 1970; NaN if not new.
     """
 
     t_s: Array
@@ -55,28 +65,32 @@ class Channels(Table):
 
     @property
     def trusted(self) -> Bools:
-        """(n) True where the display shows the lean and updates its maxima. A smoothed lean is
-        trusted by its standard deviation and FALLEN_DEG."""
+        """True where the display shows the lean and updates its maxima, shape (n).
+
+        A smoothed lean is trusted if its standard deviation is small, and the lean is under FALLEN_DEG.
+        """
         return (self.sure > 0.0) & ~(np.abs(self.lean_deg) >= FALLEN_DEG)
 
     @property
     def force_g(self) -> Array:
-        """(n, 3) specific force, g: left, up, forward."""
+        """Specific force along left, up, forward, shape (n, 3), in g."""
         return np.column_stack((self.left_g, self.up_g, self.forward_g))
 
     @property
     def rate_dps(self) -> Array:
-        """(n, 3) rates, deg/s: about left, up, forward."""
+        """Rates about left, up, forward, shape (n, 3), in deg/s."""
         return np.column_stack((-self.pitch_rate_dps, self.yaw_rate_dps, self.roll_rate_dps))
 
 
 def channels(block: Block, calibration: CalibrationFile, lean: dict[str, Array], car: bool = False) -> Channels:
-    """Convert a block to the vehicle's axes. lean: lean_deg, lean_sigma_deg, shown_g, resting, rolling, sure and
-    doubtful.
+    """Convert a block to the vehicle's axes.
 
-    The forces come from Nicolae's formulas (18)-(20) and the matrix, then lean and lateral from (25)-(26) and (23). A
-    car has no lean, and its lateral acceleration is the force to the left: of `lean` only shown_g, resting and sure are
-    used.
+    The forces are computed by Nicolae's formulas (18)-(20) and the matrix vehicle_from_sensor. Then (25)-(26) give
+    lean_formula_deg, and (23) gives lateral_g. A car has no lean, and its lateral acceleration is the force to the
+    left.
+
+    lean: lean_deg, lean_sigma_deg, shown_g, resting, rolling, sure and doubtful. For a car, only shown_g, resting and
+        sure are used.
     """
     none = np.zeros(len(block.time_us))
     if car:
@@ -107,8 +121,10 @@ def channels(block: Block, calibration: CalibrationFile, lean: dict[str, Array],
 
 
 def joined(parts: Iterable[Channels]) -> Channels:
-    """Join the parts of a ride. They are read one by one to limit memory. A column without any value takes no memory
-    and is read-only."""
+    """Join the parts of a ride.
+
+    The parts are read one by one to limit memory. A column without any value takes no memory, and is read-only.
+    """
     columns: list[Array | None] = [None for _ in fields(Channels)]
     length = 0
     for part in parts:
@@ -120,7 +136,7 @@ def joined(parts: Iterable[Channels]) -> Channels:
                     continue
                 column = columns[k] = np.full(end, np.nan)
             if end > len(column):
-                longer = np.empty(2 * end)  # unwritten memory costs nothing, except in a browser
+                longer = np.empty(2 * end)  # memory that is not written takes no room, except in a browser
                 longer[:length] = column[:length]
                 column = columns[k] = longer
             column[length:end] = values
@@ -132,23 +148,24 @@ def joined(parts: Iterable[Channels]) -> Channels:
 
 
 def thinned(course: Channels, step_s: float) -> Channels:
-    """Average a whole ride over steps of step_s. A ride with fewer samples is returned unchanged."""
+    """Average a whole ride over steps of step_s. A ride with at most one sample per step is returned unchanged."""
     if np.all(np.diff(_stretches(course.t_s, step_s)) > 0.0):
         return course
     return joined(downsampled([course], step_s))
 
 
 def spacing_s(course: Channels) -> float:
-    """Median time between samples, s."""
+    """Return the median time between samples, in s."""
     return float(np.median(np.diff(course.t_s))) if len(course.t_s) > 1 else 1.0
 
 
 def downsampled(blocks: Iterable[Channels], step_s: float, rounded: bool = False) -> Iterator[Channels]:
-    """Yield the means over each stretch of step_s with samples. NaNs do not count. Positions and their time are the
-    last values, because longitudes on both sides of 180 degrees have no mean.
+    """Yield the means over each stretch of step_s that has samples. NaNs do not count.
 
-    A ride with at most one sample per stretch is not changed. A stretch may extend over several blocks. rounded: a
-    stretch contains the times that round to the same multiple of step_s.
+    For positions and their time, the last value of a stretch is used, because longitudes on both sides of 180 degrees
+    have no mean. A ride with at most one sample per stretch is not changed. A stretch may extend over several blocks.
+
+    rounded: a stretch contains the times that round to the same multiple of step_s.
     """
     rest: Channels | None = None
     for block in blocks:
@@ -163,12 +180,12 @@ def downsampled(blocks: Iterable[Channels], step_s: float, rounded: bool = False
 
 
 def rounded_to(t_s: Array, step_s: float) -> Array:
-    """Times rounded to multiples of step_s. Rounded stretches have different times."""
+    """Round times to multiples of step_s. Each stretch of downsampled(..., rounded=True) has a different result."""
     return _stretches(t_s, step_s, True) * step_s
 
 
 def _stretches(t_s: Array, step_s: float, rounded: bool = False) -> Array:
-    """The number of each sample's stretch."""
+    """Return the number of each sample's stretch."""
     return np.floor(t_s / step_s + 0.5 * rounded + 1e-6)
 
 

@@ -18,10 +18,10 @@ from .stops.brake_test import RATE_S, Stop, stops_of
 from .stops.standstill import standing
 from .summary import Summary
 
-# they would take a quarter of a long ride's memory
+# These columns would take a quarter of the memory for a long ride.
 _NOT_KEPT = ("lean_formula_deg", "temp_c", "shown_g", "lean_sigma_deg", "utc_s")
-# A vehicle counts as moved if it turned, sped up or braked by this much for a second. An engine that idles at
-# standstill shakes as much as a road, but the mean over a second hardly changes.
+# A vehicle has moved if it turned, sped up or braked by this much for OVER_S. An engine that idles at standstill shakes
+# as much as a road, but the mean over OVER_S hardly changes.
 OVER_S = 1.0
 TURNS_DPS, PUSHES_G = 3.0, 0.05
 MOVES_MPS = 1.0
@@ -29,11 +29,16 @@ MOVES_MPS = 1.0
 
 @dataclass
 class Overview:
-    """A ride: the summary of all samples, and the channels averaged over RATE_S. Columns that neither report nor
-    pictures need are NaN (vehicle_channels() has them).
+    """The data of a ride for its report and its pictures.
 
-    riding_s: time without the standstills of standing(), s, as shown by `report`. notices: remarks about the log, and
-    contradictions to the calibration. stops: empty if forward and backward are exchanged.
+    ride: the log with its calibration.
+    summary: summary of all samples.
+    course: channels averaged over RATE_S. Columns that neither report nor pictures need are NaN; vehicle_channels() has
+        them.
+    stops: stops as in a brake test; empty if forward and backward are exchanged.
+    quality: how far the aligned axes seem to be off.
+    riding_s: time without the standstills of standing(), in s, as shown by `report`.
+    notices: remarks about the log, and contradictions to the calibration.
     """
 
     ride: Ride
@@ -46,7 +51,7 @@ class Overview:
 
     @property
     def exchanged(self) -> ForwardExchanged | None:
-        """The notice that forward and backward are exchanged, or None."""
+        """The notice that forward and backward are exchanged; None without this notice."""
         return next((notice for notice in self.notices if isinstance(notice, ForwardExchanged)), None)
 
     @property
@@ -56,9 +61,10 @@ class Overview:
 
 
 def overview(ride: Ride, progress: Progress | None = None) -> Overview:
-    """Read a ride of open_ride(), block by block, so the memory hardly grows with the ride's length. Raises InputError.
+    """Read a ride of open_ride() block by block, so the memory hardly grows with the ride's length.
 
     progress: called with (done, total) of the log.
+    Raises InputError.
 
     >>> import numpy as np
     >>> from kickstand_tools.api import CalibrationFile, Log, open_ride
@@ -76,7 +82,7 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
             yield replace(block, **dict.fromkeys(_NOT_KEPT, np.full(len(block.t_s), np.nan)))
 
     course = joined(downsampled(blocks(), RATE_S))
-    # a speed that is always 0, as from a broken wheel contact, does not mean that the bike stood
+    # A speed that is always 0 does not prove a standstill. A broken contact at the wheel also reads 0.
     if total.speed_mps.time_s is None:
         course = replace(course, speed_mps=np.broadcast_to(np.nan, len(course.t_s)))
     frozen_s = sum((notice.seconds for notice in notices if isinstance(notice, FrozenReadings)), 0.0)
@@ -93,9 +99,13 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
 
 
 def _riding_s(ride: Channels, standing: Bools, whole: bool = True) -> float:
-    """The time for which a vehicle was moving, s. ride: with evenly spaced samples (see downsampled()). standing (n):
-    True where the vehicle stands still. whole: False for a stretch of a ride, in which a vehicle may go straight ahead,
-    or keep the same turn, from start to end."""
+    """Return the time for which a vehicle was moving, in s.
+
+    ride: evenly spaced samples (see downsampled()).
+    standing: True where the vehicle stands still, shape (n).
+    whole: True for a whole ride. In a stretch of a ride, a vehicle may go straight ahead, or keep the same turn, from
+        start to end.
+    """
     if whole and not _has_moved(ride):
         return 0.0
     return float(np.count_nonzero(~standing)) * spacing_s(ride)
@@ -113,5 +123,8 @@ def _has_moved(ride: Channels) -> bool:
 
 
 def _changes(means: Array) -> float:
-    """The largest difference of the means from their median, which is a gyro's bias or the slope of the ground."""
+    """Return the largest difference of the means from their median.
+
+    The median is the gyro's bias, or the force due to the slope of the ground.
+    """
     return float(np.max(np.abs(means - np.median(means))))

@@ -17,9 +17,9 @@ from .summary import Peak
 if TYPE_CHECKING:
     from rich.console import Group
 
-COSTS_DEG = 0.25  # smaller errors of the lean are invisible on the display and need no action
-GRAVITY_G = 0.02  # allowed difference of the force at rest from 1 g, as in the check of the six positions
-RIDDEN_S = 10.0  # shorter riding means that the bike was only pushed around
+COSTS_DEG = 0.25  # least error of the lean that the display can show, so that it is worth a remedy
+GRAVITY_G = 0.02  # largest accepted difference of the force at rest from 1 g, as in the check of the six positions
+RIDDEN_S = 10.0  # least time of riding; with less, the bike was only pushed around
 STOPS_TITLE = "Stops"
 STOPS_UNITS = {"at": "", "from": "km/h", "time": "s", "distance": "m", "MFDD": "m/s²", "peak": "m/s²", "jerk": "m/s³"}
 STOPS_UNITS |= {"pulls": "m"}  # a stop must fit one line of 80 columns, without room for units
@@ -43,9 +43,15 @@ _SIX_POSITIONS = Remedy("kickstand calibrate six takes that out", "the six posit
 
 @dataclass
 class Words:
-    """The texts of a report. name: the log's name. too_little: sentence that the log has too little of a ride, or "".
-    ride: rows of (quantity, value, time or ""). alignment: a paragraph. stops: a row per stop with the columns of
-    STOPS_UNITS, some of which STOPS_TERMS explains. remark: about the stops, or the reason for none, or ""."""
+    """The texts of a report.
+
+    name: name of the log.
+    too_little: a sentence that the log has too little riding; "" if it has enough.
+    ride: rows of (quantity, value, time or "").
+    alignment: a paragraph about the alignment.
+    stops: one row per stop, with the columns of STOPS_UNITS. STOPS_TERMS explains some of the columns.
+    remark: a remark about the stops, or the reason why there are none; "" without a remark.
+    """
 
     name: str
     too_little: str
@@ -56,7 +62,7 @@ class Words:
 
 
 def as_data(seen: Overview) -> dict[str, Any]:
-    """The values of the report for JSON; None for a missing value."""
+    """Return the values of the report for JSON; None for a missing value."""
     total, quality = seen.summary, seen.quality
     data: dict[str, Any] = {
         "ride": seen.ride.name,
@@ -99,7 +105,7 @@ def as_data(seen: Overview) -> dict[str, Any]:
 
 
 def page(seen: Overview) -> "Group":
-    """The ride for a terminal."""
+    """Format the report for a terminal."""
     from rich.console import Group
     from rich.table import Table
     from rich.text import Text
@@ -124,7 +130,7 @@ def page(seen: Overview) -> "Group":
 
 
 def words(seen: Overview, on_page: bool = False) -> Words:
-    """The ride in words. on_page: name the buttons of the page, not commands, as remedies."""
+    """Describe the ride in words. on_page: remedies name the buttons of the page, not commands."""
     alignment = _alignment(seen, on_page)
     return Words(
         Path(seen.ride.name).name, _too_little(seen), _ride(seen), alignment, _stops(seen.stops), _remark(seen)
@@ -148,7 +154,7 @@ def _no_stops(seen: Overview) -> str:
     if seen.exchanged:
         return "Stops: not known, see the warning."
     if not seen.has_speed and seen.riding_s > RIDDEN_S:
-        return "Stops: not known, the log has no speed."  # there may have been stops, but none that is certain
+        return "Stops: not known, the log has no speed."  # without a speed, no stop is certain
     if stops_by_speed(seen.course):
         return "The speed falls to a stop, the force says otherwise: is the calibration this ride's?"
     return "No stop from over 10 km/h found."
@@ -187,7 +193,7 @@ def _alignment(seen: Overview, on_page: bool) -> str:
     known = angles(quality)
     if known:
         far = abs(quality.roll_deg or 0.0) > SWAPPED_DEG and not seen.ride.car
-        # swapped poses also exchange forward and backward
+        # Swapped poses also exchange forward and backward.
         swapped = far and (seen.exchanged or not seen.has_speed)
         costs = "" if seen.ride.car or seen.exchanged else _cost_sentences(lean_cost(quality), seen.has_speed, on_page)
         said = f"Alignment: it seems off by {', '.join(known)}"
@@ -226,8 +232,10 @@ def judged(seen: Overview) -> bool:
 
 
 def _cost_sentences(cost: LeanCost, speed: bool, on_page: bool) -> str:
-    """A sentence, with the remedy, for each angle that causes a lean error. "" without such an angle. speed: True if
-    the log has a speed."""
+    """Return a sentence with a remedy for each angle that causes an error of the lean; "" without such an angle.
+
+    speed: True if the log has a speed.
+    """
     costs = {
         "Roll": (cost.roll_deg, _LESS_ROLL),
         "Pitch": (cost.pitch_deg, _LESS_PITCH),
@@ -258,13 +266,13 @@ def _stops(stops: list[Stop]) -> list[tuple[str, ...]]:
 
 
 def peak_words(peak: Peak, form: str) -> tuple[str, str]:
-    """A peak's value and its time; "--" if no lean was certain enough."""
+    """Return a peak's value and its time in words; "--" if no lean was certain enough."""
     if peak.time_s is None:
         return "--", ""
     return form.format(peak.value), f"at {clock(peak.time_s)}"
 
 
 def angles(quality: Quality) -> list[str]:
-    """The known angles, in words."""
+    """Return the known angles in words."""
     named = {"roll": quality.roll_deg, "pitch": quality.pitch_deg, "yaw": quality.yaw_deg}
     return [f"{name} {value:+z.1f}°" for name, value in named.items() if value is not None]

@@ -1,4 +1,7 @@
-"""Reads a recorded ride block by block: a log with its calibration, and the lean to use."""
+"""Reads a recorded ride block by block.
+
+A ride is a log with its calibration. Its lean is the displayed lean or the smoothed lean.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +20,7 @@ from ..replay.meter_along import MeterAlong, Misfit
 from ..signals import Array, Bools
 from .channels import Channels, channels, joined
 
-_MAX_SIGMA_DEG = 3.0  # a smoothed lean with a larger standard deviation is not trusted
+_MAX_SIGMA_DEG = 3.0  # largest standard deviation of a smoothed lean that is trusted
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,12 @@ class SmoothSlow(Message):
 
 @dataclass(frozen=True)
 class AbsurdReadings(Message):
-    """Implausible readings. rate_dps, force_g: the largest in the second before at_s."""
+    """The log has implausible readings.
+
+    at_s: time in the log.
+    rate_dps: largest rate in the second before at_s.
+    force_g: largest force in the second before at_s.
+    """
 
     at_s: float
     rate_dps: float
@@ -49,7 +57,7 @@ class AbsurdReadings(Message):
 
 @dataclass
 class Ride:
-    """A log and its calibration. smoothed: use the smoothed lean, not the displayed lean."""
+    """A log and its calibration. smoothed: True to use the smoothed lean, False for the displayed lean."""
 
     log: Source
     calibration: CalibrationFile
@@ -71,9 +79,11 @@ class Ride:
         return self.calibration.vehicle == "car"
 
     def blocks(self, progress: Progress | None = None, notices: list[Message] | None = None) -> Iterator[Channels]:
-        """Yield the channels of the ride, block by block, without frozen readings, which become gaps. progress,
-        notices: see read_blocks(); they concern the whole log, even if the ride is a stretch of it. Raises
-        InputError."""
+        """Yield the channels of the ride block by block. Frozen readings are left out, so they become gaps.
+
+        progress, notices: see read_blocks(). Both are about the whole log, even if the ride is a stretch of it.
+        Raises InputError.
+        """
         along, absurd, slow, some = MeterAlong(self.calibration), False, False, False
         log, stretch = split_stretch(self.log)
         misfit = Misfit()
@@ -110,8 +120,10 @@ class Ride:
     def _read(
         self, log: Source, progress: Progress | None, notices: list[Message] | None
     ) -> Iterator[tuple[Block, Array | None]]:
-        """Yield the blocks of the log, each with its smoothed values (see smooth_blocks()). The values are None if the
-        ride is not smoothed or the log has under 10 samples per second."""
+        """Yield the blocks of the log, each with its smoothed values (see smooth_blocks()).
+
+        The values are None if the ride is not smoothed, or if the log has under 10 samples per second.
+        """
         if self.smoothed:
             return smooth_blocks(log, self.calibration, progress, notices, lines=False)
         blocks = read_blocks(log, 2, progress, notices, lines=False, calibration=self.calibration)
@@ -119,8 +131,10 @@ class Ride:
 
 
 def calibration_beside(log: Path) -> Path:
-    """The path of the calibration beside a log. Raises InputError if the calibration or the log does not exist, or if
-    log is not a log."""
+    """Return the path of the calibration beside a log.
+
+    Raises InputError if the calibration or the log does not exist, or if the file is not a log.
+    """
     if not log.is_file():
         what = "is a directory: give the name of a ride in it" if log.is_dir() else "there is no such file"
         raise InputError(f"{log}: {what}")
@@ -135,11 +149,12 @@ def calibration_beside(log: Path) -> Path:
 
 
 def open_ride(log: Source, calibration: CalibrationFile | File | None = None, smoothed: bool = False) -> Ride:
-    """Open a ride from a log (see read_log) and its calibration.
-    calibration: an object or a file; None: NAME.cal.json beside the log.
+    """Open a ride from a log and its calibration.
 
-    smoothed: use the lean of smooth() instead of the firmware's; a car has none. Raises InputError, also for a
-    calibration that is not aligned, because lean and braking are then unknown.
+    log: see read_log.
+    calibration: an object or a file. None: NAME.cal.json beside the log.
+    smoothed: use the lean of smooth() instead of the firmware's lean. It has no effect for a car, which has no lean.
+    Raises InputError, also for a calibration that is not aligned, because lean and braking are then unknown.
 
     >>> import numpy as np
     >>> from kickstand_tools.api import CalibrationFile, Log
@@ -163,9 +178,12 @@ def open_ride(log: Source, calibration: CalibrationFile | File | None = None, sm
 def vehicle_channels(
     log: Source, calibration: CalibrationFile | File | None = None, progress: Progress | None = None
 ) -> Channels:
-    """The whole ride in the vehicle's axes, with the firmware's lean. log, calibration and errors: as open_ride().
+    """Return the whole ride in the vehicle's axes, with the firmware's lean.
 
-    progress: called with (done, total) of the log. Forces come from Nicolae's formulas (18)-(20) and the matrix.
+    Forces are computed by Nicolae's formulas (18)-(20) and the matrix vehicle_from_sensor.
+
+    log, calibration: see open_ride(), which raises the same errors.
+    progress: called with (done, total) of the log.
 
     >>> import numpy as np
     >>> from kickstand_tools.api import CalibrationFile, Log
@@ -178,16 +196,20 @@ def vehicle_channels(
 
 
 def _divergence_notice(block: Block, at: int) -> Message:
-    """The notice that the lean filter diverged at this row, with the readings of the previous second."""
+    """Return the notice that the lean filter diverged at row `at`, with the largest readings of the previous second."""
     before = slice(int(np.searchsorted(block.time_us, block.time_us[at] - 1_000_000)), at + 1)
     most = np.max(np.abs(block.readings[before]), axis=0)
     return AbsurdReadings(block.time_us[at] / 1e6, float(np.max(most[4:])), float(np.max(most[:3])))
 
 
 def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str, Array], Array, Bools]:
-    """Run the firmware's meter over a block. Returns the `lean` of channels(), the variance of the lean (rad2; < 0 if
-    the filter diverged), and True where the meter blamed the sensor because its readings do not fit.
-    shown: compute the displayed lean; otherwise lean_deg and sure are 0, which saves a tenth of the time.
+    """Run the firmware's meter over a block of n samples.
+
+    shown: compute the displayed lean. Without it, lean_deg and sure are 0, which saves a tenth of the time.
+    Returns:
+        lean: the argument `lean` of channels().
+        variance: variance of the lean, shape (n), in rad2; negative if the filter diverged.
+        odd: True where the meter blamed the sensor because its readings do not fit, shape (n).
     """
     names = ("lean_deg", "shown_g", "variance", "resting", "rolling", "odd", "sure")
     columns: list[list[float]] = [[] for _ in names]
@@ -205,6 +227,6 @@ def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str,
     n = len(block.time_us)
     found = {name: np.array(column or np.zeros(n), dtype=float) for name, column in zip(names, columns)}
     variances = found.pop("variance")
-    found["doubtful"] = np.zeros(n)  # only smooth() finds these
+    found["doubtful"] = np.zeros(n)  # only smooth() finds doubtful samples
     found["lean_sigma_deg"] = np.degrees(np.sqrt(np.where(variances >= 0.0, variances, np.nan)))
     return found, variances, found.pop("odd") > 0.0

@@ -1,4 +1,4 @@
-"""Summarises a ride in numbers, block by block: maxima with their times, time at large leans, histogram of the lean."""
+"""Summarises a ride block by block: maxima with their times, time at large leans, and a histogram of the lean."""
 
 from dataclasses import dataclass, field
 
@@ -11,19 +11,23 @@ from .channels import Channels
 
 LEANS_DEG = (30.0, 40.0)
 BIN_DEG = 1.0
-HELD_S = 2e-6 * HELD_US  # a maximum of the lean must last this long, as on the display
+HELD_S = 2e-6 * HELD_US  # least duration of a maximum of the lean, as on the display
 BINS_DEG = np.arange(-70.0, 70.0 + BIN_DEG, BIN_DEG)
 
 
 @dataclass
 class Peak:
-    """The largest value so far and its time, s from the start; 0 and None if there was none."""
+    """The largest value so far, and its time in the log.
+
+    value: 0 without a value.
+    time_s: None without a value.
+    """
 
     value: float = 0.0
     time_s: float | None = None
 
     def add(self, t_s: Array, values: Array) -> None:
-        """Add values (n) at the times t_s (n); NaN for a value that does not count."""
+        """Add values (n) at the times t_s (n). A value that does not count is NaN."""
         if len(values) and np.nanmax(values, initial=-np.inf) > self.value:
             at = int(np.nanargmax(values))
             self.value, self.time_s = float(values[at]), float(t_s[at])
@@ -33,12 +37,20 @@ class Peak:
 class Summary:
     """A ride in numbers. Call add() block by block.
 
-    left_deg, right_deg: the largest lean to each side that lasted HELD_S. brake_g, accel_g: the largest forces,
-    smoothed as on the display. These four maxima count only while the display would show the lean. riding_s: time in
-    which the lean filter finds no rest; unlike in Overview.riding_s, a stop with a shaking engine counts as riding.
-    beyond_s: time at a lean of at least each key in degrees. histogram_s: the part of riding_s in each bin of BINS_DEG.
-    not_sure_s: time in which the meter does not trust its lean. missing_s: time without readings, longer than LOST_US
-    each. frozen_s: the part of missing_s with frozen readings.
+    The maxima of lean and force count only while the display would show the lean.
+
+    samples: number of samples.
+    duration_s: time from the first to the last sample.
+    left_deg, right_deg: largest lean to each side that lasted for HELD_S.
+    brake_g, accel_g: largest forces, smoothed as on the display.
+    speed_mps: largest speed.
+    riding_s: time in which the lean filter finds no rest. A stop with a shaking engine counts as riding, unlike in
+        Overview.riding_s.
+    beyond_s: for each key, the time at a lean of at least so many degrees.
+    histogram_s: time at the leans of each bin of BINS_DEG, while riding with a trusted lean.
+    not_sure_s: time in which the meter does not trust its lean.
+    missing_s: time without readings; gaps shorter than LOST_US do not count.
+    frozen_s: the part of missing_s with frozen readings.
     """
 
     samples: int = 0
@@ -84,7 +96,7 @@ class Summary:
         self.histogram_s += np.histogram(block.lean_deg[held], BINS_DEG, weights=step[held])[0]
 
     def _update_maxima(self, t_s: Array, lean: Array) -> None:
-        """Update the maxima of the lean that last for HELD_S. lean: NaN if not trusted."""
+        """Update the maxima of the lean that last for HELD_S. lean: NaN where it is not trusted."""
         if not len(t_s):
             return
         step_s = float(np.median(np.diff(t_s))) if len(t_s) > 1 else HELD_S
@@ -93,7 +105,7 @@ class Summary:
         self._last_t_s, self._last_deg = t_s[-n:], lean[-n:]
         if len(lean) > n:
             for peak, values in ((self.right_deg, lean), (self.left_deg, -lean)):
-                windows = np.lib.stride_tricks.sliding_window_view(values, n + 1)  # n steps each
+                windows = np.lib.stride_tricks.sliding_window_view(values, n + 1)  # each window has n steps
                 least = np.min(windows, axis=1)
                 best = int(np.argmax(np.where(np.isnan(least), -np.inf, least)))
                 at = best + int(np.argmin(windows[best]))

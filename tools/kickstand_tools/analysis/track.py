@@ -1,4 +1,4 @@
-"""The track of a ride: the positions of a log, and those interpolated between them."""
+"""The track of a ride: the positions in a log, and positions interpolated between them."""
 
 from dataclasses import dataclass, fields
 
@@ -8,20 +8,30 @@ from ..logs.log import Block
 from ..signals import Array
 from .channels import Channels
 
-GAP_S = 5.0  # after a longer time without a position the place is unknown
+GAP_S = 5.0  # longest time between two positions over which positions are interpolated
 
 
 @dataclass
 class LogTrack:
-    """m positions. t_s: seconds since the log's first sample; lat_deg, lon_deg: degrees north and east."""
+    """m positions. Each field has the shape (m).
+
+    t_s: seconds since the log's first sample.
+    lat_deg: degrees north.
+    lon_deg: degrees east.
+    """
 
     t_s: Array
     lat_deg: Array
     lon_deg: Array
 
     def at(self, t_s: Array) -> tuple[Array, Array]:
-        """Latitude and longitude (n) at these times (n), interpolated along straight lines, also across 180 degrees.
-        NaN before the first position, after the last, and in gaps of over GAP_S."""
+        """Interpolate the positions along straight lines, also across 180 degrees.
+
+        Results are NaN before the first position, after the last position, and in gaps of over GAP_S.
+
+        t_s: times, shape (n).
+        Returns latitude and longitude, each of shape (n), in degrees.
+        """
         none = np.full(len(t_s), np.nan)
         if not len(self.t_s):
             return none, none
@@ -35,7 +45,7 @@ class LogTrack:
 
 
 def track(part: Channels | Block) -> LogTrack:
-    """The positions in a block of a ride or of a log, or in a whole ride."""
+    """Return the positions in a block of a ride or of a log, or in a whole ride."""
     there = np.isfinite(part.lat_deg) & np.isfinite(part.lon_deg)
     return LogTrack(part.t_s[there], part.lat_deg[there], part.lon_deg[there])
 

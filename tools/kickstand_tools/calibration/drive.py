@@ -25,15 +25,18 @@ from .published import PublishedAlignment
 
 METHODS = {"improved": DriveAlignment, "published": PublishedAlignment}
 _SLOWEST_US = 50_000  # longest allowed time between samples
-# Standard error of the up direction, pitch and roll combined. It is due to a slope or camber that a whole drive, or a
-# pose, has throughout
+# Standard error of up, pitch and roll combined. A slope or camber that lasts for the whole drive, or the whole pose,
+# causes it.
 UP_DEG = 1.1
 
 
 @dataclass
 class PoseCheck:
-    """An alignment of two poses, compared with the drive. verdict: a constant of kickstand.drive_alignment.verdict;
-    yaw_deg: yaw error of the alignment from the poses."""
+    """The alignment from two poses, compared with the drive.
+
+    verdict: a constant of kickstand.drive_alignment.verdict.
+    yaw_deg: yaw error of the alignment from the poses.
+    """
 
     verdict: int
     yaw_deg: float
@@ -41,14 +44,23 @@ class PoseCheck:
 
 @dataclass
 class DriveFit:
-    """The alignment from drives. refusal: the reason why the drives do not determine it, otherwise None. With a
-    refusal, calibration is the earlier calibration.
+    """The alignment from drives.
 
-    vehicle: "car" or "motorcycle". used: number of braking events that count. turned: number of braking events in
-    bends, which do not count. quality_deg: standard error of forward about the vertical. ready_s: seconds of logs, in
-    all, until the alignment was ready. lag_s: delay of the speed; halves_deg: difference of two halves of the drive;
-    None for the published method. poses: for a motorcycle with an earlier alignment from two poses. notices: remarks
-    about the logs, with the log's name. bias_dps (3): the gyro's bias.
+    calibration: the alignment; with a refusal, the earlier calibration.
+    vehicle: "car" or "motorcycle".
+    method: a key of METHODS.
+    used: number of braking events that count.
+    turned: number of braking events in bends, which do not count.
+    stops: number of stops.
+    quality_deg: standard error of forward about the vertical.
+    ready_s: seconds of all logs together until the alignment was ready.
+    lag_s: delay of the speed; None for the published method.
+    halves_deg: difference between the two halves of the drive; None for the published method.
+    poses: comparison with an earlier alignment from two poses; None for a car, or without an earlier alignment.
+    events: what happened in the drives.
+    notices: remarks about the logs, each with the name of its log.
+    bias_dps: the gyro's bias, shape (3).
+    refusal: the reason why the drives do not determine the alignment, otherwise None.
     """
 
     calibration: CalibrationFile
@@ -91,15 +103,18 @@ def fit_drive(
     progress: Progress | None = None,
     on_event: Callable[[DriveEvent], None] | None = None,
 ) -> DriveFit:
-    """Find the alignment of a sensor on a vehicle from logs of drives. The logs need a speed, stops, and braking in
-    straight lines.
+    """Find the alignment of a sensor on a vehicle from logs of drives.
 
-    logs: recorded with one mount, in chronological order (see read_log). calibration: an earlier calibration with
-    offset and slope and, for a motorcycle, the alignment from two poses. vehicle: "motorcycle" or "car"; None: a
-    motorcycle if calibration has two poses, otherwise a car. method: "improved", or "published" for ViriCiti's
-    published method. progress: called with the samples done and their total (each is read twice). on_event: called with
-    each DriveEvent as it happens, even if the drive is refused later. Raises InputError; RefusedInput, a subclass with
-    a Message, if the drive does not determine the sensor's mounting.
+    The logs need a speed, stops, and braking in straight lines.
+
+    logs: recorded with one mount, in chronological order (see read_log).
+    calibration: an earlier calibration with offset and slope and, for a motorcycle, the alignment from two poses.
+    vehicle: "motorcycle" or "car". None: a motorcycle if `calibration` is aligned and not a car's, otherwise a car.
+    method: "improved", or "published" for ViriCiti's published method.
+    progress: called with (done, total). Each sample counts twice, because it is read twice.
+    on_event: called with each DriveEvent as it happens, even if the drive is refused later.
+    Raises InputError. Raises its subclass RefusedInput, with a Message, if the drive does not determine the sensor's
+    mounting.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("city", seed=3, seconds=240.0)
@@ -126,20 +141,20 @@ def fit_logs(
     progress: Progress | None = None,
     on_event: Callable[[DriveEvent], None] | None = None,
 ) -> DriveFit:
-    """fit_drive() for logs from usable(). A refusal is not raised: it is part of the result, with the counts."""
+    """Run fit_drive() on logs from usable(). A refusal is not raised, but is in the result with the counts."""
     before = calibration or CalibrationFile()
     poses = before.aligned and before.vehicle != CAR
     kind = vehicle or (MOTORCYCLE if poses else CAR)
     up = before.vehicle_from_sensor[1].tolist() if kind == MOTORCYCLE and poses else None
     steps = Steps(progress, 2 * sum(len(log.t_s) for log in logs))
-    # a first pass finds the gyro's bias at a stop, so that the driving before the first stop also counts
+    # A first pass finds the gyro's bias at a stop. Then the driving before the first stop also counts.
     stood = standing(logs, before, steps)
     known = stood.stops or calibration is not None
     alignment = METHODS[method](kind, up, list(stood.bias) if known else None)
     watch = DriveWatch(alignment, on_event)
     feed(alignment, logs, before, steps, watch)
     matrix = array("f", [0.0] * 9)
-    # `standing` gives a calibrated rate, but the bias must be a reading
+    # The bias from `standing` is a calibrated rate. The calibration file needs it as a reading.
     bias = before.gyro_bias_dps + np.linalg.solve(before.gyro_matrix, alignment.standing.bias)
     refusal, result = None, before
     try:
@@ -181,8 +196,10 @@ def fit_logs(
 
 
 def usable(log: Log, others: bool) -> Log:
-    """The log without frozen readings, checked for a speed and enough samples. others: True if there are other logs, so
-    that you can leave this log out. Raises InputError."""
+    """Return the log without frozen readings. Raises InputError without a speed, or with too few samples per second.
+
+    others: True if the user gave other logs, and can leave this log out.
+    """
     log = without_frozen(log)
     if np.all(np.isnan(log.speed_mps)):
         instead = ", or leave this log out" if others else ""

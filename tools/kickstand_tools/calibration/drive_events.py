@@ -20,12 +20,21 @@ READY, NOT_READY = "ready", "not-ready"
 
 @dataclass
 class DriveEvent:
-    """Something that happened in a drive, t_s seconds from the first sample of the log of that name.
+    """Something that happened in a drive.
 
-    what: USED (a braking event in a straight line, or a start; counted and needed give the progress), TURNING (a
-    braking event in a bend, not counted), PROBLEM (refusal gives the reason), READY (the alignment is good enough, to
-    quality_deg), NOT_READY (no longer ready; refusal gives the reason unless a PROBLEM does), LOG_BEGINS,
-    LOG_WITHOUT_EVENTS.
+    log: name of the log.
+    t_s: seconds since the first sample of this log.
+    what: one of these constants:
+        USED: a braking event in a straight line, or a start, was counted.
+        TURNING: a braking event in a bend was not counted.
+        PROBLEM: speed or mount have a fault.
+        READY: the alignment is good enough.
+        NOT_READY: the alignment is no longer good enough.
+        LOG_BEGINS: a log begins.
+        LOG_WITHOUT_EVENTS: a log ends, and nothing has happened in it.
+    counted, needed: number of counted events, and number of events that are needed.
+    quality_deg: standard error of forward.
+    refusal: the reason for PROBLEM, or for NOT_READY unless a PROBLEM gives the reason; otherwise None.
     """
 
     log: str
@@ -38,13 +47,17 @@ class DriveEvent:
 
 
 class DriveWatch:
-    """Emits DriveEvents for the changes of an alignment's state. events: all so far; on_event: called with each."""
+    """Emits a DriveEvent for each change of an alignment's state.
+
+    events: all events so far.
+    ready_s: seconds of all logs together until the alignment was first READY; 0 if never.
+    """
 
     def __init__(
         self, alignment: DriveAlignment | PublishedAlignment, on_event: Callable[[DriveEvent], None] | None
     ) -> None:
         self.events: list[DriveEvent] = []
-        self.ready_s = 0.0  # seconds of logs, in all, until the alignment was first READY; 0 if never
+        self.ready_s = 0.0
         self._alignment, self._on_event = alignment, on_event
         self._log = ""
         self._counts = (0, 0)  # used, turned
@@ -53,13 +66,15 @@ class DriveWatch:
         self._elapsed_s = 0.0  # duration of the earlier logs
 
     def begin(self, log: str) -> None:
-        """Set the name of the log for the following events, and emit LOG_BEGINS. Nothing is reset."""
+        """Set the name of the log for the following events, and emit LOG_BEGINS."""
         self._log = log
         self._add(0.0, LOG_BEGINS)
 
     def end(self, t_s: float) -> None:
-        """End a log at t_s, after its last sample. Emit the pending events, or LOG_WITHOUT_EVENTS if the log had no
-        event."""
+        """End a log. Emit the pending events, or LOG_WITHOUT_EVENTS if the log had no event.
+
+        t_s: time of the log's last sample.
+        """
         self.look(t_s)
         if self.events[-1].what == LOG_BEGINS:
             self._add(t_s, LOG_WITHOUT_EVENTS)

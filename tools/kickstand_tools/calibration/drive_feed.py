@@ -1,7 +1,7 @@
-"""Runs recorded drives through the firmware's classes for alignment by driving, in numpy sums over 100 ms.
+"""Runs recorded drives through the firmware's classes for alignment by driving.
 
-DriveAlignment uses only sums of its samples. This module computes the sums with numpy and passes them on, which gives
-the same results. Ten minutes at 200 Hz take 0.2 s instead of 0.9 s.
+DriveAlignment uses only sums of its samples over 100 ms. This module computes these sums with numpy, and passes them to
+DriveAlignment. The results are the same. A drive of ten minutes at 200 Hz takes 0.2 s instead of 0.9 s.
 """
 
 from bisect import bisect_left
@@ -29,11 +29,16 @@ _CHUNK = 1000  # least number of samples between two calls of progress
 class Bin:
     """Successive samples that are passed to DriveAlignment as sums.
 
-    begins: True if the samples do not continue the previous bin; then start_mps is the speed at the bin's start. force
-    (3, g), rate (3, deg/s): means in the sensor's axes. first_us: duration of all samples but the last. last_us:
-    duration of the last sample, 0 if the bin is not full. speeds: (microseconds before the end of first_us, m/s) for
-    the speeds during first_us. end_mps: speed of the last sample. start_mps and end_mps are None without a new value.
-    end_us: the log's time at the last sample. samples: number of samples.
+    begins: True if the samples do not continue the previous bin.
+    start_mps: if `begins`, the speed at the start of the bin; None without a new speed.
+    force: mean force along the sensor's axes, 3 values in g.
+    rate: mean rate along the sensor's axes, 3 values in deg/s.
+    first_us: duration of all samples but the last.
+    last_us: duration of the last sample; 0 if the bin is not full.
+    speeds: the speeds during first_us, each as (microseconds before the end of first_us, m/s).
+    end_mps: speed of the last sample; None without a new speed.
+    end_us: time of the last sample in the log.
+    samples: number of samples.
     """
 
     begins: bool
@@ -49,8 +54,10 @@ class Bin:
 
 
 def drive_bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterator[Bin]:
-    """Split the samples of a log into bins of at least length_us, as short as possible. If length_us is 0, each bin has
-    one sample."""
+    """Split the samples of a log into the shortest bins that last at least length_us.
+
+    If length_us is 0, each bin has one sample.
+    """
     time_us = log.time_us
     step_us = np.diff(time_us, prepend=time_us[0])
     is_gap = step_us > GAP_US
@@ -97,7 +104,10 @@ def drive_bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterat
 
 
 def standing(logs: Sequence[Log], calibration: CalibrationFile, steps: "Steps") -> StandingVertical:
-    """The StandingVertical from the stops in all logs. Only stops are computed: much faster than an alignment."""
+    """Return the StandingVertical from the stops in all logs.
+
+    Only stops are computed, so this is much faster than an alignment.
+    """
     standing = StandingVertical()
     speed_mps, silent_us = -1.0, 0  # no speed yet
     for log in logs:
@@ -120,7 +130,7 @@ def feed(
     steps: "Steps",
     watch: DriveWatch,
 ) -> None:
-    """Run the logs through an alignment; watch.look() is called after each step that may change its state."""
+    """Run the logs through an alignment. Call watch.look() after each step that may change its state."""
 
     def measure(speed_mps: float, age_us: int, time_us: int) -> None:
         alignment.measure_speed(speed_mps, age_us)
@@ -157,8 +167,8 @@ def feed(
 
 
 def _end_stop(standing: StandingVertical) -> None:
-    """End a stop at the end of a log, because the vehicle stands elsewhere at the start of the next log."""
-    standing.update((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 2.0 * MOVED_MPS, 0.0)  # as if the vehicle had driven
+    """End a stop at the end of a log, because the next log may begin at another place."""
+    standing.update((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 2.0 * MOVED_MPS, 0.0)  # pretend that the vehicle moves
 
 
 class Steps:
@@ -168,7 +178,7 @@ class Steps:
         self._progress, self._done, self._said, self._total = progress, 0, 0, total
 
     def more(self, samples: int) -> None:
-        """Count more samples."""
+        """Add samples to the count, and call the callback if enough of them are new."""
         self._done += samples
         if self._progress and (self._done - self._said >= _CHUNK or self._done == self._total):
             self._said = self._done

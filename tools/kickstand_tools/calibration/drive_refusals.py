@@ -1,5 +1,7 @@
-"""The messages for the firmware's refusals of a drive: one class per code of kickstand.drive_alignment. of_firmware()
-converts a refusal to its message."""
+"""The messages for the firmware's refusals of a drive.
+
+Each code of kickstand.drive_alignment has a class. of_firmware() converts a refusal to its message.
+"""
 
 from dataclasses import dataclass
 
@@ -22,7 +24,11 @@ _MOVED = {
 
 @dataclass(frozen=True)
 class MountMoved(Message):
-    """The mount has moved. how: a key of _MOVED. angle_deg: the change, None if unknown."""
+    """The mount has moved.
+
+    how: a key of _MOVED.
+    angle_deg: angle by which it moved; None if unknown.
+    """
 
     how: str
     angle_deg: float | None = None
@@ -66,7 +72,7 @@ class NoSpeed(Message):
 
 @dataclass(frozen=True)
 class NotDriven(Message):
-    """The vehicle did not move. needed: number of braking events."""
+    """The vehicle did not move. needed: number of braking events that are needed."""
 
     needed: int
 
@@ -88,7 +94,12 @@ class NotStopped(Message):
 
 @dataclass(frozen=True)
 class FewEvents(Message):
-    """There are too few braking events. turned: events in bends."""
+    """There are too few braking events.
+
+    used: number of braking events that count.
+    needed: number of braking events that are needed.
+    turned: number of braking events in bends, which do not count.
+    """
 
     used: int
     needed: int
@@ -140,5 +151,5 @@ CODES = by_code(
 
 
 def of_firmware(refusal: Refusal) -> Message:
-    """The message for an AlignmentError of a drive."""
+    """Return the message for an AlignmentError of a drive."""
     return CODES[refusal.code](*refusal.values)

@@ -28,11 +28,13 @@ from ..logs.source import File, log_stem, name_of, open_input
 from ..signals import Array, rotated
 
 VERSION = 1
-MOST_BYTES = 1_000_000  # largest accepted file; Kickstand's own are a thousand times smaller
+MOST_BYTES = 1_000_000  # largest accepted file; Kickstand's own files are a thousand times smaller
 MAX_DELAY_S = 0.05  # largest accepted delay of a chip's low-pass filter; the slowest filter has 33 ms
 _NEUTRAL = {"accel_matrix": np.eye(3), "gyro_matrix": np.eye(3), "gyro_sigma": np.zeros((3, 3))}
-_MATRICES = tuple(_NEUTRAL)  # in the order of the firmware's Calibration.matrices()
-ROTATION_TOLERANCE = 2e-3  # accepts a matrix copied with three or four decimals, which is exact to 0.1 degrees
+_MATRICES = tuple(_NEUTRAL)  # names in the order of the firmware's Calibration.matrices()
+# Largest error of a rotation matrix. It accepts a matrix that was copied with three or four decimals, which is exact to
+# 0.1 degrees.
+ROTATION_TOLERANCE = 2e-3
 
 BY_RIDE = "remove the calibration and let the ride show how the sensor sits"
 ALIGN = Remedy("kickstand calibrate two, or calibrate ride, first", BY_RIDE)
@@ -41,16 +43,24 @@ GIVE_CALIBRATION = Remedy("give a file made by kickstand calibrate", "give the .
 
 @dataclass(eq=False)
 class CalibrationFile:
-    """The parameters of one mounted sensor: calibrated = slope * reading + offset, Nicolae's (18)-(20).
+    """The parameters of one mounted sensor.
 
-    accel_offset_g (3), accel_slope (3), gyro_bias_dps (3); vehicle_from_sensor (3, 3): rows left, up, forward. aligned:
-    the matrix was measured; six_done: offset and slope were measured. trim_deg: the roll-misalignment correction found
-    while riding. vehicle: "car" or "motorcycle" if the matrix was measured by driving; also "car" if the board was set
-    to a car; otherwise "". kickstand_side: "left" or "right", the side of the kickstand in the two poses, otherwise "".
-    notes: further entries for the file. gyro_delay_s: delay of the gyro by its low-pass filter (DLPF) in a recorded
-    ride, None if unknown. accel_matrix, gyro_matrix (3, 3): the cross-axis corrections: force = accel_matrix x (slope *
-    reading + offset), rate = gyro_matrix x (reading - bias). gyro_sigma (3, 3): standard errors of gyro_matrix, zeros
-    if it was not measured.
+        force = accel_matrix x (accel_slope * reading + accel_offset_g)       Nicolae's (18)-(20)
+        rate = gyro_matrix x (reading - gyro_bias_dps)
+
+    accel_offset_g, accel_slope: offset and slope of the accelerometer's axes, shape (3).
+    gyro_bias_dps: bias of the gyro's axes, shape (3).
+    vehicle_from_sensor: shape (3, 3). The rows are left, up and forward.
+    aligned: True if vehicle_from_sensor was measured.
+    six_done: True if offset and slope were measured.
+    notes: further entries for the file.
+    trim_deg: correction of the roll misalignment, found while riding.
+    vehicle: "car" or "motorcycle" if vehicle_from_sensor was measured by driving. Also "car" if the board was set to a
+        car. Otherwise "".
+    kickstand_side: side of the kickstand in the two poses, "left" or "right"; otherwise "".
+    gyro_delay_s: delay of the gyro by its low-pass filter (DLPF) in a recorded ride; None if unknown.
+    accel_matrix, gyro_matrix: cross-axis corrections, shape (3, 3).
+    gyro_sigma: standard errors of gyro_matrix, shape (3, 3); zeros if it was not measured.
 
     >>> calibration = CalibrationFile(gyro_bias_dps=[1.0, 0.0, 0.0])
     >>> calibration.vehicle_from_sensor @ [0.0, 1.0, 0.0]
@@ -80,20 +90,20 @@ class CalibrationFile:
             setattr(self, name, np.reshape(np.array(getattr(self, name), dtype=float), (3, 3)))
 
     def __eq__(self, other: object) -> bool:
-        """True if both would be written as the same file."""
+        """True if both would be written to equal files."""
         return isinstance(other, CalibrationFile) and self.as_json() == other.as_json()
 
     def parameters(self) -> list[float]:
-        """The 19 numbers of the firmware's Calibration.parameters()."""
+        """Return the 19 numbers of the firmware's Calibration.parameters()."""
         measured = self.accel_offset_g, self.accel_slope, self.gyro_bias_dps, self.vehicle_from_sensor.ravel()
         return [*np.concatenate(measured).tolist(), self.trim_deg]
 
     def matrices(self) -> list[float]:
-        """The 27 numbers of the firmware's Calibration.matrices()."""
+        """Return the 27 numbers of the firmware's Calibration.matrices()."""
         return np.concatenate([getattr(self, name).ravel() for name in _MATRICES]).tolist()
 
     def to_firmware(self) -> Calibration:
-        """The firmware's Calibration with these parameters, for readings in g and deg/s."""
+        """Return the firmware's Calibration with these parameters, for readings in g and deg/s."""
         calibration = Calibration()
         calibration.set_parameters(self.parameters())
         calibration.set_matrices(self.matrices())
@@ -101,31 +111,40 @@ class CalibrationFile:
         return calibration
 
     def in_vehicle(self, readings: Array) -> tuple[Array, Array]:
-        """Convert readings (n, 7), in the chip's order, to force (n, 3, g) and rate (n, 3, deg/s) along left, up,
-        forward."""
+        """Convert readings to the vehicle's axes left, up, forward.
+
+        readings: in the chip's order, shape (n, 7).
+        Returns:
+            force: shape (n, 3), in g.
+            rate: shape (n, 3), in deg/s.
+        """
         force, rate = rotated(self.vehicle_from_sensor, *self.in_sensor(readings[:, :3], readings[:, 4:]))
         return force, rate
 
     def in_sensor(self, accel_g: Array, gyro_dps: Array) -> tuple[Array, Array]:
-        """Calibrate readings with the firmware's Calibration.apply(), by (18)-(20) and the matrices. Returns force
-        (n, 3, g) and rate (n, 3, deg/s) along the sensor's own axes."""
-        # the firmware's function takes one reading; arrays in place of numbers give it n
+        """Calibrate readings along the sensor's own axes, with the firmware's Calibration.apply().
+
+        Returns:
+            force: shape (n, 3), in g.
+            rate: shape (n, 3), in deg/s.
+        """
+        # The firmware's function takes the numbers of one reading. Arrays instead of numbers give it n readings.
         readings = [*accel_g.T, None, *gyro_dps.T]
         force, rate = [np.zeros(0)] * 3, [np.zeros(0)] * 3
         self.to_firmware().apply(readings, force, rate)
         return np.column_stack(force), np.column_stack(rate)
 
     def gyro_sigma_in_vehicle(self) -> Array:
-        """(3, 3): gyro_sigma along left, up, forward, if the errors of the entries are independent."""
+        """Return gyro_sigma along left, up and forward, shape (3, 3). The errors of its entries are independent."""
         squared = self.vehicle_from_sensor**2
         return np.sqrt(squared @ self.gyro_sigma**2 @ squared.T)
 
     def delay_s(self) -> float:
-        """gyro_delay_s or, if unknown, the delay of the default DLPF setting."""
+        """Return gyro_delay_s or, if it is unknown, the delay of the default DLPF setting."""
         return DELAY_S if self.gyro_delay_s is None else self.gyro_delay_s
 
     def as_json(self) -> dict[str, Any]:
-        """The content of a CAL.json, as plain numbers and lists."""
+        """Return the content of a CAL.json, as plain numbers and lists."""
         data = {
             "version": VERSION,
             "accel_offset_g": _rounded(self.accel_offset_g),
@@ -147,7 +166,9 @@ class CalibrationFile:
 
 
 def read_calibration(source: File) -> CalibrationFile:
-    """Read and check a CAL.json. source: a path or an open file. Raises InputError naming the file.
+    """Read and check a CAL.json. Raises InputError that names the file.
+
+    source: a path or an open file.
 
     >>> import io
     >>> file = io.StringIO()
@@ -199,8 +220,7 @@ def read_calibration(source: File) -> CalibrationFile:
 
 
 def _one_of(name: str, data: dict[str, Any], entry: str, words: tuple[str, str]) -> str:
-    """The value of an entry, which must be one of these words; "" if the entry is missing. Raises InputError
-    otherwise."""
+    """Return the value of an entry, or "" if the entry is missing. Raises InputError for other values than `words`."""
     if data.get(entry) in (None, ""):
         return ""
     if data[entry] not in words:
@@ -209,9 +229,9 @@ def _one_of(name: str, data: dict[str, Any], entry: str, words: tuple[str, str])
 
 
 def write_calibration(target: Path | str | IO[str], calibration: CalibrationFile) -> None:
-    """Write a CAL.json. target: a path, whose file is written whole or not at all, or a file open for text.
+    """Write a CAL.json. Raises InputError.
 
-    Raises InputError.
+    target: a path, or a file open for text. The file of a path is written whole or not at all.
 
     >>> import sys
     >>> write_calibration(sys.stdout, CalibrationFile())  # doctest: +ELLIPSIS
@@ -229,8 +249,8 @@ def write_calibration(target: Path | str | IO[str], calibration: CalibrationFile
 
 
 def calibration_path(log: Path) -> Path:
-    """The path of a ride's calibration: NAME.cal.json beside NAME.csv, NAME.csv.gz or another app's export."""
-    if log.name in ("", ".."):  # the current folder or its parent: use the file beside that folder
+    """Return the path of a ride's calibration: NAME.cal.json beside NAME.csv, NAME.csv.gz or another app's export."""
+    if log.name in ("", ".."):  # the log is the current folder or its parent, so use the file beside this folder
         log = Path(os.path.abspath(log))
     return log.parent / f"{log_stem(log.name)}.cal.json"
 
@@ -245,13 +265,13 @@ def _list(name: str, data: dict[str, Any], entry: str) -> list[Any]:
 
 
 def _matrix(name: str, data: dict[str, Any], entry: str) -> Array:
-    """An entry of three rows of three numbers. Raises InputError for other values."""
+    """Return an entry of three rows of three numbers. Raises InputError for other values."""
     rows = _list(name, data, entry)
     return np.array([_numbers(name, f"{entry}, row {i + 1},", row) for i, row in enumerate(rows)])
 
 
 def _numbers(name: str, entry: str, values: Any) -> list[float]:
-    """The values of an entry, three finite floats. Raises InputError for other values."""
+    """Return the values of an entry, three finite floats. Raises InputError for other values."""
     if not isinstance(values, list) or len(values) != 3:
         raise InputError(f"{name}: {entry} must be 3 numbers: calibrate again")
     for value in values:
@@ -261,7 +281,7 @@ def _numbers(name: str, entry: str, values: Any) -> list[float]:
 
 
 def _within(name: str, data: dict[str, Any], entry: str, limit: float) -> float:
-    """The number of an entry, from -limit to limit; 0 if it is missing. Raises InputError for other values."""
+    """Return the number of an entry, or 0 if the entry is missing. Raises InputError if it is not within +-limit."""
     value = data.get(entry, 0.0)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= limit:
         raise InputError(f"{name}: {entry} is {_shown(value)}, it is at most {limit:g}: calibrate again")
@@ -293,7 +313,7 @@ def _check_ranges(name: str, calibration: CalibrationFile) -> None:
 
 
 def _rounded(values: Any) -> list[float]:
-    """Round values to nine significant digits, which is all that the firmware's 32-bit floats hold."""
+    """Round values to nine significant digits. The firmware's 32-bit floats do not hold more."""
     return [float(f"{value:.9g}") for value in values]
 
 

@@ -1,8 +1,7 @@
-"""The messages for the firmware's refusals of poses: one class per code. of_firmware() converts a refusal to its
-message.
+"""The messages for the firmware's refusals of poses. Each code has a class.
 
-In kickstand.calibration, still_pose refuses a single pose, six_position and sensor_fit refuse six poses, and
-two_position refuses two.
+of_firmware() converts a refusal to its message. In kickstand.calibration, still_pose refuses a single pose,
+six_position and sensor_fit refuse six poses, and two_position refuses two poses.
 """
 
 from dataclasses import dataclass
@@ -30,7 +29,7 @@ class Vibration(Message):
 
 @dataclass(frozen=True)
 class Tilting(Message):
-    """The mean drifts."""
+    """The mean of the readings drifts."""
 
     code = "tilting"
     text = "not still: slowly tilting"
@@ -186,7 +185,7 @@ class Unclear(Message):
 
 @dataclass(frozen=True)
 class OddAxis(Message):
-    """Offset or slope are impossible for a sensor."""
+    """The offset or the slope is impossible for a sensor."""
 
     axis: str
     offset_g: float
@@ -199,7 +198,7 @@ class OddAxis(Message):
 
 @dataclass(frozen=True)
 class SideTilted(Message):
-    """A side was not up."""
+    """A side did not point up."""
 
     side: str
     tilt_deg: float
@@ -296,5 +295,5 @@ CODES = by_code(
 
 
 def of_firmware(refusal: Refusal) -> Message:
-    """The message for a CaptureError, CalibrationError, GyroError or AlignmentError of poses."""
+    """Return the message for a CaptureError, CalibrationError, GyroError or AlignmentError of poses."""
     return CODES[refusal.code](*refusal.values)

@@ -1,5 +1,7 @@
-"""Computes a calibration from recorded still poses with the firmware's own modules. Six poses give offset and slope of
-the accelerometer, two poses give the alignment."""
+"""Computes a calibration from recorded still poses, with the firmware's own modules.
+
+Six poses give offset and slope of the accelerometer. Two poses give the alignment.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,17 +21,22 @@ from ..signals import Array
 from .file import CalibrationFile
 from .pose_refusals import FreePoseOff, SideTilted, of_firmware
 
-_MICRO = 1_000_000  # StillPose sums integers: millionths of g and deg/s
-_SATURATED = 1_990_000  # the smallest range is 2 g, so an axis that reads almost 2 g may be at its limit
-GOOD_FREE_POSE_G = 0.010  # a free pose that is closer to 1 g confirms the calibration
-_SHEET_OFFSET_G = (0.05, 0.05, 0.08)  # the data sheet's limit of the MPU6050's offset, for each axis
-_SHEET_SLOPE_ERROR = 0.03
-_EQUAL_TILT_DEG = 3.0  # the free pose must tilt from its nearest axis by this much more than the side pose on that axis
+_MICRO = 1_000_000  # readings are in millionths of g and deg/s, because StillPose sums integers
+_SATURATED = 1_990_000  # almost 2 g, the end of the smallest range: an axis that reads more may be at its limit
+GOOD_FREE_POSE_G = 0.010  # largest difference from 1 g of a free pose that confirms the calibration
+_SHEET_OFFSET_G = (0.05, 0.05, 0.08)  # largest offset of the MPU6050's axes by the data sheet
+_SHEET_SLOPE_ERROR = 0.03  # largest error of the MPU6050's slope by the data sheet
+# Least tilt of the free pose from its nearest axis, minus the tilt of the side pose from the same axis.
+_EQUAL_TILT_DEG = 3.0
 
 
 @dataclass
 class Pose:
-    """The mean of one still pose. name: the name of its log. still: the firmware's StillPose."""
+    """The mean of one still pose.
+
+    name: the name of its log.
+    still: the firmware's StillPose.
+    """
 
     name: str
     still: StillPose
@@ -41,25 +48,33 @@ class Pose:
 
     @property
     def accel_g(self) -> Array:
-        """(3) mean specific force in the sensor's axes, not calibrated."""
+        """Mean specific force along the sensor's axes, not calibrated, shape (3)."""
         return np.array(self.still.accel)
 
     @property
     def gyro_dps(self) -> Array:
-        """(3) mean angular rate of the sensor at rest: the gyro's bias."""
+        """Mean angular rate of the sensor at rest, which is the gyro's bias, shape (3)."""
         return np.array(self.still.gyro)
 
 
 def read_pose(source: Source) -> Pose:
-    """Average a recorded pose (see read_log for source). Raises InputError naming the file; RefusedInput, a subclass,
-    if the pose was not still."""
+    """Average a recorded pose.
+
+    source: see read_log.
+    Raises InputError that names the file. Raises its subclass RefusedInput if the pose was not still.
+    """
     log = read_log(source)
     return take_pose(log.name, log.readings, "capture this pose again")
 
 
 def take_pose(name: str, readings: Array, advice: str) -> Pose:
-    """Average the readings (n, 7) of a still pose, in the chip's order (g, C, deg/s). name: the pose's name in
-    messages. Raises RefusedInput, with the advice, if the pose was not still."""
+    """Average the readings of a still pose.
+
+    name: the pose's name in messages.
+    readings: in the chip's order (g, C, deg/s), shape (n, 7).
+    advice: what to do if the pose is refused.
+    Raises RefusedInput, with the advice, if the pose was not still.
+    """
     still = StillPose(_MICRO, _MICRO, _SATURATED, len(readings))
     where = f"{name}: pose refused"
     counts = np.round(np.nan_to_num(readings, nan=ROOM_TEMP_C) * _MICRO).astype(int).tolist()
@@ -87,11 +102,13 @@ def refuse_same_file(sources: Sequence[Source]) -> None:
 class SixPositions:
     """The calibration from six or seven poses.
 
-    sides: the pose of each side in the order of kickstand.calibration.six_position.SIDES (+x -x +y -y +z -z up);
-    tilt_deg: the tilt of each pose from its axis. free_pose, free_pose_error_g: the seventh, slanted pose, and its
-    calibrated length minus 1 g; None without a seventh pose. beyond_sheet: axes whose offset or slope exceeds the data
-    sheet's limits. turns: number of turns between poses that calibrated the gyro. all_turns: number of all turns. Both
-    are 0 if each pose has its own log.
+    sides: the pose of each side, in the order of kickstand.calibration.six_position.SIDES (+x -x +y -y +z -z up).
+    tilt_deg: the tilt of each of these poses from its axis.
+    free_pose: the seventh, slanted pose; None without it.
+    free_pose_error_g: the calibrated length of the seventh pose minus 1 g; None without it.
+    beyond_sheet: axes whose offset or slope exceeds the data sheet's limits.
+    turns: number of turns between poses that calibrated the gyro; 0 if each pose has its own log.
+    all_turns: number of all turns between poses; 0 if each pose has its own log.
     """
 
     calibration: CalibrationFile
@@ -107,10 +124,11 @@ class SixPositions:
 def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
     """Find offset (g) and slope of each axis from six still poses, each side up once, in any order.
 
-    poses: six logs, or seven with a slanted pose that checks the result (see read_log for the kinds of log). Solves the
-    equations (16)-(20) of Nicolae's paper, section 4, such that each calibrated reading is 1 g long, even if the axis
-    does not point exactly up. The gyro's bias is the median of the poses. Raises InputError; RefusedInput, a subclass
-    with a Message, if the firmware refuses a pose or the result.
+    The equations are (16)-(20) of Nicolae's paper, section 4. They are solved such that each calibrated reading is 1 g
+    long, even if an axis does not point exactly up. The gyro's bias is the median of the poses.
+
+    poses: six logs, or seven with a slanted pose that checks the result. See read_log for the kinds of log.
+    Raises InputError. Raises its subclass RefusedInput, with a Message, if the firmware refuses a pose or the result.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)
@@ -140,7 +158,7 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
 
 
 def wrong_number(captures: int) -> InputError:
-    """The error for a wrong number of captures."""
+    """Return the error for a wrong number of captures."""
     return InputError(
         f"{captures} captures given: six are needed, one for each side up, or seven with a free pose; or one log of "
         "the whole procedure"
@@ -148,9 +166,9 @@ def wrong_number(captures: int) -> InputError:
 
 
 def _sides(poses: list[Pose]) -> tuple[list[Pose], Pose | None]:
-    """The pose of each side in the order of SIDES, and the free pose (None without one).
+    """Return the pose of each side, in the order of SIDES, and the free pose; None without a free pose.
 
-    With seven poses, two poses have the same side up. The one that is further from the axis is the free pose.
+    Of seven poses, two have the same side up. The pose that is further from the axis is the free pose.
     """
     found: dict[int, list[Pose]] = {}
     for pose in poses:
@@ -179,7 +197,7 @@ def _tilt_deg(pose: Pose) -> float:
 
 
 def _with_file(error: CalibrationError, sides: list[Pose], free: Pose | None) -> RefusedInput:
-    """The refusal, with the name of the file if it concerns one pose."""
+    """Return the refusal, with the name of the file if it concerns one pose."""
     reason = of_firmware(error)
     if isinstance(reason, SideTilted):
         return RefusedInput(reason, sides[SIDES.index(reason.side)].name, ": capture this side again")
@@ -187,7 +205,10 @@ def _with_file(error: CalibrationError, sides: list[Pose], free: Pose | None) ->
 
 
 def beyond_sheet(offset: Sequence[float], slope: Sequence[float]) -> list[str]:
-    """The axes whose offset or slope exceeds the data sheet's limits. The sensor is usable, but the user is warned."""
+    """Return the axes whose offset or slope exceeds the data sheet's limits.
+
+    The sensor is usable, but the user is warned.
+    """
     return [
         axis
         for axis, o, s, most in zip(AXES, offset, slope, _SHEET_OFFSET_G, strict=True)
@@ -197,7 +218,10 @@ def beyond_sheet(offset: Sequence[float], slope: Sequence[float]) -> list[str]:
 
 @dataclass
 class TwoPositions:
-    """The alignment from two poses. tilt_deg: the angle between the poses; under 8 degrees, forward is uncertain."""
+    """The alignment from two poses.
+
+    tilt_deg: the angle between the poses. If it is under 8 degrees, forward is uncertain.
+    """
 
     calibration: CalibrationFile
     kickstand: Pose
@@ -210,10 +234,14 @@ def fit_two_positions(
 ) -> TwoPositions:
     """Find the alignment of a sensor on a bike from two poses: on the kickstand, and upright.
 
-    kickstand, upright: logs (see read_log). calibration: the result of fit_six_positions(), with offset and slope;
-    None: the readings are treated as calibrated. side: "left" or "right", the side of the kickstand. The gyro's bias is
-    its mean reading in the pose on the kickstand. The method is Nicolae's paper, section 2, equations (3)-(8). Raises
-    InputError; RefusedInput, a subclass with a Message, if the firmware refuses the poses.
+    The equations are (3)-(8) of Nicolae's paper, section 2. The gyro's bias is its mean reading in the pose on the
+    kickstand.
+
+    kickstand, upright: logs (see read_log).
+    calibration: the calibration in the result of fit_six_positions(), with offset and slope. None if the readings are
+        calibrated.
+    side: side of the kickstand, "left" or "right".
+    Raises InputError. Raises its subclass RefusedInput, with a Message, if the firmware refuses the poses.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)

@@ -1,5 +1,7 @@
-"""Computes the six positions from one log: finds the still poses in it, and calibrates the gyro by the turns between
-them."""
+"""Calibrates a sensor from one log of the six positions.
+
+It finds the still poses in the log, and calibrates the gyro by the turns between the poses.
+"""
 
 from dataclasses import replace
 
@@ -17,27 +19,31 @@ from .file import CalibrationFile
 from .pose_refusals import SideTilted, UnprovedGyro, of_firmware
 from .poses import Pose, SixPositions, beyond_sheet, take_pose, wrong_number
 
-_WINDOW_S = 0.5  # stillness is searched in windows of this length
-_LEAST_S = 1.0  # a shorter still stretch is not a pose
-_MARGIN_S = 0.1  # this much is left out at both ends of a pose
-_STILL_G, _STILL_DPS = 0.1, 6.0  # largest change of an axis in a window
-_STILL_SPREAD_G = 0.02  # largest standard deviation in a window
-_STILL_DRIFT_G = 0.007  # largest difference between the means of a window's halves
-_ROUGH_TILT_DEG = 30.0  # a pose further from every axis counts as slanted
-_MICRO = 1_000_000  # Turn sums integers: millionths of deg/s
-_RANGES_DPS = (250.0, 500.0, 1000.0, 2000.0)  # ranges of a gyro; a log does not contain its range
-# if the largest rate is between these shares of a range, the gyro reached the end of that range
+_WINDOW_S = 0.5  # length of the windows in which the sensor must be still
+_LEAST_S = 1.0  # least length of a pose
+_MARGIN_S = 0.1  # time that is left out at both ends of a pose
+_STILL_G, _STILL_DPS = 0.1, 6.0  # largest change of an axis in a still window
+_STILL_SPREAD_G = 0.02  # largest standard deviation in a still window
+_STILL_DRIFT_G = 0.007  # largest difference between the means of the halves of a still window
+_ROUGH_TILT_DEG = 30.0  # largest tilt of a side pose from its axis
+_MICRO = 1_000_000  # readings are in millionths of deg/s, because Turn sums integers
+_RANGES_DPS = (250.0, 500.0, 1000.0, 2000.0)  # possible ranges of the gyro, because a log does not contain its range
+# If the largest rate is between these shares of a range, the gyro reached the end of that range.
 _AT_RANGE = 0.985, 1.01
-_QUICK = 0.95  # from this share of the range on, a rate may have been clipped before the chip's low-pass filter
+_QUICK = 0.95  # a rate over this share of the range may have been clipped before the chip's low-pass filter
 
 
 def fit_procedure(source: Source) -> SixPositions:
-    """Calibrate the whole sensor from one log of the six positions. The sensor was still on each side once, in any
-    order, and slanted at least once; the log also contains the turns between the poses.
+    """Calibrate the whole sensor from one log of the six positions.
+
+    In the log, the sensor is still on each side once, in any order, and slanted at least once. The log also contains
+    the turns between the poses. Every still pose and every turn counts.
 
     The result has offset, slope and cross-axis errors of the accelerometer, and bias, scale and cross-axis errors of
-    the gyro (see kickstand.calibration.sensor_fit). Every still pose and every turn counts. source: see read_log.
-    Raises InputError; RefusedInput, a subclass, if the firmware refuses a pose or the result.
+    the gyro (see kickstand.calibration.sensor_fit).
+
+    source: see read_log.
+    Raises InputError. Raises its subclass RefusedInput if the firmware refuses a pose or the result.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)
@@ -85,7 +91,10 @@ def fit_procedure(source: Source) -> SixPositions:
 
 
 def _still_stretches(log: Log) -> list[tuple[int, int]]:
-    """The stretches in which the sensor was still: (index of the first sample, index after the last sample)."""
+    """Find the stretches in which the sensor was still.
+
+    Returns the index of the first sample, and the index after the last sample, of each stretch.
+    """
     step_s = float(np.median(np.diff(log.t_s))) if len(log.t_s) > 1 else 1.0
     n = max(4, round(_WINDOW_S / step_s))
     if len(log.t_s) < n:
@@ -98,7 +107,7 @@ def _still_stretches(log: Log) -> list[tuple[int, int]]:
     drift = np.mean(accel[:, half:], axis=1) - np.mean(accel[:, :half], axis=1)
     still &= np.all(np.abs(drift) <= _STILL_DRIFT_G, axis=1)
     still &= np.all(np.ptp(log.gyro_dps[within], axis=1) <= _STILL_DPS, axis=1)
-    still &= log.t_s[within[:, -1]] - log.t_s[starts] < 2 * _WINDOW_S  # no window across a gap
+    still &= log.t_s[within[:, -1]] - log.t_s[starts] < 2 * _WINDOW_S  # a window must not extend across a gap
     lies = np.zeros(len(log.t_s) + 2, dtype=int)
     for start in starts[still]:
         lies[start + 1 : start + 1 + n] = 1
@@ -109,8 +118,10 @@ def _still_stretches(log: Log) -> list[tuple[int, int]]:
 
 
 def _pose(log: Log, first: int, last: int) -> Pose:
-    """The mean of these samples. If the sensor tilts a little, as when a hand puts it down slowly, the mean of the
-    calmest half."""
+    """Average these samples.
+
+    If the sensor tilts a little, as when a hand puts it down slowly, average the middle half or else the last half.
+    """
     name = f"{log.name}, {log.t_s[first]:.1f} to {log.t_s[last - 1]:.1f} s"
     quarter = (last - first) // 4
     problem = None
@@ -124,8 +135,10 @@ def _pose(log: Log, first: int, last: int) -> Pose:
 
 
 def _sides(log: Log, means: list[list[float]]) -> list[int]:
-    """The index of the pose for each side, in the order of SIDES. If a side has several poses, the least tilted is
-    used."""
+    """Return the index of the pose for each side, in the order of SIDES.
+
+    If a side has several poses, the least tilted pose is used.
+    """
     best: dict[int, int] = {}
     for k, mean in enumerate(means):
         side = six_position.side_of(mean)
@@ -143,7 +156,7 @@ def _sides(log: Log, means: list[list[float]]) -> list[int]:
 
 
 def _turns(log: Log, stretches: list[tuple[int, int]], poses: list[Pose]) -> list[tuple[list[float], float] | None]:
-    """The turns between the poses, for SensorFit. None for a turn with missing or clipped readings."""
+    """Return the turns between the poses, for SensorFit; None for a turn with missing or clipped readings."""
     times_us = np.round(log.t_s * 1e6).astype(int)
     steps_us = np.diff(times_us, prepend=times_us[0])
     rates = np.round(log.gyro_dps * _MICRO).astype(int).tolist()

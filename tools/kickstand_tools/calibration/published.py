@@ -1,9 +1,11 @@
-"""Alignment by driving with ViriCiti's published method: R = R2 R1, each a rotation by Rodrigues' formula.
+"""Alignment by driving with ViriCiti's published method, for comparison with the firmware's DriveAlignment.
 
-R1 rotates the mean direction of gravity at the stops to up. R2 rotates the mean force of the braking events, levelled
-by R1, to backward. A braking event counts if the directions of its levelled force spread little. The vertical
-from the stops is slightly tilted, which causes a yaw error of about 3 to 4 degrees. More braking events do not reduce
-this error. The firmware's DriveAlignment does not have it. The published method is here for comparison.
+The alignment is R = R2 R1, two rotations by Rodrigues' formula. R1 rotates the mean direction of gravity at the stops
+to up. R2 rotates the mean force of the braking events, levelled by R1, to backward. A braking event counts if the
+directions of its levelled force spread little.
+
+The vertical from the stops is slightly tilted. This causes a yaw error of about 3 to 4 degrees, and more braking events
+do not reduce it. The firmware's DriveAlignment does not have this error.
 """
 
 from array import array
@@ -18,26 +20,26 @@ from kickstand.units import GAP_US
 
 from ..signals import Array, cross_matrix
 
-MAX_DISPERSION = 0.02  # 8 degrees
-MIN_LEVEL_G = 0.03  # a smaller levelled force has a random direction
-BRAKING_MPS2 = -1.0  # an interval with more deceleration belongs to a braking event
-MEAN_US = 100_000
-LOSS_MPS = 1.5  # a braking event that reduces the speed by less is noise
+MAX_DISPERSION = 0.02  # largest circular dispersion of a braking event: a spread of 8 degrees
+MIN_LEVEL_G = 0.03  # least levelled force; a smaller force has a random direction
+BRAKING_MPS2 = -1.0  # an interval with more deceleration than this belongs to a braking event
+MEAN_US = 100_000  # forces are averaged over this time
+LOSS_MPS = 1.5  # least reduction of the speed in a braking event; a smaller one is noise
 MIN_EVENTS = 3
 UP = np.array([0.0, 1.0, 0.0])
 BACKWARD = np.array([0.0, 0.0, -1.0])
-NO_MEAN = 9.9  # the largest value returned, also if there is no mean direction, as for opposite directions
+NO_MEAN = 9.9  # largest circular dispersion; also the value for opposite directions, which have no mean direction
 
 
 def rotation_between(a: Array, b: Array, axis: int) -> Array:
-    """(3, 3): the rotation that takes unit vector a to unit vector b (O. Rodrigues).
+    """Return the rotation that takes unit vector a to unit vector b, shape (3, 3) (O. Rodrigues).
 
         R = I + K + K^2 / (1 + c),  K the cross product matrix of a x b, c = a . b
 
-    Near c = -1 the quotient has no significant digits left. If c < 0, a half turn D about a coordinate axis is
-    therefore applied first, which makes c > 0: R = Rodrigues(D a, b) D.
+    Near c = -1 the quotient has no significant digits left. Therefore, if c < 0, a half turn D about a coordinate axis
+    is applied first: R = Rodrigues(D a, b) D. The half turn makes c > 0.
 
-    axis: 0, 1 or 2, the coordinate axis of the half turn, perpendicular to b.
+    axis: coordinate axis of the half turn, 0, 1 or 2. It must be perpendicular to b.
     """
     half_turn = np.eye(3)
     if a @ b < 0.0:
@@ -49,12 +51,13 @@ def rotation_between(a: Array, b: Array, axis: int) -> Array:
 
 
 def circular_dispersion(directions: Sequence[complex]) -> float:
-    """The spread of directions in a plane, given as complex numbers of length 1 (N. I. Fisher, 1993, section 2.3); at
-    most NO_MEAN.
+    """Return the circular dispersion of directions in a plane, at most NO_MEAN (N. I. Fisher, 1993, section 2.3).
 
         d = (1 - rho2) / (2 R^2),  R = |mean of e^(i a)|,  rho2 = the mean cosine of 2 (a - mean direction)
 
     For small spreads, d is about the variance in rad^2: 0.02 means 8 degrees, 0.005 means 4 degrees.
+
+    directions: complex numbers of length 1.
     """
     mean = np.mean(directions)
     square = float(abs(mean)) ** 2
@@ -65,11 +68,13 @@ def circular_dispersion(directions: Sequence[complex]) -> float:
 
 
 class PublishedAlignment:
-    """The published method, with the interface of DriveAlignment. A DriveAlignment inside checks speed and mount and
-    finds the vertical.
+    """The published method, with the interface of DriveAlignment.
 
-    counted: number of accepted braking events. turned: number of events refused for their dispersion. needed: required
-    number of accepted events.
+    It uses a DriveAlignment to check speed and mount, and to find the vertical.
+
+    counted: number of accepted braking events.
+    turned: number of braking events that were refused for their dispersion.
+    needed: number of accepted braking events that are needed.
     """
 
     def __init__(self, vehicle: str, up: list[float] | None = None, bias: list[float] | None = None) -> None:
@@ -79,9 +84,9 @@ class PublishedAlignment:
         self.counted = self.turned = 0
         self._accepted = np.zeros(3)  # sum of the forces of accepted braking events
         self._means: list[complex] = []  # one direction for each accepted braking event
-        # Mean forces over MEAN_US each (g, along the sensor's axes) and their levelled directions. The first list
-        # belongs to the current braking event. The second holds those since the last speed: the next speed shows
-        # whether they were braking
+        # Mean forces over MEAN_US, in g along the sensor's axes, each with its levelled direction. The first list
+        # belongs to the current braking event. The second list holds the means since the last speed. The next speed
+        # shows if the vehicle was braking during these means.
         self._event: list[tuple[Array, complex]] = []
         self._interval: list[tuple[Array, complex]] = []
         self._level = np.eye(3)
@@ -89,7 +94,7 @@ class PublishedAlignment:
 
     @property
     def problem(self) -> Refusal | None:
-        """An AlignmentError that names the fault of the speed or of the mount, or None."""
+        """An AlignmentError that names the fault of the speed or of the mount; None without a fault."""
         return self._improved.problem
 
     @property
@@ -99,8 +104,10 @@ class PublishedAlignment:
 
     @property
     def quality_deg(self) -> float:
-        """Standard error of the mean direction of the accepted braking events, 180 until there are two. It does not
-        include the error of a wrong vertical."""
+        """Standard error of the mean direction of the accepted braking events; 180 for fewer than two events.
+
+        It does not include the error of a wrong vertical.
+        """
         n = self.counted
         return float(np.degrees(np.sqrt(circular_dispersion(self._means) / n))) if n > 1 else 180.0
 
@@ -127,7 +134,7 @@ class PublishedAlignment:
                     self._interval.append((mean, levelled / abs(levelled)))
 
     def interrupt(self) -> None:
-        """Samples are missing: drop the current braking event. Accepted events are kept."""
+        """Drop the current braking event, because samples are missing. Keep the accepted events."""
         self._improved.interrupt()
         self._drop_event()
 
@@ -136,7 +143,7 @@ class PublishedAlignment:
         self._improved.finish()
 
     def measure_speed(self, speed_mps: float, age_us: int = 0) -> None:
-        """Add a new speed: see DriveAlignment.measure_speed(), but this method does not estimate the lag."""
+        """Add a new speed: see DriveAlignment.measure_speed(). Unlike there, the lag is not estimated."""
         self._improved.measure_speed(speed_mps, age_us)
         seconds = self._interval_us * 1e-6
         if self._interval_us < MIN_INTERVAL_US:
@@ -153,7 +160,10 @@ class PublishedAlignment:
         self._speed = speed_mps
 
     def matrix(self, out: array) -> None:
-        """Fill out (9, rows left, up, forward) with vehicle-from-sensor. Raises AlignmentError while not ready."""
+        """Fill `out` with the 9 numbers of vehicle from sensor, in rows left, up, forward.
+
+        Raises AlignmentError while the alignment is not ready.
+        """
         if not self.ready:
             raise self.reason
         self._find_level()
@@ -167,7 +177,7 @@ class PublishedAlignment:
         self._sums, self._sums_us = [0.0] * 3, 0
 
     def _find_level(self) -> bool:
-        """Level forces by the current vertical. False if it is unknown."""
+        """Set the rotation that levels forces, from the current vertical. Returns False if the vertical is unknown."""
         up = vector()
         known = self._improved.vertical.known(up)
         if known:
@@ -175,7 +185,7 @@ class PublishedAlignment:
         return known
 
     def _levelled(self, force: Array) -> complex:
-        """The horizontal part of a force as a complex number: real part to the left, imaginary part forward."""
+        """Return the horizontal part of a force as a complex number: real part to the left, imaginary part forward."""
         left, _, forward = self._level @ force
         return complex(left, forward)
 

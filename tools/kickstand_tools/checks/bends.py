@@ -27,7 +27,7 @@ MOVES_S, MOVES = 1.6, 0.1
 # With the opposite sign, the share was -1.6 to -1.0.
 AGAINST, SURE = -0.5, 5.0
 # The calmest seconds are the share CALMEST of all seconds, but at least LEAST seconds. A standard deviation CALM_G of
-# the force counts as much as the limit of the rates.
+# the force counts as much as the argument calm_rate of calm_rates().
 CALMEST, LEAST, CALM_G = 0.2, 3, 0.02
 # The gyro's bias is known if the share AGREE of the calmest seconds is within KNOWN_DPS. Otherwise the FEW calmest
 # seconds are tried. In a ride that is mostly one long, steady bend, they are a standstill.
@@ -71,7 +71,7 @@ def bends(cells: LogCells) -> Message | None:
     if len(rate) * WINDOW_S < RIDING_S:
         return None
     changes = unrest(rate, MOVES_S)
-    moves = MOVES * np.percentile(changes, 95)  # relative, because the unit is unknown
+    moves = MOVES * np.percentile(changes, 95)  # the limit is relative, because the unit of the rates is unknown
     if np.count_nonzero(changes > moves) * WINDOW_S < RIDING_S:
         return None
     whole = len(rate) // 5 * 5  # in whole seconds

@@ -56,8 +56,8 @@ class Checks:
     def remarks(self, axes: bool = True, calibration: CalibrationFile | None = None) -> list[Message]:
         """Return at most one remark about the log's axes, and one if the log contradicts the calibration.
 
-        axes: False for no remark about the axes.
-        calibration: None for no remark about the calibration.
+        axes: False to skip the checks of the axes.
+        calibration: None to skip the check of the calibration.
         Raises RefusedInput if the speed is not in m/s.
         """
         cells = self._table.cells()

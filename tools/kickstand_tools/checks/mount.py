@@ -153,7 +153,7 @@ class UpsideDown(WrongMount):
 
 @dataclass(frozen=True)
 class AnotherMount(WrongMount):
-    """The calibration that a new one builds on belongs to another mount. Only its offset and slope are used."""
+    """The earlier calibration belongs to another mount. The new calibration uses only its offset and slope."""
 
     angle_deg: float
 

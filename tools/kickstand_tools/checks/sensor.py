@@ -28,8 +28,8 @@ NOISY = 0.15
 DEAD_ALL_S = 20.0
 DEAD_FROM_S = 2.0  # least time of a dead axis; for one second, rounding alone may hide the noise
 SATURATED_DPS, SATURATED_S, SATURATED_SAMPLES = 100.0, 0.1, 5
-# An accelerometer is clipped if CLIPPED_SAMPLES have the same largest reading, over CLIPPED_G. CLIPPED_STEPS is the
-# least size of this reading in last digits.
+# An accelerometer is clipped if CLIPPED_SAMPLES have the same largest reading, over CLIPPED_G. This reading
+# must be over CLIPPED_STEPS steps of the last digit.
 CLIPPED_G, CLIPPED_SAMPLES, CLIPPED_STEPS = 1.1, 10, 200.0
 NAMES = tuple(f"{sensor} {axis}" for sensor in ("accelerometer", "gyro") for axis in AXES)
 

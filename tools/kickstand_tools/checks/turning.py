@@ -21,10 +21,9 @@ from .cells import CELL_S
 KNOT_S = 5.0  # time between the knots of an unknown velocity
 EVENED = 10  # number of cells over which the rotated forces are averaged, to remove vibration
 FORCE_G = 0.1  # standard deviation of the noise of these means
-# Standard deviations of the prior
-VELOCITY_MPS = 20.0  # of an unknown velocity
-DIRECTION = 1.0  # of each component of the constant direction
-BIAS_DPS = 3.0  # of the correction of the gyro's bias
+# Standard deviations of the prior. VELOCITY_MPS is that of an unknown velocity. DIRECTION is that of each component of
+# the constant direction. BIAS_DPS is that of the correction of the gyro's bias.
+VELOCITY_MPS, DIRECTION, BIAS_DPS = 20.0, 1.0, 3.0
 BIAS_STEPS, MOST_DPS = 2, 5.0  # number of steps that correct the bias, and largest change in one step
 LATE_S = (0.0, 0.5, 1.0, 1.5)  # delays of the speed that are tried, because a satellite receiver's speed is late
 

@@ -1,7 +1,7 @@
 """Estimates a motorcycle's ride from all of its readings at once, by Gauss-Newton steps with the model of equations.py.
 
     windows.py        readings -> means over 0.2 s
-    first_guess.py    when the bike stands, rough lean and speed; for an alignment also rough axes
+    first_guess.py    standstills, rough lean and speed; for an alignment also rough axes
     unknowns.py       the states, the parameters, and the prior of the parameters
     equations.py      process model, measurement model and their Jacobian
     noise.py          process noise and measurement noise

@@ -34,9 +34,9 @@ from .windows import WINDOW_S, Windows, windows_of
 SLOWEST_HZ = 20.0  # least sample rate
 LONGEST_S = 1800.0  # the longest part of a ride that is used; a longer part does not improve the result
 # Standard deviations of the prior
-ROTATION_SIGMA = 10.0  # rad: of the misalignment, which is unknown
-AXES_SIGMA = 0.012  # ratio: of scale and cross-axis errors of the accelerometer
-BESIDE_SIGMA_G = 0.005  # of the force to the side on straights, caused by luggage or camber
+ROTATION_SIGMA = 10.0  # rad: misalignment, so large because the misalignment is unknown
+AXES_SIGMA = 0.012  # ratio: scale and cross-axis errors of the accelerometer
+BESIDE_SIGMA_G = 0.005  # force to the side on straights, caused by luggage or camber
 UNSETTLED = np.radians(0.5)  # if the last step changed an angle by more than this, the estimate has not converged
 # An estimated error of the sensor over ODD_SIGMAS standard deviations of its prior enlarges the standard errors. An
 # error over ABSURD_SIGMAS standard deviations refuses the ride.

@@ -1,9 +1,9 @@
 """The process model and the measurement model of a motorcycle, and their Jacobian.
 
-The states are the lean t, the pitch q, and the sensor's velocity to the left l, up u and forward v. The velocity is in
-level axes that yaw with the bike at the yaw rate p. Rates w and forces f are the measured values (w_m, f_m) without the
-sensor's errors. R is the rotation by ROTATION, to second order. The acceleration a is the force in level axes, minus
-1 g upwards.
+The states are the lean t, the pitch q, and three velocities of the sensor: l to the left, u up and v forward. The
+velocities are in level axes that yaw with the bike at the yaw rate p. Rates w and forces f are the measured values
+(w_m, f_m) without the sensor's errors. R is the rotation by ROTATION, to second order. The acceleration a is the force
+in level axes, minus 1 g upwards.
 
     w = R w_m + GYRO w_m - bias        f = R f_m + ACCEL f_m + offset
     p = (w_x sin t + w_y cos t) / cos q        t' = w_z - p sin q        q' = w_y sin t - w_x cos t

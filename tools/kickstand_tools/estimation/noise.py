@@ -58,10 +58,11 @@ ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
 # residual CLIMBING shows their size and how long they last. It is the upward velocity from integrated forces minus the
 # upward velocity from pitch and speed.
 #
-# The misfit is a factor on the standard deviation of the velocities. It is the square of a ratio. The numerator is the
-# rms of CLIMBING, averaged over LASTING_MISFIT_S, times the root of the number of windows in a mean. The denominator is
-# USUAL_MISFIT, the same value for an ordinary ride. A mount's error in m/s is the same in town as on a motorway.
-# Therefore CLIMBING is divided by its standard deviation at the speed MISFIT_MPS, whatever the actual speed.
+# The misfit is a factor on the standard deviation of the velocities. To compute it, take the means of CLIMBING over
+# LASTING_MISFIT_S, and multiply their rms by the root of the number of windows in a mean. Divide the result by
+# USUAL_MISFIT, its value in an ordinary ride. The misfit is the square of this ratio. A mount's error in m/s is the
+# same in town as on a motorway. Therefore, at any speed, CLIMBING is first divided by its standard deviation at
+# MISFIT_MPS.
 LASTING_MISFIT_S, MISFIT_MPS, USUAL_MISFIT, MOST_MISFIT = 2.0, 25.0, 0.25, 6.0
 # If the misfit is over 1, the roughness is at least MISFIT_ROUGHNESS times the misfit. The residuals alone would give
 # less, because lasting errors have small residuals.
@@ -157,9 +158,9 @@ class Noise:
     def estimate_misfit(self, off: Array) -> None:
         """Estimate the misfit: how much the accelerations differ from a bike's.
 
-        The estimate of the states uses CLIMBING divided by its standard deviation, which grows with speed. Slow rides
-        then get too little weight, which makes the states only slightly worse. The covariance, after
-        count_own_misfit(), uses CLIMBING divided by a constant.
+        The misfit for the states comes from CLIMBING divided by its standard deviation, which grows with speed. Slow
+        rides then get too little weight, but the states become only slightly worse. The misfit for the covariance comes
+        from CLIMBING divided by a constant. It is used after count_own_misfit().
 
         off: residuals, shape (n, ROWS).
         """

@@ -32,12 +32,12 @@ LEANED_SHARE = 0.001
 TIMING_S = 0.002
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps", "doubtful")
 DIGITS = 3, 3, 3, 3, 0
-DOUBTFUL = 0.2  # a larger share of doubtful riding causes a remark
+DOUBTFUL = 0.2  # largest share of doubtful riding without a remark
 # Largest lean at which a bike balances on straights, if the upright pose was right and no luggage is on one side
 POSE_DEG = 1.8
 # A gyro is faulty if an estimated error is over this many standard deviations of its prior. Good gyros stayed under
-# 2.6, on good and bad mounts. For a faulty gyro, this number of standard deviations multiplies the standard deviation
-# of the lean.
+# 2.6, on good and bad mounts. If a gyro is faulty, the standard deviation of the lean is multiplied
+# by this ratio of the error to the standard deviation of its prior.
 ODD_SIGMAS = 4.0
 
 

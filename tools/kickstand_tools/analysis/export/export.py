@@ -28,14 +28,14 @@ _WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
     "racechrono": export_racechrono.write,
     "vbo": export_vbo.write,
 }
-_NEEDS = {"gpx": ("GPX", "gpxpy"), "parquet": ("Parquet", "pyarrow")}  # format's name, and its library
-_DATED = ("gpx", "racechrono", "vbo")
-_CLOCK_S = 1e8  # March 1973: larger times in a log are Unix time
+_NEEDS = {"gpx": ("GPX", "gpxpy"), "parquet": ("Parquet", "pyarrow")}  # name and library of a format
+_DATED = ("gpx", "racechrono", "vbo")  # formats that need date and time
+_CLOCK_S = 1e8  # least time in a log that is Unix time (March 1973)
 
 
 @dataclass(frozen=True)
 class RowsShare(Message):
-    """Several samples have one time in the format."""
+    """Several samples have the same time in the format."""
 
     samples: int
     rows: int
@@ -51,14 +51,15 @@ class RowsShare(Message):
 def export(
     ride: Ride, form: str, out: Path | str, progress: Progress | None = None, notices: list[Message] | None = None
 ) -> int:
-    """Write a ride of open_ride() to a file, whole or not at all. Returns the number of rows. Raises InputError.
+    """Write a ride of open_ride() to a file, whole or not at all.
 
-    form: "csv" (gzipped if out ends in .gz), "gpx", "parquet", "racechrono" or "vbo". progress: called with (done,
-    total) of the log. notices: remarks about the log are appended.
+    gpx needs positions. gpx, racechrono and vbo need date and time, which a satellite receiver gives. A board without a
+    receiver has no clock. Therefore its ride is assumed to end when the file was last written.
 
-    gpx needs positions. gpx, racechrono and vbo need date and time, which come with positions. A board without a
-    satellite receiver has no clock. Its ride, recorded live or pulled, is therefore assumed to end when the file was
-    last written.
+    form: "csv" (gzipped if `out` ends in .gz), "gpx", "parquet", "racechrono" or "vbo".
+    progress: called with (done, total) of the log.
+    notices: remarks about the log are appended to this list.
+    Returns the number of rows. Raises InputError.
 
     >>> import tempfile
     >>> import numpy as np
@@ -83,7 +84,7 @@ def export(
         written_s = Path(log).stat().st_mtime if isinstance(log, (Path, str)) else time.time()
         start_s = float(max(0, int(written_s - whole.seconds)))
     step_s = STEP_S[form]
-    if step_s:  # rounded before the start is added: different times stay different
+    if step_s:  # both the start and the times are rounded, so different times have different sums
         start_s = round(start_s / step_s) * step_s
     count = given = 0
 
@@ -99,12 +100,12 @@ def export(
             if form == "gpx":
                 block = block.part(np.isfinite(block.lat_deg) & np.isfinite(block.lon_deg))
             if form in ("gpx", "vbo") and len(whole.speeds):
-                # every row of a VBO file needs a speed: without interpolation, rows between two values would have speed
-                # 0
+                # Every row of a VBO file needs a speed. Without interpolation, rows between two speeds would have a
+                # speed of 0.
                 block.speed_mps = np.interp(block.t_s, *whole.speeds.T)
             if form == "vbo":
                 block.lat_deg, block.lon_deg = whole.places.at(block.t_s)
-            block.lean_sigma_deg = np.where(block.trusted, block.lean_sigma_deg, np.nan)  # as in a replay
+            block.lean_sigma_deg = np.where(block.trusted, block.lean_sigma_deg, np.nan)  # as the command replay does
             if step_s:
                 block.t_s = rounded_to(block.t_s, step_s)
             count += len(block.t_s)
@@ -119,9 +120,15 @@ def export(
 
 @dataclass
 class _Whole:
-    """What the first pass finds in a log. start_s: the log's time at the first sample. seconds: duration. speeds (n,
-    2): s since the first sample, and m/s. places: the positions. utc_s: Universal Time at the first sample, None if
-    unknown; it is the median over the rows because some values come late."""
+    """The data that the first pass finds in a log.
+
+    start_s: time of the first sample, in the log's own time.
+    seconds: duration of the log.
+    speeds: time since the first sample in s, and speed in m/s, shape (n, 2).
+    places: the positions.
+    utc_s: Universal Time of the first sample; None if unknown. It is the median over the rows, because some values are
+        late.
+    """
 
     start_s: float
     seconds: float

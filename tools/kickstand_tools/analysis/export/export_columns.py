@@ -1,7 +1,7 @@
-"""Writes Kickstand's own columns: the log, calibrated and in the vehicle's axes, and the lean that the display shows.
+"""Writes Kickstand's own columns: the calibrated log in the vehicle's axes, and the lean that the display shows.
 
-The file is CSV, or Apache Parquet with each field's unit in its metadata, which pandas.read_parquet opens:
-https://arrow.apache.org/docs/python/parquet.html
+The file is CSV or Apache Parquet. In Parquet, the metadata of each field has its unit. pandas.read_parquet opens the
+file: https://arrow.apache.org/docs/python/parquet.html
 """
 
 import gzip
@@ -14,7 +14,7 @@ from ...logs.csv_lines import csv_lines
 from ...logs.log import float_schema
 from ..channels import Channels
 
-# name: (digits, unit)
+# Each name has (digits after the decimal point, unit).
 COLUMNS = {
     "t_s": (6, "s"),
     "lean_deg": (3, "deg"),
@@ -36,7 +36,7 @@ COLUMNS = {
 }
 
 
-_FINE = ("t_s", "lat_deg", "lon_deg", "utc_s")  # a 32-bit float resolves positions only to 1 m
+_FINE = ("t_s", "lat_deg", "lon_deg", "utc_s")  # 64-bit floats, because a 32-bit float resolves positions only to 1 m
 
 
 def write_csv(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
@@ -51,8 +51,10 @@ def write_csv(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
 
 
 def write_parquet(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """Write one row group per block. Times and positions are 64-bit floats, the rest 32-bit floats. A missing value
-    is NaN."""
+    """Write Parquet, one row group per block.
+
+    Times and positions are 64-bit floats, all other columns 32-bit floats. A missing value is NaN.
+    """
     import pyarrow
     from pyarrow.parquet import ParquetWriter
 

@@ -24,8 +24,10 @@ KICKSTAND = "urn:kickstand"
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """Write the file. start_s: Universal Time of the log's first sample, for positions without a time. A new segment
-    begins after a gap."""
+    """Write the file. After a gap, a new segment begins.
+
+    start_s: Universal Time of the log's first sample, for positions without a time.
+    """
     from gpxpy.gpx import GPX, GPXTrack, GPXTrackSegment
 
     gpx, track = GPX(), GPXTrack(name="Ride")

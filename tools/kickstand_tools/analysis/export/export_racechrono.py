@@ -1,10 +1,10 @@
 """Writes CSV v3, the table that RaceChrono exports and related programs read.
 
-Metadata, a blank line, then three heading lines: names, units, sources ("100: gps", "calc", "101: acc", "102:
-gyro"); a cell is empty if its source has no new value. Names and units are those of RaceChrono's own files: see
-https://github.com/ClassicMiniDIY/UltraLog/pull/85 and https://apexlog.io/blog/what-to-do-with-racechrono-data;
-https://racechrono.com/article/2572 also gives acc in G and gyro in deg/s. In those files lateral_acc is positive in
-a left turn and longitudinal_acc when speeding up, as here. RaceChrono itself imports sessions as .vbo.
+The file has metadata, a blank line, and three heading lines: names, units, and sources ("100: gps", "calc", "101: acc",
+"102: gyro"). A cell is empty if its source has no new value. Names and units are the same as in RaceChrono's own files:
+see https://github.com/ClassicMiniDIY/UltraLog/pull/85 and https://apexlog.io/blog/what-to-do-with-racechrono-data. Also
+https://racechrono.com/article/2572 gives acc in G and gyro in deg/s. As in RaceChrono's files, lateral_acc is positive
+in a left turn, and longitudinal_acc when speeding up. RaceChrono itself imports sessions as .vbo.
 """
 
 import time
@@ -17,7 +17,7 @@ from ...logs.csv_lines import csv_lines
 from ..channels import Channels
 
 _NOTE = "Made by Kickstand. lean_angle > 0 to the right; x left, y up, z forward"
-# name, unit, source, digits, value: time_s or a channel; "" for an empty cell
+# Each column has name, unit, source, digits, and value. The value is time_s or a channel; "" for an empty cell.
 COLUMNS = (
     ("timestamp", "unix time", "", 3, "time_s"),
     ("fragment_id", "", "", 0, "zero"),

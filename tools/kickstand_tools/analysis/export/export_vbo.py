@@ -1,13 +1,21 @@
 """Writes Racelogic's VBO, which Circuit Tools opens and RaceChrono imports.
 
-Sections, standard channels, and units (only for other channels) are those of
-https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.html; columns and signs are those of
-https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and the VBOX HD Lite's user guide:
-time HHMMSS.SS, velocity in km/h, latitude and longitude in minutes, north and west positive, heading in degrees
-clockwise from north, long accel > 0 forward, lat accel > 0 to the left, others with mantissa and exponent. A log does
-not contain the number of satellites, so the file says 4, the fewest that give a position. Without a position, the
-satellites and the position are written as 0. Other columns without values are left out. Only velocity is required by
-VBO: without a speed it is 0, and a comment in the file says so.
+Sections and standard channels follow
+https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.html. Only other channels have units.
+Columns and signs follow https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and the user guide
+of the VBOX HD Lite:
+
+* time: HHMMSS.SS
+* velocity: km/h
+* latitude and longitude: minutes, north and west positive
+* heading: degrees clockwise from north
+* long accel: positive forward
+* lat accel: positive to the left
+* other channels: with mantissa and exponent
+
+A log does not contain the number of satellites. The file says 4, because a position needs at least 4. Without a
+position, satellites and position are written as 0. Other columns without values are left out. VBO requires a velocity.
+Without a speed it is 0, and a comment in the file says so.
 """
 
 import time
@@ -20,7 +28,7 @@ import numpy as np
 from ...signals import Array, distance_m
 from ..channels import Channels
 
-# standard channels have a title in [header] and a name in [column names]; other channels a title, a unit, a channel
+# A standard channel has a title in [header], and a name in [column names].
 STANDARD = (
     ("satellites", "sats"),
     ("time", "time"),
@@ -32,6 +40,7 @@ STANDARD = (
     ("long accel g", "longacc"),
     ("lat accel g", "latacc"),
 )
+# Each other channel has a title, a unit, and the name of the channel of a ride.
 OTHER = (
     ("lean-angle", "deg", "lean_deg"),
     ("yaw-rate", "deg/s", "yaw_rate_dps"),
@@ -40,13 +49,15 @@ OTHER = (
 )
 _STANDARD_ROW = "%03d %09.2f %+013.6f %+013.6f %07.3f %06.2f +00000.00 %+07.3f %+07.3f"
 _SATELLITES = 4
-_SAME_M = 1e-3  # less movement between two rows, 0.01 s apart, gives no new heading
+_SAME_M = 1e-3  # least movement between two rows, 0.01 s apart, that gives a new heading
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """Write the file. Lines end in CR and LF; the date and each row's time are UTC. blocks: should have positions in
-    as many rows as possible."""
-    first = next(blocks)  # a channel that the log does not have is NaN from its first block on
+    """Write the file. Lines end in CR and LF. Date and times are UTC.
+
+    blocks: should have positions in as many rows as possible.
+    """
+    first = next(blocks)  # a channel that the log does not have is NaN in the first block too
     other = [column for column in OTHER if not np.all(np.isnan(getattr(first, column[2])))]
     lean = "lean-angle in degrees, > 0 to the right; " if OTHER[0] in other else ""
     satellites = f"satellites {_SATELLITES} stands for a position, 0 for none"
@@ -100,13 +111,15 @@ class _Heading:
         self._last = np.full((3, 1), np.nan)  # latitude, longitude and heading of the last row of the previous block
 
     def of(self, lat_deg: Array, lon_deg: Array) -> Array:
-        """(n) heading, degrees clockwise from north, from the previous row to each row. If two rows have the same
-        position, the heading of the previous row is kept. The first row with a position gets the heading of the
-        second."""
+        """Return the heading from the previous row to each row, shape (n), in degrees clockwise from north.
+
+        If two rows have the same position, the heading of the previous row is kept. The first row with a position has
+        the heading of the second row.
+        """
         lat, lon = (np.concatenate((last, now)) for last, now in zip(self._last, (lat_deg, lon_deg)))
         east, north = distance_m(lat[:-1], lon[:-1], lat[1:], lon[1:])
         found = np.concatenate((self._last[2], np.degrees(np.arctan2(east, north)) % 360.0))
-        # NaN counts as moved, because a gap ends the track
+        # A distance of NaN counts as a movement, because a gap ends the track.
         moved = np.concatenate(([True], ~(np.hypot(east, north) <= _SAME_M)))
         found = found[np.maximum.accumulate(np.where(moved, np.arange(len(found)), 0))]
         first = np.flatnonzero(np.isnan(found[:-1]) & np.isfinite(lat[:-1]))
@@ -116,7 +129,7 @@ class _Heading:
 
 
 def _clock(seconds: np.ndarray) -> np.ndarray:
-    """The time of day (s since midnight) as the number HHMMSS.SS."""
+    """Convert seconds to the time of day, as the number HHMMSS.SS."""
     hundredths = np.rint(seconds * 100.0).astype(np.int64) % (86400 * 100)
     whole, part = np.divmod(hundredths, 100)
     return (whole // 3600) * 10000 + (whole // 60 % 60) * 100 + whole % 60 + part / 100.0

@@ -1,6 +1,6 @@
 """The charts of a ride as data: traces, units, colours and ranges.
 
-picture.py draws them with matplotlib, interactive.py passes them to plotly: both show the same.
+picture.py draws the charts with matplotlib. interactive.py passes the same charts to plotly.
 """
 
 from dataclasses import dataclass, field
@@ -21,17 +21,22 @@ GUIDE_COLOUR = "#bbbbbb"
 DOUBT_COLOUR, DOUBT_WIDTH = "#d99a00", 4.0
 SMOOTH_S = 0.3
 GG_BIN_G = 0.025
-GAP_S = 1.0  # a line is interrupted after this time without a value
+GAP_S = 1.0  # longest time without a value that does not interrupt a line
 SPEED_GAP_S = 5.0  # GAP_S for the speed, which has fewer values
-_HIGH, _LOW, _SQUARE = 2.5, 1.5, 3.0  # heights of charts, inches of the picture
-_MARKED = 0.82  # share of a chart's height: above it, lines of the maxima would cross the words in the corner
-_UPRIGHT_DEG = 5.0  # bars of smaller leans may be cut off, because they would make the others too low
+_HIGH, _LOW, _SQUARE = 2.5, 1.5, 3.0  # heights of charts in the picture, in inches
+_MARKED = 0.82  # height of the lines of the maxima, as a share of the chart; higher lines would cross the words
+_UPRIGHT_DEG = 5.0  # bars of smaller leans may be cut off, because they would make all other bars too low
 
 
 @dataclass
 class Line:
-    """A line through n points, interrupted at NaNs that last longer than gap_s. name: empty for an auxiliary line.
-    width: factor on the usual width."""
+    """A line through n points.
+
+    x, y: the points, shape (n). A y may be NaN.
+    name: name of the quantity; "" for an auxiliary line.
+    gap_s: NaNs that last longer than this interrupt the line.
+    width: factor on the usual width.
+    """
 
     x: Array
     y: Array
@@ -53,7 +58,7 @@ class Sides:
 
 @dataclass
 class Dots:
-    """n points."""
+    """n points. x, y: shape (n)."""
 
     x: Array
     y: Array
@@ -63,7 +68,7 @@ class Dots:
 
 @dataclass
 class Bars:
-    """n bars as wide as `width` around x, from zero to y, in the colours of both sides."""
+    """n bars from zero to y, in the colours of both sides. Each bar is around x, and as wide as `width`."""
 
     x: Array
     y: Array
@@ -73,8 +78,11 @@ class Bars:
 
 @dataclass
 class CellMap:
-    """A map of n x n cells between the edges (n + 1) of both axes: darker for larger values. values (n, n): rows along
-    y, 0 for nothing."""
+    """A map of n x n cells. Cells with larger values are darker.
+
+    edges: edges of the cells, the same on both axes, shape (n + 1).
+    values: shape (n, n), in rows along y; 0 for an empty cell.
+    """
 
     edges: Array
     values: Array
@@ -96,9 +104,15 @@ class Note:
 
 @dataclass
 class Chart:
-    """One pair of axes. height: inches of the picture. ticks: positions and words on the x axis, None for the default.
-    square: True if a unit has the same length on both axes. spans: (from, to, words) in x, drawn in grey behind the
-    traces. left, right: words in the upper corners."""
+    """One pair of axes with its traces.
+
+    height: height in the picture, in inches.
+    ticks: positions and words on the x axis; None for the default.
+    square: True if a unit has the same length on both axes.
+    notes: words at points.
+    spans: parts of the x axis as (from, to, words), drawn in grey behind the traces.
+    left, right: words in the upper corners.
+    """
 
     title: str
     traces: list[Trace]
@@ -117,8 +131,12 @@ class Chart:
 
 @dataclass
 class Charts:
-    """The charts of a ride. over_time: stacked, with one axis of time, s; below: the others, side by side. warnings:
-    one sentence each."""
+    """The charts of a ride.
+
+    over_time: charts over the time in s, one above the other.
+    below: all other charts, side by side.
+    warnings: one sentence for each warning.
+    """
 
     title: str
     over_time: list[Chart]
@@ -127,7 +145,10 @@ class Charts:
 
 
 def charts(seen: Overview) -> Charts:
-    """The charts of a ride. A car has no chart of the lean, and a log without a speed has no chart of the speed."""
+    """Make the charts of a ride.
+
+    A car has no chart of the lean, and a log without a speed has no chart of the speed.
+    """
     course, car = seen.course, seen.ride.car
     lateral, forward = (smoothed(values, course.t_s, SMOOTH_S) for values in (course.lateral_g, course.forward_g))
     over_time = [] if car else [_lean(seen)]
@@ -138,12 +159,12 @@ def charts(seen: Overview) -> Charts:
 
 
 def shown_lean_deg(seen: Overview) -> Array:
-    """(n) lean at each sample of the course, NaN if the display shows none."""
+    """Return the lean at each sample of the course, shape (n); NaN where the display shows no lean."""
     return np.where(seen.course.trusted, seen.course.lean_deg, np.nan)
 
 
 def title(seen: Overview) -> str:
-    """One line: name and length of the ride, and its maxima."""
+    """Return one line with name, length and maxima of the ride."""
     total = seen.summary
     said = [seen.ride.stem, clock(total.duration_s)]
     if not seen.ride.car:
@@ -156,15 +177,17 @@ def title(seen: Overview) -> str:
 
 
 def lean_limit(seen: Overview) -> float:
-    """The end of the lean's axis on each side, degrees."""
+    """Return the end of the lean's axis on each side, in degrees."""
     return max(20.0, 1.2 * max(seen.summary.left_deg.value, seen.summary.right_deg.value))
 
 
 def envelope(time: Array, values: Array, points: int, gap_s: float = np.inf) -> tuple[Array, Array]:
     """Reduce a long line to the smallest and the largest value of each stretch. The drawn line looks the same.
 
-    Returns at most about `points` of the samples, in their order, or all if there are not more. NaNs are left out,
-    except one in the middle of each gap of over gap_s, which breaks the line.
+    NaNs are left out. Each gap of over gap_s has one NaN in its middle, which interrupts the line.
+
+    points: approximate limit of the number of samples. A shorter line keeps all samples.
+    Returns times and values of the samples that are left, in their order.
     """
     there = ~np.isnan(values)
     time, values = time[there], values[there]
@@ -180,7 +203,7 @@ def envelope(time: Array, values: Array, points: int, gap_s: float = np.inf) -> 
 
 
 def _maxima(seen: Overview) -> list[tuple[Peak, float]]:
-    """The largest lean to each side, and its sign in the drawing."""
+    """Return the largest lean to each side, and its sign in the chart."""
     peaks = ((seen.summary.left_deg, -1.0), (seen.summary.right_deg, 1.0))
     return [(peak, sign) for peak, sign in peaks if peak.time_s is not None]
 
@@ -266,7 +289,7 @@ def _shares(seen: Overview) -> Chart:
 
 
 def _alignment(seen: Overview) -> Chart:
-    """Forces on the straights, and the line on which the found yaw would put them."""
+    """Forces on the straights, and the line on which they would be with the estimated yaw error."""
     found, fits = seen.quality, judged(seen)
     most = float(np.max(np.abs(found.forward_g), initial=0.0))
     reach = max(0.5, 1.1 * most)

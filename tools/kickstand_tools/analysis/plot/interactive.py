@@ -1,5 +1,8 @@
-"""The charts of a ride for plotly.js, to zoom into: {"data": traces, "layout": of a wide window, "narrow": of a phone}.
-In a wide window, the last charts are side by side, below the charts over time."""
+"""Converts the charts of a ride to figures of plotly.js, which you can zoom.
+
+A figure is {"data": traces, "layout": layout of a wide window, "narrow": layout of a phone}. In a wide window, the last
+charts are side by side, below the charts over time.
+"""
 
 import html
 from typing import Any
@@ -11,14 +14,14 @@ from .charts import LEFT_COLOUR, RIGHT_COLOUR, Bars, Chart, Charts, Dots, Line, 
 
 POINTS = 40_000  # largest number of points in a line; with more, a browser does not zoom smoothly
 _INCH = 86  # pixels per inch of a chart's height
-_GAP, _NARROW_GAP = 62, 96  # pixels between rows of charts; in a narrow window axes have names there
+_GAP, _NARROW_GAP = 62, 96  # pixels between rows of charts; in a narrow window, each row needs room for names of axes
 _MARGIN = {"l": 80, "r": 80, "t": 100, "b": 80}
 _NARROW_MARGIN = {"l": 52, "r": 12, "t": 160, "b": 60}
-_ASIDE = 0.085  # space between charts side by side, over the width of the window
+_ASIDE = 0.085  # space between charts side by side, as a share of the width of the window
 _SMALL = {"font": {"size": 12}}
 _OWN_WORDS: dict[str, Any] = {"hoverinfo": "none"}  # page.js writes the words for each trace, found by the trace's name
 _INK = "rgb(36,36,36)"
-# Colours from rare to frequent. The first is visible on white and, with inverted colours, on a dark background
+# Colours from rare to frequent. The first colour is visible on white and, with inverted colours, on a dark background.
 _OFTEN = [[0.0, "#5aabab"], [0.35, "#2f93b4"], [0.7, "#235fa5"], [1.0, "#0b1f5c"]]
 _AXIS = {
     "automargin": True,
@@ -33,7 +36,7 @@ PAPER = {
     "bargap": 0,
     "font": {"color": _INK},
     "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": "rgb(120,120,120)", "activecolor": _INK},
-    "paper_bgcolor": "rgba(0,0,0,0)",  # the page's own
+    "paper_bgcolor": "rgba(0,0,0,0)",  # transparent: the background of the page is visible
     "plot_bgcolor": "rgba(0,0,0,0)",
     "showlegend": False,
 }
@@ -51,8 +54,10 @@ def plain(values: Array, digits: int = 3) -> list[float | None]:
 
 
 def figure(charts: Charts, linked: bool = False) -> dict[str, Any]:
-    """The figure for plotly.js, in plain numbers, lists and None for NaN. linked: the mouse selects a moment anywhere
-    in a chart over time, not only at its lines."""
+    """Return the figure for plotly.js, in plain numbers and lists, with None for NaN.
+
+    linked: the mouse selects a moment anywhere in a chart over time, not only at its lines.
+    """
     each = [*charts.over_time, *charts.below]
     data = [drawn | _axes(k) for k, chart in enumerate(each) for trace in chart.traces for drawn in _traces(trace)]
     layouts = {kind: _layout(charts, kind == "narrow", linked) for kind in ("layout", "narrow")}
@@ -60,12 +65,12 @@ def figure(charts: Charts, linked: bool = False) -> dict[str, Any]:
 
 
 def time_axes(charts: Charts) -> list[str]:
-    """plotly's names of the axes of time."""
+    """Return plotly's names of the axes of time."""
     return [_axes(k)["xaxis"] for k in range(len(charts.over_time))]
 
 
 def _axes(k: int) -> dict[str, str]:
-    """plotly's names of the axes of chart k."""
+    """Return plotly's names of the axes of chart k."""
     return {"xaxis": f"x{k + 1 if k else ''}", "yaxis": f"y{k + 1 if k else ''}"}
 
 
@@ -81,7 +86,7 @@ def _traces(trace: Trace) -> list[dict[str, Any]]:
         return [{"mode": "lines", "line": line, "x": plain(x), "y": plain(y)} | named]
     if isinstance(trace, Sides):
         x, y = envelope(trace.x, trace.y, POINTS, trace.gap_s)
-        # at both ends of a gap y becomes 0, because plotly would fill across the gap
+        # At both ends of a gap, y becomes 0. Otherwise plotly would fill the area across the gap.
         gaps = np.flatnonzero(np.isnan(y))
         x = np.insert(x, np.concatenate((gaps, gaps + 1)), np.concatenate((x[gaps - 1], x[gaps + 1])))
         y = np.insert(y, np.concatenate((gaps, gaps + 1)), 0.0)
@@ -108,7 +113,7 @@ def _traces(trace: Trace) -> list[dict[str, Any]]:
 
 
 def _filled(name: str, x: Array, y: Array, colour: str) -> dict[str, Any]:
-    """A trace filled from zero to y (n). Each run of zeros is reduced to its two ends."""
+    """Return a trace that is filled from zero to y, shape (n). Only the two ends of each run of zeros are kept."""
     leans = y != 0.0
     kept = leans.copy()
     kept[1:] |= leans[:-1]
@@ -156,8 +161,10 @@ def _layout(charts: Charts, narrow: bool, linked: bool) -> dict[str, Any]:
 
 
 def _annotations(chart: Chart, x: str, y: str, narrow: bool) -> list[dict[str, Any]]:
-    """All words on a chart: the title, the names of the traces in their colours, and the words in the corners, at
-    points and in spans."""
+    """Return all words on a chart.
+
+    These are the title, the names of the traces in their colours, and the words in corners, at points and in spans.
+    """
     within = {"xref": f"{x} domain", "yref": f"{y} domain"}
     names = [
         f"<span style='color:{trace.colour}'>{trace.name}</span>"

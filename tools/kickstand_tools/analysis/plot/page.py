@@ -1,5 +1,7 @@
-"""Writes the ride as one HTML page that you can zoom. The page needs no other file.
-If the log has positions, a map is beside the charts. Pointing at a moment in the map or in a chart marks it in both.
+"""Writes the ride as one HTML page with charts that you can zoom. The page needs no other file.
+
+If the log has positions, a map is beside the charts. If you point at a moment in the map or in a chart, the page marks
+it in both.
 """
 
 from importlib.resources import files
@@ -24,8 +26,10 @@ MOST_ZOOM = 19
 
 
 def draw(path: Path, seen: Overview, tiles: bool = False) -> None:
-    """Write the page, with a map beside the charts if the log has positions. tiles: the map has streets, which the page
-    loads from a server."""
+    """Write the page, with a map beside the charts if the log has positions.
+
+    tiles: show streets in the map. The page loads them from a server.
+    """
     library = files("plotly").joinpath("package_data/plotly.min.js").read_text(encoding="utf-8")
     path.write_text(
         page(seen, f"<script>{library}</script>", source_hash(library), tiles, warnings=True), encoding="utf-8"
@@ -33,11 +37,16 @@ def draw(path: Path, seen: Overview, tiles: bool = False) -> None:
 
 
 def page(seen: Overview, library: str, allowed: str, tiles: bool = False, warnings: bool = False) -> str:
-    """The page's HTML. library: the element that loads plotly.js. allowed: its source in the policy. tiles: see draw().
-    warnings: show the charts' warnings above them.
+    """Return the page's HTML.
 
-    The policy allows only the page's own scripts, and images of the map's tiles. It also allows 'unsafe-eval' and
-    inline styles: plotly.js compiles functions from text for charts with many points, and sets styles.
+    The content security policy allows only the page's own scripts, and images of the map's tiles. It also allows
+    'unsafe-eval' and inline styles. plotly.js needs both: it compiles functions from text for charts with many points,
+    and sets styles.
+
+    library: the element that loads plotly.js.
+    allowed: the source of plotly.js in the policy.
+    tiles: see draw().
+    warnings: show the warnings above the charts.
     """
     drawn, points = charts(seen), track_map.map_points(seen)
     beside = None
@@ -63,7 +72,7 @@ def page(seen: Overview, library: str, allowed: str, tiles: bool = False, warnin
 
 
 def tiles_at(points: track_map.MapPoints) -> dict[str, Any]:
-    """The tiles' server, and the position of its world map in this map's metres."""
+    """Return the address of the tiles' server, and the position of its world map in the metres of this map."""
     lat, lon = np.radians(points.lat_deg), np.radians(points.lon_deg)
     scale_m = EARTH_M * float(np.cos(lat))
     return {

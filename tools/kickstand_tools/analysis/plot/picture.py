@@ -15,7 +15,7 @@ POINTS = 6000
 _OTHER_LETTERS = re.compile(
     r"CJK|Noto Sans|Gothic|Hei|Ming|Song|YaHei|Arial Unicode|Malgun|Droid|WenQuanYi|Symbola|IPA"
 )
-_CHARACTERS, _LINE = 180, 0.16  # characters of a line of warnings, and its height in inches
+_CHARACTERS, _LINE = 180, 0.16  # length of a line of warnings in characters, and height in inches
 _STYLE: Any = {
     "font.size": 9,
     "axes.spines.top": False,
@@ -29,7 +29,7 @@ _STYLE: Any = {
     "xtick.color": "0.35",
     "ytick.color": "0.35",
 }
-_SIDES: dict[str, Any] = {  # position of a point's words
+_SIDES: dict[str, Any] = {  # position of the words beside a point
     "above": {"xytext": (0, 4), "ha": "center", "va": "bottom"},
     "below": {"xytext": (0, -4), "ha": "center", "va": "top"},
     "left": {"xytext": (-3, 0), "ha": "right"},
@@ -43,7 +43,7 @@ def draw(path: Path, seen: Overview) -> None:
 
 
 def figure_of(seen: Overview) -> Any:
-    """The picture as a Figure of matplotlib."""
+    """Draw the picture as a Figure of matplotlib."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -73,7 +73,10 @@ def figure_of(seen: Overview) -> Any:
 
 
 def _fonts(text: str) -> tuple[list[str], str]:
-    """The font families for a text, and the text with a code for each letter that none of them has."""
+    """Choose the font families for a text.
+
+    Returns the families, and the text in which a code replaces each letter that no font has.
+    """
     from matplotlib import font_manager
 
     families = ["DejaVu Sans"]

@@ -1,7 +1,7 @@
-"""Draws the map of a ride: its track, coloured by lean, north up, in metres.
+"""Draws the map of a ride: its track in metres, coloured by lean. North is up.
 
-It uses the Mercator projection, as map tiles do. Angles are true. The scale is exact at the ride's own latitude; 50 km
-further north it is off by one per cent.
+The map uses the Mercator projection, as map tiles do. Angles are true. The scale is exact at the ride's own latitude,
+and off by one per cent 50 km further north.
 """
 
 from dataclasses import dataclass
@@ -15,22 +15,26 @@ from ..track import LogTrack, track
 from .charts import LEFT_COLOUR, RIGHT_COLOUR, SPEED_COLOUR, lean_limit, shown_lean_deg
 from .interactive import PAPER, plain
 
-POINTS = 20_000
+POINTS = 20_000  # largest number of points
 SHORTEST_S = 0.2  # least time between points
-SAME_M = 0.5  # points closer to the previous point are left out, so a standing bike is one point
-MOST_LAT_DEG = 85.0  # the map ends here, because Mercator cannot show the poles
-_SHAPES = (0.6, 2.2)  # width over height
-LEAST_LEAN_DEG = 30.0  # the lean with the full colour is at least this
-# Colours from left lean to right lean, grey when upright. Colour-blind people can distinguish blue from orange
+SAME_M = 0.5  # least distance between points, so a standing bike is one point
+MOST_LAT_DEG = 85.0  # largest latitude on the map, because Mercator cannot show the poles
+_SHAPES = (0.6, 2.2)  # least and largest ratio of width to height
+LEAST_LEAN_DEG = 30.0  # least value of the lean that has the full colour
+# Colours from left lean to right lean, with grey for upright. Colour-blind people can distinguish blue from orange.
 _COLOURS = [[0.0, "#0d3a73"], [0.25, LEFT_COLOUR], [0.5, "#c9c9c9"], [0.75, RIGHT_COLOUR], [1.0, "#7a2c05"]]
 
 
 @dataclass
 class MapPoints:
-    """m points of a track, sorted by their times t_s (s since the log's first sample).
+    """m points of a track, sorted by time.
 
-    east_m, north_m: distances from the point at lat_deg, lon_deg; each gap in the positions has one point that is NaN.
-    lean_deg: NaN if the display shows none. speed_kmh: NaN if the log has none.
+    t_s: seconds since the log's first sample, shape (m).
+    east_m, north_m: distances from the position lat_deg, lon_deg, shape (m). Each gap in the positions has one point
+        that is NaN.
+    lean_deg: shape (m); NaN where the display shows no lean.
+    speed_kmh: shape (m); NaN if the log has no speed.
+    lat_deg, lon_deg: position of the map's origin.
     """
 
     t_s: Array
@@ -43,7 +47,7 @@ class MapPoints:
 
 
 def map_points(seen: Overview) -> MapPoints | None:
-    """The track of a ride; None without positions. Points are on straight lines between the log's positions."""
+    """Return the track of a ride; None without positions. Points are on straight lines between the log's positions."""
     places = track(seen.course)
     if len(places.t_s) < 2:
         return None
@@ -66,11 +70,11 @@ def map_points(seen: Overview) -> MapPoints | None:
 
 
 def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
-    """The map for plotly.js: {"data": traces, "layout": ...}, in plain numbers, lists and None for NaN.
+    """Return the map for plotly.js: {"data": traces, "layout": ...}, in plain numbers and lists, with None for NaN.
 
-    The first trace is the track as a line: customdata are time (s), lean (degrees) and speed (km/h), None if missing.
-    The second trace has the coloured points: customdata are their times. The first shape marks a place, the second is
-    the scale bar, and the first annotation names the bar's length. map.js moves all three.
+    The first trace is the track as a line. Its customdata are time (s), lean (degrees) and speed (km/h), None if
+    missing. The second trace has the coloured points. Its customdata are their times. The first shape marks a place,
+    the second shape is the scale bar, and the first annotation names the length of the bar. map.js moves all three.
     """
     x, y = plain(points.east_m, 1), plain(points.north_m, 1)
     rows = [plain(row, 1) for row in np.column_stack((points.t_s, points.lean_deg, points.speed_kmh))]
@@ -91,7 +95,7 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
     paper = {"xref": "paper", "yref": "paper", "showarrow": False}
     thin = {"arrowhead": 0, "arrowwidth": 1}
     layout = PAPER | {
-        "margin": {"l": 5, "r": 5, "t": 85, "b": 5},  # above the track: plotly's buttons, and below them the legend
+        "margin": {"l": 5, "r": 5, "t": 85, "b": 5},  # the top has room for plotly's buttons and the legend
         "hovermode": "closest",
         "dragmode": "pan",
         "xaxis": {"visible": False},
@@ -117,13 +121,13 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
 
 
 def shape(points: MapPoints) -> float:
-    """The width of the map divided by its height, chosen so that the track fills the map, within _SHAPES."""
+    """Return the width of the map divided by its height, within _SHAPES, so that the track fills the map."""
     east, north = (float(np.nanmax(metres) - np.nanmin(metres)) for metres in (points.east_m, points.north_m))
     return float(np.clip((east or 1.0) / (north or 1.0), *_SHAPES))
 
 
 def _times(places: LogTrack, seconds: float) -> Array:
-    """The times of the points: at most POINTS, evenly over the ride."""
+    """Return the times of the points: at most POINTS, evenly spaced over the ride."""
     first, last = float(places.t_s[0]), min(seconds, float(places.t_s[-1]))
     count = int(np.clip((last - first) / SHORTEST_S, 1, POINTS)) + 1
     return np.linspace(first, last, count)
@@ -134,8 +138,10 @@ def _mercator(lat_deg: Array) -> Array:
 
 
 def _moved(east: Array, north: Array) -> Ints:
-    """The indexes of the points to keep: points over SAME_M from the last kept point, the first in each gap, and the
-    first after each gap."""
+    """Return the indexes of the points to keep.
+
+    These are the points over SAME_M from the last kept point, the first in each gap, and the first after each gap.
+    """
     kept, (last_x, last_y) = [0], (east[0], north[0])
     for k, (x, y) in enumerate(zip(east.tolist(), north.tolist())):
         begins_or_ends_gap = (x != x) != (last_x != last_x)

@@ -1,19 +1,20 @@
 """Measures stops as in a brake test: initial speed, distance, mean fully developed deceleration.
 
-UN Regulation No. 13, Annex 4, paragraph 1.1.2: braking starts at the speed v0 (km/h). The distances sb and se (m) are
-from that point to the speeds vb = 0.8 v0 and ve = 0.1 v0.
+UN Regulation No. 13, Annex 4, paragraph 1.1.2, defines the mean fully developed deceleration dm. Braking starts at the
+speed v0. The speed falls to vb = 0.8 v0 after the distance sb, and to ve = 0.1 v0 after the distance se.
 
-    dm = (vb^2 - ve^2) / (25.92 (se - sb))   in m/s2.
-    At the standstill the force shows the slope of the road, and the gyro's readings are its bias. Speed and pitch are
-integrated backwards from there. Because the pitch is known, the dive of the fork does not look like braking:
+    dm = (vb^2 - ve^2) / (25.92 (se - sb))       dm in m/s2, speeds in km/h, distances in m
+
+At the standstill, the force shows the slope of the road, and the gyro's readings are its bias. Speed and pitch are
+integrated backwards from the standstill. Because the pitch is known, the dive of the fork does not look like braking:
 
     dq/dt = w_y sin t - w_x cos t,   dv/dt = f_z - g sin q       (as in kickstand.lean.bike_model)
 
-with lean t (> 0 to the right), pitch q (nose up), speed v, rates w and specific force f along left (x), up (y) and
-forward (z).
+The symbols are lean t (positive to the right), pitch q (positive if the nose is up), speed v, rates w, and specific
+force f. The axes are left (x), up (y) and forward (z).
 
-If the log has a speed, the integrated one is fitted to it (speed_fit.py). If not, the result must be plausible:
-integration from a wrong standstill can give any speed and distance.
+If the log has a speed, the integrated speed is fitted to it (speed_fit.py). Otherwise the result must be plausible,
+because integration from a wrong standstill can give any speed and distance.
 """
 
 from dataclasses import dataclass
@@ -29,35 +30,46 @@ from .standstill import standing
 
 RATE_S = 0.02  # time between samples for the search of stops
 MIN_SPEED_MPS = 10.0 / 3.6
-MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0  # limits of a stop's deceleration; above them it is a fall or a fault
-LONGEST_S = 60.0
-FEWEST = 10  # a standstill with fewer samples shows neither slope nor bias
+MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0  # least and largest deceleration of a stop; a larger one is a fall or a fault
+LONGEST_S = 60.0  # longest time before a standstill that is searched for its stop
+FEWEST = 10  # least number of samples of a standstill that show slope and bias
 GAP_S = 0.5  # longest gap in the readings over which speed and pitch are integrated
 REST_S = 2.5  # duration of the standstill that is used
-SETTLE_S = 0.5  # this first part of a standstill is not used, because the fork rebounds
-# shares of the full deceleration: above the first, braking has begun; below the second, it has not
+SETTLE_S = 0.5  # first part of a standstill that is not used, because the fork rebounds
+# Shares of the full deceleration. Over ONSET_SHARE, the vehicle is braking. Under FAINT_SHARE, it is not.
 ONSET_SHARE, FAINT_SHARE = 0.15, 0.04
-ONSET_S = 0.6  # longest time between these two shares
+ONSET_S = 0.6  # longest time in which the deceleration rises from FAINT_SHARE to ONSET_SHARE
 
-# Height of the sensor above the point about which a bike pitches, which is as high as the wheels' hubs. When the nose
-# goes down, a sensor under the seat moves forward.
+# Height of the sensor above the point about which a bike pitches. This point is as high as the hubs of the wheels. When
+# the nose goes down, a sensor under the seat moves forward.
 SENSOR_HEIGHT_M = 0.65
 
 MAX_SPEED_MPS = 250.0 / 3.6
-MAX_SIDE_M, MAX_HEADING_DEG = 15.0, 30.0  # limits of the deviation from a straight line: more is a bend
-# Allowed difference of the integrated speed from 0 at the previous standstill: OPEN_MPS, and OPEN_MPS2 per second
-# between them. A degree of pitch makes 0.17 m/s2, and a gyro's drift adds to it: over more than SHOWING_S the speed
-# proves nothing.
+MAX_SIDE_M, MAX_HEADING_DEG = 15.0, 30.0  # largest deviation of a stop from a straight line; more is a bend
+# The speed is integrated backwards from a standstill to the previous standstill, where it should be 0. It may differ
+# from 0 by OPEN_MPS, plus OPEN_MPS2 per second between both. A degree of pitch causes 0.17 m/s2, and a gyro's drift
+# adds to the error. After more than SHOWING_S, the integrated speed proves nothing.
 OPEN_MPS, OPEN_MPS2, SHOWING_S = 3.0, 0.7, 30.0
 SPEED_S, SURELY_MPS2 = 15.0, 1.5  # longest time and least deceleration of a stop that only the log's speed shows
 
-STRAIGHT_S = 0.1  # the mean heading in this first part of the braking is the direction before it
+STRAIGHT_S = 0.1  # first part of the braking, whose mean heading is the direction before the braking
 SMOOTH_S = 0.2  # accelerations and jerks are means over this time
 
 
 @dataclass
 class Stop:
-    """One stop. Times in s from the start of the log, side > 0 to the left."""
+    """One stop.
+
+    start_s, stop_s: times in the log at which the braking begins and the vehicle stands.
+    initial_speed_mps: speed at start_s.
+    distance_m: distance from start_s to stop_s.
+    mfdd_mps2: mean fully developed deceleration.
+    peak_mps2: largest deceleration.
+    jerk_mps3: largest absolute value of the jerk.
+    side_m: deviation from the straight line, positive to the left.
+    heading_deg: change of heading, positive to the left.
+    speed_from: "log" or "integrated".
+    """
 
     start_s: float
     stop_s: float
@@ -65,10 +77,10 @@ class Stop:
     distance_m: float
     mfdd_mps2: float
     peak_mps2: float
-    jerk_mps3: float  # largest absolute value
-    side_m: float  # deviation from the straight line
-    heading_deg: float  # change of heading, > 0 to the left
-    speed_from: str  # "log" or "integrated"
+    jerk_mps3: float
+    side_m: float
+    heading_deg: float
+    speed_from: str
 
     @property
     def duration_s(self) -> float:
@@ -94,7 +106,7 @@ def find_stops(channels: Channels) -> list[Stop]:
 
 
 def stops_of(ride: Channels, still: NDArray[np.bool_]) -> list[Stop]:
-    """Find the stops of a whole ride averaged over RATE_S. still (n): True where the vehicle stands still."""
+    """Find the stops of a whole ride averaged over RATE_S. still: True where the vehicle stands still, shape (n)."""
     delay_s = speed_delay_s(ride)
     found, after = [], 0
     for start, end in stretches(still):
@@ -111,9 +123,12 @@ def stops_of(ride: Channels, still: NDArray[np.bool_]) -> list[Stop]:
 
 
 def mfdd_mps2(speed_mps: Array, distance_m: Array) -> float:
-    """Mean fully developed deceleration, dm in the module's docstring. For speeds in m/s the factor 25.92 becomes 2.
-    speed_mps (n): falls from the initial speed to at most a tenth of it. distance_m (n): distances from the start of
-    braking.
+    """Return the mean fully developed deceleration, dm in the module's docstring.
+
+    Speeds are in m/s instead of km/h, so the factor 25.92 becomes 2.
+
+    speed_mps: falls from the initial speed to at most a tenth of it, shape (n).
+    distance_m: distances from the start of braking, shape (n).
     """
     vb, ve = 0.8 * speed_mps[0], 0.1 * speed_mps[0]
     falling = np.minimum.accumulate(speed_mps)
@@ -124,8 +139,11 @@ def mfdd_mps2(speed_mps: Array, distance_m: Array) -> float:
 
 
 def closes(speed_mps: float, seconds: float) -> bool:
-    """True if speed_mps, integrated backwards from a standstill to the previous standstill, is close enough to 0 for
-    the seconds between them."""
+    """True if a speed integrated backwards from a standstill is close enough to 0 at the previous standstill.
+
+    speed_mps: the integrated speed at the previous standstill.
+    seconds: time between both standstills.
+    """
     return seconds > SHOWING_S or abs(speed_mps) < OPEN_MPS + OPEN_MPS2 * seconds
 
 
@@ -135,8 +153,10 @@ def plausible(initial_speed_mps: float, side_m: float, heading_deg: float) -> bo
 
 
 def stops_by_speed(ride: Channels) -> bool:
-    """True if the log's speed shows a stop from over 10 km/h that is certainly hard enough for a brake test, even if
-    the force does not show the stop."""
+    """True if the log's speed shows a stop from over 10 km/h that is certainly hard enough for a brake test.
+
+    The force may not show this stop.
+    """
     there = ~np.isnan(ride.speed_mps)
     time, speed = ride.t_s[there], ride.speed_mps[there]
     for end in np.flatnonzero((speed[1:] < STANDING_MPS) & (speed[:-1] >= STANDING_MPS)) + 1:
@@ -148,14 +168,17 @@ def stops_by_speed(ride: Channels) -> bool:
 
 
 def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | None:
-    """The stop that ends in the standstill which begins at index rest. None if there was no stop.
-    part: the ride up to some time after the beginning of that standstill. from_rest: True if part begins at the end of
-    the previous standstill.
+    """Return the stop that ends in a standstill; None without a stop.
+
+    part: the ride up to some time after the beginning of the standstill.
+    rest: index in `part` at which the standstill begins.
+    delay_s: delay of the log's speed.
+    from_rest: True if `part` begins at the end of the previous standstill.
     """
     time = part.t_s
     acceleration, pitch_rate, yaw_rate = _acceleration(part, rest)
     integrated = integral(time, acceleration)
-    # integrated backwards from the standstill
+    # The speed is integrated backwards from the standstill. A pitching bike moves the sensor forward or backward.
     speed = integrated - integrated[-1] + SENSOR_HEIGHT_M * np.radians(pitch_rate)
     smooth = smoothed(acceleration, time, SMOOTH_S)
     begin = _onset(smooth, time, rest)
@@ -180,7 +203,7 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
         return None
     heading = integral(t, yaw_rate[braked])
     straight = np.mean(heading[t <= t[0] + STRAIGHT_S])
-    # the fork's rebound hides the last hundredths of the braking: assume that the speed falls evenly to zero
+    # The fork's rebound hides the last hundredths of the braking. Assume that the speed falls evenly to zero.
     tail = v[-1] / mfdd
     stop = Stop(
         float(t[0]),
@@ -200,7 +223,13 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
 
 
 def _acceleration(part: Channels, rest: int) -> tuple[Array, Array, Array]:
-    """Acceleration along the road (m/s2), pitch and yaw rate (deg/s), all minus their values at standstill."""
+    """Compute acceleration and rates. The values at standstill are subtracted.
+
+    Returns:
+        acceleration: along the road, shape (n), in m/s2.
+        pitch_rate: shape (n), in deg/s.
+        yaw_rate: shape (n), in deg/s.
+    """
     time = part.t_s
     settled = int(np.searchsorted(time, time[rest] + SETTLE_S))
     still = slice(settled if settled < len(time) - 5 else rest, len(time))
@@ -215,7 +244,7 @@ def _acceleration(part: Channels, rest: int) -> tuple[Array, Array, Array]:
 
 
 def _onset(smooth: Array, time: Array, rest: int) -> int | None:
-    """Index at which the braking that ends in this standstill begins."""
+    """Return the index at which the braking begins that ends in this standstill; None without braking."""
     braking = -smooth[:rest]
     hard = np.flatnonzero(braking > 0.5 * MIN_MFDD_MPS2)
     if not len(hard):
@@ -224,7 +253,7 @@ def _onset(smooth: Array, time: Array, rest: int) -> int | None:
     end_s = time[hard[-1]]
     level = float(np.percentile(braking[int(np.searchsorted(time, end_s - 2.0)) :], 75))
     weak = np.flatnonzero(braking < max(ONSET_SHARE * level, 0.25))
-    weak = weak[time[weak] < end_s - 0.3]  # a pause just before the standstill does not count
+    weak = weak[time[weak] < end_s - 0.3]  # weak braking just before the standstill does not end the search
     begin = int(weak[-1]) if len(weak) else 0
     earliest = int(np.searchsorted(time, time[begin] - ONSET_S))
     while begin > earliest and braking[begin] > FAINT_SHARE * level:

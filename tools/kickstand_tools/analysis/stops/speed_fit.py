@@ -1,7 +1,7 @@
 """Corrects a speed integrated from the acceleration by the speed in the log.
 
-A log with one speed per second has only two or three speeds in a hard stop. They do not show how the speed falls. The
-acceleration shows that, but its integral drifts.
+A log with one speed per second has only two or three speeds in a hard stop. They do not show how the speed falls
+between them. The acceleration shows how it falls, but its integral drifts.
 """
 
 import numpy as np
@@ -10,24 +10,26 @@ from kickstand.units import STANDARD_GRAVITY
 from ...signals import Array, best_lag, integral, smoothed
 from ..channels import Channels
 
-SMOOTH_S = 0.2  # smoothing of the acceleration, which multiplied by the delay is the error of a late speed
+SMOOTH_S = 0.2  # the acceleration is averaged over this time; acceleration x delay is the error of a late speed
 LEAD_S = 4.0  # time before the braking in which the log's speed is used for the fit
 DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # delays of the speed that are tried
-# The search for a delay needs this many speeds, a second apart, whose changes have at least this standard deviation
+# The search for a delay needs ENOUGH_SPEEDS, one per second. Their changes need a standard deviation of
+# ENOUGH_CHANGE_MPS.
 ENOUGH_SPEEDS, ENOUGH_CHANGE_MPS = 30, 0.5
 
-# One standard deviation of each fitted parameter and of a speed
+# Standard deviations of each fitted parameter, and of a logged speed
 SIGMA_SCALE, SIGMA_SLOPE_MPS2, SIGMA_DELAY_S, SIGMA_SPEED_MPS = 0.01, 0.05, 0.05, 0.05
-SIGMA_WALK_MPS2, KNOT_S = 0.1, 0.5  # per square root of a second
+# The random walk of the acceleration error, per square root of a second, and the time between its knots
+SIGMA_WALK_MPS2, KNOT_S = 0.1, 0.5
 
 
 def speed_delay_s(ride: Channels) -> float:
-    """The delay at which the changes of the log's speed best match the integrated longitudinal force, s.
+    """Find the delay at which the changes of the log's speed best match the integrated longitudinal force.
 
-    0 if the ride does not show a delay.
+    Returns the delay in s; 0 if the ride does not show a delay.
     """
     there = np.flatnonzero(~np.isnan(ride.speed_mps))
-    there = there[np.unique(np.floor(ride.t_s[there]), return_index=True)[1]]  # one a second
+    there = there[np.unique(np.floor(ride.t_s[there]), return_index=True)[1]]  # one speed per second
     time, changes = ride.t_s[there], np.diff(ride.speed_mps[there])
     pushed = integral(ride.t_s, STANDARD_GRAVITY * ride.forward_g)
     if len(there) < ENOUGH_SPEEDS or np.std(changes) < ENOUGH_CHANGE_MPS:
@@ -42,22 +44,27 @@ def speed_delay_s(ride: Channels) -> float:
 
 
 def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, delay_s: float) -> Array | None:
-    """The speed (n, m/s), corrected by the log's; None if the log has no speed there.
+    """Correct an integrated speed by the log's speed.
 
-    part: the ride up to a standstill; speed, acceleration (n): integrated and measured, m/s and m/s2. begin: index at
-    which braking begins. delay_s: delay of the log's speed.
-
-    The correction is found by least squares with a prior. The log's speed at the time t is
+    Least squares with a prior find the correction. The log's speed at the time t is
 
         u(t) = (1 + k) v(t) + integral of b from t to the end - d a(t)
 
-    with the arguments v and a, the scale error k, the acceleration error b (m/s2) and the delay error d (s). The error
-    b comes from slopes and fork dive that the gyro did not measure. It is modelled as a random walk backwards in time,
-    nearly 0 at standstill and linear between knots (the basis are hat functions, the linear B-splines).
+    v is the integrated speed, and a the measured acceleration. The unknowns are the scale error k, the acceleration
+    error b (m/s2) and the delay error d (s). Slopes and fork dive that the gyro did not measure cause the error b. The
+    model of b is a random walk backwards in time. It is nearly 0 at standstill, and linear between knots. Its basis
+    functions are hat functions (linear B-splines).
+
+    part: the ride up to a standstill.
+    begin: index at which braking begins.
+    speed: integrated speed, shape (n), in m/s.
+    acceleration: measured acceleration, shape (n), in m/s2.
+    delay_s: delay of the log's speed.
+    Returns the corrected speed, shape (n), in m/s; None if the log has too few speeds during the stop.
     """
     time = part.t_s
     values = np.flatnonzero(~np.isnan(part.speed_mps))
-    # the samples at which the vehicle had these speeds
+    # The indices of the samples at which the vehicle had the logged speeds.
     wanted = np.minimum(np.searchsorted(time, time[values] - delay_s - 1e-6), len(time) - 1)
     values, wanted = (these[time[wanted] >= time[begin] - LEAD_S] for these in (values, wanted))
     if len(wanted) < 2 or wanted[-1] < begin:
@@ -65,7 +72,7 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
     knots = np.arange(float(time[-1]), float(min(time[wanted[0]], time[begin])) - KNOT_S, -KNOT_S)
     hats = np.column_stack([np.interp(time, knots[::-1], row[::-1]) for row in np.eye(len(knots))])
     pushed = np.column_stack([integral(time, hat) for hat in hats.T])
-    pushed = pushed[-1] - pushed  # integral from each sample to the end
+    pushed = pushed[-1] - pushed  # the integral from each sample to the end
     terms = np.column_stack((speed, pushed, -smoothed(acceleration, time, SMOOTH_S)))[wanted]
     error = part.speed_mps[values] - speed[wanted]
     prior = _prior(len(knots))
@@ -77,8 +84,11 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
 
 
 def _prior(knots: int) -> Array:
-    """The matrix of the prior, (knots + 2, knots + 2). The matrix times the unknowns (k; b at each knot, last knot
-    first; d) has mean 0 and standard deviation 1."""
+    """Return the matrix of the prior, shape (knots + 2, knots + 2).
+
+    The unknowns are k, then b at each knot, the last knot first, then d. The prior of the matrix times the unknowns has
+    mean 0 and standard deviation 1.
+    """
     walk = [SIGMA_WALK_MPS2 * KNOT_S**0.5] * (knots - 1)
     sigma = np.array([SIGMA_SCALE, SIGMA_SLOPE_MPS2, *walk, SIGMA_DELAY_S])
     prior = np.eye(knots + 2)

@@ -1,8 +1,8 @@
 """Detects standstills, for the stops of a ride.
 
-The limits are relative to the shaking of the ride. They find all of the standing time in simulated rides; the fixed
-limits of signals.motionless, in deg/s and g, find 54 to 92 %. Only where an idling engine shakes as much as the road,
-relative limits find less (17 to 41 % instead of 91 %).
+The limits are relative to the shaking of the ride. In simulated rides they find all of the standing time, but the fixed
+limits of signals.motionless, in deg/s and g, find only 54 to 92 %. Relative limits are worse only if an idling engine
+shakes as much as the road: they then find 17 to 41 %, and fixed limits 91 %.
 """
 
 import numpy as np
@@ -10,21 +10,26 @@ import numpy as np
 from ...signals import STANDING_MPS, Array, Bools, smoothed, stretches, window_means, window_spreads
 from ..channels import Channels, spacing_s
 
-STALE_S = 3.0  # an older speed is not used
+STALE_S = 3.0  # largest age of a speed that is used
 
-# Without a speed, a vehicle stands still if it shakes over QUIET_S by less than a share of its shaking when moving
+# Without a speed, the shaking shows a standstill. The shaking over QUIET_S must be less than a share of the shaking
+# while moving.
 QUIET_S = 1.0
-QUIET_SHARE = 0.15  # this share, for pitch and yaw
-QUIET_UP_SHARE = 0.2  # this share, for up and down: a fork at a stop shakes less, smooth roads and idling engines more
-RIDING_PERCENTILE = 90.0  # this percentile of the shaking is from moving, even in a ride with long pauses
-ENGINE_S, BEND_S = 0.1, 0.5  # shaking by the road is slower than an engine's, and faster than bends and the fork's dive
-STILL_DPS, STILL_G = 1.0, 0.01  # limits at standstill: rate, change of the forward force from beginning to end
-MAX_OFF_G = 0.05  # largest difference from the force at rest; even smooth braking and gentle bends exceed this
-UNCALIBRATED_G = 0.12  # largest difference from 1 g if the ride has no rest and the sensor is not calibrated
+QUIET_SHARE = 0.15  # the share for pitch and yaw
+# The share for up and down. A fork at a stop shakes less than this share. Smooth roads and idling engines shake more.
+QUIET_UP_SHARE = 0.2
+RIDING_PERCENTILE = 90.0  # percentile of the shaking that belongs to moving, even in a ride with long pauses
+ENGINE_S, BEND_S = 0.1, 0.5  # the road's shaking is slower than the engine's, and faster than bends and fork dive
+STILL_DPS, STILL_G = 1.0, 0.01  # at standstill, largest rate, and largest change of the forward force over QUIET_S
+MAX_OFF_G = 0.05  # largest difference from the force at rest; even smooth braking and gentle bends exceed it
+UNCALIBRATED_G = 0.12  # largest difference from 1 g if the ride has no rest; the sensor may not be calibrated
 
 
 def standing(ride: Channels) -> Bools:
-    """(n) True where the vehicle stands still. Uses the log's speed or, without a speed, the shaking."""
+    """Find the standstills by the log's speed or, without a speed, by the shaking.
+
+    Returns shape (n), True where the vehicle stands still.
+    """
     still = _quiet(ride)
     if not np.any(still):
         still = _rests_of_filter(ride)
@@ -55,8 +60,10 @@ def _quiet(ride: Channels) -> Bools:
 
 
 def _rests_of_filter(ride: Channels) -> Bools:
-    """The rests found by the lean filter, for a road that is too smooth to detect standstills by shaking. Each rest is
-    extended back to the time when the forward force reached its value at rest."""
+    """Return the rests that the lean filter finds, for a road that is too smooth to detect standstills by shaking.
+
+    Each rest is extended back to the time when the forward force reached its value at rest.
+    """
     still = ride.resting > 0.5
     forward = smoothed(ride.forward_g, ride.t_s, ENGINE_S)
     for start, _ in stretches(still):
@@ -67,7 +74,7 @@ def _rests_of_filter(ride: Channels) -> Bools:
 
 
 def _shaking_by_road(values: Array, time: Array) -> Array:
-    """The values without the engine's shaking (faster), and without bends and braking (slower): the road's shaking."""
+    """Return only the road's shaking: remove the engine's faster shaking, and slower bends and braking."""
     slow = smoothed(values, time, ENGINE_S)
     return slow - smoothed(slow, time, BEND_S)
 
@@ -79,8 +86,7 @@ def _is_calm(values: Array, n: int, share: float) -> Bools:
 
 
 def _has_force_at_rest(ride: Channels, n: int) -> Bools:
-    """True where the force over n successive samples equals the force at rest, within the sensor's calibration
-    errors."""
+    """True where the mean force over n samples is the force at rest, within the errors of the calibration."""
     size = np.sqrt(sum(window_means(axis, n) ** 2 for axis in (ride.left_g, ride.up_g, ride.forward_g)))
     rests = size[window_means(ride.resting, n) > 0.99]
     weight = float(np.median(rests)) if len(rests) else 1.0
