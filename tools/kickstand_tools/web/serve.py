@@ -13,9 +13,12 @@ from urllib.parse import unquote, urlsplit
 
 HOST = "127.0.0.1"
 MOST, PATIENCE_S = 64, 10.0  # most connections at a time; longest wait for a browser's data
-FULL_S = 1.0  # wait of a new connection for a free place; then the oldest is ended, a silent one at once
-PORT = 8377  # always the same, because the browser keeps files by address
-# Defined here, because the registry of Windows may have others, and then a browser does not run modules
+# If MOST connections are open, a silent connection is ended at once. A new connection waits this long for a free place.
+# Then the oldest connection is ended.
+FULL_S = 1.0
+PORT = 8377  # the port is always the same, because the browser stores files per address
+# The media types are defined here. The registry of Windows may have wrong types for modules, and then a browser does
+# not run them.
 TYPES = {
     ".css": "text/css; charset=utf-8",
     ".gz": "application/gzip",
@@ -34,8 +37,10 @@ TYPES = {
 
 
 class Server(ThreadingHTTPServer):
-    """Ignores a browser that disconnects. If there are more than MOST connections, it ends the oldest, which may be
-    stuck."""
+    """A server that ignores errors from a browser that disconnects.
+
+    A new connection beyond MOST may end the oldest connection, because that connection may be stuck.
+    """
 
     request_queue_size = 128
     daemon_threads = True
@@ -43,7 +48,7 @@ class Server(ThreadingHTTPServer):
 
     def __init__(self, *arguments: Any) -> None:
         self._free = BoundedSemaphore(MOST)
-        self._open: dict[Any, None] = {}  # the oldest first
+        self._open: dict[Any, None] = {}  # the open connections, the oldest first
         self.has_asked: set[Any] = set()
         super().__init__(*arguments)
 
@@ -59,7 +64,10 @@ class Server(ThreadingHTTPServer):
         super().process_request(request, client_address)
 
     def _end_silent_connection(self) -> bool:
-        """End the oldest connection that has sent no request, and use its place; False if there is none."""
+        """End the oldest connection that has sent no request, and take its place.
+
+        Returns False if every connection has sent a request, or if the place does not become free within FULL_S.
+        """
         with contextlib.suppress(OSError, StopIteration, RuntimeError):
             next(one for one in list(self._open) if one not in self.has_asked).shutdown(socket.SHUT_RDWR)
             return self._free.acquire(timeout=FULL_S)
@@ -79,7 +87,11 @@ class Server(ThreadingHTTPServer):
 
 
 def server(files: dict[str, bytes], port: int = PORT) -> Server:
-    """A server of {path: content}, on `port` or, if that is taken, on a free one. Its port is server_address[1]."""
+    """Create a server on `port`, or on a free port if `port` is in use.
+
+    files: {path: content}.
+    Returns the server. Its port is server_address[1].
+    """
 
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
