@@ -1,7 +1,7 @@
 """`kickstand web`: pages that run the firmware on the simulated board, install it on a real one, watch a board and
 fetch its recordings, show a ride, and show the project's documents.
 
-page/ contains our files for the browser; documents/ makes pages from the documents. In the browser, device.py runs on
-MicroPython, the modules *_guest.py on CPython. npm/ names both packages and the others to download. The other modules
-build the site and serve it.
+page/ contains our files for the browser. documents/ makes pages from the documents. In the browser, device.py runs on
+MicroPython, and the modules *_guest.py run on CPython. npm/ lists the packages to download, including these two
+interpreters. The other modules build the site and serve it.
 """

@@ -1,7 +1,7 @@
 """Packs the tools for the pages in ZIP files. The same content always gives the same ZIP file.
 
-install_archive() has the files that install_guest.py and cable_guest.py need to talk to a board. rides_archive() has
-those that rides_guest.py needs to show a ride.
+install_archive() packs the files with which install_guest.py and cable_guest.py talk to a board. rides_archive() packs
+the files with which rides_guest.py shows a ride.
 """
 
 import io
@@ -23,9 +23,9 @@ from ..deploy import bytecode
 from ..deploy.firmware_files import firmware_files
 
 _DATE = (1980, 1, 1, 0, 0, 0)
-# For Pico; Pico 2; ESP32-C3, C6, H2 and the other processor of a Pico 2; all other ESP32
+# In this order: Pico; Pico 2 (Arm); ESP32-C3, C6, H2 and Pico 2 (RISC-V); all other ESP32
 ARCHITECTURES = ("armv6m", "armv7emsp", "rv32imc", "xtensawin")
-# Replaces pyserial and a module for terminals: the names that mpremote needs when it is imported
+# Replaces pyserial and mpremote's module for terminals. Contains only the names that mpremote needs at its import.
 _STANDS_IN = {
     "serial/__init__.py": b"SerialException = OSError\n",
     "serial/tools/__init__.py": b"",
@@ -33,14 +33,14 @@ _STANDS_IN = {
     "mpremote/console.py": b"VT_ENABLED = False\n",
 }
 _MPREMOTE = ("__init__.py", "mp_errno.py", "transport.py", "transport_serial.py")
-_NUMPY = "lib/python3.12/site-packages/"  # in the conda package
-# A third of numpy: parts for its developers, other compilers and random numbers
+_NUMPY = "lib/python3.12/site-packages/"  # the folder of numpy in the conda package
+# These folders are a third of numpy: parts for its developers, for compilers and for random numbers
 _LEFT_OUT = ("/tests/", "/f2py/", "/random/", "/distutils/", "/testing/", "/include/", "/_pyinstaller/")
 _LICENCES = "info/licenses/"
 
 
 class _ToolsFinder(ModuleFinder):
-    """Finds only modules of kickstand_tools, because an installed one has other packages beside it."""
+    """Finds only modules of kickstand_tools. An installed kickstand_tools has other packages beside it."""
 
     def find_module(self, name: str, path: Any, parent: Any = None) -> Any:
         if path is None and name != "kickstand_tools":
@@ -49,8 +49,11 @@ class _ToolsFinder(ModuleFinder):
 
 
 def tools(*modules: str) -> dict[str, Path]:
-    """{path below the tools: file} of these modules of kickstand_tools, such as "web/device.py", and of everything that
-    they import from it, also within functions, with the templates and scripts beside them."""
+    """Find the files of some modules of kickstand_tools and of all its modules that they import, also in functions.
+
+    modules: paths in kickstand_tools, such as "web/device.py".
+    Returns {path below tools/: file}, also with the templates, scripts and style sheets in the modules' folders.
+    """
     finder = _ToolsFinder([str(firmware_path.TOOLS)])
     for name in modules:
         finder.import_hook("kickstand_tools." + name.removesuffix(".py").replace("/", "."))
@@ -60,7 +63,7 @@ def tools(*modules: str) -> dict[str, Path]:
 
 
 def zipped(contents: Mapping[str, bytes]) -> bytes:
-    """A ZIP file of {name: content}."""
+    """Pack {name: content} in a ZIP file."""
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in sorted(contents.items()):
@@ -71,8 +74,14 @@ def zipped(contents: Mapping[str, bytes]) -> bytes:
 
 
 def install_archive() -> bytes:
-    """The tools of `kickstand flash`, `record` and `pull`, mpremote, and the firmware, as sources and compiled for
-    every machine code of a board: tools/ and firmware/ as in a checkout, mpremote/, serial/, compiled/."""
+    """Pack what the browser needs to install the firmware and to read a board.
+
+    The ZIP file contains these folders:
+        tools/: the tools of `kickstand flash`, `record` and `pull`.
+        firmware/: the firmware's sources.
+        compiled/: the firmware compiled for every architecture in ARCHITECTURES.
+        mpremote/, serial/: mpremote, and a replacement of pyserial.
+    """
     files = {f"mpremote/{name}": Path(mpremote.__file__).parent / name for name in _MPREMOTE}
     files |= {f"tools/{name}": path for name, path in tools("web/cable_guest.py", "web/install_guest.py").items()}
     files |= {f"firmware{path}": source for path, source in firmware_files().items()}
@@ -80,13 +89,16 @@ def install_archive() -> bytes:
 
 
 def firmware() -> bytes:
-    """The firmware as a ZIP file, for riders whose browser cannot connect to a board. They copy it with mpremote."""
+    """Pack the firmware for riders whose browser cannot connect to a board. They copy it with mpremote."""
     return zipped({f"kickstand-firmware{path}": source.read_bytes() for path, source in firmware_files().items()})
 
 
 def _compiled() -> dict[str, bytes]:
-    """compiled/ARCHITECTURE/... .mpy: complete for the first architecture, only the files with machine code for the
-    others. Empty without a compiler: then the sources are copied."""
+    """Compile the firmware for every architecture in ARCHITECTURES.
+
+    Returns {compiled/ARCHITECTURE/... .mpy: content}. The first architecture has all files. The other architectures
+    have only the files with machine code. The result is empty without a compiler. Then the board gets the sources.
+    """
     sources = sorted(firmware_path.PACKAGE.rglob("*.py"))
     first, *others = ARCHITECTURES
     try:
@@ -105,9 +117,12 @@ def _compiled() -> dict[str, bytes]:
 
 
 def rides_archive() -> bytes:
-    """The packages for `kickstand report` and `plot`: the tools, the firmware's mathematics, readers of GPX and FIT
-    files, Jinja, and markupsafe without its compiled module, which also exists in Python. Raises InputError without
-    fitdecode or gpxpy."""
+    """Pack what the browser needs for `kickstand report` and `plot`.
+
+    The ZIP file contains the tools, the firmware's package, fitdecode, gpxpy, Jinja and markupsafe. The compiled module
+    of markupsafe is left out, because markupsafe also has this module in Python.
+    Raises InputError if fitdecode or gpxpy is not installed.
+    """
     try:
         import fitdecode
         import gpxpy
@@ -120,7 +135,13 @@ def rides_archive() -> bytes:
 
 
 def numpy_archive(conda: bytes) -> tuple[bytes, bytes]:
-    """A ZIP file with an importable numpy, and the text of its licences. conda: the package of emscripten-forge."""
+    """Extract numpy from its conda package.
+
+    conda: content of the package from emscripten-forge.
+    Returns:
+        archive: a ZIP file from which numpy can be imported.
+        licences: the text of its licences.
+    """
     kept, licences = {}, b""
     with tarfile.open(fileobj=io.BytesIO(conda)) as package:
         for entry in package:

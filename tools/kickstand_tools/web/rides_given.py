@@ -17,8 +17,14 @@ from ..logs.reader import is_log
 
 @dataclass
 class GivenRide:
-    """log: a file, or a folder with the files of one recording. files: all its files. table: the table to ask the user
-    about, None if its columns are known. track: a .gpx or .fit to join with it, or ""."""
+    """A ride among the given files.
+
+    log: a file, or a folder with the files of one recording.
+    files: names of all its files.
+    calibration: name of its calibration file, or "".
+    track: name of a .gpx or .fit file to join with the ride, or "".
+    table: the table whose columns the user must choose; None if the columns are known.
+    """
 
     log: str
     files: list[str]
@@ -29,7 +35,12 @@ class GivenRide:
 
 @dataclass
 class Given:
-    """rides: sorted by name. kinds: the kind of each file. refused: the reason why a file cannot be used."""
+    """The result of sorted_out().
+
+    rides: sorted by name.
+    kinds: {name of a file: its kind}.
+    refused: {name of a file: the reason why it cannot be used}.
+    """
 
     rides: list[GivenRide] = field(default_factory=list)
     kinds: dict[str, str] = field(default_factory=dict)
@@ -37,10 +48,12 @@ class Given:
 
 
 def sorted_out(names: list[str]) -> Given:
-    """Identify these files of the working directory. names: in the order given.
+    """Identify files in the working directory.
 
-    A ride gets the calibration beside it, or else the last given one that is not beside another ride; and the last
-    track.
+    A calibration belongs to a ride if its name matches the ride's name. A ride without its own calibration gets the
+    last calibration that belongs to no ride. Every ride gets the last track.
+
+    names: names of the files, in the order in which the user chose them.
     """
     found, loose = Given(), []
     track = ""
@@ -79,18 +92,21 @@ def sorted_out(names: list[str]) -> Given:
 
 
 def _in_folder(name: str, files: list[RecordingFile]) -> str:
-    """Write files to a new folder; returns its name."""
+    """Write files to a new folder, and return its name."""
     while Path(name).exists():
         name += "_"
     Path(name).mkdir()
     for file in files:
-        Path(name, file.name).write_bytes(file.content)  # not a link: an import leaves out links to outside
+        Path(name, file.name).write_bytes(file.content)  # no link, because imports skip links to outside
     return name
 
 
 def _recordings_among(files: list[RecordingFile]) -> Iterator[tuple[str, list[RecordingFile]]]:
-    """Yield the name and the files of each recording among single files. A recording of several files gets a folder as
-    its name."""
+    """Find the recordings among single files.
+
+    Yields the name and the files of each recording. The files of a recording with several files are written to a new
+    folder, and its name is the folder's name.
+    """
     found = recordings(files)
     used = {id(file) for _, group in found for file in group}
     for app, group in found:
@@ -104,7 +120,7 @@ def _recordings_among(files: list[RecordingFile]) -> Iterator[tuple[str, list[Re
 
 
 def _add(found: Given, log: str, names: list[str], files: list[RecordingFile]) -> None:
-    """Add a ride, or the reason why these files are not one."""
+    """Add a ride, or the reason why the files are not a ride."""
     known = recordings(files)
     table = None if known else mapped.table_in(files)
     if not known and (table is None or len(table.columns) < len(mapped.REQUIRED)):

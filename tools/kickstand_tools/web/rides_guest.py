@@ -1,8 +1,9 @@
-"""`kickstand report`, `plot`, `smooth`, `import`, `join` and `calibrate ride` in the browser: their own code on CPython
-for WebAssembly. page/rides/worker.mjs runs it, in a separate folder.
+"""Runs `kickstand report`, `plot`, `smooth`, `import`, `join` and `calibrate ride` in the browser.
 
-Each function returns JSON as described in its docstring, or {"refused": reason}: the command's message in the words of
-a page.
+page/rides/worker.mjs calls this module on CPython for WebAssembly, in a separate working directory.
+
+Each function returns JSON as described in its docstring, or {"refused": reason}. The reason is the command's message,
+worded for a page.
 """
 
 import functools
@@ -32,8 +33,8 @@ from ..logs.reader import read_blocks
 from .rides_given import sorted_out
 
 PLOTLY = "./plotly/plotly.min.js"  # the page of a ride loads it from the site
-MADE = Path("../made")  # not in the folder of the given files, which may have any name
-_smoothed: dict[str, list] = {}  # of the last shown ride: results of smooth_blocks(), block by block
+MADE = Path("../made")  # results are not written beside the given files, because names could collide
+_smoothed: dict[str, list] = {}  # {name of the last shown ride: results of smooth_blocks(), one per block}
 TOO_LONG = "this ride is too long for the memory of a browser: give a part of it"
 
 
@@ -54,11 +55,15 @@ def in_json(function: Callable[..., Any]) -> Callable[..., str]:
 
 @in_json
 def rides(given, names):
-    """Identify the files of these names (JSON, in the order given) in the folder `given`.
+    """Identify the given files.
 
-    {"rides": [{"log", "isLog": true unless it is an app's recording, "calibration" and "track": name or "", "files":
-    [names], "table": asked_for() of an unknown table}, ...], sorted by name; "kinds": {name: kind}; "why": {name:
-    reason why it cannot be used}}.
+    given: the folder of the files.
+    names: their names as a JSON list, in the order in which the user chose them.
+    Returns:
+        rides: list of objects, sorted by name. Each has the fields of GivenRide, with "table" as from asked_for(), and
+            "isLog": true if the ride is a log of Kickstand.
+        kinds: {name: kind of the file}.
+        why: {name: reason why the file cannot be used}.
     """
     _smoothed.clear()
     for old in Path().iterdir():
@@ -76,9 +81,16 @@ def rides(given, names):
 
 
 def asked_for(table: mapped.MappedTable) -> dict[str, Any]:
-    """The questions of the page about a table: {"columns": all, "keys": [[key, words, required, probable column or ""],
-    ...], "units": [[key, words, [[unit, words], ...], probable unit, reason], ...], "lacking": missing columns in
-    words, "certain": true if all required columns are certain, "picture": Table.first_seconds()}."""
+    """Prepare the page's questions about the columns and units of a table.
+
+    Returns:
+        columns: names of all columns.
+        keys: list of [key, words, required, probable column or ""].
+        units: list of [key, words, choices, probable unit, reason]. The choices are a list of [unit, words].
+        lacking: the missing columns in words.
+        certain: true if all required columns are certain.
+        picture: result of MappedTable.first_seconds().
+    """
     keys = [[key, words, key in mapped.REQUIRED, table.found.get(key, "")] for key, words in mapped.WORDS.items()]
     found = table.findings
     units = []
@@ -95,9 +107,19 @@ def asked_for(table: mapped.MappedTable) -> dict[str, Any]:
 
 @in_json
 def take(log, is_log, columns, units, track, progress):
-    """{"log": log} for a log. For an app's recording (`import`) or with a track (`join`), {"log": the new log, "path":
-    the same, "warnings": [...], "words": how it was joined or ""}. columns, units: of a table, as JSON of the values of
-    --columns and --units, otherwise "{}". track: a .gpx, a .fit or ""."""
+    """Import a recording that is not a log, and join a track if there is one.
+
+    log: name of the log or recording.
+    is_log: True if it is a log of Kickstand.
+    columns, units: the values of --columns and --units for a table, as JSON; otherwise "{}".
+    track: name of a .gpx or .fit file, or "".
+    progress: function that is called with the progress of the join.
+    Returns {"log": log} for a log without a track, otherwise:
+        log: path of the new log, or the given log if the track could not be joined to it.
+        path: path of the new log. It is missing if no new log was written.
+        warnings: list of messages.
+        words: a sentence about the quality of the join, or "".
+    """
     if is_log and not track:
         return {"log": log}
     out, warnings, words = log, [], ""
@@ -120,7 +142,7 @@ def take(log, is_log, columns, units, track, progress):
 
 
 class _Keeping(Ride):
-    """Keeps the smoothed lean, because computing it again would take as long."""
+    """A ride whose smoothed lean is kept for smooth(), because computing it takes long."""
 
     def _read(self, log, progress, notices):
         for block, found in super()._read(log, progress, notices):
@@ -130,9 +152,18 @@ class _Keeping(Ride):
 
 @in_json
 def look(log, calibration, progress):
-    """The results of `report` and `plot` for a log with the calibration of a file: {"words": report.Words, "json":
-    report.as_data(), "warnings": [...], "page": HTML, "plotly": the script that the page loads, "stem": the name
-    without suffixes}. progress(done, total): the progress."""
+    """Compute the results of `report` and `plot`.
+
+    log, calibration: names of the files.
+    progress: function that is called with (done, total).
+    Returns:
+        words: the fields of report.Words, with the units, title and terms of the table of stops.
+        json: result of report.as_data(), with the name of the ride.
+        warnings: list of messages.
+        page: HTML of the plot.
+        plotly: address of the script that this HTML loads.
+        stem: name of the ride without suffixes.
+    """
     opened = open_ride(Path(log), Path(calibration), smoothed=True)
     _smoothed.clear()
     ride = _Keeping(opened.log, opened.calibration, opened.smoothed)
@@ -150,7 +181,10 @@ def look(log, calibration, progress):
 
 @in_json
 def smooth(log, calibration, progress):
-    """{"path": of LEAN.csv as written by `smooth`}. Results of look() are reused."""
+    """Write LEAN.csv as `smooth` does. The lean from look() is reused if look() showed the same ride.
+
+    Returns {"path": path of LEAN.csv}.
+    """
     ride = open_ride(Path(log), Path(calibration))
     out = _result_path(log, f"{ride.stem}.lean.csv")
     kept = _smoothed.get(ride.name, [None])
@@ -162,7 +196,10 @@ def smooth(log, calibration, progress):
 
 
 def _blocks_with(values, ride, progress):
-    """Blocks of the ride's log, each with its rows of values (n samples, columns)."""
+    """Yield each block of the ride's log with its rows of values.
+
+    values: shape (number of samples, number of columns).
+    """
     at = 0
     for block in read_blocks(ride.log, 2, progress, calibration=ride.calibration):
         at, begin = at + len(block.time_us), at
@@ -171,7 +208,12 @@ def _blocks_with(values, ride, progress):
 
 @in_json
 def align(log, progress):
-    """{"path": of the calibration from `calibrate ride`, "roll_deg", "pitch_deg", "yaw_deg": its standard errors}."""
+    """Write a calibration as `calibrate ride` does.
+
+    Returns:
+        path: path of the calibration.
+        roll_deg, pitch_deg, yaw_deg: its standard errors.
+    """
     found = fit_ride(Path(log), progress=progress)
     out = _result_path(log, calibration_path(Path(log)).name)
     write_calibration(out, found.calibration)
@@ -180,21 +222,22 @@ def align(log, progress):
 
 
 def _result_path(log, name):
-    """A path for a result of a log. Another log may have a result of the same name."""
+    """Return the path for a result of a log. Each log has its own folder, so equal names do not collide."""
     folder = Path(log).parent if MADE in Path(log).parents else MADE / log
     folder.mkdir(parents=True, exist_ok=True)
     return folder / name
 
 
 def _one_line(text):
-    """The message without the folder of results, which is an internal path."""
+    """Return a message on one line, without the internal path of the folder of results."""
     return re.sub(rf"{re.escape(str(MADE))}/[^/]*/", "", " ".join(text.split()))
 
 
 def raising(function):
-    """A decorator for functions of numpy.linalg: they then raise LinAlgError for a singular matrix, as elsewhere.
+    """A decorator that makes a function of numpy.linalg raise LinAlgError for a singular matrix.
 
-    numpy detects it by the processor's flags of floating-point errors. WebAssembly has none: the result is NaN.
+    On other platforms numpy detects a singular matrix from the processor's flags of floating-point errors. WebAssembly
+    has no such flags, so the result would be NaN.
     """
 
     @functools.wraps(function)

@@ -1,4 +1,4 @@
-"""Makes the sample ride of the page Rides: a simulated one in the form of `pull`, and a drawing of it."""
+"""Simulates the sample ride of the page Rides, writes it in the format of `kickstand pull`, and draws it."""
 
 import functools
 import gzip
@@ -16,10 +16,10 @@ from ..simulation.ride import SimulatedRide
 
 LOG, CALIBRATION = "simulated-ride.csv.gz", "simulated-ride.cal.json"
 PROFILE, SEED, SECONDS = "street", 2, 180.0
-_EACH = 2  # readings of the sensor per row of the log, as on a board that records
+_EACH = 2  # number of the sensor's readings per row of the log, as in a recording of a board
 
 
-_WIDE, _CHART, _MAP = 640.0, 190.0, 150.0  # of the drawing
+_WIDE, _CHART, _MAP = 640.0, 190.0, 150.0  # width of the drawing, and heights of its chart and map
 _EDGE, _UPRIGHT_DEG, _EACH_S = 24.0, 3.0, 0.5
 
 
@@ -31,7 +31,10 @@ def _ride() -> SimulatedRide:
 
 @functools.cache
 def sample_ride() -> dict[str, bytes]:
-    """{name: content} of the log, with values of a GPS receiver, and of the calibration from six and two poses."""
+    """Return {name: content} of the log and its calibration.
+
+    The log contains values of a GPS receiver. The calibration comes from six poses and then from two poses.
+    """
     made = _ride()
     with tempfile.TemporaryDirectory() as directory:
         folder = Path(directory)
@@ -49,8 +52,10 @@ def sample_ride() -> dict[str, bytes]:
 
 
 def preview() -> str:
-    """The lean over the sample ride, and its road in the colours of the lean, as an SVG element. The style sheet gives
-    the classes left, right and road their colours."""
+    """Draw the lean during the sample ride, and its road in the colours of the lean, as an SVG element.
+
+    The style sheet sets the colours of the classes left, right and road.
+    """
     made = _ride()
     each = round(_EACH_S * made.rate_hz)
     lean = made.truth["lean_deg"][::each]

@@ -1,4 +1,7 @@
-"""A board at the browser's serial port, on CPython for WebAssembly. While it waits, the page keeps running."""
+"""Connects to a board at the browser's serial port, on CPython for WebAssembly.
+
+The page keeps running while this module waits for the board.
+"""
 
 import time
 
@@ -11,7 +14,10 @@ _GONE = "nothing comes any more"
 
 
 class Port:
-    """The part of pyserial's Serial that mpremote uses. line: the SerialLine of cable.mjs."""
+    """The part of pyserial's Serial that mpremote uses.
+
+    line: the SerialLine of cable.mjs.
+    """
 
     dtr = rts = True
 
@@ -25,7 +31,7 @@ class Port:
         return len(self._received)
 
     def read(self, size=1):
-        """`size` bytes, or fewer at the time-out."""
+        """Read `size` bytes. After ANSWER_S, return the bytes received so far."""
         until_s = time.monotonic() + ANSWER_S
         while len(self._received) < size and time.monotonic() < until_s:
             self._listen()
@@ -53,7 +59,11 @@ class Port:
 
 
 class BrowserBoard(ConnectedBoard):
-    """The board at an open SerialLine. name: of its port, for messages."""
+    """The board at an open serial port.
+
+    line: the SerialLine of the port.
+    name: name of the port, for messages.
+    """
 
     def __init__(self, line, name):
         self.serial, self.device_name = Port(line), name

@@ -17,25 +17,27 @@ from . import archives, npm_packages, sample_ride
 from .documents import documents
 
 PAGE = Path(__file__).resolve().parent / "page"
-# Large, and only for visitors with a board or a ride: fetched on demand
+# Large files that only visitors with a board or a ride need. The browser fetches them on demand.
 LATER = ("esptool/", "firmware.zip", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip", "sample/")
 _BOARDS = {"pico": wiring.PICO, "esp32": wiring.ESP32}
-_NARROW = 4  # number of drawn poses side by side on a phone
+_NARROW = 4  # number of poses side by side in the drawing for phones
 _STYLE = "style.css"  # the style sheet is a template too
 _SHOWN = ("Kickstand", "starting")  # the text on the drawn display
-_NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first file automatically, the second as "./"
-_WHEN_READ = (*LATER, documents.FOLDER)  # the browser keeps these after they were opened
+_NOT_KEPT = ("service_worker.js", "index.html")  # stored anyway, the first as a worker, the second as "./"
+_WHEN_READ = (*LATER, documents.FOLDER)  # the browser stores these when they are opened
 
 
 def python_files() -> dict[str, str]:
-    """{path for import: source} of the firmware's package and of the tools' modules that the page runs."""
+    """Return {path for import: source} of the firmware's package and of the tools' modules that the page Try runs."""
     package = firmware_path.PACKAGE
     found = {path.relative_to(package.parent).as_posix(): path for path in sorted(package.rglob("*.py"))}
     return {name: path.read_text(encoding="utf-8") for name, path in (found | archives.tools("web/device.py")).items()}
 
 
 def site_files() -> dict[str, bytes]:
-    """{path in the site: content} of the whole site. Raises InputError if a required package cannot be downloaded.
+    """Build the whole site as {path in the site: content}.
+
+    Raises InputError if a required package cannot be downloaded.
 
     >>> sorted(site_files())[:2]  # doctest: +SKIP
     ['bike.mjs', 'board.mjs']
@@ -46,7 +48,7 @@ def site_files() -> dict[str, bytes]:
     files |= wiring_files()
     values = {"home": home(), "boards": wiring_tables(), "preview": sample_ride.preview()}
     library = files["plotly/plotly.min.js"].decode()
-    values["charts"] = " ".join(map(source_hash, (library, *page.SCRIPTS)))  # in the form of a policy
+    values["charts"] = " ".join(map(source_hash, (library, *page.SCRIPTS)))  # for the content security policy
     files |= {name: _filled(name, **values) for name in files if name.endswith(".html") or name == _STYLE}
     files |= documents.document_files(values["home"])
     files |= {f"sample/{name}": data for name, data in sample_ride.sample_ride().items()}
@@ -67,14 +69,17 @@ def site_files() -> dict[str, bytes]:
 
 
 def wiring_files() -> dict[str, bytes]:
-    """{name in the site: SVG}: wiring_pico.svg, wiring_esp32.svg, and the drawings of what to build."""
+    """Return {name in the site: SVG} of the wiring drawings and the other drawings for building the device."""
     display = lcd.draw([list(line.ljust(16).encode("ascii")) for line in _SHOWN], bytes(64))
     drawn = building.drawings(display, display) | {"six_positions_narrow.svg": building.six_positions(_NARROW)}
     return {name: svg.encode() for name, svg in drawn.items()}
 
 
 def wiring_tables() -> dict[str, tuple[str, list[tuple[str, str, str]]]]:
-    """{board: (title, rows of (part, its pin, the board's pin))} of the wiring drawings."""
+    """Return the tables of the wiring drawings.
+
+    The result is {board: (title, rows)}. A row is (part, the part's pin, the board's pin).
+    """
     return {
         name: (board.title, [(part, *both) for part, pins in wiring.connections(board) for both in pins.items()])
         for name, board in _BOARDS.items()
@@ -82,7 +87,7 @@ def wiring_tables() -> dict[str, tuple[str, list[tuple[str, str, str]]]]:
 
 
 def home() -> str:
-    """The address of the project, "" if the installed package does not contain it: see tools/hatch_build.py."""
+    """Return the project's address, or "" if the package's metadata have no address (see tools/hatch_build.py)."""
     try:
         named = metadata.metadata(DISTRIBUTION).get_all("Project-URL") or []
     except metadata.PackageNotFoundError:
@@ -95,7 +100,10 @@ def _filled(name: str, **values: Any) -> bytes:
 
 
 def write_site(files: dict[str, bytes], out: Path) -> None:
-    """Write site_files() to a directory. Raises InputError if that is not possible.
+    """Write the site's files to a directory.
+
+    files: {path in the site: content}, as from site_files().
+    Raises InputError if the directory cannot be written.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as made:
