@@ -35,9 +35,15 @@ _SOLID = ("-c:v", "libx264", "-preset", "fast", "-crf", "18", "-pix_fmt", "yuv42
 
 @dataclass
 class Overlaid:
-    """A written overlay. pictures: number of pictures. fps: pictures per second. begin_s, end_s: the drawn part of the
-    ride. offset_s: the ride's time at the video's first picture, None without a video. correlation: of camera and ride
-    if the offset was found from it, otherwise None. notices: remarks about the ride."""
+    """A written overlay.
+
+    pictures: number of pictures.
+    fps: pictures per second.
+    begin_s, end_s: begin and end of the drawn part of the ride.
+    offset_s: the ride's time at the video's first picture; None without a video.
+    correlation: correlation of camera and ride if the offset was found from it, otherwise None.
+    notices: remarks about the ride.
+    """
 
     pictures: int
     fps: float

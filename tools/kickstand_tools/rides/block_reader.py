@@ -15,9 +15,10 @@ _HEAD_LENGTH = struct.calcsize(block_format.HEAD)
 _TAIL_LENGTH = struct.calcsize(block_format.TAIL)
 _START = _HEAD_LENGTH + store.BODY_LENGTH  # start of the entries if the calibration has no matrices
 _PLACE_LENGTH = struct.calcsize(block_format.PLACE)
-_LATE_PERIODS = 2  # samples were lost if a turn is late by more sample periods; same rule as kickstand.imu.sensor
-_DEGREE = 60 * 100_000  # in the unit of positions, 0.00001 minutes
-_MOST = 1e4  # largest accepted parameter of a calibration; a board stores far smaller ones
+# Samples were lost if a turn is late by more than this number of sample periods. Same rule as in kickstand.imu.sensor.
+_LATE_PERIODS = 2
+_DEGREE = 60 * 100_000  # a degree in the unit of stored positions, which is 0.00001 minutes
+_MOST = 1e4  # largest accepted parameter of a calibration; the parameters of a board are far smaller
 CUT_SHORT = "cut short"  # common for the last block of a ride, because the ignition cuts the power during the write
 
 
@@ -83,21 +84,23 @@ class StoredBlock:
 
     @property
     def who_am_i(self) -> int:
-        """The chip's WHO_AM_I."""
+        """The content of the chip's register WHO_AM_I."""
         return self.body[0]
 
     def calibration(self) -> Calibration:
-        """The calibration used for the lean on the display."""
+        """Return the calibration that the board used for the lean on the display."""
         return store.unpack(self.body)[2]
 
     def numbers(self) -> list[float]:
-        """All numbers of the calibration."""
+        """Return all numbers of the calibration."""
         calibration = self.calibration()
         return calibration.parameters() + calibration.matrices()
 
     def missing_s(self) -> list[float]:
-        """The durations of all gaps in the readings, s. A gap is the excess of the time between two turns of the loop
-        over the duration of the second turn's samples."""
+        """Return the durations of all gaps in the readings, in s.
+
+        The samples of a turn should fill the time since the turn before it. The rest of this time is a gap.
+        """
         period_us, before_us, found = 1_000_000 // self.sample_hz, self.time_us, []
         for turn in self.turns:
             late_us = turn.time_us - before_us - turn.n * period_us
@@ -108,9 +111,12 @@ class StoredBlock:
 
 
 def read(content: bytes) -> tuple[list[StoredBlock], list[str]]:
-    """Read the complete blocks of a file. Also returns one text per damaged place.
+    """Read the complete blocks of a file.
 
-    The text CUT_SHORT means that the last block is incomplete, which is not damage.
+    Returns:
+        blocks: the complete blocks.
+        problems: one text per damaged place. The text CUT_SHORT means that the last block is incomplete. This is not
+            damage.
     """
     blocks, problems = [], []
     at = 0
@@ -128,7 +134,7 @@ def read(content: bytes) -> tuple[list[StoredBlock], list[str]]:
 
 
 def parse(data: bytes) -> StoredBlock:
-    """Parse one complete block. Raises BadBlock."""
+    """Parse one block. Raises BadBlock if it is not complete and valid."""
     if not data.startswith(block_format.MAGIC[: len(data)]):
         raise BadBlock("not of a ride")
     if len(data) < _START + _TAIL_LENGTH:
@@ -158,7 +164,7 @@ def parse(data: bytes) -> StoredBlock:
 
 
 def _places(data: bytes) -> Iterator[tuple[int, Place]]:
-    """Yield each position with the number of its entry."""
+    """Yield the number of the entry and the position, for each position."""
     for entry, date, day_ms, lat, lon in struct.iter_unpack(block_format.PLACE, data):
         if abs(lat) > 90 * _DEGREE or abs(lon) > 180 * _DEGREE:
             continue  # a receiver's error, which would make the log invalid
@@ -170,7 +176,12 @@ def _places(data: bytes) -> Iterator[tuple[int, Place]]:
 
 
 def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]) -> Iterator[StoredTurn]:
-    """Decode the entries that block_format.encode_python writes. places: positions by the number of their entry."""
+    """Decode the entries that block_format.encode_python writes.
+
+    data: the bytes of the entries.
+    count: number of entries.
+    places: {number of the entry: its position}.
+    """
     bits = bin(int.from_bytes(b"\x01" + data, "big"))[3:]
     before = [1] + [0] * (block_format.FIELDS - 1)
     means = [block_format.START_MEAN] * block_format.FIELDS
@@ -212,7 +223,10 @@ def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]
 
 
 def missing_note(missing_s: list[float]) -> str:
-    """A line about gaps with these durations."""
+    """Return a line of text about gaps.
+
+    missing_s: durations of the gaps, in s.
+    """
     times = "once" if len(missing_s) == 1 else f"{len(missing_s)} times"
     return (
         f"readings are missing {times}, {sum(missing_s):.1f} s in all: the sensor was set up again, "

@@ -21,7 +21,7 @@ from .block_reader import CUT_SHORT, StoredBlock, missing_note, read
 
 _SILENT_S = 60  # longest wait for an answer; an emulated board is slow
 
-# Prints the directory and the vehicle, and (ride, part, bytes, path) of each part in it
+# Prints (directory, vehicle), then (ride, part, number of bytes, path) for each part of a ride in the directory
 _LIST = """
 import os
 from kickstand import settings
@@ -37,7 +37,7 @@ else:
     for ride, part, size in ride_paths.parts(directory):
         print((ride, part, size, ride_paths.part_path(directory, ride, part)))
 """
-# Prints a file, then its length and CRC-32 as the board read them
+# Prints a file in base64, then the length and the CRC-32 that the board computed
 _READ = """
 from binascii import b2a_base64, crc32
 count, crc = 0, 0
@@ -57,7 +57,12 @@ _Came = Callable[[str, int], None]  # called with the name of the item that is c
 
 
 class _Part(NamedTuple):
-    """A file on the board. size: bytes."""
+    """A file of a ride on the board.
+
+    ride: number of the ride.
+    part: number of the file in the ride.
+    size: number of bytes.
+    """
 
     ride: int
     part: int
@@ -87,7 +92,11 @@ class PulledRide:
 
 @dataclass(frozen=True)
 class PullResult:
-    """port: name of the board's port. rides: the copied rides, sorted by number."""
+    """The result of pull().
+
+    port: name of the board's port.
+    rides: the copied rides, sorted by number.
+    """
 
     port: str
     rides: list[PulledRide]
@@ -102,8 +111,11 @@ def pull(
 ) -> PullResult:
     """Write every ride on the board to a log in the directory `out`, then restart the board.
 
-    delete: remove each completely copied ride from the board.
-    pulled: called with each finished ride. Raises InputError.
+    port: the board's port, or a connected board; None for the only board that is plugged in.
+    delete: True to remove each completely copied ride from the board.
+    progress: function that is called with (what, done, total). The numbers done and total are in bytes.
+    pulled: function that is called with each finished ride.
+    Raises InputError if the rides cannot be copied.
     """
     check_directory(out)
     if not out.parent.is_dir():
@@ -136,7 +148,13 @@ def pull(
 
 
 def _list(transport: ConnectedBoard, name: str) -> tuple[str, str, dict[int, list[_Part]]]:
-    """The directory of the rides, the vehicle from the board's config.py, and the parts of each ride by ride number."""
+    """List the rides on the board.
+
+    Returns:
+        directory: the directory of the rides on the board.
+        vehicle: the vehicle from the board's config.py.
+        rides: {number of the ride: its parts in order}.
+    """
     first, *lines = printed(transport, name, _LIST, "its rides").splitlines() or [b""]
     directory, vehicle = literal(first, (str, str))
     in_order = sorted(_Part(*literal(line, (int, int, int, str))) for line in lines)
@@ -149,8 +167,11 @@ def _list(transport: ConnectedBoard, name: str) -> tuple[str, str, dict[int, lis
 def _pull_ride(
     transport: ConnectedBoard, number: int, parts: list[_Part], vehicle: str, out: Path, came: _Came
 ) -> PulledRide:
-    """Copy a ride and write its log. vehicle: from the board's config.py. A ride with an alignment by two poses is
-    always a motorcycle's."""
+    """Copy a ride and write its log.
+
+    vehicle: the vehicle from the board's config.py. It is used only if the alignment was measured or refined by
+        driving, because an alignment by two poses is always a motorcycle's.
+    """
     ride = PulledRide(number)
     blocks: list[StoredBlock] = []
     for part in parts:
@@ -197,7 +218,7 @@ def _pull_ride(
 
 
 def _delete(transport: ConnectedBoard, directory: str, parts: list[_Part]) -> None:
-    """Remove the parts of one ride, and then empty directories."""
+    """Remove the parts of one ride, and the directories that are empty afterwards."""
     for part in parts:
         transport.fs_rmfile(part.path)
     emptied = PurePosixPath(parts[0].path).parent
@@ -208,7 +229,7 @@ def _delete(transport: ConnectedBoard, directory: str, parts: list[_Part]) -> No
 
 
 def _readings(log: Path) -> int:
-    """Number of readings in an earlier log, 0 if it does not exist or cannot be read."""
+    """Return the number of readings in an earlier log, or 0 if the log does not exist or cannot be read."""
     try:
         with gzip.open(log) as file:
             return sum(1 for _ in file) - 1
@@ -217,13 +238,18 @@ def _readings(log: Path) -> int:
 
 
 def _free_name(log: Path) -> Path:
-    """The first of NAME-2.csv.gz, NAME-3.csv.gz ... that does not exist."""
+    """Return the first of NAME-2.csv.gz, NAME-3.csv.gz ... that does not exist."""
     stem = log.name.removesuffix(".csv.gz")
     return next(path for n in itertools.count(2) if not (path := log.with_name(f"{stem}-{n}.csv.gz")).exists())
 
 
 def _read(transport: ConnectedBoard, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
-    """Read a file of the board. Also returns True if all announced bytes arrived unchanged."""
+    """Read a file of the board.
+
+    Returns:
+        content: the bytes that arrived.
+        whole: True if all announced bytes arrived unchanged.
+    """
     content, whole = b"", False
     for attempt in range(_TRIES):
         again, whole = _try_to_copy(transport, part, title, came if attempt == 0 else _no_progress)
@@ -238,19 +264,19 @@ def _no_progress(_what: str, _count: int) -> None:
 
 
 def _try_to_copy(transport: ConnectedBoard, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
-    """One attempt of _read()."""
+    """Try once to read a file of the board. Returns the same values as _read()."""
     content = bytearray()
     there = None
     came(f"pulling {title}", 0)
     try:
-        # base64 needs four characters for three bytes, plus two per line end; a ride still being recorded may grow
+        # base64 needs four characters per three bytes, and two per line end. The file of a running recording may grow.
         for line in lines(
             transport, _READ.replace("PATH", repr(part.path)), _SILENT_S, most_bytes=2 * part.size + 9999
         ):
             if line.startswith(b"("):
                 there = literal(line, (int, int))
                 continue
-            with contextlib.suppress(binascii.Error):  # a byte was lost, which the check sum will show
+            with contextlib.suppress(binascii.Error):  # a byte was lost; the check sum will show the loss
                 piece = binascii.a2b_base64(line)
                 content += piece
                 came(f"pulling {title}", len(piece))

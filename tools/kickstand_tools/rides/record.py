@@ -24,8 +24,13 @@ from .stream import LiveReading, StreamLog, blocks
 
 @dataclass(frozen=True)
 class RecordResult:
-    """log, calibration: the written files. seconds, readings: length of the recording. notes: one line per gap or
-    fault."""
+    """The result of record().
+
+    log, calibration: the written files.
+    seconds: duration of the recording.
+    readings: number of readings in the recording.
+    notes: one line per gap or fault.
+    """
 
     log: Path
     calibration: Path
@@ -40,10 +45,15 @@ def record(
     begin: Callable[[str], None] | None = None,
     live: Callable[[LiveReading], None] | None = None,
 ) -> RecordResult:
-    """Write readings to the log `out`, and NAME.cal.json beside it, until Ctrl-C; then restart the board.
+    """Write readings to a log, and NAME.cal.json beside it, until Ctrl-C. Then restart the board.
 
-    Existing files are not overwritten, because a ride cannot be repeated. port: None for the only board that is plugged
-    in. begin: called with the port's name before the first readings. live: called every half second. Raises InputError.
+    Existing files are not overwritten, because a ride cannot be repeated.
+
+    port: the board's port; None for the only board that is plugged in.
+    out: path of the log, which ends in .csv or .csv.gz.
+    begin: function that is called with the port's name before the first readings.
+    live: function that is called with a LiveReading every half second.
+    Raises InputError if a file cannot be written, or if the board sends no readings.
     """
     if not out.name.endswith((".csv", ".csv.gz")):
         raise InputError(f"{out}: give --out a name that ends in .csv or .csv.gz")
@@ -71,7 +81,7 @@ def record(
 
 
 def _save_first_calibration(blocks: Iterator[StoredBlock], calibration: Path) -> Iterator[StoredBlock]:
-    """Yield the blocks. Before the first one, write its calibration to the file `calibration`."""
+    """Yield the blocks. Write the first block's calibration to the file `calibration` before yielding this block."""
     for i, block in enumerate(blocks):
         if i == 0:
             write_calibration(calibration, ride_log.calibration(block))
@@ -81,7 +91,8 @@ def _save_first_calibration(blocks: Iterator[StoredBlock], calibration: Path) ->
 class _GrowingFile(io.TextIOBase):
     """A text file that contains only complete writes. If a write fails on a full disk, the earlier content stays.
 
-    packed: compress with gzip, each write as a separate member, because a gzip file cut inside a member is damaged.
+    packed: True to compress with gzip. Each write is a separate member, because a gzip file that is cut inside a member
+        is damaged.
     """
 
     def __init__(self, path: Path, packed: bool) -> None:
@@ -108,9 +119,9 @@ class _GrowingFile(io.TextIOBase):
 
 @contextlib.contextmanager
 def live_line() -> Iterator[Callable[[str], None]]:
-    """A context with a function that redraws a line on standard error, if standard error is a terminal.
+    """A context that gives a function to redraw a line on standard error.
 
-    If the terminal is closed, the work continues without an error.
+    The function draws nothing if standard error is not a terminal. A closed terminal causes no error.
     """
     console = Console(stderr=True) if sys.stderr.isatty() else Console(quiet=True)
     line = Live(console=console, auto_refresh=False, transient=True)
@@ -139,7 +150,10 @@ def _signals(stopped: threading.Event) -> Iterator[None]:
 
 
 def _ending_signals() -> list[signal.Signals]:
-    """The signals that end a recording: Ctrl-C, kill, a closed terminal (not on Windows; not after nohup)."""
+    """Return the signals that end a recording: Ctrl-C, kill and a closed terminal.
+
+    A closed terminal does not count on Windows and after nohup.
+    """
     ends = [signal.SIGINT, signal.SIGTERM]
     if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
         ends.append(signal.SIGHUP)

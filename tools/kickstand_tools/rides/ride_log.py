@@ -12,16 +12,22 @@ from .block_reader import StoredBlock, StoredTurn
 
 
 def header(track: Sequence[str]) -> tuple[str, ...]:
-    """The log's column names. track: the columns of TRACK in this log."""
+    """Return the log's column names.
+
+    track: the columns of TRACK that this log has.
+    """
     return (*COLUMNS, *track, "temp_c")
 
 
 def rows(blocks: Iterable[StoredBlock], track: Sequence[str], from_us: int = 0) -> Iterator[list[str]]:
-    """Yield one row per turn of the board's loop: the time of its last sample, s since from_us, and the mean of its
-    samples.
+    """Yield one row per turn of the board's loop.
 
+    A row contains the time of the turn's last sample and the mean of the turn's samples.
     Values have enough digits to distinguish single counts of the chip. Only the first row of each block has the
-    temperature. track: as for header().
+    temperature.
+
+    track: the columns of TRACK that this log has.
+    from_us: the board's time at which the log's time is 0, in us.
     """
     for block in blocks:
         lsb, gyro_lsb = block.accel_lsb_per_g, block.gyro_lsb_tenths / 10
@@ -39,7 +45,7 @@ def rows(blocks: Iterable[StoredBlock], track: Sequence[str], from_us: int = 0) 
 
 
 def _track_cells(turn: StoredTurn) -> dict[str, str]:
-    """The cells of the columns TRACK: the values from the speed source in this turn."""
+    """Return the cells of the columns TRACK, with the values that the speed source sent in this turn."""
     cells: dict[str, str] = dict.fromkeys(TRACK, "")
     if turn.speed_mps is not None:
         cells["speed_mps"] = f"{turn.speed_mps:.2f}"
@@ -50,7 +56,7 @@ def _track_cells(turn: StoredTurn) -> dict[str, str]:
 
 
 def calibration(block: StoredBlock) -> CalibrationFile:
-    """The calibration that the board used for its display, with notes on board and chip."""
+    """Return the calibration that the board used for its display, with notes on board and chip."""
     c = block.calibration()
     notes = {"firmware": block.firmware, "who_am_i": f"{block.who_am_i:#04x}", "sample_hz": block.sample_hz}
     return CalibrationFile(
@@ -71,7 +77,10 @@ def calibration(block: StoredBlock) -> CalibrationFile:
 
 
 def write(path: Path, blocks: list[StoredBlock]) -> Path:
-    """Write NAME.csv.gz (or .csv), and NAME.cal.json beside it. Returns the path of the latter."""
+    """Write the log `path` (NAME.csv.gz or NAME.csv), and NAME.cal.json beside it.
+
+    Returns the path of NAME.cal.json.
+    """
     turns = [turn for block in blocks for turn in block.turns]
     there = {
         "speed_mps": any(turn.speed_mps is not None for turn in turns),

@@ -1,4 +1,4 @@
-"""Reads a ride that a board streams: writes the arriving blocks to a log, and computes the lean."""
+"""Reads a ride that a board streams. Writes the arriving blocks to a log, and computes the lean."""
 
 import binascii
 import contextlib
@@ -38,16 +38,21 @@ CHANGED = "the board's calibration has changed: the log ends here"
 
 @dataclass(frozen=True)
 class LiveReading:
-    """The readings of half a second. aligned: True if the sensor is aligned. car: True if the board is set to a vehicle
-    that does not lean.
+    """The readings of half a second.
 
-    moments: one tuple per turn of the board's loop: (s since the start of the recording, lean in degrees > 0 to the
-    right, specific force forward in g, specific force to the left in g). The last three are None before the sensor is
-    aligned. The lean is also None for a car, or if it is too uncertain to be shown. The force to the left is None for
-    a motorcycle, because it is near 0 in a bend.
-
-    max_left_deg, max_right_deg, max_accel_g, max_brake_g: maxima as on the display, since the start of the recording; 0
-    without a value. rate_hz: turns per second. seconds: time since the start of the recording."""
+    aligned: True if the sensor is aligned.
+    car: True if the board is set to a vehicle that does not lean.
+    moments: one tuple per turn of the board's loop. Its values are:
+        1. the time since the start of the recording, in s.
+        2. the lean in degrees, positive to the right. It is None for a car, and if it is too uncertain to be shown.
+        3. the specific force forward, in g.
+        4. the specific force to the left, in g. It is None for a motorcycle, because it is near 0 in a bend.
+        The last three values are None if the sensor is not aligned.
+    max_left_deg, max_right_deg, max_accel_g, max_brake_g: maxima since the start of the recording, as on the display.
+        They are 0 if the sensor is not aligned.
+    rate_hz: turns of the board's loop per second.
+    seconds: time since the start of the recording.
+    """
 
     aligned: bool
     car: bool
@@ -79,8 +84,13 @@ class StreamLog:
         self._live = live
 
     def write(self, file: TextIOBase, blocks: Iterator[StoredBlock], notes: list[str]) -> None:
-        """Write all blocks as they arrive. notes: a line is appended for each gap. Raises InputError if there is no
-        block."""
+        """Write each block when it arrives.
+
+        file: the log.
+        blocks: the blocks from the board.
+        notes: list to which a line is appended for each kind of gap or fault.
+        Raises InputError if no block was written.
+        """
         missing, expected = 0, 0
         missing_s: list[float] = []
         replay = Replay(CalibrationFile().to_firmware())
@@ -144,8 +154,12 @@ class StreamLog:
 
 
 def blocks(transport: ConnectedBoard, name: str, notes: list[str], stopped: threading.Event) -> Iterator[StoredBlock]:
-    """Yield the complete blocks that the board sends, until `stopped` is set or the connection is lost. name: of the
-    port, "" on a page. notes: a line with the reason for the end is appended. Raises InputError."""
+    """Yield the complete blocks that the board sends, until `stopped` is set or the connection is lost.
+
+    name: name of the port, "" on a page.
+    notes: list to which the reason is appended if the stream ends early.
+    Raises InputError if the firmware on the board cannot stream.
+    """
     parts: list[bytes] = []
     vehicle = ""
     for line in _lines(transport, name, notes, stopped):
@@ -155,7 +169,7 @@ def blocks(transport: ConnectedBoard, name: str, notes: list[str], stopped: thre
         if line != b".":
             parts.append(line)
             continue
-        with contextlib.suppress(BadBlock, binascii.Error):  # a missing block number shows the loss
+        with contextlib.suppress(BadBlock, binascii.Error):  # the missing block number will show the loss
             block = parse(b"".join(binascii.a2b_base64(part) for part in parts))
             block.vehicle = vehicle
             yield block
