@@ -48,8 +48,8 @@ class Summary:
         Overview.riding_s.
     beyond_s: for each key, the time at a lean of at least so many degrees.
     histogram_s: time at the leans of each bin of BINS_DEG, while riding with a trusted lean.
-    not_sure_s: time in which the meter does not trust its lean.
-    missing_s: time without readings; gaps shorter than LOST_US do not count.
+    not_sure_s: time in which the display would not show the lean.
+    missing_s: total length of the gaps in the readings. A gap is longer than LOST_US and 4 usual steps.
     frozen_s: the part of missing_s with frozen readings.
     """
 
