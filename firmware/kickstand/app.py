@@ -26,8 +26,8 @@ from .ui.screen import Screen
 from .units import const
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
-_COLLECT_TURNS = const(40)  # turns between two garbage collections: they use 80 KB of heap, of 109 free while recording
-# The same while aligning by driving, with an OLED, a phone or user.py: 80 KB are free
+_COLLECT_TURNS = const(40)  # turns between two garbage collections: they use 80 KB of heap, of 91 free while recording
+# The same while aligning by driving, with an OLED, a phone or user.py: they use 46 KB, of 72 free while driving
 _COLLECT_TURNS_DRIVING = const(23)
 # Collections between two looks at the free heap, which take 3 ms on an ESP32. In a smaller heap each collection looks.
 _PLAN_EVERY = const(4)
@@ -167,6 +167,7 @@ class App:
         return state(self)
 
     def _plan_collection(self):
+        """Set the number of turns until the next garbage collection."""
         small = self.drive or self.lcd.draws or self.live or self.user
         if small or self._collections % _PLAN_EVERY == 0:
             self._planned_turns = port.turns_to_collect(_COLLECT_TURNS_DRIVING if small else _COLLECT_TURNS)

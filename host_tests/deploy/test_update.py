@@ -227,7 +227,7 @@ def test_ring_of_rides_knows_the_size_of_the_firmware():
     assert taken <= flash_ring.FIRMWARE <= taken + 10 * BLOCK
 
 
-def test_plain_mpremote_needs_the_space_in_the_readme():
+def test_plain_mpremote_needs_the_documented_space():
     """Plain mpremote copies each .py file, and the .mpy file beside it stays on the board."""
     blocks = sum(update.most_blocks(len(data), BLOCK) for data in wanted(".py").values())
     assert 0.9 * 730 < blocks * BLOCK / 1024 <= 730

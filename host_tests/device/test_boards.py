@@ -149,7 +149,7 @@ def test_a_device_that_hangs_on_an_esp32_is_freed(bits, tmp_path):
 
 
 def on(machine, function, until_s):
-    """Run function(board) on a board of this machine, which imports the firmware anew. Return (outcome, board)."""
+    """Run function(board) on a board of this machine, which imports the firmware again. Return (outcome, board)."""
     before = device_runs.take_firmware()
     try:
         with Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=machine) as board:

@@ -1,4 +1,4 @@
-"""The parts that read and write logs, with small inputs and results worked out by hand."""
+"""The parts that read and write logs, with small inputs and results computed by hand."""
 
 import csv
 import io

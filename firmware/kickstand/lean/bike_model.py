@@ -13,7 +13,7 @@ State                                       Measured (a vector with [3] has the 
     c_zx, c_zy, s_z  CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD: the same for its forward axis
 The data sheet allows 3 % of scale error and 2 % of cross-axis sensitivity. A filter without these states would mistake
 them for bias in a long turn, and for lean in a quick roll. The up axis has no such states: without a measured speed its
-scale error cannot be told from an error of the speed.
+scale error cannot be distinguished from an error of the speed.
 
 Equations, with ' for the derivative by time
     rates, corrected         w = w_m - b,  then  w_z -= c_zx w_x + c_zy w_y + s_z w_z,  w_x -= s_x w_x + c_xy w_y

@@ -128,7 +128,7 @@ class LeanMeter:
         return formula_lean_deg(self.force, self.rate[1])
 
     def measure_speed(self, speed_mps):
-        """Use a measured speed for the lean. Optional. A negative value means that there is none."""
+        """Use a measured speed for the lean. Optional. A negative value means no speed."""
         if speed_mps >= 0.0:
             self.filter.measure_speed(speed_mps)
 

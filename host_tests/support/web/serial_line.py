@@ -72,13 +72,13 @@ class SerialLine:
         return self._said_by("#look")
 
     def status(self):
-        """Let the page read the board's status. Return the shown status, or the reason why there is none."""
+        """Let the page read the board's status. Return the shown status, or the error that the page shows."""
         self.rider.page.click("#status")
         why = self._said_by("#status", "#status-said")
         return self.rider.text("#status-text") if self.rider.page.is_visible("#status-text") else why
 
     def check(self):
-        """Let the page check the board. Return the shown findings, or the reason why there are none."""
+        """Let the page check the board. Return the shown findings, or the error that the page shows."""
         self.rider.page.click("#check")
         why = self._said_by("#check", "#status-said")
         return self.rider.text("#status-text") if self.rider.page.is_visible("#status-text") else why

@@ -50,7 +50,7 @@ class Words:
     ride: rows of (quantity, value, time or "").
     alignment: a paragraph about the alignment.
     stops: one row per stop, with the columns of STOPS_UNITS. STOPS_TERMS explains some of the columns.
-    remark: a remark about the stops, or the reason why there are none; "" without a remark.
+    remark: a remark about the stops, or the reason why no stop was found; "" without a remark.
     """
 
     name: str
