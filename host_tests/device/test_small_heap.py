@@ -5,14 +5,18 @@ simulated parts are on the heap, too. So the test first measures how much heap o
 """
 
 import json
+from types import SimpleNamespace
 
 import pytest
+from kickstand_tools.simulated_board.simulator import Board
+from kickstand_tools.simulation.scripted import sensor_errors
 from support.mpy import run_mpy
 
 _SCRIPT = """
 import gc, json, sys
 from array import array
 from kickstand_tools.simulated_board.simulator import Board
+from kickstand_tools.simulation.scripted import sensor_errors
 board = Board(lambda t_s: (0.0, 1.0, 0.0, 0.0, 0.0, 0.0))
 board.install()
 board.remove_lcd()  # its driver would not find the piece of memory that it takes once
@@ -90,3 +94,39 @@ def test_the_garbage_is_collected_between_turns(plan):
     assert 3 <= found["plan"] <= 10
     assert found["turns"] > 500
     assert (found["within"] == 0) is plan, found
+
+
+def _nothing(*_):
+    return None
+
+
+# A part of the app that does nothing
+IDLE = SimpleNamespace(
+    begin=_nothing, poll=_nothing, feed=_nothing, press=_nothing, lean=_nothing, take_problem=_nothing,
+    check_memory=_nothing, period_ms=0, speed=SimpleNamespace(take_problem=_nothing),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("part", ["drive", "live", "user"])
+def test_a_part_that_uses_heap_shortens_the_next_wait(part, tmp_path, monkeypatch):
+    """The part comes in the first turn, when four collections are planned already. Only the first of them keeps its
+    plan."""
+    monkeypatch.chdir(tmp_path)
+    turns = [0]  # between two collections
+    with Board(sensor_errors.resting(sensor_errors.Sensor(), (0, 1, 0))) as board:
+        from kickstand import app, devices, settings
+
+        monkeypatch.setattr(app.gc, "collect", lambda: turns.append(0))
+        chosen = settings.Settings(None)
+
+        def run():
+            device = app.App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen))
+            device.begin()
+            turns[:] = [0]
+            for _ in range(app._COLLECT_TURNS + 3 * app._COLLECT_TURNS_DRIVING):
+                turns[-1] += 1
+                device.step()
+                setattr(device, part, IDLE)
+
+        board.run(run, 10.0)
+    assert turns == [app._COLLECT_TURNS, *3 * [app._COLLECT_TURNS_DRIVING], 0]
