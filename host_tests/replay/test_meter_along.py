@@ -1,14 +1,11 @@
 """The commands replay, report and plot use a fast loop. For each sample it gives the result of the firmware's meter.
 LEAN.csv contains exactly these results."""
 
-import multiprocessing
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from kickstand_tools.common.errors import InputError
-from kickstand_tools.logs import reader
 from kickstand_tools.logs.csv_lines import write_log
 from kickstand_tools.logs.reader import read_blocks, read_log
 from kickstand_tools.replay import replay, replay_engine
@@ -76,25 +73,3 @@ def test_lean_file_has_values_as_python_writes_them(known, tmp_path):
     rows = zip(times, want.tolist(), strict=True)
     assert lines == [",".join((time, *(f"{value:.5f}" for value in row))) for time, row in rows]
     assert count == len(lines)
-
-
-def test_two_processes_write_the_same_file(known, tmp_path, monkeypatch):
-    """As for a long log, a second process reads the blocks ahead. The log has more blocks than the process may read
-    ahead. If this process ends early, the command raises an error."""
-    log, calibration = known
-    write_log(tmp_path / "log.csv", log)
-    monkeypatch.setattr(reader, "BLOCK_BYTES", 50_000)
-    for name, long_bytes in (("one.csv", 1 << 30), ("two.csv", 1)):
-        monkeypatch.setattr(replay, "_LONG_BYTES", long_bytes)
-        replay.replay_to_csv(tmp_path / "log.csv", calibration, "cpython", tmp_path / name)
-    assert (tmp_path / "two.csv").read_bytes() == (tmp_path / "one.csv").read_bytes()
-
-    def end(columns, pool=None):
-        for process in multiprocessing.active_children():
-            process.terminate()
-            process.join()
-
-    with pytest.raises(InputError, match="second process of replay has ended"):
-        replay.replay_to_csv(tmp_path / "log.csv", calibration, "cpython", tmp_path / "two.csv", progress=end)
-    assert (tmp_path / "two.csv").read_bytes() == (tmp_path / "one.csv").read_bytes()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["log.csv", "one.csv", "two.csv"]

@@ -16,15 +16,12 @@ from ..common import plugins, unix_port
 from ..common.errors import InputError
 from ..common.messages import Message
 from ..logs.csv_lines import write_lean
-from ..logs.log import Block, Log, Stretch, Table, within
+from ..logs.log import Block, Table, within
 from ..logs.reader import Source, read_blocks, read_twice, split_stretch
-from ..logs.source import Progress, total_bytes
+from ..logs.source import Progress
 from ..signals import Array
 from . import replay_engine
 from .meter_along import MeterAlong, Misfit
-
-# Size of a log of a quarter of an hour at 200 Hz. For a smaller log, a second process costs more time than it saves
-_LONG_BYTES = 20 << 20
 
 _RESULT_BYTES = struct.calcsize(replay_engine.RESULT)
 
@@ -110,18 +107,12 @@ def replay_to_csv(
 ) -> tuple[int, list[Message]]:
     """Replay a log and write LEAN.csv. Its columns are the log's own times, then replay_engine.COLUMNS.
 
-    A long log uses two processes. Memory does not grow with the length of the log, except with the engine rp2040, which
-    is too slow for long logs.
+    Memory does not grow with the length of the log, except with the engine rp2040, which is too slow for long logs.
 
     Returns the number of samples and the notices. Raises InputError if the log cannot be used.
     """
     notices: list[Message] = []
-    whole = log.source if isinstance(log, Stretch) else log
-    # Only the command uses a second process. This process imports the main program again, and programs other than the
-    # command may not allow that
-    long = not isinstance(whole, Log) and total_bytes(whole) > _LONG_BYTES
-    run = "two processes" if engine == "cpython" and long else engine
-    rows = replay_blocks(log, calibration, run, progress, notices)
+    rows = replay_blocks(log, calibration, engine, progress, notices)
     return write_lean(out, replay_engine.COLUMNS, [5] * len(replay_engine.COLUMNS), rows), notices
 
 
@@ -156,10 +147,6 @@ def _replayed(
     if engine == "cpython":
         meter = MeterAlong(calibration)
         return ((block, meter.columns(block.measured)) for block in blocks)
-    if engine == "two processes":
-        from . import second_process  # imported here, because Python in a browser cannot import it
-
-        return second_process.columns_of(blocks, calibration)
     run = _BY_RECORDS[engine] or plugins.part(plugins.ENGINES, engine)
     return _by_records(run(_records(read_blocks(log), calibration), progress), blocks)
 
