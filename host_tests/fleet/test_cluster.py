@@ -63,11 +63,24 @@ def test_killed_worker_costs_no_result(cluster, tmp_path):
             time.sleep(0.05)
         os.kill(int(note.read_text().splitlines()[-1].split()[1]), signal.SIGKILL)  # a worker of this test's cluster
 
-    killer = threading.Thread(target=kill)
+    killer = threading.Thread(target=kill, daemon=True)
     killer.start()
     found = sorted((index, result) for index, result, _, _ in cluster.run(task, items))
     killer.join()
     assert found == [(k, k) for k in range(8)]
+
+
+def test_run_without_workers_ends(tmp_path, monkeypatch):
+    monkeypatch.setattr("kickstand_fleet.cluster._LOST_S", 1.0)
+    note = tmp_path / "began"
+    with Cluster(None, 1, timeout_s=600.0) as running:
+        outcomes = running.run(task, [(0, "", str(note)), (1, "hang", str(note)), (2, "", str(note))])
+        assert next(outcomes) == (0, 0, "", "")
+        workers = running._client.cluster
+        assert workers is not None
+        workers.scale(0)
+        with pytest.raises(InputError, match="all workers have ended; finished work is kept"):
+            list(outcomes)
 
 
 def test_fleet_on_a_cluster_is_resumed(cluster, fleet, tmp_path, monkeypatch):

@@ -30,7 +30,8 @@ _PER_WORKER = 2  # tasks per worker: one runs, one waits
 _LOOK_S = 0.5  # time between two checks for tasks that take too long
 _TOPIC = "kickstand-fleet"  # topic of the messages by which a worker announces that it begins a task
 Outcome = tuple[int, Any | None, str, str]
-_LOCAL_PATIENCE_S, _REMOTE_PATIENCE_S = 60.0, 20.0  # longest time to wait for workers
+_LOCAL_PATIENCE_S, _REMOTE_PATIENCE_S = 60.0, 20.0  # longest time to wait for the first worker
+_LOST_S = 60.0  # longest time without any worker. Dask replaces a dead worker sooner, if it can
 
 
 def run_tasks(
@@ -137,10 +138,13 @@ class Cluster:
             self._stack.close()
 
     def run(self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]]) -> Iterator[Outcome]:
-        """Yield the same outcomes as run_tasks(). The function and the items must be picklable. Raises InputError if
-        the connection to the scheduler is lost."""
+        """Yield the same outcomes as run_tasks(). The function and the items must be picklable.
+
+        Raises InputError if the connection to the scheduler is lost, or if no worker is left.
+        """
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._under_way: dict[str, tuple[int, Any]] = {}
+        self._working_s = time.monotonic()  # time at which a task ended or a worker existed, at the latest
         suspects: list[int] = []
         waiting = deque(range(len(items)))
         while waiting or self._under_way:
@@ -166,8 +170,12 @@ class Cluster:
 
         If the worker of a task died, append the index of the task to suspects.
         """
-        with contextlib.suppress(queue.Empty):
+        try:
             future = self._ended.get(timeout=_LOOK_S)
+        except queue.Empty:
+            self._check_workers()
+        else:
+            self._working_s = time.monotonic()
             place = self._under_way.pop(future.key, None)
             self._started.pop(future.key, None)
             if place is None:
@@ -184,9 +192,20 @@ class Cluster:
             elif self._client.status == "running":
                 suspects.append(index)  # its worker was ended because of another task
             else:
-                raise InputError(f"the cluster{f' at {self._address}' if self._address else ''} was lost; {KEPT}")
+                raise InputError(f"the cluster{self._where()} was lost; {KEPT}")
             future.release()
         yield from self._end_overdue_tasks()
+
+    def _check_workers(self) -> None:
+        """Raise InputError if no worker has existed for _LOST_S. The tasks would wait for ever."""
+        now = time.monotonic()
+        if self._client.scheduler_info(n_workers=1)["workers"]:
+            self._working_s = now
+        elif now - self._working_s > _LOST_S:
+            raise InputError(f"all workers{self._where()} have ended; {KEPT}")
+
+    def _where(self) -> str:
+        return f" at {self._address}" if self._address else ""
 
     def _end_overdue_tasks(self) -> Iterator[Outcome]:
         now = time.monotonic()
