@@ -54,7 +54,7 @@ def calibrated(log: Log, calibration: CalibrationFile) -> Samples:
 
 
 def trailing_mean(x: NDArray, seconds: float, rate_hz: float) -> NDArray[np.float64]:
-    """Return the mean over the last `seconds` at each sample. At the start the window is shorter."""
+    """Return the mean over the last `seconds` at each sample. The first samples have shorter windows."""
     n = max(round(seconds * rate_hz), 1)
     total = np.cumsum(np.concatenate((np.zeros((1, *x.shape[1:])), x)), axis=0)
     first = np.maximum(np.arange(1, len(x) + 1) - n, 0)
