@@ -38,7 +38,7 @@ TABLES: dict[str, dict[str, tuple[str, str, str]]] = {
         "speed_lag_s": (_NUMBER, "s", "delay of the speed"),
         "stops": (_COUNT, "", "number of standstills used for the vertical"),
         "events_used": (_COUNT, "", "number of times the vehicle braked or sped up in a straight line"),
-        "events_in_turns": (_COUNT, "", "number of times it braked or sped up in a turn, which are not used"),
+        "events_in_turns": (_COUNT, "", "number of braking events in turns, which are not used"),
         "logs": (_COUNT, "", "number of logs that were used"),
         "logs_left_out": (_COUNT, "", "number of logs that were not used, see errors"),
         "driven_s": (_NUMBER, "s", "total duration of the logs that were used"),

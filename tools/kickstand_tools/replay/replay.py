@@ -23,13 +23,14 @@ from ..signals import Array
 from . import replay_engine
 from .meter_along import MeterAlong, Misfit
 
-# Size of a log of a quarter of an hour at 200 Hz. For a smaller log, a second process costs more time than it saves
+# Size in bytes from which a log is replayed with a second process, a quarter of an hour at 200 Hz. For a smaller log,
+# the second process costs more time than it saves
 _LONG_BYTES = 20 << 20
 
 _RESULT_BYTES = struct.calcsize(replay_engine.RESULT)
 
-# A function that runs replay_engine.run() on another Python. It gets the records and the progress. It returns a context
-# that yields a file with the results. It may raise InputError
+# A function that runs replay_engine.run() on another Python. Its arguments are the records and the progress function.
+# It returns a context that yields a file with the results, and may raise InputError
 Engine = Callable[[Iterator[bytes], Progress | None], contextlib.AbstractContextManager[IO[bytes]]]
 
 _SIGMA = replay_engine.COLUMNS.index("lean_sigma_deg")
@@ -69,7 +70,7 @@ class LeanTable(Table):
 
 @dataclass(frozen=True)
 class CarReplayed(Message):
-    """The log comes from a car, and a car does not lean."""
+    """The log is from a car. A car's display shows no lean."""
 
     code = "car-replayed"
     text = (
@@ -117,8 +118,8 @@ def replay_to_csv(
     """
     notices: list[Message] = []
     whole = log.source if isinstance(log, Stretch) else log
-    # Only the command uses a second process. This process imports the main program again, and programs other than the
-    # command may not allow that
+    # Only the command uses a second process. The new process imports the main program again, and a main program other
+    # than the command may not allow that
     long = not isinstance(whole, Log) and total_bytes(whole) > _LONG_BYTES
     run = "two processes" if engine == "cpython" and long else engine
     rows = replay_blocks(log, calibration, run, progress, notices)
@@ -165,7 +166,7 @@ def _replayed(
 
 
 def _with_frozen(block: Block, results: Array) -> Array:
-    """Return results for all rows of the block. They are NaN for frozen rows. results: those of the other rows."""
+    """Add rows of NaN for the frozen rows of the block. results: the results of all other rows."""
     found = np.full((len(block.time_us), len(replay_engine.COLUMNS)), np.nan)
     found[~block.frozen] = results
     sigma = found[:, _SIGMA]
@@ -201,8 +202,8 @@ def micropython(records: Iterator[bytes], _progress: Progress | None) -> Iterato
             yield process.stdout
 
 
-# Engines on another Python. The engine rp2040, an emulated Pico, is in the package kickstand_emulator. pyproject.toml
-# names it
+# Engines on another Python. The engine rp2040, an emulated Pico, is None here, because it is in the package
+# kickstand_emulator. It is found by its entry point in pyproject.toml
 _BY_RECORDS: dict[str, Engine | None] = {"micropython": micropython, "rp2040": None}
 
 

@@ -1,7 +1,7 @@
 """Runs MeterAlong in a second process.
 
-An hour at 200 Hz takes 6.3 s of processor time in one process. With two processes, the second computes for 4.0 s, while
-the first reads and writes for 2.2 s.
+For a log of an hour at 200 Hz, one process needs 6.3 s of processor time. With two processes, the second computes for
+4.0 s. At the same time, the first reads and writes for 2.2 s.
 """
 
 import multiprocessing
@@ -18,7 +18,7 @@ from ..logs.log import Block
 from ..signals import Array
 from .meter_along import MeterAlong
 
-_AHEAD = 3  # number of blocks that are read before their turn, which keeps the second process busy
+_AHEAD = 3  # number of blocks that are read in advance to keep the second process busy
 
 _along: MeterAlong  # exists only in the second process
 
@@ -28,7 +28,7 @@ def columns_of(blocks: Iterator[Block], calibration: CalibrationFile) -> Iterato
 
     Raises InputError if the log cannot be used, and if the second process ends.
     """
-    spawn = multiprocessing.get_context("spawn")  # a process must not be forked if the progress bar runs in a thread
+    spawn = multiprocessing.get_context("spawn")  # do not fork, because the progress bar runs in a thread
     waiting: deque[tuple[Block, Future[Array]]] = deque()
     try:
         with ProcessPoolExecutor(1, spawn, _begin, (calibration,)) as pool:
