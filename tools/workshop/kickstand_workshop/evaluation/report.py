@@ -16,7 +16,7 @@ from .real_ride import RealScore
 from .runs import Evaluation, Result
 
 CAPTION = (
-    "possible: our filter with the true speed and an ideal sensor; rms: over all rides; "
+    "possible: our filter with the true speed and a sensor with noise only; rms: over all rides; "
     "ratio: rms divided by the rms of possible; worst ride: largest rms of a ride; "
     "95 %: mean of the rides' 95th percentiles; worst: largest error; "
     "slope: shown lean divided by true lean for leans over 10 deg, mean, then lowest to highest; "
