@@ -49,15 +49,16 @@ YAW_ERROR = 6
 SCALE_LEFT, CROSS_LEFT_UP = 7, 8
 CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD = 9, 10, 11
 
-MAX_PITCH = 1.2  # rad. No motorcycle reaches it, but a sensor in the hand may. At 90 degrees lean has no meaning.
-MIN_PITCH = -MAX_PITCH  # a constant, because a negation in each sample would take heap and time
+# rad: largest pitch. Only a sensor in a hand reaches it, no motorcycle. At a pitch of 90 degrees the lean is undefined.
+MAX_PITCH = 1.2
+MIN_PITCH = -MAX_PITCH  # stored as a constant, because a negation for each sample would take heap and time
 
 # turn_rates() uses the yaw rate of a bike in balance if the speed is above _BALANCE_MIN_SPEED, the lean's standard
 # deviation is below BALANCE_SIGMA, and the measured rate differs by less than
 # _BALANCE_RATE + _BALANCE_SHARE x |balanced rate|. Comments in the form of measurements.py.
 _BALANCE_MIN_SPEED = const(4.0)  # m/s. Larger: the balanced rate is not used in slow turns.
 _BALANCE_RATE = const(0.1)  # rad/s. Larger: the balanced rate is used with a wrong lean or speed.
-_BALANCE_SHARE = const(0.5)  # ratio. Larger: as for _BALANCE_RATE.
+_BALANCE_SHARE = const(0.5)  # ratio. Larger: the balanced rate is used with a wrong lean or speed.
 BALANCE_SIGMA = radians(20.0)  # rad. Larger: the balanced rate is used with a more uncertain lean.
 _BALANCE_MIN_COS = const(0.3)  # ratio: lower bound of cos(lean). Larger: too small a rate about left in deep leans.
 
@@ -85,7 +86,7 @@ def predict(x, force, rate, seconds, sums):
     st, ct = sin(t), cos(t)
     sq = sin(q)
     cq = sqrt(1.0 - sq * sq)
-    per_rate = v / STANDARD_GRAVITY  # g in a turn of 1 rad/s
+    per_rate = v / STANDARD_GRAVITY  # centripetal acceleration in g per rad/s of yaw rate
     sideways = per_rate * wy
     acceleration = fz - sq + sideways * yaw_error
     x[LEAN] = t + (wz - sq / cq * (wx * st + wy * ct)) * seconds
@@ -146,7 +147,7 @@ class Linearisation:
         st, ct, sq = sin(x[LEAN]), cos(x[LEAN]), sin(x[PITCH])
         cq = sqrt(1.0 - sq * sq)
         yaw_rate = wx * st + wy * ct  # about the vertical, where there is no pitch
-        per_rate = speed / STANDARD_GRAVITY  # g in a turn of 1 rad/s
+        per_rate = speed / STANDARD_GRAVITY  # centripetal acceleration in g per rad/s of yaw rate
         sideways = per_rate * wy
         acceleration = forward - sq + sideways * yaw_error
         turn_x, turn_y = turn_rates(speed if lean_variance < BALANCE_SIGMA**2 else 0.0, st, ct, cq, wx, wy)
