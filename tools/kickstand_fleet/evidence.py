@@ -269,7 +269,7 @@ def _integrals(columns: Iterable[Array], t_s: Array, step: Array, time: Array) -
         time: The end times, in s.
 
     Returns:
-        The integrals, shape (len(time), k).
+        integrals: one row per end time, shape (len(time), k).
     """
     return np.array([np.interp(time, t_s, np.cumsum(column * step)) for column in columns]).T
 

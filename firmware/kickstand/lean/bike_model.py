@@ -64,16 +64,24 @@ _BALANCE_MIN_COS = const(0.3)  # ratio: lower bound of cos(lean). Larger: too sm
 
 
 def predict(x, force, rate, seconds, sums):
-    """Integrate (1) to (3) in the state x (STATES values) over one sample of force (3 values, g) and rate (3, rad/s).
+    """Integrate (1) to (3) over one sample. Return the corrected roll rate in rad/s.
 
-    The sample's values are added to sums (9 values). A window is a fifth of a second, one update of the filter. Divided
-    by its number of samples, the sums are the window's means:
+    This function also computes the innovations, because both computations use the same sines.
+
+    Args:
+        x: the state, STATES values, which is updated.
+        force: 3 values in g.
+        rate: 3 values in rad/s.
+        seconds: time since the previous sample.
+        sums: 9 values, to which the sample's values are added.
+
+    A window is a fifth of a second, one update of the filter. The sums of a window, divided by its number of samples,
+    are these means:
         0       innovation of (4) without its terms in h and d, at the state before the step, in g
         1       innovation of (5) without its terms in h and d, at the same state, in g
         2 to 4  corrected rates about left, up, forward, in rad/s
         5 to 7  force left, up, forward, in g
         8       square of innovation 0, in g^2
-    Returns the corrected roll rate in rad/s. Motion and innovations are one function because they share sines.
     """
     fx, fy, fz = force
     wx, wy, wz = rate
@@ -112,17 +120,17 @@ def predict(x, force, rate, seconds, sums):
 
 
 def possible_pitch(pitch):
-    """Limit pitch to +-MAX_PITCH: at a right angle, as with a board lying flat, predict() would divide by zero."""
+    """Limit the pitch to +-MAX_PITCH. At 90 degrees, as on a board that lies flat, predict() would divide by zero."""
     return max(MIN_PITCH, min(MAX_PITCH, pitch))
 
 
 def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
-    """Return the rates about left and up (rad/s) for derivatives that multiply a rate by a state.
+    """Return the rates about left and up, in rad/s, for derivatives that multiply a rate by a state.
 
-    They are the rates of a bike in balance at this lean and speed, v w_y / g = -cos q sin t, if the measured rate about
-    up is close to the balanced one. Otherwise, and with a speed of 0, they are the measured rates. The noise of a
-    measured rate would be squared in such products and make the estimated speed and lean too small (errors in
-    variables).
+    A bike in balance has the rate v w_y / g = -cos q sin t about up. If the measured rate about up is close to this
+    rate, the function returns the rates of a bike in balance. Otherwise, and with a speed of 0, it returns the measured
+    rates. In a product of rate and state, the noise of a measured rate would be squared. This would make the estimated
+    speed and lean too small (errors in variables).
     """
     if speed > _BALANCE_MIN_SPEED:
         balanced = -STANDARD_GRAVITY * cos_pitch * sin_lean / speed
@@ -132,13 +140,22 @@ def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
 
 
 class Linearisation:
-    """The partial derivatives of (1) to (6) at the state x. rates (3 values) and forward: a window's means of the
-    corrected rates and of the forward force. lean_variance: rad^2, see turn_rates().
+    """The partial derivatives of (1) to (6).
 
-    Each row is ((state, partial derivative), ...). lean_row, pitch_row and speed_row belong to the rates of change (1)
-    to (3), left_row and up_row to the forces (4) and (5), level_row to (6). Zero derivatives are left out, and terms
-    that are small because a pitch, yaw error, scale error or cross-axis error is small. The other attributes are values
-    that several terms share.
+    Args:
+        x: the state.
+        rates: the window's mean corrected rates, 3 values in rad/s.
+        forward: the window's mean forward force in g.
+        lean_variance: variance of the lean in rad^2, see turn_rates().
+
+    Attributes:
+        lean_row, pitch_row, speed_row: derivatives of the rates of change (1), (2) and (3).
+        left_row, up_row: derivatives of the forces (4) and (5).
+        level_row: derivatives of (6).
+        The other attributes are values that several terms share.
+
+    Each row is ((state, partial derivative), ...). Derivatives that are zero are left out. Terms are also left out if
+    they are small because a pitch, yaw error, scale error or cross-axis error is small.
     """
 
     def __init__(self, x, rates, forward, lean_variance=0.0):

@@ -1,28 +1,29 @@
-"""Checks that the readings fit the model: the lean filter judges itself by its own innovations.
+"""Checks that the readings fit the lean filter's model, by the innovations of the filter.
 
-A filter's covariance does not show a partly failed sensor, but its innovations do. The square of an innovation over its
-expected variance, the normalised innovation squared, is 1 on average if everything fits (Y. Bar-Shalom and others,
-Estimation with Applications to Tracking and Navigation, section 5.4). This module averages the root instead, with the
-innovation's sign. Vibration and bumps, which a good sensor has too, cancel in this mean. A dead or mirrored axis, a
-halved scale, a step of the bias and a slipped mount do not cancel. The forces to the left and up have two means each.
-The short mean shows large errors within two seconds; the long one shows small errors after some seconds.
+A filter's covariance does not reveal a partly failed sensor, but its innovations do. An innovation is a measured value
+minus the expected value. Its square divided by its expected variance is called the normalised innovation squared. The
+mean of this value is 1 if everything fits (Y. Bar-Shalom and others, Estimation with Applications to Tracking and
+Navigation, section 5.4). This module averages the root of this value, with the innovation's sign. In this mean,
+vibration and bumps cancel. A dead or mirrored axis, a halved scale, a jump of the bias and a slipped mount do not
+cancel. The forces to the left and up have two means each. The short mean shows large errors within two seconds. The
+long mean shows small errors after some seconds.
 
-Three more means are of quantities that never last long on a real ride:
-    a force to the side, because a bike is in balance
-    a steep pitch
-    a pitch without its force
-On a real slope the forward force contains gravity's part, sin(pitch). If that part is missing, wrong rates have caused
-the pitch. The filter takes the difference for an acceleration: uphill the bike seems to brake, downhill to accelerate.
-A real bike does so only for a few seconds.
+Three more means are of quantities that never stay large for long on a real ride:
+    the force to the side, because a bike is in balance
+    the pitch
+    the part of the pitch that the forward force does not confirm
+On a real slope the forward force contains a part of gravity, sin(pitch). If this part is missing, the pitch is wrong,
+and was caused by wrong rates. The filter then mistakes the missing force for an acceleration. So the bike seems to
+brake uphill or to accelerate downhill for longer than a real bike does.
 
 Each mean is compared with its own spread, as in Student's t-test. On a road rougher than the filter expects, single
 innovations are large, and their means vary more.
 
-After a doubt there is one more check. If the gyro's rate about up is wrong, a straight can look like an endless bend,
-with all forces as expected. So a lean that has long been on one side is not shown.
+A misfit is a mean above its limit. After a misfit the lean is doubted: it is hidden until everything has fitted for a
+while. Repeated misfits mean a faulty sensor.
 
-After a misfit the lean is doubted: it is hidden until everything has fitted for a while. Repeated misfits mean a faulty
-sensor.
+There is one more check after a doubt. If the gyro's rate about up is wrong, a straight can look like an endless bend,
+with all forces as expected. So a lean that stays on one side for long is not shown.
 """
 
 from math import sqrt
@@ -48,7 +49,7 @@ _UNMEASURED = const(2.0)
 # ratio: force to the side divided by force up, minus the trim. Without a fault: at most 0.12
 _SIDEWAYS = const(0.15)
 _STEEP = const(0.21)  # rad: pitch. Without a fault: at most 0.14
-# rad: root mean square of a pitch without its force. On a recorded ride without a fault: 0.096
+# rad: root mean square of the pitch that the forward force does not confirm. On a recorded ride without a fault: 0.096
 _SLOPE = const(0.12)
 # square of standard deviations: spread above which the limits of left and up grow with the root of the spread. The
 # spread is the mean of half the squared change between windows. Larger: more leans are hidden on the roughest roads.

@@ -78,7 +78,8 @@ SIGMA_START_LEAN_MOVING = radians(30.0)
 PRIOR_SPEED = 15.0
 
 # Process noise, per square root of a second
-NOISE_ANGLE = radians(0.24)  # rad: vibration of the gyro. Larger: lean follows the forces more and the gyro less.
+# rad: error of the integrated rates, caused by vibration. Larger: the lean follows the forces more and the gyro less.
+NOISE_ANGLE = radians(0.24)
 NOISE_SPEED = 0.35  # m/s. Larger: the estimated speed adapts sooner in turns, and is less steady on straights.
 NOISE_BIAS = radians(0.01)  # rad/s: 0.6 deg/s in five minutes of warming up. Larger: long turns are mistaken for bias.
 # Lost readings
@@ -169,13 +170,16 @@ SIGMA_TRIM_LEAN = radians(1.4)  # rad
 def gyro_variances(sigma, r):
     """Return the prior variances of the last five states, or None if the six positions have not measured the gyro.
 
-    sigma (9): standard errors of the gyro matrix' entries in the sensor's axes, treated as independent, or zeros. r
-    (9): vehicle_from_sensor."""
+    Args:
+        sigma: standard errors of the gyro matrix' entries in the sensor's axes, 9 values, treated as independent. All
+            are zero if the gyro was not measured.
+        r: vehicle_from_sensor, 9 values.
+    """
     if not any(sigma):
         return None
 
     def variance(i, j):
-        """The variance for the reading of the vehicle's axis i from a rate about its axis j."""
+        """Return the variance of the reading of the vehicle's axis i per rate about its axis j."""
         total = _SIGMA_GYRO_DRIFT**2
         for a in range(3):
             for b in range(3):
@@ -187,14 +191,19 @@ def gyro_variances(sigma, r):
 
 
 def forces(model, means, roll_acceleration, force_error, dive=0.0):
-    """Return two measurements: the force to the left, (4), and up, (5). roll_acceleration: rad/s^2. force_error:
-    relative error of the accelerometer's magnitude, as found at rest. dive: see Dive.update(), in g."""
-    rolling = roll_acceleration / STANDARD_GRAVITY  # g per metre of height, like `square` below
+    """Return two measurements: the force to the left (4), and the force up (5).
+
+    Args:
+        roll_acceleration: in rad/s^2.
+        force_error: relative error of the accelerometer's magnitude, as found at rest.
+        dive: the result of Dive.update(), in g.
+    """
+    rolling = roll_acceleration / STANDARD_GRAVITY  # in g per metre of height, like `square` below
     uncertain = _SIGMA_ROLL_HEIGHT_M * rolling
     left = means[0]
     shaken = max(0.0, means[8] - left * left)
-    # If the springs pitch the bike, its wheels do not rise: v times this pitch rate is not an acceleration. Braking
-    # explains a part of it: dive, by (8). The rest is noise.
+    # When the springs pitch the bike, its wheels do not rise. So v times this part of the pitch rate is not an
+    # acceleration. The argument `dive` is the part that braking explains by (8). The rest is noise.
     pitching = _PITCHING_SHARE * model.pitching
     sideways = pitching * model.sin_lean
     left_variance = _SIGMA_LEFT**2 + _SHAKEN_SHARE * shaken + uncertain**2 + sideways * sideways
@@ -214,15 +223,15 @@ def forces(model, means, roll_acceleration, force_error, dive=0.0):
 
 
 def level_road(model, x, seconds):
-    """Return the measurement of (6): roads are level on average. Its noise grows with the pitch, in case of a
-    wheelie."""
+    """Return the measurement of (6), which assumes that roads are level on average. Its noise grows with the pitch,
+    because a large pitch may be a wheelie."""
     innovation = -x[PITCH] - x[YAW_ERROR] * model.sin_lean
     steep = innovation / STEEP
     return model.level_row, innovation, SIGMA_SLOPE**2 * (1.0 + steep * steep) * 2 * _SLOPE_S / seconds
 
 
 def straight_or_prior_speed(lean, speed, yaw_rate, seconds):
-    """Return the measurement of a lean of 0 if the bike rides straight, otherwise of PRIOR_SPEED."""
+    """Return an assumed measurement: a lean of 0 if the bike rides straight, otherwise the speed PRIOR_SPEED."""
     if abs(lean) < STRAIGHT_MAX_LEAN and abs(yaw_rate) < STRAIGHT_MAX_RATE and speed > STRAIGHT_MIN_SPEED:
         return ((LEAN, 1.0),), -lean, SIGMA_STRAIGHT**2 * 2 * _STRAIGHT_S / seconds
     return ((SPEED, 1.0),), PRIOR_SPEED - speed, _SIGMA_PRIOR_SPEED**2 * 2 * _PRIOR_SPEED_S / seconds

@@ -27,7 +27,7 @@ class Peak:
     time_s: float | None = None
 
     def add(self, t_s: Array, values: Array) -> None:
-        """Add values (n) at the times t_s (n). A value that does not count is NaN."""
+        """Add values and their times, both of shape (n). A value that does not count is NaN."""
         if len(values) and np.nanmax(values, initial=-np.inf) > self.value:
             at = int(np.nanargmax(values))
             self.value, self.time_s = float(values[at]), float(t_s[at])

@@ -51,7 +51,7 @@ def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
     """Compute the Leaning of n windows of WINDOW_S.
 
     rate: rates without bias, shape (n, 3), in rad/s.
-    force: shape (n, 3).
+    force: forces in any unit, shape (n, 3).
     riding: True for the windows to use, shape (n).
     """
     up = _unit(force[riding].mean(axis=0))
@@ -120,7 +120,7 @@ def without_drift(values: Array) -> Array:
 def unrest(values: Array, over_s: float) -> Array:
     """Compute the moving standard deviation of three components over over_s seconds.
 
-    values: shape (n, 3).
+    values: three components at each time, shape (n, 3).
     Returns the largest of the three standard deviations at each time, shape (n).
     """
     return moving_spread(values, _windows(over_s)).max(axis=1, initial=0.0)

@@ -229,7 +229,7 @@ def _acceleration(part: Channels, rest: int) -> tuple[Array, Array, Array]:
     Returns:
         acceleration: along the road, shape (n), in m/s2.
         pitch_rate: rate of pitch, shape (n), in deg/s.
-        yaw_rate: shape (n), in deg/s.
+        yaw_rate: yaw rate, shape (n), in deg/s.
     """
     time = part.t_s
     settled = int(np.searchsorted(time, time[rest] + SETTLE_S))

@@ -149,8 +149,8 @@ def _xyz(samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return rates and forces in the axes forward, left, up.
 
     Returns:
-        The rates, shape (N, 3), in rad/s.
-        The forces, shape (N, 3), in m/s^2.
+        rates: shape (N, 3), in rad/s.
+        forces: shape (N, 3), in m/s^2.
     """
     gyro = np.ascontiguousarray(np.radians(samples.rate[:, _TO_XYZ]))
     return gyro, np.ascontiguousarray(samples.force[:, _TO_XYZ] * STANDARD_GRAVITY)

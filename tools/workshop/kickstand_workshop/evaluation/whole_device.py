@@ -41,9 +41,9 @@ def display_of(
         speed: Function that returns the speed of a GPS receiver in m/s at a time in s. None for no receiver.
 
     Returns:
-        The times, shape (n), in s.
-        The lean on the display, shape (n), in degrees. NaN where the display shows no lean.
-        The time at which the display first names a fault, in s, or NaN.
+        times: shape (n), in s.
+        leans: leans on the display, shape (n), in degrees. NaN where the display shows no lean.
+        named: time at which the display first names a fault, in s, or NaN.
     """
     rows = readings[:, [0, 1, 2, 4, 5, 6, 3]].tolist()
     last = len(rows) - 1
