@@ -25,17 +25,18 @@ Equations, with ' for the derivative by time
     roads are level          0 = q + psi sin t  on average                             (6)
     lean of the bike itself  t - psi cos t (tan q + 1/2 psi sin t)                     (7)
 
-t and q refer to the sensor's axes, which psi has turned. So t contains a part of the bike's own pitch, which is
-q + psi sin t. On a slope of 10 % a yaw error of 5 degrees causes half a degree of lean. (7) removes it, to second order
-in psi. On a level road q is -psi sin t, and (7) agrees with tan(lean of the bike) = tan t / cos psi.
+t and q refer to the sensor's axes, which the yaw error psi has turned. So t contains a part of the bike's own pitch,
+which is q + psi sin t. For example, on a slope of 10 % a yaw error of 5 degrees causes half a degree of lean. (7)
+removes this part, to second order in psi. On a level road q is -psi sin t, and (7) agrees with
+tan(lean of the bike) = tan t / cos psi.
 
-d is the springs' part of the pitch rate q': the wheels do not rise with it. Braking causes most of d; see (8) in
-dive.py. h is the height of the sensor above the roll axis.
+d is the part of the pitch rate q' that the springs cause. The wheels do not rise with it. Braking causes most of d, see
+(8) in dive.py. h is the height of the sensor above the roll axis.
 
 (4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a steady turn they cannot separate lean from speed,
-because their derivatives by lean and by speed are in the same proportion. There the ratio of two rates gives the lean:
-by (6) the pitch does not change, so by (2) w_x / w_y is tan t. At the beginning of a turn the earlier speed is still
-valid, and with it (4) gives the lean.
+because their derivatives by lean and by speed are in the same proportion. In such a turn the ratio of two rates gives
+the lean: by (6) the pitch does not change, so by (2) w_x / w_y is tan t. At the beginning of a turn the speed from
+before the turn is still valid, and with this speed (4) gives the lean.
 """
 
 from math import cos, radians, sin, sqrt, tan

@@ -28,7 +28,7 @@ START_MAX_FORCE = 0.05
 # Standard deviation of each state before the first measurement. Larger: the state is found sooner, but absorbs the
 # errors of other states.
 SIGMA_START = (
-    radians(1.5),  # rad: lean of a bike that stands, by the force
+    radians(1.5),  # rad: lean of a standing bike, computed from the force
     radians(5.0),  # rad: pitch
     15.0,  # m/s: speed
     radians(1.0),  # rad/s: drift of the gyro's bias since the calibration, left

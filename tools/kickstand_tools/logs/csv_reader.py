@@ -183,7 +183,7 @@ def _text(cells: Iterable[str]) -> Cells:
 
 
 def _number(cell: str) -> float | None:
-    """The number in a cell; NaN for an empty cell, None for text."""
+    """Convert a cell to a number. An empty cell becomes NaN. Returns None for text."""
     cell = cell.strip()
     if cell.lower() in _NOTHING:
         return np.nan

@@ -20,7 +20,7 @@ from .shown import Shown, shown
 from .video import Video, ffmpeg, input_of, open_video, write_video
 
 MARGIN = 0.03  # distance from the video's edges to the gauge, as a share of the video's height
-_BEYOND_S = 1.0  # a video may begin this long before the ride, or end this long after it
+_BEYOND_S = 1.0  # longest time by which a video may begin before the ride or end after the ride
 _FPS = 30.0
 _CLIP_HEIGHT = 1080
 _TRANSPARENT = {
