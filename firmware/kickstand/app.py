@@ -1,12 +1,13 @@
-"""The device: wires sensor, mathematics, button, flash and display, and owns the loop.
+"""The device: connects sensor, mathematics, button, flash and display, and runs the loop.
 
-sensor -> calibration and alignment -> lean -> page -> display, in one direction. The chip samples at SAMPLE_HZ on its
-own. One pass of the loop ("a turn", App.turn()) takes the new samples. App.step() adds garbage collection, the watchdog
-and the wait for the next turn.
+Data flow in one direction: sensor -> calibration and alignment -> lean -> page -> display. The chip takes samples at
+SAMPLE_HZ on its own. One pass of the loop is called a turn. App.turn() processes the new samples. App.step() also
+collects garbage, feeds the watchdog and waits for the next turn.
 
-The methods that take most of a turn (step, turn, _pass_on, LeanMeter.update_sum, Sensor.fetch) need at most eleven
-words for locals and stack. MicroPython puts a larger frame on the heap. Freeing it makes the allocator's next search
-start before all garbage since the last collection, which costs up to 1 ms per turn.
+The methods that take most of a turn are step, turn, _pass_on, LeanMeter.update_sum and Sensor.fetch. Each of them must
+need at most eleven words for locals and stack, because MicroPython puts a larger frame on the heap. When this frame is
+freed, the allocator searches again from that place, through all garbage since the last collection. This costs up to
+1 ms per turn.
 """
 
 import gc
@@ -25,45 +26,54 @@ from .rides.recording import Recording
 from .ui.screen import Screen
 from .units import const
 
-LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
-_COLLECT_TURNS = const(40)  # turns between two garbage collections: they use 80 KB of heap, of 91 free while recording
-# The same while aligning by driving, with an OLED, a phone or user.py: they use 46 KB, of 72 free while driving
+LOOP_US = 10_000  # length of a turn in us; the chip's FIFO can keep the samples for much longer
+# Turns between two garbage collections. They use 80 KB of heap. While recording, 91 KB are free
+_COLLECT_TURNS = const(40)
+# The same number while aligning by driving, and with an OLED, a phone or user.py. These turns use 46 KB of heap. While
+# aligning by driving, 72 KB are free
 _COLLECT_TURNS_DRIVING = const(23)
-# Collections between two looks at the free heap, which take 3 ms on an ESP32. In a smaller heap each collection looks.
+# Number of collections between two checks of the free heap. A check takes 3 ms on an ESP32. With a smaller heap, the
+# app checks after each collection.
 _PLAN_EVERY = const(4)
-SINGLE_GAPS = 300  # single free heap blocks that a collection leaves
+SINGLE_GAPS = 300  # number of single free heap blocks after a collection
 _PAGE_MS = const(100)
-# A page shows no lean if its own delay and the age of the readings still in the FIFO add up to more: so a lean on the
-# display is at most half a second old. A display that draws needs about _DRAWING_MS more to send a picture (estimated).
+# A lean on the display must be at most half a second old. So a page shows no lean if its own delay plus the age of the
+# readings in the FIFO is longer than _LATE_MS. A display that draws needs about _DRAWING_MS more to send a picture
+# (estimated).
 _LATE_MS = const(400)
 _DRAWING_MS = const(200)
-# Time from the start of the sensor to the first page: the lean filter's first window is over then
+# Time from the start of the sensor to the first page, long enough for the lean filter's first window
 _FIRST_PAGE_MS = const(60)
 
 
 def fill_gaps(n):
     """Allocate n single blocks of the heap and drop them.
 
-    After a collection the heap has many single free blocks. Until they are used again MicroPython scans past all of
-    them for each larger object. This function takes 2 ms and saves 0.4 ms in each of the first samples.
+    After a collection the heap has many single free blocks. Until they are in use, MicroPython scans past all of them
+    for each larger object. This function takes 2 ms, and saves 0.4 ms in each of the turns that follow a collection.
     """
     value = 0.5
     for _ in range(n):
-        value = -value  # each float is boxed: one block of the heap
+        value = -value  # each new float takes one block of the heap
 
 
-# Of the last run, once Ctrl-C has ended it: microseconds of its longest turn, the fewest places that were left in the
-# chip's FIFO, and its axes' AxisWatch.shaken(). kickstand.status() prints them
+# Worst values of the last run, set when Ctrl-C ends it: length of the longest turn in us, smallest number of free
+# places in the chip's FIFO, and AxisWatch.shaken() of its axes. kickstand.status() prints them
 worst = None
 
 
 class App:
     """The lean meter on a board.
 
-    settings: a Settings. lcd, sensor: from devices.open_lcd() and open_sensor(). keeper: see Recording. Raises
-    SettingsError for pins that cannot be used.
+    Args:
+        settings: a Settings.
+        lcd, sensor: results of devices.open_lcd() and devices.open_sensor().
+        keeper: see Recording.
 
-    live: an attached Live (see live/live.py), or None.
+    Attributes:
+        live: an attached Live (see live/live.py), or None.
+
+    Raises SettingsError for pins that cannot be used.
     """
 
     def __init__(self, settings, lcd, sensor, keeper=None):
@@ -88,34 +98,35 @@ class App:
             os.stat("user.py")
         except OSError:
             return None
-        from .user_code import UserCode  # 3 KB of heap
+        from .user_code import UserCode  # imported only if needed, because it takes 3 KB of heap
 
         user = UserCode(self)
         self.screen.pages.own = user.pages
         return user
 
     def _open_drive(self):
-        # takes 30 KB of heap with its own imports: not imported without a speed source
+        # Imported only with a speed source, because it takes 30 KB of heap with its own imports
         from .drive_alignment.background import BackgroundAlignment
         from .speed.source import open_speed
 
         return BackgroundAlignment(self.settings.leans, open_speed(self.settings), self.meter, self.calibration)
 
     def run(self):
-        """Loop until Ctrl-C, one turn per LOOP_US. At the end the display says so: it must not keep a lean."""
+        """Loop until Ctrl-C, one turn per LOOP_US. At the end the display says that the firmware has stopped, because
+        an old lean must not stay on it."""
         try:
             self.begin()
             while True:
                 self.step()
         except BaseException as error:
             if isinstance(error, KeyboardInterrupt):
-                # It is not fed from here on. This comes first, because a second Ctrl-C may interrupt the rest.
+                # Stop the watchdog first, because a second Ctrl-C may interrupt the rest, and nothing feeds it now.
                 port.rest_watchdog()
             self.lcd.end(*STOPPED)
             global worst
             chip = self.sensor.chip
             worst = LOOP_US - self._least_wait_us, chip.least_free_samples(), chip.axes.shaken()
-            if not isinstance(error, Exception):  # nobody restarts the board, as after an error
+            if not isinstance(error, Exception):  # Ctrl-C; after an error the board is restarted instead
                 port.rest_watchdog()
                 self.rides.stop()
                 if self.live:
@@ -135,10 +146,10 @@ class App:
         self._plan_collection()
 
     def step(self):
-        """One pass of the loop, LOOP_US long: turn(), collect garbage if it is time, feed the watchdog, wait."""
+        """Do one pass of the loop: turn(), collect garbage if it is time, feed the watchdog, wait. It takes LOOP_US."""
         self.turn()
         self._turns_left -= 1
-        if self._turns_left <= 0:  # here, not in the middle of a sample: the FIFO keeps the samples meanwhile
+        if self._turns_left <= 0:  # collect between two turns, while the FIFO keeps the samples
             gc.collect()
             fill_gaps(SINGLE_GAPS)
             self._plan_collection()
@@ -152,7 +163,7 @@ class App:
             self._least_wait_us = wait_us
         if wait_us > 0:
             sleep_us(wait_us)
-        else:  # late, as after writing to flash: count from here instead of racing to catch up
+        else:  # the turn was late, for example after a write to flash: do not try to catch up
             self._due_us = ticks_us()
 
     @property
@@ -161,8 +172,8 @@ class App:
         return self.settings.leans and self.sensor.fault is None and self.screen.pages.trusted
 
     def state(self):
-        """The state of the app as data: see state.py."""
-        from .state import state  # only for programs that ask
+        """Return the state of the app as data, see state.py."""
+        from .state import state  # imported only for programs that use it
 
         return state(self)
 
@@ -188,7 +199,8 @@ class App:
             self._pass_on(n, dt_us, now_ms)
         if self.drive:
             self._poll_speed(now_ms)
-        if ticks_diff(now_ms, self._page_ms) >= 0:  # compared twice: a local would put this frame on the heap
+        # The comparison is done twice, because a local variable would put this frame on the heap
+        if ticks_diff(now_ms, self._page_ms) >= 0:
             self.sensor.check(now_ms)
         if self.sensor.fault is not None:
             self.screen.interrupt(now_ms)
@@ -200,7 +212,7 @@ class App:
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self._show(now_ms)
         self.lcd.tick(now_ms)
-        if self.rides.recorder.active:  # recording() would cost 20 us
+        if self.rides.recorder.active:  # calling recording() would cost 20 us
             self.rides.recorder.tick()
         if self.live:
             self.live.poll(now_ms)
@@ -217,7 +229,7 @@ class App:
 
     def _poll_speed(self, now_ms):
         recorder = self.rides.recorder
-        if recorder.stalled:  # by a write, or by the begin or end of a ride
+        if recorder.stalled:  # a write, or the start or end of a ride, has stopped the loop for some time
             recorder.stalled = False
             self.drive.speed.source.after_stall(now_ms)
         speed = self.drive.poll(now_ms)
@@ -225,15 +237,17 @@ class App:
             recorder.add_fix(speed, self.drive.speed.source.place(now_ms))
 
     def _show(self, now_ms):
-        """Show the page, or a notice from recording or speed source. Also do the work of the same rate: while the menu
-        is open, a step of preparing a recording; at standstill, saving the roll-misalignment correction."""
+        """Show the page, or a notice of the recording or the speed source.
+
+        Also do two tasks that run at the same rate: prepare a recording while the menu is open, and save the
+        roll-misalignment correction at standstill."""
         waiting_ms = 1000 * self.sensor.chip.frames_left // self.settings.SAMPLE_HZ
         self.screen.pages.late = (
             ticks_diff(now_ms, self._page_ms) + waiting_ms > _LATE_MS - _DRAWING_MS * self.lcd.draws
         )
         self.screen.pages.draws = self.lcd.draws
         self._page_ms = ticks_add(now_ms, _PAGE_MS)
-        if self.screen.menu:  # a recording that is started there should begin at once
+        if self.screen.menu:  # prepare, so that a recording started in the menu begins at once
             self.rides.prepare()
         problem = self.rides.recorder.take_problem() or (self.drive and self.drive.speed.take_problem())
         axes = self.sensor.chip.axes
@@ -250,8 +264,9 @@ class App:
             self.calibration.keep_trim(now_ms)
 
     def _pass_on(self, n, dt_us, now_ms):
-        """Pass on n new samples: their sum to the meter, each one to a wizard. dt_us: time from the last earlier sample
-        to the last new one."""
+        """Pass the sum of n new samples to the meter, and each single sample to a wizard.
+
+        dt_us: time from the last earlier sample to the last new sample."""
         chip = self.sensor.chip
         self.meter.update_sum(chip.sums, n, dt_us)
         if self.rides.recorder.active:
@@ -271,7 +286,7 @@ class App:
         wizard.follow(chip.sums, n, dt_us, now_ms)
 
     def _sensor_started(self):
-        """Handle a chip that was set up, at the start or after a fault. It may be another chip."""
+        """Handle a chip that was set up at the start or after a fault. After a fault it may be another chip."""
         self._restarts = self.sensor.restarts
         self.clock.restart()
         self.meter.restart()
@@ -281,7 +296,7 @@ class App:
             problem = self.rides.start_due()
             if problem:
                 self.screen.notify(problem, ticks_ms())
-        # the first page would only say that there is no lean yet
+        # Delay the first page, because now it would only say that there is no lean yet
         self._page_ms = ticks_add(ticks_ms(), _FIRST_PAGE_MS)
 
     def _calibration_changed(self, replaced):

@@ -32,7 +32,7 @@ again, another sensor is needed
 incomplete|incomplete firmware ({0}): run kickstand flash
 no-memory|no memory for that ({0}): restart the board
 no-driver|SD card: its driver is not on the board: mpremote mip install sdcard
-no-card|SD card: none that can be used ({0}): check wiring and card, which has to be FAT32; then restart the board
+no-card|SD card: no usable card ({0}): check wiring and card, which must be FAT32; then restart the board
 user-failed|user.py: {0} is left out: {1}
 user-slow|user.py: {0} took {1} ms: make it shorter; over 300 ms, or 5 times over 50 ms in a row, it is left out
 user-memory|user.py is left out: it leaves too little memory ({0})
@@ -46,25 +46,27 @@ pin-twice|config.py: a pin is used twice among {1}
 one-i2c|config.py: SENSOR_I2C and LCD_I2C are both {1} on different pins; give each its own
 wrong-code|the machine code for {0}() gives wrong results on this board: slower code runs instead
 needs-speed|config.py: VEHICLE = "car" needs a speed source to be aligned: SPEED = "gps" or "wheel"
-no-radio|LIVE: this board has no Bluetooth in its MicroPython: nothing goes to a phone, the lean goes on
-no-pairing|LIVE_PIN: this board cannot ask for a PIN: nothing goes to a phone; LIVE_PIN = None lets every phone in
-radio-fault|LIVE: the radio does not start ({0}): nothing goes to a phone, the lean goes on
-live-memory|LIVE: too little memory ({0}): nothing goes to a phone, the lean goes on
+no-radio|LIVE: this board has no Bluetooth in its MicroPython: nothing is sent to a phone, the lean meter works
+no-pairing|LIVE_PIN: this board cannot ask for a PIN: nothing is sent to a phone; LIVE_PIN = None allows every phone
+radio-fault|LIVE: the radio does not start ({0}): nothing is sent to a phone, the lean meter works
+live-memory|LIVE: too little memory ({0}): nothing is sent to a phone, the lean meter works
 no-sensor|none answers on SDA {0}, SCL {1}: check these wires and the 3.3 V of the module
 unknown-chip|unknown chip, WHO_AM_I 0x{0:02x}: set ACCEPT_WHO_AM_I = 0x{0:02x} in config.py to try it as an MPU6500
-no-chip|what answers at 0x{1:02x} is no MPU6050 (it reads 0x{0:02x}): another device, such as a clock, or a broken chip
-not-kept|the chip at 0x{0:02x} answers, but does not keep its settings: it is broken or no MPU6050; the wires are good
+no-chip|the device at 0x{1:02x} is not an MPU6050 (it reads 0x{0:02x}): it is another device, such as a clock, or a \
+broken chip
+not-kept|the chip at 0x{0:02x} answers, but does not keep its settings: it is broken or not an MPU6050; the wires are \
+good
 bus-errors|the sensor at 0x{0:02x} answers, but transfers fail: use shorter wires, or SENSOR_BUS_HZ = 100_000
 other-chip|{0} at 0x{1:02x}: not supported, its registers are different ones; use a module with an MPU6050
 other-device|none answers, but a {0} at 0x{1:02x}: connect a module with an MPU6050
 exchanged|SDA and SCL are exchanged: GPIO {0} belongs to SDA and GPIO {1} to SCL
-wire-low|{0} (GPIO {1}) stays low: it touches GND, or a device without power or a broken one pulls it down
+wire-low|{0} (GPIO {1}) stays low: it touches GND, or a device that is broken or has no power pulls it down
 no-pull-ups|none answers, SDA {0} and SCL {1} have no pull-up: connect the module's wires, and its 3.3 V
 no-pull-up|none answers: nothing pulls up {0} (GPIO {1}): that wire is open
 sensor-fifo|the sensor measures, but its FIFO {0}: a clone that cannot be used; use another module
 axis-ill|sensor: {0} {1} {2}, so there is no lean: switch it off and on; if that does not help, replace it
 clips|sensor: {0} at the end of its range: mount the sensor softly, on foam or rubber
-no-such-pin|config.py: {0} = {1} is no pin of this board ({2})
+no-such-pin|config.py: {0} = {1} is not a pin of this board ({2})
 i2c-pins|config.py: {1}_SDA = {2} and {1}_SCL = {3} do not belong to I2C {4} ({5})
 uart-pins|config.py: GPS_TX = {1} and GPS_RX = {2} do not belong to UART {3} ({4})
 """

@@ -21,8 +21,8 @@ _SENSOR_ADDRESSES = const((0x68, 0x69))
 MOTION_ADDRESSES = _SENSOR_ADDRESSES + (0x6A, 0x6B)
 _NOTHING = (0x00, 0xFF, -1)  # values of WHO_AM_I that no chip of the MPU6050's family has
 _FIRST, _LAST = 0x08, 0x77  # range of the addresses for devices (UM10204, table 4)
-# Time for a pull-up to charge a wire. An internal pull-up of 80 kOhm charges 400 pF, the most that a bus may have, in
-# 32 us.
+# Waiting time after switching a pull-up, in us. A bus may have at most 400 pF. An internal pull-up of 80 kOhm charges
+# this capacitance in 32 us.
 _SETTLE_US = 100
 _SLOW_HZ = 100_000
 _TIMEOUT_US = 1000

@@ -40,7 +40,7 @@ def report(wirings=False):
     print("Kickstand %s on %s, MicroPython %s" % (__version__, machine_name, release))
     try:
         settings = load()
-        words = "%s, kickstand side %s, %d samples a second"
+        words = "%s, kickstand side %s, %d samples per second"
         _print("Settings", words, settings.VEHICLE, settings.SIDE, settings.SAMPLE_HZ)
         sensor = open_sensor(settings)
         who_am_i = _sensor(sensor, settings)

@@ -148,7 +148,7 @@ def test_nobody_is_advised_to_accept_an_empty_number(value, tmp_path, monkeypatc
     fit = instead(Registers(0x68, dict.fromkeys(range(128), value)))
     assert shown(tmp_path, monkeypatch, fit) == ("No MPU6050: 0x68", f"answers 0x{value:02x}")
     lines = status(tmp_path, monkeypatch, fit)
-    assert "no MPU6050" in lines[2] and "ACCEPT" not in "".join(lines)
+    assert "not an MPU6050" in lines[2] and "ACCEPT" not in "".join(lines)
     refused = status(tmp_path, monkeypatch, fit, config={"ACCEPT_WHO_AM_I": value})
     assert "ACCEPT_WHO_AM_I" in refused[1]
 

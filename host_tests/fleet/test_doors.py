@@ -192,7 +192,7 @@ def test_move_at_an_unknown_time_is_counted(tmp_path, monkeypatch):
     assert "mounted sensors: 2\n" in result.out and "mounts that seem to have moved: 2;" in result.out
     assert "of a motorcycle on its kickstand do: is it one?" in result.out
     page = (tmp_path / "out" / "index.html").read_text()
-    assert "None is known to have moved" not in page and "<b>2</b><span>whose mount seems to have moved" in page
+    assert "No mount is known to have moved" not in page and "<b>2</b><span>whose mount seems to have moved" in page
     assert "<td>a.csv</td><td>motorcycle</td>" in page and f"Names are those below {tmp_path}/" in page
 
 

@@ -39,7 +39,7 @@ class EmulatedClock:
         return int(self._clock.nanos + 0.5) // 1000
 
     def at(self, due_us: float, function: Callable[[], None]) -> None:
-        """Call function() at the time due_us, or at once if this time has passed."""
+        """Call function() at the time due_us, or immediately if due_us is in the past."""
         self._clock.create_alarm(function).schedule(max(0.0, due_us * 1000.0 - self._clock.nanos))
 
 
@@ -119,7 +119,7 @@ class EmulatedChip:
         self.rp2040.pio = self._pios
         self.rp2040.enter_reset(from_watchdog=from_watchdog)
         self.rp2040.pio = []
-        # rp2040py's watchdog keeps running after a reset. On the real chip it stops until it is started again
+        # The real chip's watchdog stops at a reset until it is started again. rp2040py's watchdog would keep running
         watchdog = self.rp2040.watchdog
         watchdog.timer.enable = watchdog.alarm.enable = False
         self.rp2040.core.pc = FLASH_START_ADDRESS
@@ -127,9 +127,9 @@ class EmulatedChip:
     def _hurry(self) -> None:
         """Double the emulation's speed on the host. The emulated results stay the same.
 
-        At each memory access, rp2040py's compiled core looks up a method by name. This creates a new method object,
-        unless the instance has an attribute with that name. So the methods are stored in the instance. After every
-        instruction the core also polls both PIO blocks. MicroPython does not use them, so they are removed.
+        At each memory access, rp2040py's compiled core looks up a method by name. Python then creates a method object,
+        unless the instance has an attribute with that name. So this function stores the methods in the instance. After
+        every instruction the core also polls both PIO blocks. MicroPython does not use them, so they are removed.
         """
         for name in _ACCESS:
             self.rp2040.__dict__[name] = getattr(self.rp2040, name)
@@ -138,9 +138,9 @@ class EmulatedChip:
 
 
 def _hurry_division(rp2040: RP2040) -> None:
-    """Speed up unsigned divisions, which MicroPython needs often.
+    """Speed up unsigned divisions, which MicroPython uses often.
 
-    Before each division, rp2040py's SIO compares the offset with dozens of registers.
+    rp2040py's SIO is slow, because it compares the register's offset with dozens of others before each division.
     """
     block, core = rp2040.sio, rp2040.core
     read_other, write_other = block.read_uint32, block.write_uint32

@@ -33,7 +33,7 @@ class ConsoleServer:
         self._server.close()
 
     def poll(self) -> None:
-        """Without a client, accept one. Otherwise pass the client's data to send()."""
+        """Accept a client, or pass the data of the connected client to send()."""
         if self._client is None:
             with contextlib.suppress(BlockingIOError):
                 self._client = self._server.accept()[0]

@@ -23,12 +23,12 @@ class GuestError(Exception):
 
 
 class EmulatedDevice(ABC):
-    """An emulated board. It is off until power_on(). A `with` statement switches it on, and off at the end.
+    """An emulated board. It is off until power_on(). A `with` statement switches it on, and off at its end.
 
-    Times are emulated seconds. Resets and power cycles do not set them back.
+    Times are emulated seconds. They continue through resets and power cycles.
 
     The subclasses take these arguments:
-        world: The board's motion, as for simulator.Board. None is a board that lies level and at rest.
+        world: The board's motion, as for simulator.Board. None means that the board lies level and at rest.
         files: The content of its flash, see flash_image.py.
         fitted: Other arguments of simulator.Board.
 

@@ -13,7 +13,7 @@ from kickstand_tools.replay import replay_engine
 
 _CHUNK = 500  # number of samples between two calls of progress
 _RESULT_BYTES = struct.calcsize(replay_engine.RESULT)
-_EMULATED_S = 1e6  # limit of the emulated time. It is never reached in practice, because logs may be long
+_EMULATED_S = 1e6  # limit of the emulated time in s, longer than the replay of any log
 
 
 @contextlib.contextmanager

@@ -82,7 +82,7 @@ class Sink:
         self._end_us = 0  # time at which run() returns
         self._waiting = bytearray()  # data that wait to be sent to the board's console
         self._sending = False
-        # _booted is True after the ROM has started. _reads is True after the program has begun to read the console
+        # _booted is True once the ROM has started. _reads is True once the program reads the console
         self._booted = self._reads = False
         self._sends = [False] * len(self.board.buses)  # for each bus, True if the addressed device sends bytes
         self._levels = {self.board.button_pin: 1}
@@ -144,7 +144,7 @@ class Sink:
     def _kill(self) -> None:
         if self._process:
             if self._process.poll() is None:
-                self._sync()  # keeps writes to the flash that the board has completed
+                self._sync()  # save the writes to the flash that the board has completed
             self._process.kill()
             self._process.wait()
             self._link.close()

@@ -10,11 +10,12 @@ socket. This process converts the levels of the I2C wires to bytes, because one 
 The emulated time is counted in instructions, and advances only after the message GO. Three parts of QEMU would still
 make the emulation depend on the host:
 
-1. The main loop may run timers between the turns of the two processors, or set the clock forward before both processors
-   sleep. So _hold_main_loop() makes the main loop wait until both sleep.
-2. One timer of the scheduler begins at one of two moments, by chance. So _calm_timers() postpones this timer for ever.
+1. The main loop may run timers while only one processor has had its turn, or set the clock forward before both
+   processors sleep. So _hold_main_loop() makes the main loop wait until both sleep.
+2. One timer of the scheduler begins at one of two moments, by chance. So _calm_timers() postpones this timer forever.
 3. The main loop executes a reset of one processor while the other processor continues. So _guard() delays a reset to
-   the next full millisecond and makes the processors wait for it. _on_reset() makes the reset wait for their thread.
+   the next full millisecond, and the processors wait for the reset. _on_reset() makes the reset wait until the
+   processors' thread sleeps.
 """
 
 import ctypes as c
@@ -29,7 +30,8 @@ from kickstand_tools.simulated_board.i2c import Bus
 
 from .i2c_wires import Wires
 
-# A command to this process consists of kind, a, b, value. A message from it consists of nanoseconds, kind, a, b
+# A command to this process consists of kind, a, b and value. A message from this process consists of the time in
+# nanoseconds, kind, a and b
 COMMAND, MESSAGE = struct.Struct("<BBHq"), struct.Struct("<qBBH")
 GO, PIN, UART, HANG, LEVEL, SYNC = range(6)
 START, WRITE, READ, STOP, PRINTED, STOPPED = range(6)
@@ -127,11 +129,11 @@ class Machine:
         self._inputs: dict[int, int] = {}  # levels set from outside the chip, by pin
         self._wires_of: dict[int, tuple[Wires, int, int]] = {}
         self._driven = [1] * _PINS
-        self._stale: list[int] = []  # pins whose input QEMU has set to the level that the chip drives
+        self._stale: list[int] = []  # pins whose input must be corrected, because QEMU set it to the chip's own output
         # _may_reset is True while the processors wait for a reset, _resetting while the main loop executes it
         self._may_reset = self._resetting = False
         self._fuses: _Timer | None = None
-        self._state = -1  # descriptor of the file that shows whether the processors' thread sleeps
+        self._state = -1  # descriptor of the file in /proc that shows whether the processors' thread sleeps
         self._buses = [_RemoteBus(self, i, *pins) for i, pins in enumerate(wires)]
         self._wires = [Wires(bus, self._setter(bus.sda), self._setter(bus.scl)) for bus in self._buses]
         for bus, its in zip(self._buses, self._wires, strict=True):
@@ -229,18 +231,19 @@ class Machine:
     # Time
 
     def _begun(self) -> None:
-        """Prepare the emulation. This runs in the processors' thread, at its first instruction."""
-        c.pythonapi.PyGILState_Ensure()  # otherwise each call from QEMU would create a thread state, which is slow
+        """Prepare the emulation. QEMU calls this in the processors' thread, before the first instruction."""
+        # Keep one thread state of Python. Otherwise each call from QEMU would create one, which is slow
+        c.pythonapi.PyGILState_Ensure()
         self._state = os.open(f"/proc/self/task/{threading.get_native_id()}/stat", os.O_RDONLY)
         self._calm_timers()
         self._guard_later()
         self._stale = list(self._inputs)
 
     def _calm_timers(self) -> None:
-        """Postpone the scheduler's timer for ever, by changing its scale.
+        """Postpone the scheduler's timer forever, by changing its scale.
 
-        Two timers end after 0.1 s. The one without an owner is the scheduler's. The other one ends a read of the
-        eFuses (see _guard()).
+        QEMU has two timers of 0.1 s. The scheduler's timer has no owner. The other timer ends a read of the eFuses (see
+        _guard()).
         """
         self._qemu.timer_mod_ns(c.addressof(self._stop), 0)
         following = self._stop.next
@@ -266,7 +269,7 @@ class Machine:
         while qemu.runstate_is_running():
             if qemu.qemu_reset_requested_get() and self._may_reset:
                 self._resetting = True
-                # QEMU does not set a disabled clock forward. The reset enables the clock again
+                # Disable the clock, because QEMU does not set a disabled clock forward. The reset enables it again
                 qemu.qemu_clock_enable(_VIRTUAL, False)
                 return
             idle = qemu.all_cpu_threads_idle()
@@ -275,8 +278,7 @@ class Machine:
             wait_s = min(2 * wait_s, _LONGEST_S)
 
     def _sleeps(self, wait_s: float) -> bool:
-        """Release QEMU's lock for wait_s, then return True if the processors' thread sleeps. The lock is held before
-        and after."""
+        """Release QEMU's lock for wait_s, take it again, and return True if the processors' thread sleeps."""
         self._qemu.qemu_mutex_unlock_iothread()
         time.sleep(wait_s)
         os.lseek(self._state, 0, os.SEEK_SET)
@@ -291,8 +293,9 @@ class Machine:
     def _guard(self, _: object) -> None:
         """Start a requested reset, and end reads of the eFuses early.
 
-        QEMU calls this every millisecond, between two turns of the processors. The ROM waits for three reads of the
-        eFuses. They take microseconds on a real chip. In QEMU they take 100 ms, as long as the rest of the start.
+        QEMU calls this every millisecond, between two turns of the processors. At its start the ROM waits for three
+        reads of the eFuses. On a real chip they take microseconds. In QEMU they take 100 ms, as long as the rest of the
+        start.
         """
         now_ns = self._qemu.qemu_clock_get_ns(_VIRTUAL)
         if self._fuses and self._fuses.expires > now_ns:

@@ -1,6 +1,6 @@
-"""Corrects rp2040py's flash. Erasing and programming take time, and the processor stops meanwhile.
+"""Makes rp2040py's flash realistic. Erasing and programming take time, and the processor stops during that time.
 
-The power can also be cut in the middle of an erase or program operation.
+Tests can also cut the power in the middle of an erase or program operation.
 """
 
 from collections.abc import Callable
@@ -32,7 +32,7 @@ class TimedFlash(RPSSI):
     """
 
     def __init__(self, rp2040: RP2040, name: str) -> None:
-        rp2040.qspi[1]._listeners.clear()  # the interface that this one replaces still listens
+        rp2040.qspi[1]._listeners.clear()  # disconnect rp2040py's own interface, which this one replaces
         super().__init__(rp2040, name)
         self.operations = 0
         self.before_operation: Callable[[], None] | None = None

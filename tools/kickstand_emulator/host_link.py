@@ -1,7 +1,7 @@
 """Adds registers through which code on the emulated Pico exchanges bytes with the host.
 
-The real chip does not have these registers. The console would work too, but every byte on the console costs the Pico
-time. GUEST is the code for the Pico.
+The real chip does not have these registers. They are faster than the console, on which every byte costs the Pico time.
+GUEST is the code for the Pico.
 """
 
 from collections.abc import Callable

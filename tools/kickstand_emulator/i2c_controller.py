@@ -27,9 +27,9 @@ _POLLED = (IC_RAW_INTR_STAT, IC_RXFLR, IC_TX_ABRT_SOURCE)
 class TimedI2C(RPI2C):
     """rp2040py's I2C controller on a bus of simulated_board. The SCL count registers set the length of a bit.
 
-    The SDK reads registers in a loop until the end of each byte. The loop does nothing else, but emulating it takes the
-    host ten times as long. So the first of these reads advances the time to the end of the byte. Because of this,
-    interrupts are late by up to a byte.
+    The SDK waits for the end of each byte in a loop that only reads registers. Emulating this loop would make a
+    transfer ten times as slow on the host. So the first of these reads advances the time to the end of the byte. As a
+    result, interrupts are late by up to the duration of a byte.
     """
 
     def __init__(self, rp2040: RP2040, name: str, irq: int, bus: Bus) -> None:
@@ -80,7 +80,7 @@ class TimedI2C(RPI2C):
             self.let_go()
         super().write_uint32(offset, value)
 
-    # Interrupts. If TX_EMPTY_CTRL is set, TX_EMPTY is raised at the end of a byte, and by an abort
+    # Interrupts. If TX_EMPTY_CTRL is set, the end of a byte raises TX_EMPTY. An abort raises it too
 
     def _set_interrupts(self, mask: int) -> None:
         if mask == R_TX_EMPTY and self._busy and self.control & TX_EMPTY_CTRL:
@@ -110,7 +110,7 @@ class TimedI2C(RPI2C):
 
     def _connect(self, address: int, read: bool) -> None:
         answer = self.bus.start(address, read)
-        # None means that a device holds SDA. Then the transfer does not end until the software gives up
+        # None means that a device holds SDA. Then the transfer lasts until the software gives up
         if answer is not None:
             self.complete_connect(answer)
 

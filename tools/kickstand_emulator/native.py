@@ -1,9 +1,9 @@
 """Compiles rp2040py for the running Python version, which makes it 2.3 times as fast.
 
-The modules in rp2040py's wheel use the limited API, so they work with any Python version. But they look up each
-attribute by name, which is slow. The wheel also contains their C sources. build() compiles the five modules that
-dominate the run time, once per Python version and user. install() makes Python import them instead of the wheel's
-modules. Emulated cycles and memory stay the same.
+The modules in rp2040py's wheel use the limited API, so they work with any Python version. However, they look up each
+attribute by name, which is slow. The wheel also contains the C sources. From these, build() compiles the five modules
+that use most of the time, once per Python version and user. install() makes Python import the compiled modules instead
+of the wheel's. Emulated cycles and memory stay the same.
 """
 
 import contextlib

@@ -1,8 +1,8 @@
 """Alignment, moved mounts and brake tests of many vehicles.
 
-manifest.py finds out which logs belong together. period.py processes the log files of one mount, with the mathematics
-in evidence.py, forward.py and moved.py. cluster.py runs period.py with Dask for all mounts. journal.py saves each
-result at once. tables.py and the modules in show/ write the results.
+manifest.py groups the logs by vehicle and mount. period.py processes the logs of one mount, with the mathematics in
+evidence.py, forward.py and moved.py. cluster.py runs period.py with Dask for all mounts. journal.py saves each result
+at once. tables.py and the modules in show/ write the results.
 """
 
 KEPT = "finished work is kept: run the same command again to resume"

@@ -1,14 +1,14 @@
 """Runs a function on many items with Dask, on this computer or on a cluster.
 
-Workers on this computer and their scheduler talk over 127.0.0.1 by TLS. Each run creates its own keys, and only its
-processes have them. Another user of the computer can connect, but can neither read nor run anything. Unix sockets
-would keep other users out, but Dask does not support them. A process pool of our own would need its own crash handling.
-Dask's web pages are off.
+Workers on this computer and their scheduler communicate over 127.0.0.1 with TLS. Each run creates its own keys, and
+only its processes have them. Another user of the computer can connect, but can neither read nor run anything. Unix
+sockets would exclude other users, but Dask does not support them. Dask's web pages are off. Without Dask, a process
+pool would need its own crash handling.
 
-A task that kills its worker must not cost another task. By default Dask retries the task on other workers, which kills
-them too, and then recomputes their finished results. So no retries are allowed, only a few tasks run at a time, and
-Dask keeps no results. A task whose worker died runs a second time, alone, after all other tasks. If its worker dies
-again, the task is the cause.
+A task that kills its worker must not harm other tasks. By default Dask retries such a task on other workers. The task
+kills them too, and Dask then recomputes their finished results. So this module forbids retries, submits only a few
+tasks at a time, and lets Dask keep no results. A task whose worker died runs a second time, alone, after all other
+tasks. If its worker dies again, the task is the cause.
 """
 
 import contextlib
@@ -26,7 +26,7 @@ from kickstand_tools.common.errors import InputError, cause, extra
 from . import KEPT
 
 CRASHED, TIMED_OUT = "crashed", "timed-out"
-_PER_WORKER = 2  # tasks per worker: one runs, one waits
+_PER_WORKER = 2  # tasks submitted per worker: one runs, the other waits
 _LOOK_S = 0.5  # time between two checks for tasks that take too long
 _TOPIC = "kickstand-fleet"  # topic of the messages by which a worker announces that it begins a task
 Outcome = tuple[int, Any | None, str, str]
@@ -46,8 +46,10 @@ def run_tasks(
     The arguments scheduler, workers and timeout_s are those of Cluster. Starts no workers if there are no items.
 
     Yields:
-        (index, result, "", ""), if the function returned a result.
-        (index, None, CRASHED or TIMED_OUT, explanation), if it did not.
+        index: index of the item.
+        result: the function's result, None if it did not return.
+        reason: CRASHED or TIMED_OUT, "" if there is a result.
+        explanation: the reason in words, "" if there is a result.
     """
     if items:
         with Cluster(scheduler, workers, timeout_s) as cluster:
@@ -128,7 +130,8 @@ class Cluster:
                 raise
             where = self._address or "this computer"
             raise InputError(f"no workers at {where}: {cause(error)}") from error
-        self._started: dict[str, tuple[float, str]] = {}  # task's key: (time when it began, address of its worker)
+        # The time when each task began and the address of its worker, by the key of the task
+        self._started: dict[str, tuple[float, str]] = {}
         self._client.subscribe_topic(_TOPIC, self._note_begin)
         self.workers = len(self._client.scheduler_info(n_workers=-1)["workers"])
         return self
@@ -166,9 +169,9 @@ class Cluster:
         future.add_done_callback(self._ended.put)
 
     def _collect(self, suspects: list[int]) -> Iterator[Outcome]:
-        """Wait up to _LOOK_S for a task to end, and yield its outcome. Yield the tasks that timed out too.
+        """Wait up to _LOOK_S for a task to end, and yield its outcome. Also yield the outcomes of overdue tasks.
 
-        If the worker of a task died, append the index of the task to suspects.
+        suspects: the index of each task whose worker died is appended.
         """
         try:
             future = self._ended.get(timeout=_LOOK_S)
@@ -190,7 +193,7 @@ class Cluster:
                 else:
                     yield index, None, CRASHED, f"{type(error).__name__}: {error}"
             elif self._client.status == "running":
-                suspects.append(index)  # its worker was ended because of another task
+                suspects.append(index)  # the worker was ended because of another task
             else:
                 raise InputError(f"the cluster{self._where()} was lost; {KEPT}")
             future.release()
@@ -229,12 +232,13 @@ class Cluster:
 def _without_interrupts() -> Iterator[None]:
     """A context that defers Ctrl-C to its end. Processes started in this context never receive Ctrl-C.
 
-    If Dask is interrupted while it starts or connects, it prints pages of errors.
+    Without this context, an interrupt while Dask starts or connects would make it print pages of errors.
     """
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
-    resource_tracker.ensure_running()  # otherwise Python starts it with the first process, which unblocks Ctrl-C
+    # Start Python's resource tracker now. If Python started it with the first process, it would unblock Ctrl-C
+    resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

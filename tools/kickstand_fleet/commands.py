@@ -28,7 +28,7 @@ from . import KEPT
     "--vehicle", type=VEHICLES, default="car", help="The kind of vehicle, for a GLOB. A manifest has its own column."
 )
 def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **how: Any) -> None:
-    """Align a whole fleet, find mounts that moved, and measure its brake tests.
+    """Align many vehicles, find mounts that moved, and measure brake tests.
 
     The manifest is CSV with the columns vehicle,path,kind and optionally mount: one line per log, in chronological
     order. With a GLOB each matching file is one vehicle. Paths may start with s3://. To resume a run, repeat the

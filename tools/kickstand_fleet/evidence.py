@@ -36,20 +36,23 @@ from kickstand.units import GAP_US, STANDARD_GRAVITY
 from kickstand_tools.logs.log import Log, Table
 from kickstand_tools.signals import STANDING_MPS, Array, moving_mean, runs
 
-INTERVAL_S = 0.9  # least time between two speeds that are used
+INTERVAL_S = 0.9  # shortest time between two speeds that are used
 MOVING_MPS = 2.0
-# Weight of a second at a stop. A long stop shows only one slope of the road, like a short one, so seconds count less
+# Weight of a second at a standstill, compared with a second of driving. It is small, because a long stop shows the
+# slope of the road at one place only, like a short stop
 STANDING_WEIGHT = 0.3
-LEVEL_S = 20.0  # the mean force over this time is about vertical. The rate about this vertical is the yaw rate
+LEVEL_S = 20.0  # the mean force over this time is roughly vertical. The rate about this direction is the yaw rate
 BLOCK_S = 8.0
 # ROAD_SHARE is the variance of the road's slope, divided by the variance of all other errors in a mean over 1 s.
 # ROAD_M is the correlation length of the road's slope, in m
 ROAD_SHARE, ROAD_M = 1.0, 150.0
-SWING_S = 0.2  # the yaw rate at each end of an interval is a mean over this time
-# Sway is the mean force over the first time minus the mean force over the second. This excludes noise and driving
+SWING_S = 0.2  # averaging time of the yaw rate at each end of an interval
+# Sway is the mean force over the first time minus the mean force over the second time. The first mean removes noise,
+# the difference removes braking, speeding up and bends
 SWAY_S = 0.05, 0.3
-# deg/s: an interval of a car with this yaw rate counts half. In a tight turn, a sensor ahead of the rear axle does not
-# move along the vehicle's heading. The angle is its distance from that axle divided by the turn's radius.
+# Yaw rate at which an interval of a car has half its weight. In a tight turn, a sensor ahead of the rear axle does not
+# move along the vehicle's heading. The angle between both is the sensor's distance from that axle divided by the
+# turn's radius.
 TIGHT_DPS = 20.0
 
 
@@ -62,7 +65,7 @@ class Intervals:
     terms: The regressors of level, forward, left and arm, shape (n, 4).
     weight: Weight of each interval, shape (n), in s.
     speed: Mean speed of each interval, shape (n), in m/s.
-    sway: Covariance of the quick changes of force, shape (n, 3, 3), in g^2. Zeros where it is not used.
+    sway: Covariance of the quick changes of force, shape (n, 3, 3), in g^2. Zero for intervals without usable sway.
     """
 
     t_s: Array
@@ -77,8 +80,8 @@ class Intervals:
 class Blocks(Table):
     """m consecutive blocks of intervals in one or several logs.
 
-    square: Sums of terms x terms, shape (m, 4, 4), with the road's slope filtered out (see _without_road()).
-    product: Sums of terms x force, shape (m, 4, 3), with the road's slope filtered out.
+    square: Sums of products of two terms, shape (m, 4, 4). The road's slope is filtered out, see _without_road().
+    product: Sums of products of a term and a component of the force, shape (m, 4, 3), filtered like square.
     sway: Sway of each block, shape (m, 3, 3). It is divided by its trace, so a rough road counts like a smooth one.
     log: Index of each block's log, shape (m).
     t_s: Beginning of each block in its log, shape (m), in s.
@@ -160,12 +163,12 @@ def fits(square: Array, product: Array) -> tuple[Array, Array]:
     """Solve k systems of normal equations with t terms.
 
     Args:
-        square: Sums of terms x terms, shape (k, t, t).
-        product: Sums of terms x force, shape (k, t, 3).
+        square: See Blocks, shape (k, t, t).
+        product: See Blocks, shape (k, t, 3).
 
     Returns:
-        The coefficients level, forward, left and, if t is 4, arm: shape (k, t, 3).
-        The variation of the regressors a and c of the module's docstring: shape (k, 2), in g^2 s.
+        coefficients: level, forward, left and, if t is 4, arm, shape (k, t, 3).
+        variation: of the regressors a and c of the module's docstring, shape (k, 2), in g^2 s.
     """
     ridge = np.diag([1e-9] + [1e-6] * (square.shape[-1] - 1)) * np.maximum(square[..., :1, :1], 1e-3)
     found = np.asarray(np.linalg.solve(square + ridge, product), dtype=float)
@@ -213,11 +216,12 @@ def handedness(found: Array, varied: Array) -> float:
 def _without_road(log: Intervals) -> tuple[Array, Array]:
     """Return the terms and the force with the slope and camber of the road filtered out.
 
-    For some hundred metres, slope and camber look like another level. Neighbouring intervals share this error, and a
-    plain regression would treat the road's slope during braking as forward. So a filter follows the road, modelled as
-    a first-order Gauss-Markov process in distance. It predicts each value from the earlier intervals. The values
-    returned are the differences from the prediction, divided by their standard deviation. They are uncorrelated, so a
-    plain regression of them is a generalized least squares fit.
+    Slope and camber stay similar for some hundred metres. There they tilt the measured level, so neighbouring intervals
+    share an error. An ordinary regression would mistake the slope during braking for a part of forward.
+
+    Therefore a filter follows the road, modelled as a first-order Gauss-Markov process in distance. It predicts each
+    value from the earlier intervals. The function returns the differences from the predictions, divided by their
+    standard deviations. These differences are uncorrelated, so ordinary least squares can be used on them.
     """
     rows = np.hstack((log.terms, log.force))
     driven = log.speed * np.diff(log.t_s, prepend=log.t_s[0])
@@ -247,7 +251,7 @@ def sway_deg(sway: Array, frame: Array) -> Array:
 
 
 def _sway(log: Log) -> Array:
-    """Return the changes of force that take some tenths of a second, shape (samples, 3), in g."""
+    """Return the changes of force within some tenths of a second (see SWAY_S), shape (n, 3), in g."""
     step_s = float(np.median(np.diff(log.t_s)))
     quick, slow = (moving_mean(log.accel_g, round(width_s / step_s)) for width_s in SWAY_S)
     return quick - slow
@@ -265,7 +269,7 @@ def _integrals(columns: Iterable[Array], t_s: Array, step: Array, time: Array) -
         time: The end times, in s.
 
     Returns:
-        The integrals, shape (len(time), k).
+        integrals: one row per end time, shape (len(time), k).
     """
     return np.array([np.interp(time, t_s, np.cumsum(column * step)) for column in columns]).T
 

@@ -17,13 +17,14 @@ from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.logs.source import open_input
 
-MOST_BYTES = 300_000_000  # largest packed log in a store, in bytes. Ten hours at 200 Hz need 150 million bytes
-# Longest encoded name, in bytes. A file system allows 255, and the ending and the temporary file's prefix need some
+MOST_BYTES = 300_000_000  # largest packed log in a store, in bytes. Ten hours at 200 Hz use 150 million bytes
+# Longest encoded name, in bytes. A file system allows 255 bytes, including the file's ending and the prefix of a
+# temporary file
 _LONGEST = 100
 
 
 def file_stem(readable: str, *exact: str) -> str:
-    """A unique file name without its ending, which is the same in every run.
+    """Return a unique file name without its ending. It is the same in every run.
 
     readable: Text that begins the name. Characters that a file system does not allow are encoded.
     exact: Texts that identify the file. The name ends with a hash of them.
@@ -104,10 +105,10 @@ def matches(pattern: str) -> list[str]:
 
 
 def identities(paths: Iterable[str]) -> dict[str, str]:
-    """For each path, a mark that changes when the file changes.
+    """Return a mark for each path, which changes when the file changes.
 
-    The mark consists of the file's size and its time, or in a store its ETag if it has one. The mark is "" if there is
-    no such file. Each remote directory is listed only once.
+    The mark consists of the file's size and time. In a store it is the file's ETag, if it has one. The mark is "" if
+    the file does not exist. Each remote directory is listed only once.
     """
     known: dict[str, str] = {}
     directories: dict[str, dict[str, str]] = {}
@@ -144,9 +145,9 @@ class _Named(io.BytesIO):
 
 
 def listed(parent: str) -> dict[str, str]:
-    """List a directory of a store, as {path: mark}. A mark changes when the file changes (see identities()).
+    """List a directory of a store. Raises InputError if the directory cannot be read.
 
-    The result is empty if the directory does not exist. Raises InputError if it cannot be read.
+    Returns the mark of each file (see identities()), by its path. The result is empty without such a directory.
     """
     marks: dict[str, str] = {}
     with _in_store(parent, "read") as (fs, place), contextlib.suppress(FileNotFoundError):
@@ -196,7 +197,7 @@ def write_bytes(path: str, content: bytes) -> None:
             fs.pipe_file(place, content)
         return
     directory = Path(path).parent
-    try:  # keep the directory if the write fails, because other workers use it too
+    try:  # a directory created here stays if the write fails, because other workers use it too
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{directory} cannot be made: {cause(error)}") from error

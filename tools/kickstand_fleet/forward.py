@@ -1,9 +1,9 @@
 """Computes forward, with its standard error, from all braking and all bends in the logs of one mount.
 
-The firmware's regression cannot separate the slope of the road during braking from an error of forward. From whole
-logs the slope can be filtered out (see evidence.py). This halves the error on simulated buses, which brake gently and
-seldom. On recorded drives, sometimes this method is better and sometimes the firmware's. If the firmware finds an
-alignment, forward is the mean of both results, weighted by their variances. Up is then always the firmware's.
+The firmware's regression cannot separate the slope of the road during braking from an error of forward. This module
+uses whole logs, from which the slope can be filtered out (see evidence.py). This halves the error on simulated buses,
+which brake gently and seldom. On recorded drives, neither method is always better. If the firmware finds an alignment,
+forward is therefore the mean of both results, weighted by their variances. Up is then always the firmware's.
 """
 
 from dataclasses import dataclass
@@ -16,12 +16,14 @@ from kickstand_tools.signals import Array, rotation_vector
 from . import evidence
 from .evidence import Intervals
 
-SENSOR_DEG = 0.3  # standard deviation of forward caused by scale errors of 1 % between the sensor's axes
+SENSOR_DEG = 0.3  # standard error of forward, in degrees, if the scales of the sensor's axes differ by 1 %
 CORRELATION = 0.5  # correlation between the errors of the two methods, which use the same braking
-APART_SIGMAS = 2.0  # if the two methods differ by more standard deviations, the standard error of forward grows
-# Number of terms of evidence.py that are used: level, forward and left. The fourth term, `arm`, only helps to compare
-# parts of a drive. Over a whole drive, `arm` absorbs other effects too: with it, forward was 2 degrees off in one of
-# three recorded drives, and without it at most 0.6 degrees.
+# Largest difference between the two methods, in standard deviations, that does not increase the standard error of
+# forward
+APART_SIGMAS = 2.0
+# Number of coefficients of evidence.py that are fitted: level, forward and left. The fourth coefficient, arm, is useful
+# only to compare parts of a drive. When it was fitted to whole drives, forward was wrong by 2 degrees in one of three
+# recorded drives. Without it, the error was at most 0.6 degrees in all three.
 _TERMS = 3
 _LEAST_BLOCKS = 4
 
@@ -65,7 +67,8 @@ def find_forward(logs: list[Intervals], device: DriveFit | None = None) -> Forwa
     frame = frame_of(slice(None))
     others = evidence.frames(*evidence.fits(np.sum(square, axis=0) - square, np.sum(product, axis=0) - product))
     off = np.degrees(rotation_vector(others @ frame.T))
-    # The jackknife: the variance of the results without each block in turn
+    # Jackknife: compute the alignment without each block in turn. The variance comes from the differences of these
+    # alignments
     pitch, yaw, roll = (count - 1) / count * np.sum(off * off, axis=0)
     variance = float(yaw) + SENSOR_DEG**2
     apart = float(_yaw_deg(frame_of(slice(count // 2, None)), frame_of(slice(count // 2))))
@@ -85,8 +88,8 @@ def _mean(frame: Array, variance: float, device: Array, quality_deg: float) -> t
         quality_deg: Standard error of its forward, in degrees.
 
     Returns:
-        The merged alignment, shape (3, 3), with the firmware's up and the weighted mean of both forwards.
-        The variance of the mean, in deg^2.
+        merged: the alignment with the firmware's up and the weighted mean of both forwards, shape (3, 3).
+        variance: variance of the mean, in deg^2.
     """
     other = quality_deg**2 + SENSOR_DEG**2
     share = variance / (variance + other)
@@ -98,5 +101,5 @@ def _mean(frame: Array, variance: float, device: Array, quality_deg: float) -> t
 
 
 def _yaw_deg(frames: Array, before: Array) -> Array:
-    """The angle about up from the alignment `before` to each of frames, in degrees."""
+    """Compute the angle about up, in degrees, from the alignment `before` to each alignment in frames."""
     return np.degrees(rotation_vector(frames @ before.T)[..., 1])

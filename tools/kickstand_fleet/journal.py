@@ -1,8 +1,8 @@
-"""Saves each result as soon as it is computed. So a run can be resumed after it was stopped or its disk was full.
+"""Saves each result as soon as it is computed, so a run can be resumed after it was stopped or its disk was full.
 
 In a directory on this computer, the journal is one file with a line of JSON per result. In a store such as S3 files
-cannot grow, so there is one file per result. Each result has a check sum. A power loss or a full disk can leave lines
-that are cut or damaged. They are dropped when the journal is opened again, and their results are recomputed.
+cannot grow, so there is one file per result. Each result has a check sum. A power loss or a full disk can leave cut or
+damaged lines. Opening the journal drops these lines, and the run recomputes their results.
 """
 
 import contextlib
@@ -20,7 +20,7 @@ from . import KEPT, files
 from .period import PeriodResult
 
 _AT_ONCE = 200  # number of results that are fetched from a store together
-_LONGEST = 1 << 26  # longest line, in bytes: 100 times the line for a mount with a thousand logs
+_LONGEST = 1 << 26  # longest line in bytes, 100 times the line of a mount with a thousand logs
 
 
 class Journal:
@@ -46,7 +46,7 @@ class Journal:
                 if not self._note(line) and line.strip():
                     self.damaged += 1
                     self._file.seek(self._end)
-                    # Overwrite the damaged line with blanks, so the next run does not count it again
+                    # Overwrite the damaged line with blanks. Otherwise the next run would count it again
                     self._file.write(b" " * (len(line) - 1) + b"\n")
                 self._end += len(line)
             self._file.flush()
@@ -137,8 +137,8 @@ class Journal:
 class StoreJournal:
     """A journal with the methods of Journal, in a directory of a store.
 
-    KEY.json holds a final result, and KEY.again.json one that the next run should recompute. All files are read when
-    the journal is opened. Damaged results are recomputed.
+    KEY.json holds a final result. KEY.again.json holds a result that the next run should recompute. All files are read
+    when the journal is opened. Damaged results are recomputed.
     """
 
     def __init__(self, directory: str) -> None:

@@ -12,12 +12,12 @@ from . import files
 
 COLUMNS = ("vehicle", "path", "kind")
 _KINDS = (MOTORCYCLE, CAR)
-_MOST_BYTES = 100_000_000  # largest manifest: a million logs
+_MOST_BYTES = 100_000_000  # largest manifest in bytes, enough for a million logs
 
 
 @dataclass(frozen=True)
 class Period:
-    """The logs of one vehicle during which the sensor should have kept the same alignment.
+    """Logs of one vehicle with the same alignment of the sensor.
 
     vehicle: Name of the vehicle.
     mount: Name of this mounting of the sensor, "" if the vehicle has only one.

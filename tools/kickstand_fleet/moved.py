@@ -1,14 +1,14 @@
 """Finds mounts that rotated by a few degrees or more, between two logs or during one.
 
-The firmware only refuses a drive if the mount surely moved, by some 7 to 30 degrees. This module checks every moment in
-all logs of a mount. It compares the alignment before that moment with the alignment after it.
+The firmware refuses a drive only if the mount moved by some 7 to 30 degrees. This module also finds smaller rotations.
+At every moment in all logs of a mount, it compares the alignment before that moment with the alignment after it.
 
 A rotation that tilts the sensor shows in gravity. A rotation about the vertical shows only in three things: in braking,
 in bends, and in the direction in which the vehicle sways on its springs. The sway also shows on a straight road without
 braking.
 
-The variance of a rotation comes from a jackknife over blocks of some seconds. The variances of errors that last longer
-are added: slopes of a road and, from one log to another, load and temperature.
+The variance of a rotation comes from a jackknife over blocks of some seconds. It does not contain errors that last
+longer: slopes of a road and, between two logs, changes of load and temperature. Their variances are added.
 """
 
 from dataclasses import dataclass
@@ -19,31 +19,35 @@ from kickstand_tools.signals import Array, rotation_vector
 from . import evidence
 from .evidence import Blocks, Intervals, blocks, fits, frames
 
-LEAST_DEG = 3.2  # smallest rotation that is reported. Roads, load and temperature can cause smaller ones
-# A rotation is reported if it exceeds this number of standard deviations. The limit is higher within a log than between
-# two logs, because a log has many moments, and one of them may exceed a low limit by chance
+LEAST_DEG = 3.2  # smallest rotation that is reported. Roads, load and temperature can look like smaller rotations
+# Smallest rotation that is reported, in standard deviations. The limit is higher within a log than between two logs,
+# because a log has many moments, and one of them may exceed a low limit by chance
 BETWEEN_SIGMAS, WITHIN_SIGMAS = 3.3, 4.3
-SUDDEN_SIGMAS = 3.8  # the same limit within a log, for a moment at which the vertical jumps
-SUSPECTED_SHARE = 0.7  # these limits are multiplied by this if the firmware suspects that the mount moved
-# Standard deviations, in degrees, of errors that stay the same on one side of the comparison. The three values are
-# pitch, yaw and roll (about left, up and forward). ROAD_DEG is for two parts of one log, OTHER_ROAD_DEG for two logs
+SUDDEN_SIGMAS = 3.8  # the limit within a log for a moment at which the vertical jumps
+SUSPECTED_SHARE = 0.7  # factor on the three limits if the firmware suspects that the mount moved
+# Standard deviations, in degrees, of the errors that are constant before the moment or after it. The three values are
+# for pitch, yaw and roll (about left, up and forward). ROAD_DEG is for two parts of one log, OTHER_ROAD_DEG for two
+# logs
 ROAD_DEG = np.array([0.5, 0.25, 0.35])
 OTHER_ROAD_DEG = np.array([0.75, 0.7, 0.5])
-REACH = 75  # number of blocks that are compared on each side of a moment, ten minutes
+REACH = 75  # number of blocks compared on each side of a moment, about ten minutes
 LEAST_BLOCKS = 7
-LEAST_VARIED = 0.2  # g^2 s: least variation by braking, speeding up and bends that determines forward on one side
-# If a few blocks happen to agree, the jackknife is too optimistic. So the yaw gets an additional standard deviation.
-# This is its value, in degrees, at a variation of 1 g^2 s
+# Smallest variation by braking, speeding up and bends, in g^2 s, from which forward is computed on one side of a moment
+LEAST_VARIED = 0.2
+# The jackknife underestimates the variance if a few blocks agree by chance. So the yaw gets an additional standard
+# deviation. YAW_PRIOR_DEG is its value at a variation of 1 g^2 s
 YAW_PRIOR_DEG = 0.4
-# Roads change the direction of sway on each side, with the standard deviation SWAY_DEG. The direction is not used if
-# its standard deviation over both sides is above SWAY_WORST_DEG, or if it contradicts the braking by more than
-# SWAY_SIGMAS standard deviations
+# Standard deviation, in degrees, by which roads change the direction of sway on each side of a moment: SWAY_DEG. The
+# sway is not used if its standard deviation over both sides is above SWAY_WORST_DEG. It is also not used if it
+# contradicts the braking by more than SWAY_SIGMAS standard deviations
 SWAY_DEG, SWAY_WORST_DEG, SWAY_SIGMAS = 0.7, 5.0, 3.0
-SURELY_DEG = 8.0  # slopes of roads differ by less than this. Within a log, a smaller tilt must be sudden
-TILT_DEG = 2.2  # a rotation with less tilt counts as a rotation about the vertical
-# The vertical is compared before and after a moment. Each side begins STEP_GAP_S from the moment and lasts STEP_S
+# Smallest tilt within a log that need not be sudden, in degrees. The slopes of roads differ by less
+SURELY_DEG = 8.0
+TILT_DEG = 2.2  # smallest tilt of a rotation that does not count as a rotation about the vertical
+# To find a jump, the vertical during the STEP_S before a moment is compared with the vertical during the STEP_S after
+# it. STEP_GAP_S on each side of the moment are left out
 STEP_S, STEP_GAP_S = 8.0, 1.0
-STEP_SHARE = 0.7  # a tilt is sudden if at least this share of it happens at one moment
+STEP_SHARE = 0.7  # smallest share of a sudden tilt that happens at one moment
 
 
 @dataclass
@@ -103,8 +107,7 @@ def _search(logs: list[Intervals], whole: Blocks, share: float) -> list[Move]:
         score = move.sigmas / share / (BETWEEN_SIGMAS if between else SUDDEN_SIGMAS if tilted else WITHIN_SIGMAS)
         if move.angle_deg < LEAST_DEG or score < 1.0 or (best and score <= best[0]):
             continue
-        # A slope of the road can look like a tilt, but does not change yaw. So a tilt without a change of yaw must be
-        # sudden
+        # A slope of the road looks like a tilt without a change of yaw. So such a tilt is reported only if it is sudden
         if not between and tilted and abs(turn[1]) < WITHIN_SIGMAS * sigma[1]:
             moment = _moment_of_jump(logs[move.log], move)
             if moment is None:
@@ -120,7 +123,7 @@ def _search(logs: list[Intervals], whole: Blocks, share: float) -> list[Move]:
 def _sides(whole: Blocks, at: int, between: bool) -> tuple[Blocks, Blocks]:
     """Return the blocks before and after block number `at`.
 
-    between: True if the block is the first of a log. Then the blocks may be of any log, otherwise only of this log.
+    between: True if the block is the first of a log. True uses blocks of all logs, False only blocks of the same log.
     """
     if between:
         return whole.part(slice(max(0, at - REACH), at)), whole.part(slice(at, at + REACH))
@@ -133,9 +136,10 @@ def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
     """Measure by how much the mount rotated between two groups of blocks.
 
     Returns:
-        The rotation vector along left, up and forward, shape (3), in degrees.
-        Its standard deviations, shape (3), in degrees.
-        Or None, if one of the groups does not determine an alignment.
+        turn: rotation vector along left, up and forward, shape (3), in degrees.
+        sigma: standard deviations of turn, shape (3), in degrees.
+
+    Returns None if one of the groups does not determine an alignment.
     """
     if min(len(before.log), len(after.log)) < LEAST_BLOCKS:
         return None
@@ -145,8 +149,8 @@ def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
     turn = np.degrees(rotation_vector(other.frame @ one.frame.T))
     road = ROAD_DEG if before.log[-1] == after.log[0] else OTHER_ROAD_DEG
     variance = one.variance + other.variance + 2.0 * road**2
-    # The direction of the sway is an independent measurement of yaw. If the two alignments differ by an error of yaw,
-    # the sway seems to turn by that error
+    # The direction of the sway measures yaw independently. An error between the two yaws makes the sway seem to turn
+    # by the same angle
     swayed = one.sway_variance + other.sway_variance + 2.0 * SWAY_DEG**2
     error = (other.sway_deg - one.sway_deg + 90.0) % 180.0 - 90.0
     if swayed < SWAY_WORST_DEG**2 and error**2 < SWAY_SIGMAS**2 * (swayed + variance[1]):
@@ -206,7 +210,7 @@ def _moment_of_jump(log: Intervals, move: Move) -> float | None:
     if np.count_nonzero(near) < 10:
         return None
     found, varied = fits(terms[near].T @ terms[near], terms[near].T @ force[near])
-    level = (force - terms[:, 1:] @ found[1:]) / terms[:, :1]  # the vertical is the force without the part from driving
+    level = (force - terms[:, 1:] @ found[1:]) / terms[:, :1]  # the vertical: the force minus the effects of driving
     left, _, forward = frames(found, varied)
     tips = (left * move.turn_deg[2] - forward * move.turn_deg[0]) / tilt  # unit vector in which the vertical moves
     best, moment = 0.0, move.at_s

@@ -36,9 +36,10 @@ NO_SPEED, MOVED = "no-speed", "mount-moved"
 AFTERWARDS, DISK_FULL = "not-finished", "disk-full"
 # Notices about parts of a log that are not used, and about a faulty sensor
 _REPORTED = (CutLine, CutGzip, NulEnd, FrozenReadings, AxisDead, GyroSaturated, AccelClipped)
-_SUSPECTS = (MOVED, "parts-differ", "uncertain")  # moves of the mount are searched after these refusals of the firmware
+# Refusals of the firmware whose cause may be a move of the mount
+_SUSPECTS = (MOVED, "parts-differ", "uncertain")
 _PLOTTED = 160  # largest number of intervals in a picture
-_AGAINST = -0.5  # if evidence.handedness() is below this, the gyro or the axes are mirrored
+_AGAINST = -0.5  # below this value of evidence.handedness(), the gyro or the axes are mirrored
 
 Row = dict[str, Any]
 
@@ -47,8 +48,8 @@ Row = dict[str, Any]
 class PeriodResult:
     """The rows of one mount of one vehicle in tables.TABLES, and the points of its picture.
 
-    A point of the picture has four numbers of an interval, in g: change of speed, force forward, centripetal
-    acceleration, force to the left.
+    A point of the picture has four numbers of one interval, all in g: change of speed, force forward, centripetal
+    acceleration and force to the left.
     """
 
     alignment: Row
@@ -130,7 +131,7 @@ class _Drive:
     """The alignment from the logs of a period.
 
     fit: Alignment by the firmware's method.
-    intervals: Intervals of each log. Empty if the firmware refused the logs for a reason that no other method can mend.
+    intervals: Intervals of each log. Empty if the firmware refused the logs and no other method can help.
     moves: Moves of the mount.
     found: Alignment from all logs, or None if they do not determine it.
     """
@@ -234,7 +235,7 @@ def _alignment(
 
 
 def _mirrored(driven: list[evidence.Intervals]) -> bool:
-    """True if the force in bends points to the opposite side of the one computed from the gyro's yaw rate."""
+    """Detect mirrored axes: in bends, the force points to the side opposite to the one that the yaw rate predicts."""
     whole = evidence.blocks(driven)
     if not len(whole.log):
         return False
@@ -283,7 +284,7 @@ def _utc_s(log: Log, at_s: float) -> float | None:
 def _picture(drive: _Drive) -> list[list[float]]:
     """Compute the points of the picture (see PeriodResult).
 
-    If the mount moved, the alignment is a mean over several mountings, so the points scatter.
+    If the mount moved, the alignment is a mean over several mountings. The scatter of the points then shows the move.
     """
     if not drive.found:
         return []

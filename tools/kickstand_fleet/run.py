@@ -20,11 +20,11 @@ from .period import AFTERWARDS, CHANGED, DISK_FULL, PeriodResult, failed, work_o
 from .show import plot
 from .show.page import Glance
 
-RESULTS_VERSION = 4  # a new number makes all earlier results obsolete
+RESULTS_VERSION = 4  # a new number makes the next run recompute all earlier results
 PLOTS, SIGNALS = "plots", "signals"
 TIMEOUT_S = 600.0  # longest time for one mount of one vehicle
-# During a run, the tables are rewritten at most once in _WRITE_S seconds. If writing them takes long, the pause is
-# _SHARE times as long as the last writing
+# Shortest pause before the tables are written again during a run: _WRITE_S seconds, and _SHARE times the duration of
+# the last writing
 _WRITE_S, _SHARE = 15.0, 20.0
 
 
@@ -55,7 +55,7 @@ def run_fleet(
 ) -> FleetRun:
     """Process all periods, and write tables (see tables.TABLES), pictures and index.html.
 
-    Results of an earlier run into the same directory are reused if their logs have not changed.
+    If earlier results are in the same directory, they are reused unless their logs have changed.
 
     Args:
         periods: The periods of read_manifest() or by_pattern().

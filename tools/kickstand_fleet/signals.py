@@ -33,8 +33,8 @@ COLUMNS = {
 def write(directory: str, period: Period, log: Log, calibration: CalibrationFile) -> list[str]:
     """Write a log to DIRECTORY/vehicle=.../day=.../NAME.parquet, one file per day of Universal Time.
 
-    The day is "unknown" if the log has no Universal Time. NAME consists of the mount, the log's name and a hash of its
-    path. So two logs never share a file, and another run writes the same files.
+    The day is "unknown" if the log has no Universal Time. NAME consists of the mount, the log's name and a hash of the
+    log's path. So two logs never share a file, and a second run overwrites the same files.
 
     calibration: must be aligned. Returns the paths of the files. Raises InputError if a file cannot be written.
     """

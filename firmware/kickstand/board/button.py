@@ -11,19 +11,19 @@ from ..units import const
 SHORT = 1
 LONG = 2
 
-_DEBOUNCE_MS = const(20)  # a change of the contact must last this long
-_LONG_MS = const(800)  # a press that lasts longer is a long one
+_DEBOUNCE_MS = const(20)  # shortest time for which a change of the contact must last to count
+_LONG_MS = const(800)  # shortest duration of a long press
 
 
 class Button:
-    """A debounced push button. pin: a machine.Pin with pull-up, low while pressed. Call poll() at least every 20 ms."""
+    """A debounced push button. Call poll() at least every 20 ms. pin: a machine.Pin with pull-up, low while pressed."""
 
     def __init__(self, pin):
         self._pin = pin
         self._pressed = self._raw = self.held()
         self._changed_ms = None
         self._pressed_ms = 0
-        # True once the long press was reported, and for a press that began before this object existed
+        # True after the long press was reported. At first also True, for a press that began before this object existed
         self._long_sent = True
 
     def held(self):
@@ -31,7 +31,7 @@ class Button:
         return not self._pin.value()
 
     def poll(self, now_ms):
-        """Return SHORT when a short press ends, LONG while a long one is still held, else 0. now_ms: ticks_ms()."""
+        """Return SHORT when a short press ends, LONG once while a long press continues, else 0. now_ms: ticks_ms()."""
         raw = not self._pin.value()
         if self._changed_ms is None or raw != self._raw:
             self._raw = raw

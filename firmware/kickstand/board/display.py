@@ -9,16 +9,19 @@
 A driver (hd44780.Lcd, oled.Oled) has the following members. host_tests/simulated_board/test_board_display.py tests each
 driver.
 
-begin(i2c, address, hz, fresh)  takes a display that has just answered. fresh: True if it may have just been powered.
-show(line1, line2, picture)     stores what to show. 16 characters per line, a str of codes below 256 or bytes.
+begin(i2c, address, hz, fresh)  prepares for a display that has just answered. fresh: True if the display may have been
+                                powered just now.
+show(line1, line2, picture)     stores the lines and the picture to show. A line has 16 characters. It is bytes, or a
+                                str with codes below 256.
 tick(now_ms)                    does one step and uses the bus for 3 ms (OLED) or at most 13 ms (LCD). Raises OSError if
                                 the display does not answer.
-busy                            True while something must still be sent
-draws                           True if it shows pictures. A picture is (draw, values...): draw(canvas, values...) is
-                                called with a blank framebuf.FrameBuffer of 128x64 pixels. Others show the two lines.
+busy                            True while something must still be sent.
+draws                           True if the display shows pictures. Other displays show only the two lines. A picture is
+                                a tuple (draw, values...). The driver calls draw(canvas, values...) with a blank
+                                framebuf.FrameBuffer of 128x64 pixels.
 
-After a loss of power or a failed transfer the display is set up again. It stays dark or shows dashes until its content
-is correct.
+After a loss of power or a failed transfer, the driver sets the display up again. The display stays dark or shows dashes
+until its content is correct.
 """
 
 from time import sleep_ms, ticks_diff, ticks_ms
@@ -29,15 +32,17 @@ from ..errors import attempt
 from ..units import const
 
 _OLED_ADDRESSES = const((0x3C, 0x3D))
-ADDRESSES = (0x27, 0x3F) + _OLED_ADDRESSES  # the backpack's PCF8574 and PCF8574A with all jumpers open
-_FAMILY = tuple(range(0x20, 0x27)) + tuple(range(0x38, 0x3C)) + (0x3E,)  # a backpack's other addresses
-LCD_HZ, OLED_HZ = 100_000, 400_000  # the fastest clocks that a PCF8574 and the OLEDs allow
+# 0x27 and 0x3F are the addresses of a backpack's PCF8574 and PCF8574A with all jumpers open
+ADDRESSES = (0x27, 0x3F) + _OLED_ADDRESSES
+_FAMILY = tuple(range(0x20, 0x27)) + tuple(range(0x38, 0x3C)) + (0x3E,)  # other addresses of a backpack
+LCD_HZ, OLED_HZ = 100_000, 400_000  # fastest clocks of a PCF8574 and of the OLEDs
 STOPPED = "Kickstand", "stopped"  # shown after the firmware has ended
 KINDS = ("auto", "lcd", "ssd1306", "sh1106", "ssd1306-32")
 _PROBE_MS = const(200)  # time between two searches for a missing display
-MOST_WAIT_MS = 60_000  # the longest time between searches: it doubles while a driver cannot be loaded
-_REOPEN_PROBES = const(5)  # without a display the bus is freed once per this many probes
-_POWER_UP_MS = const(40)  # a display found sooner after power-on may have been powered together with the board
+# Longest time between two searches. While a driver cannot be loaded, the time doubles up to this limit
+MOST_WAIT_MS = 60_000
+_REOPEN_PROBES = const(5)  # number of searches without a display after which the bus is freed
+_POWER_UP_MS = const(40)  # a display found within this time may have been powered together with the board
 _FLUSH_STEPS = const(60)
 _STEP_MS = const(5)
 
@@ -45,11 +50,17 @@ _STEP_MS = const(5)
 class Display:
     """A display that you may plug in or out at any time.
 
-    reopen(hz): frees the bus and returns it as a machine.I2C.  bus_hz: the clock of the bus; None selects the fastest
-    that the display allows. kind: one of KINDS.  addresses: where to look for the display.  contrast, inverted: see
-    Oled.  wiring: see Lcd.
+    Args:
+        reopen: reopen(hz) frees the bus and returns it as a machine.I2C.
+        bus_hz: clock of the bus. None selects the fastest clock that the display allows.
+        kind: one of KINDS.
+        addresses: addresses at which to look for the display.
+        contrast, inverted: see Oled.
+        wiring: see Lcd.
 
-    address: where it was found, or None while no display answers.  draws: as above.
+    Attributes:
+        address: address of the display, or None while no display answers.
+        draws: True if the display shows pictures.
     """
 
     def __init__(self, reopen, bus_hz=None, kind="auto", addresses=ADDRESSES, contrast=255, inverted=False, wiring=1):
@@ -65,7 +76,7 @@ class Display:
         self._status = bytearray(1)
         self.address = None
         self.draws = False
-        self._probes = 0  # successive probes that found nothing
+        self._probes = 0  # number of successive searches that found no display
         self._probed_ms = None
         self._wait_ms = _PROBE_MS
         self._fresh = ticks_ms() < _POWER_UP_MS
@@ -113,7 +124,7 @@ class Display:
                 self._fresh = True
                 self.show(line1, line2)
                 self.flush()
-        except Exception:  # pins, drivers, memory: the firmware has ended, so nothing can report the error
+        except Exception:  # nothing can report an error any more, because the firmware has ended
             pass
         finally:
             if interrupt:
@@ -121,7 +132,7 @@ class Display:
 
     def _probe(self):
         """Look for the display at each address."""
-        if self._probes % _REOPEN_PROBES == 0:  # freeing a stuck bus takes too long to do it at every search
+        if self._probes % _REOPEN_PROBES == 0:  # not at every search, because freeing a stuck bus takes long
             self._i2c = self._reopen(self._bus_hz or LCD_HZ)
         self._probes += 1
         for address in self._addresses:
@@ -130,7 +141,7 @@ class Display:
         other = _FAMILY[self._probes % len(_FAMILY)]
         if self._addresses is ADDRESSES and self._kind in ("auto", "lcd") and self._answers(other):
             return
-        # Not found: a display that answers later has just been powered and may be a different one
+        # Not found. A display that answers later has just been powered, and may be another display
         self._fresh = True
         self._wait_ms = _PROBE_MS
 

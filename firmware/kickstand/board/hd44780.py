@@ -1,11 +1,11 @@
 """Driver for an HD44780 character display, 16x2 or larger, behind a PCF8574 port expander (the usual I2C backpack).
 display.py finds it and describes its methods.
 
-Sources: data sheets Hitachi HD44780U (ADE-207-272) and NXP PCF8574. The display is driven in 4-bit mode. The changed
-part of a line is sent in two transfers: first dashes, then the text. A transfer of a whole line takes 6 ms at 100 kHz.
+Sources: data sheets Hitachi HD44780U (ADE-207-272) and NXP PCF8574. The driver uses the 4-bit mode. It sends the
+changed part of a line in two transfers: first dashes, then the text. A transfer of a whole line takes 6 ms at 100 kHz.
 
-Backpacks connect the pins of the PCF8574 differently: see WIRINGS. The bit of R/W is between those of RS and E; it
-stays low.
+Different backpacks connect the pins of the PCF8574 in different ways, see WIRINGS. The bit of R/W is between the bits
+of RS and E, and stays low.
 """
 
 from time import ticks_diff, ticks_ms
@@ -25,23 +25,23 @@ _CGRAM_ADDRESS = const(0x40)  # instruction "set CGRAM address" (table 6)
 _COLUMNS = const(16)
 _DASHES = b"-" * _COLUMNS
 _NO_TEXT = "\n"
-_NEVER = b"\xfe" * _COLUMNS  # a code that no text uses: marks a line as not yet written
-# Time between initialisations. After electrical noise the display may pair the nibbles wrongly; only an initialisation
-# repairs that.
+_NEVER = b"\xfe" * _COLUMNS  # marks a line that was not written yet; no text uses this code
+# Time between two initialisations. After electrical noise the display may combine the wrong nibbles to bytes. Only an
+# initialisation repairs this.
 _REINIT_MS = const(10_000)
 _PROBE_MS = const(200)  # time between two checks that the display is connected
-_STEP_MS = const(5)  # time between two steps: the longest wait that the initialisation requires is 4.1 ms
-_POWER_UP = const(-8)  # first step after power-up: the display takes no instruction for 40 ms
+_STEP_MS = const(5)  # time between two steps of the initialisation, which requires waits of up to 4.1 ms
+_POWER_UP = const(-8)  # number of the first step after power-up, because the display takes no instruction for 40 ms
 
-# Initialisation by instruction (data sheet, figure 24), one step per tick, _STEP_MS apart, so the loop never waits.
-# Single nibbles come first: they bring the display into 4-bit mode from any state. Whole bytes follow: function set (4
-# bit, 2 lines); display on, no cursor; entry mode left to right; return home, which undoes a shift. Each of the first
-# three needs 37 us, less than a transfer.
+# Initialisation by instruction (data sheet, figure 24). Each tick does one step, and steps are _STEP_MS apart, so the
+# loop never waits. First come single nibbles, which bring the display into 4-bit mode from any state. Then come whole
+# bytes: function set (4 bit, 2 lines); display on, no cursor; entry mode left to right; return home, which undoes a
+# shift. Each of the first three bytes needs 37 us, which is less than a transfer takes.
 _NIBBLES = (0x30, 0x30, 0x30, 0x20)
 _COMMANDS = b"\x28\x0c\x06\x02"
 _GLYPH_PARTS = const(4)  # the 64 bytes of character patterns are sent 16 at a time
-# A larger display (20x4 or 20x2) shows more than 16 characters of a line. The driver blanks the rest, one line per
-# step.
+# Number of characters to blank behind each line, one line per step. A larger display (20x4 or 20x2) would show other
+# memory there.
 _BEHIND = const(24)
 _STEPS = len(_NIBBLES) + 1 + _GLYPH_PARTS + 2
 
@@ -63,7 +63,7 @@ class Lcd:
     draws = False
 
     def __init__(self, wiring=1):
-        """wiring: a number from 1 on, as LCD_WIRING. See WIRINGS."""
+        """wiring: number of the wiring in WIRINGS, from 1, like the setting LCD_WIRING."""
         self._rs, self._e, self._light, self._low = WIRINGS[wiring - 1]
         self._wanted = [bytearray(b" " * _COLUMNS), bytearray(b" " * _COLUMNS)]
         self._shown = [bytearray(_COLUMNS), bytearray(_COLUMNS)]
@@ -76,19 +76,21 @@ class Lcd:
     def begin(self, i2c, address, hz, fresh):
         self._i2c = i2c
         self._address = address
-        # step of the initialisation; negative while the display powers up
+        # Step of the initialisation. It is negative while the display powers up
         self._step = _POWER_UP if fresh else 0
-        self._acted_ms = ticks_ms()  # when something was last sent
-        self._seen_ms = 0  # when the display last answered
-        self._init_ms = 0  # when the initialisation last ended
+        self._acted_ms = ticks_ms()  # time of the last transfer
+        self._seen_ms = 0  # time of the display's last answer
+        self._init_ms = 0  # time of the end of the last initialisation
 
     @property
     def busy(self):
         return self._changed or self._step < _STEPS
 
     def show(self, line1, line2, picture=None):
-        """Set the two lines that tick() sends: str or bytes, padded or cut to 16 characters. Codes 0 to 7 show the
-        patterns of _bar_glyphs(), other codes those of the display's ROM. picture: not used."""
+        """Set the two lines that tick() sends.
+
+        A line is str or bytes. It is padded or cut to 16 characters. Codes 0 to 7 show the patterns of _bar_glyphs().
+        Other codes show the characters of the display's ROM. picture: not used."""
         self._put(0, line1)
         self._put(1, line2)
 
@@ -116,7 +118,7 @@ class Lcd:
     def _put(self, number, text):
         line = self._wanted[number]
         if isinstance(text, str):
-            if text == self._texts[number]:  # usually unchanged; a conversion takes 0.2 ms
+            if text == self._texts[number]:  # usually the text is unchanged, and this saves 0.2 ms for a conversion
                 return
             self._texts[number] = text
             for i in range(_COLUMNS):
@@ -144,11 +146,10 @@ class Lcd:
             self._changed = True
 
     def _kept_power(self):
-        """Return False if the display lost its power since the last transfer, however briefly. Raises OSError without
-        an answer.
+        """Return False if the display has lost its power since the last transfer, even for a moment.
 
         The PCF8574's pins are high after power-up, but every transfer leaves E low. So this check must run before the
-        next transfer."""
+        next transfer. Raises OSError if the display does not answer."""
         self._i2c.readfrom_into(self._address, self._port)
         return not self._port[0] & self._e
 
@@ -166,7 +167,8 @@ class Lcd:
                 while shown[last] == wanted[last]:
                     last -= 1
                 at = _LINE_ADDRESSES[i] + first
-                if last > first:  # dashes first: an interrupted transfer must not leave half a number or the wrong side
+                # Send dashes first, because an interrupted transfer must not leave half a number or the wrong side
+                if last > first:
                     self._send(at, memoryview(_DASHES)[first : last + 1])
                 self._send(at, memoryview(wanted)[first : last + 1])
                 shown[:] = wanted
@@ -183,9 +185,10 @@ class Lcd:
         self._i2c.writeto(self._address, memoryview(packed)[: 4 * (len(data) + 1)])
 
     def _pack(self, at, value, control):
-        """Put a byte into _packed as two nibbles, each with E high and then low: the falling edge latches the nibble.
+        """Put a byte into _packed as two nibbles. Each nibble is sent with E high, then with E low, because the falling
+        edge of E latches it.
 
-        RS changes in the byte that raises E: at 100 kHz that is 90 us before E falls."""
+        RS changes together with the rise of E. At 100 kHz this is 90 us before E falls."""
         packed, enable = self._packed, self._e
         if self._low:
             high = value >> 4 | control

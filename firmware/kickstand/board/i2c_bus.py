@@ -6,9 +6,9 @@ from machine import Pin
 
 from . import port
 
-_HALF_PERIOD_US = 5  # half a period of SCL while a bus is freed: 100 kHz
-# Time-out in bit times: on rp2 of a whole transfer of at most 136 bytes, on an ESP32 of one bit. The default of 50 ms
-# would stop the loop for too long.
+_HALF_PERIOD_US = 5  # half a period of SCL while a bus is freed, so SCL runs at 100 kHz
+# Time-out in bit times. On a Pico it limits a whole transfer of at most 136 bytes, on an ESP32 a single bit. The
+# default of 50 ms would stop the loop for too long.
 _TIMEOUT_BITS = 2000
 
 
@@ -18,10 +18,13 @@ def _set(pin, value):
 
 
 def free(sda_pin, scl_pin):
-    """Make a device release SDA. Return True if SDA is high afterwards. Pins: GPIO numbers.
+    """Make a device release SDA. Return True if SDA is high afterwards.
 
-    If the microcontroller resets in the middle of a read, the device waits for clocks and holds SDA low forever. Up to
-    nine clocks let the device finish its byte; a STOP condition ends the transfer. MicroPython does not send them.
+    If the microcontroller resets in the middle of a read, the device waits for clock pulses and holds SDA low forever.
+    Up to nine pulses let the device finish its byte, and a STOP condition ends the transfer. MicroPython sends neither.
+
+    Args:
+        sda_pin, scl_pin: GPIO numbers.
     """
     scl = Pin(scl_pin, Pin.OPEN_DRAIN, value=1)
     sda = Pin(sda_pin, Pin.OPEN_DRAIN, value=1)
@@ -39,10 +42,14 @@ def free(sda_pin, scl_pin):
 
 
 def open_i2c(controller, sda_pin, scl_pin, frequency):
-    """Free the bus and open it: see port.open_i2c(). controller: number of the I2C controller.  Pins: GPIO numbers.
-    frequency: in Hz.
+    """Free the bus and open it, see port.open_i2c(). Raises OSError if SDA stays low, ValueError for pins that the
+    controller cannot use.
 
-    Raises OSError if SDA stays low, ValueError for pins that the controller cannot use."""
+    Args:
+        controller: number of the I2C controller.
+        sda_pin, scl_pin: GPIO numbers.
+        frequency: clock in Hz.
+    """
     if not free(sda_pin, scl_pin):
         raise OSError("SDA is held low")
     timeout_us = _TIMEOUT_BITS * 1_000_000 // frequency

@@ -1,8 +1,8 @@
 """Driver for an OLED of 128x64 pixels with an SSD1306 or SH1106, or of 128x32 with an SSD1306. display.py finds it and
 describes its methods.
 
-Sources: data sheets Solomon Systech SSD1306 rev 1.1 and Sino Wealth SH1106 V2.3. Both are addressed by pages of 8 rows,
-the only way that an SH1106 has. An SH1106 has 132 columns; the panel shows the middle 128.
+Sources: data sheets Solomon Systech SSD1306 rev 1.1 and Sino Wealth SH1106 V2.3. The driver addresses both chips by
+pages of 8 rows, because an SH1106 has no other way. An SH1106 has 132 columns, and the panel shows the middle 128.
 """
 
 from time import ticks_add, ticks_diff, ticks_ms
@@ -12,30 +12,34 @@ import framebuf
 from ..units import const
 
 WIDTH, HEIGHT = 128, 64
-# The picture is sent in parts of _PART columns of a page, and only changed parts are sent. A part takes 0.9 ms at 400
-# kHz, 3.5 ms at 100 kHz. One pass of the loop sends _PARTS of them, or _PARTS_SLOW on a bus slower than _SLOW_HZ.
+# A part is _PART columns of a page. Only changed parts are sent. Sending a part takes 0.9 ms at 400 kHz, and 3.5 ms at
+# 100 kHz. One pass of the loop sends _PARTS parts, or _PARTS_SLOW parts on a bus slower than _SLOW_HZ.
 _PART = 32
 _PARTS, _PARTS_SLOW, _SLOW_HZ = 3, 2, 200_000
 _PROBE_MS = const(200)  # time between two checks that the display has kept its power
-_REFRESH_MS = const(10_000)  # time until everything is sent again: this repairs the effects of electrical noise
+_REFRESH_MS = const(10_000)  # time until everything is sent again, to repair the effects of electrical noise
 _POWER_UP_MS = 40
 _OFF = 0x40  # bit of the status: the panel is off
-_SH1106_STATUS = (0x08, 0x00, 0x0C)  # low half of an SH1106's status; an SSD1306 reads 3 or 6, a clone any value
-_SH1106_OFFSET = 2  # the first visible column of an SH1106
-# Rows by which the picture is shifted, each for _SHIFT_REFRESHES, against burn-in. Rows shifted out at the top return
-# at the bottom, so pictures leave the first two rows blank.
+# Low half of the status of an SH1106. An SSD1306 has 3 or 6 there, and a clone may have any value
+_SH1106_STATUS = (0x08, 0x00, 0x0C)
+_SH1106_OFFSET = 2  # first visible column of an SH1106
+# To avoid burn-in, the picture is shifted by each of these numbers of rows for _SHIFT_REFRESHES. Rows that leave the
+# panel at the top return at the bottom, so pictures leave the first two rows blank.
 _SHIFTS = (0, 1, 2, 1)
 _SHIFT_REFRESHES = const(6)
-# A panel of 32 rows has no spare rows at the top: its picture moves down over the two blank rows below the letters.
+# A panel of 32 rows has no blank rows at the top. So its picture is shifted down, over the two blank rows below the
+# text.
 _SHIFTS_32 = (0, 63, 62, 63)
-# A control byte, which starts a stream of commands, then: clock, rows - 1, no offset, columns and rows from the side
-# opposite to the cable, COM pins alternate (64 rows) or in sequence (32), pre-charge, VCOMH, show the RAM
+# First a control byte, which starts a stream of commands. Then the commands: clock; number of rows - 1; no offset;
+# columns and rows from the side opposite to the cable; COM pins alternate (64 rows) or in sequence (32); pre-charge;
+# VCOMH; show the RAM
 _SET_UP = b"\x00\xd5\x80\xa8\x3f\xd3\x00\xa1\xc8\xda\x12\xd9\xf1\xdb\x40\xa4"
 _SET_UP_32 = b"\x00\xd5\x80\xa8\x1f\xd3\x00\xa1\xc8\xda\x02\xd9\xf1\xdb\x40\xa4"
-# The SH1106's DC-DC converter; the SSD1306's charge pump, page addressing, no scrolling. Each chip ignores the other's
-# commands. A clone may report the status of either chip, so both sets are sent: without its own set a panel stays dark.
+# For the SH1106: DC-DC converter. For the SSD1306: charge pump, page addressing, no scrolling. Without the commands for
+# its own chip a panel stays dark. A clone may report the status of the other chip, so all commands are sent to every
+# panel. Each chip ignores the other chip's commands.
 _SUPPLY = b"\xad\x8b\x8d\x14\x20\x02\x2e"
-# each bit of a nibble doubled
+# For each nibble, the byte with each of its bits doubled
 _SPREAD = bytes((i & 1) * 3 | (i & 2) * 6 | (i & 4) * 12 | (i & 8) * 24 for i in range(16))
 
 
@@ -47,8 +51,9 @@ class Canvas(framebuf.FrameBuffer):
         self._pixels = pixels
 
     def tall(self, line, page, inverted=False):
-        """Write up to 16 letters of 8x16 pixels across the display, from row 8 * page on. line: str or bytes, as in
-        show()."""
+        """Write up to 16 letters of 8x16 pixels across the display. Their top is at row 8 * page.
+
+        line: str or bytes, as in show()."""
         for i in range(min(16, len(line))):
             character(self, line[i] if isinstance(line[i], int) else ord(line[i]), 8 * i, 8 * page)
         pixels = self._pixels
@@ -62,10 +67,14 @@ class Canvas(framebuf.FrameBuffer):
 class Oled:
     """The driver of the OLED. display.py describes its methods.
 
-    kind: "ssd1306", "sh1106", "auto", or "ssd1306-32": a panel of 32 rows, which shows only the two lines. contrast: 0
-    to 255.  inverted: dark on bright.
+    Args:
+        kind: "ssd1306", "sh1106", "auto" or "ssd1306-32". The last one is a panel of 32 rows, which shows only the two
+            lines.
+        contrast: 0 to 255.
+        inverted: True for dark on bright.
 
-    canvas: the Canvas on which pictures are drawn.
+    Attributes:
+        canvas: the Canvas on which pictures are drawn.
     """
 
     def __init__(self, kind, contrast, inverted):
@@ -75,14 +84,14 @@ class Oled:
         self._pixels = bytearray(WIDTH * HEIGHT // 8)
         self._sent = bytearray(WIDTH * HEIGHT // 8)
         self.canvas = Canvas(self._pixels)
-        # the pixels to show and the pixels sent, part by part; parts of the same columns are neighbours, so a digit is
-        # sent at once
+        # The pixels to show and the pixels that were sent, part by part. Parts with the same columns are neighbours, so
+        # the parts of a digit are sent together
         self._pages = HEIGHT // 8 if self.draws else HEIGHT // 16
         starts = [page * WIDTH + x for x in range(0, WIDTH, _PART) for page in range(self._pages)]
         self._new, self._old = [
             [memoryview(pixels)[at : at + _PART] for at in starts] for pixels in (self._pixels, self._sent)
         ]
-        # a transfer: three commands, each after a control byte, then data
+        # A transfer consists of three commands, each after a control byte, and the data
         self._packet = bytearray(b"\x80\xb0\x80\x00\x80\x10\x40") + bytearray(_PART)
         self._status = bytearray(1)
         self._wanted = self._drawn = "", ""
@@ -96,13 +105,13 @@ class Oled:
         self._restart()
 
     def _restart(self):
-        # decided at every start, because another display may be plugged in
+        # Find the chip at every start, because another display may have been plugged in
         self._sh1106 = self._kind == "sh1106" or (self._kind == "auto" and self._state() & 0x0F in _SH1106_STATUS)
         self._set_up = self._lit = False
         self._send_all()
 
     def _send_all(self):
-        self._unsent = len(self._new)  # number of parts that must be sent even if unchanged
+        self._unsent = len(self._new)  # number of parts that must be sent even if they are unchanged
         self._changed = True
 
     @property
@@ -110,7 +119,8 @@ class Oled:
         return not self._lit or self._changed or self._drawn is not self._wanted
 
     def show(self, line1, line2, picture=None):
-        """Set the picture, or without one the two lines, in letters of double height. Codes: those of hd44780.py."""
+        """Set the picture. Without a picture, set the two lines, in letters of double height. The codes are those of
+        hd44780.py."""
         wanted = (self.draws and picture) or tuple(
             [line if isinstance(line, str) else bytes(line) for line in (line1, line2)]
         )
@@ -118,11 +128,12 @@ class Oled:
             self._wanted = wanted
 
     def tick(self, now_ms):
-        """Draw, or send some changed parts, or check the display's power. A picture does not change while it is being
-        sent."""
+        """Do one step: draw, send some changed parts, or check the display's power.
+
+        A picture does not change while it is being sent."""
         if ticks_diff(now_ms, self._due_ms) < 0:
             return
-        if not self._set_up:  # not set up: stay dark until the RAM is written
+        if not self._set_up:  # the panel stays dark until the RAM is written
             self._command(b"\x00\xae")
             self._configure()
             self._draw(self._wanted)

@@ -22,25 +22,27 @@ if IS_ESP32:
     _KNOWN = MACHINE.startswith("Generic ESP32 module")  # ESP32-DevKitC and similar, with the classic chip
     SENSOR_PINS, LCD_PINS, BUTTON_PIN = (21, 22), (18, 19), 4  # (SDA, SCL)
     GPS_UART, GPS_PINS, WHEEL_PIN = 2, (17, 16), 27  # (TX, RX)
-    if "SPIRAM" in MACHINE:  # MicroPython's image for PSRAM uses 16 and 17 itself and has no Pin for them
+    if "SPIRAM" in MACHINE:  # MicroPython's image for PSRAM uses pins 16 and 17 itself, and has no Pin for them
         GPS_PINS = None, None
-    PIN_IRQ = {}  # extra arguments of Pin.irq(): this port has only soft interrupts, and SoftI2C transfers delay them
+    # Extra arguments of Pin.irq(). This port has only soft interrupts, and SoftI2C transfers delay them
+    PIN_IRQ = {}
     I2C_NUMBERED = False  # see open_i2c()
     SD_SPI = (2, 3)  # the slots of machine.SDCard that are SPI
-    # Pins that the chip itself needs: its own USB (driving one cuts the board off from the computer until BOOT is
-    # held), a classic chip's flash (6 to 11; driving one crashes the board at each start) and its console
+    # Pins that the chip itself needs. On a pin of its own USB, an output disconnects the board from the computer until
+    # BOOT is held. On a pin of a classic chip's flash (6 to 11), an output crashes the board at each start. The third
+    # group is the console
     _CHIP = MACHINE.split(" with ESP32")[-1].lstrip("-")[:2]  # "S2", "C3", ...; classic: "", "UN", "D2" or "PI"
     _CLASSIC = not (_CHIP[:1] in ("S", "C", "H", "P") and _CHIP[1:].isdigit())
     TAKEN_PINS = {"S2": (19, 20), "S3": (19, 20), "C3": (18, 19), "C6": (12, 13), "H2": (26, 27)}.get(
         _CHIP, (1, 3, 6, 7, 8, 9, 10, 11) if _CLASSIC else ()
     )
-    INPUT_PINS = (34, 35, 36, 37, 38, 39) if _CLASSIC else ()  # no output and no pull-up
+    INPUT_PINS = (34, 35, 36, 37, 38, 39) if _CLASSIC else ()  # pins without output and without pull-up
 else:  # Raspberry Pi Pico and Pico 2, and other makers' boards with the same pins and name
     _KNOWN = sys.platform != "rp2" or "Pico" in MACHINE
     SENSOR_PINS, LCD_PINS, BUTTON_PIN = (4, 5), (6, 7), 15
     GPS_UART, GPS_PINS, WHEEL_PIN = 1, (8, 9), 14
-    PIN_IRQ = {"hard": True}  # a soft interrupt is lost during a transfer to the display
-    I2C_NUMBERED = True  # two buses need two numbers
+    PIN_IRQ = {"hard": True}  # soft interrupts would be lost during a transfer to the display
+    I2C_NUMBERED = True  # two buses must have two different numbers
     SD_SPI = (0, 1)  # the numbers of machine.SPI
     TAKEN_PINS = INPUT_PINS = ()
 if not _KNOWN:  # an unknown board may lack these pins or use them for something else
@@ -49,38 +51,45 @@ if not _KNOWN:  # an unknown board may lack these pins or use them for something
     GPS_UART = 1
 
 
-_SOFT_I2C_HZ = 250_000  # gives half a period of 2 us; at 400 kHz SoftI2C has 1 us, but the MPU6050 needs 1.3 us
-_TURN_BYTES = 2000  # bytes of heap used by one pass of the app's loop; 3000 while aligning by driving
+# Largest clock of SoftI2C, with half a period of 2 us. At 400 kHz, half a period is 1 us, but the MPU6050 needs 1.3 us
+_SOFT_I2C_HZ = 250_000
+_TURN_BYTES = 2000  # bytes of heap that one pass of the app's loop uses; 3000 while aligning by driving
 _FEWEST_TURNS = 3
 
-_WATCHDOG_MS = 8000  # rp2 allows 8388 at most
-_WEEK_MS = 604_800_000  # an ESP32 counts a time-out in 32 bits, four counts per ms: 12 days at most
+_WATCHDOG_MS = 8000  # a Pico allows at most 8388
+_WEEK_MS = 604_800_000  # a week. An ESP32 counts a time-out in 32 bits, with four counts per ms, so it allows 12 days
 
 _watchdog = None
 
 
 def open_i2c(controller, sda, scl, frequency, timeout_us):
-    """Open a machine.I2C or SoftI2C. controller: its number, which an ESP32 does not need.  Pins: machine.Pin.
+    """Open a machine.I2C, or a SoftI2C on an ESP32. Raises ValueError for pins that the controller cannot use.
 
-    Raises ValueError for pins that the controller cannot use. An ESP32's machine.I2C is not used. Up to MicroPython
-    1.28 it ignores the time-out and waits up to 0.1 s for each byte of a stalled transfer: longer than the watchdog
-    allows. Later versions count the time-out in ticks of 10 ms: with 5 ms every transfer fails. And a C3 has only one
-    I2C controller."""
+    An ESP32's machine.I2C has three problems. Up to MicroPython 1.28 it ignores the time-out, and waits up to 0.1 s for
+    each byte of a stalled transfer. The whole transfer then takes longer than the watchdog allows. Later versions count
+    the time-out in ticks of 10 ms, so with 5 ms every transfer fails. And a C3 has only one I2C controller.
+
+    Args:
+        controller: number of the controller, not used on an ESP32.
+        sda, scl: each a machine.Pin.
+        frequency: clock in Hz.
+        timeout_us: time-out in us.
+    """
     if IS_ESP32:
         return machine.SoftI2C(scl, sda, freq=min(frequency, _SOFT_I2C_HZ), timeout=timeout_us)
     return machine.I2C(controller, sda=sda, scl=scl, freq=frequency, timeout=timeout_us)
 
 
 def turns_to_collect(most):
-    """The number of passes of the app's loop between two garbage collections: `most`, or fewer if the heap is small.
+    """Return the number of passes of the app's loop between two garbage collections. It is `most` or smaller.
 
-    An ESP32's heap starts with 64 KB and grows only after a collection that frees too little. With `most`, collections
-    would often run in the middle of a pass."""
+    An ESP32's heap starts with 64 KB and grows only after a collection that frees too little. In such a small heap,
+    `most` passes would use up the heap, and collections would often run in the middle of a pass."""
     if not IS_ESP32:
         return most
     import esp32  # type: ignore[import-not-found]
 
-    # mem_free() also counts the heap's possible growth: the largest block of ESP-IDF's heap
+    # mem_free() also counts the possible growth of the heap, which is the largest block of ESP-IDF's heap
     grow = max(region[2] for region in esp32.idf_heap_info(esp32.HEAP_DATA))
     return max(_FEWEST_TURNS, min(most, (gc.mem_free() - grow) // (2 * _TURN_BYTES)))
 
@@ -109,9 +118,14 @@ def rest_watchdog():
 
 
 def open_sd_card(number, sck, mosi, miso, cs):
-    """Open the card as a block device for os.mount(). number: one of SD_SPI.  Pins: machine.Pin.
+    """Open the card as a block device for os.mount().
 
-    Raises ImportError if the driver is missing, OSError without a card, ValueError for wrong pins."""
+    Raises ImportError if the driver is missing, OSError without a card, ValueError for wrong pins.
+
+    Args:
+        number: one of SD_SPI.
+        sck, mosi, miso, cs: each a machine.Pin.
+    """
     if IS_ESP32:
         from machine import SDCard
 

@@ -11,10 +11,10 @@ MOUNT = "/sd"
 
 
 def mount(settings):
-    """Mount the card unless it is mounted; return its directory. settings: a Settings. Raises CardError.
+    """Mount the card unless it is already mounted. Return its directory. settings: a Settings. Raises CardError.
 
     If the card does not become ready, this takes 5 s or more."""
-    # A mounted card is listed without a size. A folder in flash with the same name has one.
+    # The directory of a mounted card is listed without a size. A folder in flash with the same name has a size.
     if any(entry[0] == MOUNT[1:] and len(entry) == 3 for entry in os.ilistdir("/")):
         return MOUNT
     pins = settings.SD_SCK, settings.SD_MOSI, settings.SD_MISO, settings.SD_CS

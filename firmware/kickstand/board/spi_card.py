@@ -11,13 +11,13 @@ from sdcard import SDCard  # type: ignore[import-not-found]
 
 from ..units import const
 
-_CLOCK_HZ = const(10_000_000)  # at the driver's default of 1.32 MHz a block of a ride takes 25 ms
+_CLOCK_HZ = const(10_000_000)  # the driver's default of 1.32 MHz would take 25 ms for a block of a ride
 _BUSY_MS = const(1000)  # cards may take 250 to 500 ms (SD Physical Layer Simplified Specification, section 4.6.2.2)
 _ACCEPTED = 0x05  # data response, section 7.3.3.1
 
 
 class CheckedCard(SDCard):
-    """An SD card whose writes are checked. spi: a machine.SPI.  cs: a machine.Pin. Raises OSError."""
+    """An SD card whose writes are checked. spi: a machine.SPI. cs: a machine.Pin. Raises OSError."""
 
     def __init__(self, spi, cs):
         self._byte = bytearray(1)
@@ -32,7 +32,7 @@ class CheckedCard(SDCard):
             raise OSError(self._fault)
 
     def write(self, token, buf):
-        """Write one sector. The driver calls this for each sector; after a fault the remaining sectors are skipped."""
+        """Write one sector. The driver calls this method for each sector. After a fault it skips the other sectors."""
         if self._fault:
             return
         self._send(token)
@@ -45,7 +45,7 @@ class CheckedCard(SDCard):
         self._release()
 
     def write_token(self, token):
-        """End a write of several sectors; the driver calls this."""
+        """End a write of several sectors. The driver calls this method."""
         self._send(token)
         self._receive()
         self._wait()

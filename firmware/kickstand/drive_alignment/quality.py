@@ -18,14 +18,17 @@ from .vertical import MAX_CHANGE_DEG
 MIN_EVENTS = 5  # number of straight braking and acceleration events needed for an alignment
 MIN_EVENTS_TO_CHECK_SPEED = 2
 # Each pair of limits is a hysteresis against flicker: the limit to become ready, and the limit to stay ready.
-READY_DEG, STAY_READY_DEG = 1.5, 2.5  # largest standard error of forward; one drive in ten is off by twice as much
+# Largest standard error of forward. In one drive of ten, the real error of forward is twice this standard error
+READY_DEG, STAY_READY_DEG = 1.5, 2.5
 AGREE_DEG, STAY_AGREE_DEG = 4.0, 6.0  # largest difference of forward between the halves, and between the parts
 # A larger difference between the parts is allowed if it is within this number of standard deviations
 AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0
 # If two parts differ by more than the next three limits, the mount moved
-_MOVED_DEG = const(30.0)  # difference of forward; a long banked motorway curve, treated as straight, caused 15
-PITCH_DEG = 7.0  # difference of pitch; a road of 6 % uphill and then downhill causes less
-ROLL_DEG = 7.0  # difference of roll; the banked curve caused 6; not used on a motorcycle, because it leans
+# Difference of forward. A long banked motorway curve that was treated as straight caused a difference of 15 degrees
+_MOVED_DEG = const(30.0)
+PITCH_DEG = 7.0  # difference of pitch. A road that goes 6 % uphill and then 6 % downhill causes less
+# Difference of roll. The banked curve caused 6 degrees. This limit is not used on a motorcycle, because it leans
+ROLL_DEG = 7.0
 # The mount moved if forward from one event differs by over _EVENT_OFF_DEG from forward of the whole drive. An event is
 # judged only if its weight and the length of its forward exceed the two limits below. On recorded drives no such event
 # differed by more than 40 degrees.

@@ -14,7 +14,7 @@ Sources: register map RM-MPU-6000A rev 4.2 (the page numbers below); product spe
         for k in range(chip.fetch()):  # every sample since the last fetch(), oldest first
             chip.take(k)
             print([count / chip.accel_lsb_per_g for count in chip.counts[0:3]], "g")
-        sleep_ms(10)  # up to 0.17 s at 200 samples per second; meanwhile the chip's FIFO keeps the samples
+        sleep_ms(10)  # the chip's FIFO keeps the samples for up to 0.17 s at 200 samples per second
 """
 
 from array import array
@@ -70,7 +70,7 @@ CHIPS = {
     0x74: ("MPU6515", 333.87, 21.0, True, 512, 0xF8),
     0x78: ("MPU6500 0x78", 333.87, 21.0, True, 512, 0xF8),
     0x98: ("ICM20689", 326.8, 25.0, True, 512, 0xF8),
-    0x19: ("MPU6886", 326.8, 25.0, True, 512, 0x18),  # always adds the temperature to the FIFO and has no bit for it
+    0x19: ("MPU6886", 326.8, 25.0, True, 512, 0x18),  # it always adds the temperature to the FIFO, so it has no bit
 }
 _NAME = const(0)
 _LSB_PER_C = const(1)
@@ -78,7 +78,7 @@ _ZERO_C = const(2)
 _HAS_ACCEL_CONFIG2 = const(3)
 _FIFO_EN_BITS = const(5)
 
-_MAX_FRAMES = const(8)  # most frames in one transfer when there are many to catch up; takes 3 ms at 400 kHz
+_MAX_FRAMES = const(8)  # most frames in one transfer, used after a delay; the transfer takes 3 ms at 400 kHz
 # Most frames in one transfer while fewer than _MAX_FRAMES are in the FIFO. Because of this limit, one slow pass of the
 # loop does not slow the next pass.
 _FEW_FRAMES = const(3)

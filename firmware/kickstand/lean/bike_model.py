@@ -25,17 +25,18 @@ Equations, with ' for the derivative by time
     roads are level          0 = q + psi sin t  on average                             (6)
     lean of the bike itself  t - psi cos t (tan q + 1/2 psi sin t)                     (7)
 
-t and q refer to the sensor's axes, which psi has turned. So t contains a part of the bike's own pitch, which is
-q + psi sin t. On a slope of 10 % a yaw error of 5 degrees causes half a degree of lean. (7) removes it, to second order
-in psi. On a level road q is -psi sin t, and (7) agrees with tan(lean of the bike) = tan t / cos psi.
+t and q refer to the sensor's axes, which the yaw error psi has turned. So t contains a part of the bike's own pitch,
+which is q + psi sin t. For example, on a slope of 10 % a yaw error of 5 degrees causes half a degree of lean. (7)
+removes this part, to second order in psi. On a level road q is -psi sin t, and (7) agrees with
+tan(lean of the bike) = tan t / cos psi.
 
-d is the springs' part of the pitch rate q': the wheels do not rise with it. Braking causes most of d; see (8) in
-dive.py. h is the height of the sensor above the roll axis.
+d is the part of the pitch rate q' that the springs cause. The wheels do not rise with it. Braking causes most of d, see
+(8) in dive.py. h is the height of the sensor above the roll axis.
 
 (4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a steady turn they cannot separate lean from speed,
-because their derivatives by lean and by speed are in the same proportion. There the ratio of two rates gives the lean:
-by (6) the pitch does not change, so by (2) w_x / w_y is tan t. At the beginning of a turn the earlier speed is still
-valid, and with it (4) gives the lean.
+because their derivatives by lean and by speed are in the same proportion. In such a turn the ratio of two rates gives
+the lean: by (6) the pitch does not change, so by (2) w_x / w_y is tan t. At the beginning of a turn the speed from
+before the turn is still valid, and with this speed (4) gives the lean.
 """
 
 from math import cos, radians, sin, sqrt, tan
@@ -49,30 +50,39 @@ YAW_ERROR = 6
 SCALE_LEFT, CROSS_LEFT_UP = 7, 8
 CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD = 9, 10, 11
 
-MAX_PITCH = 1.2  # rad. No motorcycle reaches it, but a sensor in the hand may. At 90 degrees lean has no meaning.
-MIN_PITCH = -MAX_PITCH  # a constant, because a negation in each sample would take heap and time
+# rad: largest pitch. Only a sensor in a hand reaches it, no motorcycle. At a pitch of 90 degrees the lean is undefined.
+MAX_PITCH = 1.2
+MIN_PITCH = -MAX_PITCH  # stored as a constant, because a negation for each sample would take heap and time
 
 # turn_rates() uses the yaw rate of a bike in balance if the speed is above _BALANCE_MIN_SPEED, the lean's standard
 # deviation is below BALANCE_SIGMA, and the measured rate differs by less than
 # _BALANCE_RATE + _BALANCE_SHARE x |balanced rate|. Comments in the form of measurements.py.
 _BALANCE_MIN_SPEED = const(4.0)  # m/s. Larger: the balanced rate is not used in slow turns.
 _BALANCE_RATE = const(0.1)  # rad/s. Larger: the balanced rate is used with a wrong lean or speed.
-_BALANCE_SHARE = const(0.5)  # ratio. Larger: as for _BALANCE_RATE.
+_BALANCE_SHARE = const(0.5)  # ratio. Larger: the balanced rate is used with a wrong lean or speed.
 BALANCE_SIGMA = radians(20.0)  # rad. Larger: the balanced rate is used with a more uncertain lean.
 _BALANCE_MIN_COS = const(0.3)  # ratio: lower bound of cos(lean). Larger: too small a rate about left in deep leans.
 
 
 def predict(x, force, rate, seconds, sums):
-    """Integrate (1) to (3) in the state x (STATES values) over one sample of force (3 values, g) and rate (3, rad/s).
+    """Integrate (1) to (3) over one sample. Return the corrected roll rate in rad/s.
 
-    The sample's values are added to sums (9 values). A window is a fifth of a second, one update of the filter. Divided
-    by its number of samples, the sums are the window's means:
+    This function also computes the innovations, because both computations use the same sines.
+
+    Args:
+        x: the state, STATES values, which is updated.
+        force: 3 values in g.
+        rate: 3 values in rad/s.
+        seconds: time since the previous sample.
+        sums: 9 values, to which the sample's values are added.
+
+    A window is a fifth of a second, one update of the filter. The sums of a window, divided by its number of samples,
+    are these means:
         0       innovation of (4) without its terms in h and d, at the state before the step, in g
         1       innovation of (5) without its terms in h and d, at the same state, in g
         2 to 4  corrected rates about left, up, forward, in rad/s
         5 to 7  force left, up, forward, in g
         8       square of innovation 0, in g^2
-    Returns the corrected roll rate in rad/s. Motion and innovations are one function because they share sines.
     """
     fx, fy, fz = force
     wx, wy, wz = rate
@@ -85,7 +95,7 @@ def predict(x, force, rate, seconds, sums):
     st, ct = sin(t), cos(t)
     sq = sin(q)
     cq = sqrt(1.0 - sq * sq)
-    per_rate = v / STANDARD_GRAVITY  # g in a turn of 1 rad/s
+    per_rate = v / STANDARD_GRAVITY  # centripetal acceleration in g per rad/s of yaw rate
     sideways = per_rate * wy
     acceleration = fz - sq + sideways * yaw_error
     x[LEAN] = t + (wz - sq / cq * (wx * st + wy * ct)) * seconds
@@ -111,17 +121,17 @@ def predict(x, force, rate, seconds, sums):
 
 
 def possible_pitch(pitch):
-    """Limit pitch to +-MAX_PITCH: at a right angle, as with a board lying flat, predict() would divide by zero."""
+    """Limit the pitch to +-MAX_PITCH. At 90 degrees, as on a board that lies flat, predict() would divide by zero."""
     return max(MIN_PITCH, min(MAX_PITCH, pitch))
 
 
 def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
-    """Return the rates about left and up (rad/s) for derivatives that multiply a rate by a state.
+    """Return the rates about left and up, in rad/s, for derivatives that multiply a rate by a state.
 
-    They are the rates of a bike in balance at this lean and speed, v w_y / g = -cos q sin t, if the measured rate about
-    up is close to the balanced one. Otherwise, and with a speed of 0, they are the measured rates. The noise of a
-    measured rate would be squared in such products and make the estimated speed and lean too small (errors in
-    variables).
+    A bike in balance has the rate v w_y / g = -cos q sin t about up. If the measured rate about up is close to this
+    rate, the function returns the rates of a bike in balance. Otherwise, and with a speed of 0, it returns the measured
+    rates. In a product of rate and state, the noise of a measured rate would be squared. This would make the estimated
+    speed and lean too small (errors in variables).
     """
     if speed > _BALANCE_MIN_SPEED:
         balanced = -STANDARD_GRAVITY * cos_pitch * sin_lean / speed
@@ -131,13 +141,22 @@ def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
 
 
 class Linearisation:
-    """The partial derivatives of (1) to (6) at the state x. rates (3 values) and forward: a window's means of the
-    corrected rates and of the forward force. lean_variance: rad^2, see turn_rates().
+    """The partial derivatives of (1) to (6).
 
-    Each row is ((state, partial derivative), ...). lean_row, pitch_row and speed_row belong to the rates of change (1)
-    to (3), left_row and up_row to the forces (4) and (5), level_row to (6). Zero derivatives are left out, and terms
-    that are small because a pitch, yaw error, scale error or cross-axis error is small. The other attributes are values
-    that several terms share.
+    Args:
+        x: the state.
+        rates: the window's mean corrected rates, 3 values in rad/s.
+        forward: the window's mean forward force in g.
+        lean_variance: variance of the lean in rad^2, see turn_rates().
+
+    Attributes:
+        lean_row, pitch_row, speed_row: derivatives of the rates of change (1), (2) and (3).
+        left_row, up_row: derivatives of the forces (4) and (5).
+        level_row: derivatives of (6).
+        The other attributes are values that several terms share.
+
+    Each row is ((state, partial derivative), ...). Derivatives that are zero are left out. Terms are also left out if
+    they are small because a pitch, yaw error, scale error or cross-axis error is small.
     """
 
     def __init__(self, x, rates, forward, lean_variance=0.0):
@@ -146,7 +165,7 @@ class Linearisation:
         st, ct, sq = sin(x[LEAN]), cos(x[LEAN]), sin(x[PITCH])
         cq = sqrt(1.0 - sq * sq)
         yaw_rate = wx * st + wy * ct  # about the vertical, where there is no pitch
-        per_rate = speed / STANDARD_GRAVITY  # g in a turn of 1 rad/s
+        per_rate = speed / STANDARD_GRAVITY  # centripetal acceleration in g per rad/s of yaw rate
         sideways = per_rate * wy
         acceleration = forward - sq + sideways * yaw_error
         turn_x, turn_y = turn_rates(speed if lean_variance < BALANCE_SIGMA**2 else 0.0, st, ct, cq, wx, wy)

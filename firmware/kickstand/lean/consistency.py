@@ -1,71 +1,87 @@
-"""Checks that the readings fit the model: the lean filter judges itself by its own innovations.
+"""Checks that the readings fit the lean filter's model, by the innovations of the filter.
 
-A filter's covariance does not show a partly failed sensor, but its innovations do. The square of an innovation over its
-expected variance, the normalised innovation squared, is 1 on average if everything fits (Y. Bar-Shalom and others,
-Estimation with Applications to Tracking and Navigation, section 5.4). This module averages the root instead, with the
-innovation's sign. Vibration and bumps, which a good sensor has too, cancel in this mean. A dead or mirrored axis, a
-halved scale, a step of the bias and a slipped mount do not cancel. The forces to the left and up have two means each.
-The short mean shows large errors within two seconds; the long one shows small errors after some seconds.
+A filter's covariance does not reveal a partly failed sensor, but its innovations do. An innovation is a measured value
+minus the expected value. Its square divided by its expected variance is called the normalised innovation squared. The
+mean of this value is 1 if everything fits (Y. Bar-Shalom and others, Estimation with Applications to Tracking and
+Navigation, section 5.4). This module averages the root of this value, with the innovation's sign. In this mean,
+vibration and bumps cancel. A dead or mirrored axis, a halved scale, a jump of the bias and a slipped mount do not
+cancel. The forces to the left and up have two means each. The short mean shows large errors within two seconds. The
+long mean shows small errors after some seconds.
 
-Three more means are of quantities that never last long on a real ride:
-    a force to the side, because a bike is in balance
-    a steep pitch
-    a pitch without its force
-On a real slope the forward force contains gravity's part, sin(pitch). If that part is missing, wrong rates have caused
-the pitch. The filter takes the difference for an acceleration: uphill the bike seems to brake, downhill to accelerate.
-A real bike does so only for a few seconds.
+Three more means are of quantities that never stay large for long on a real ride:
+    the force to the side, because a bike is in balance
+    the pitch
+    the part of the pitch that the forward force does not confirm
+On a real slope the forward force contains a part of gravity, sin(pitch). If this part is missing, the pitch is wrong,
+and was caused by wrong rates. The filter then mistakes the missing force for an acceleration. So the bike seems to
+brake uphill or to accelerate downhill for longer than a real bike does.
 
 Each mean is compared with its own spread, as in Student's t-test. On a road rougher than the filter expects, single
 innovations are large, and their means vary more.
 
-After a doubt there is one more check. If the gyro's rate about up is wrong, a straight can look like an endless bend,
-with all forces as expected. So a lean that has long been on one side is not shown.
+A misfit is a mean above its limit. After a misfit the lean is doubted: it is hidden until everything has fitted for a
+while. Repeated misfits mean a faulty sensor.
 
-After a misfit the lean is doubted: it is hidden until everything has fitted for a while. Repeated misfits mean a faulty
-sensor.
+There is one more check after a doubt. If the gyro's rate about up is wrong, a straight can look like an endless bend,
+with all forces as expected. So a lean that stays on one side for long is not shown.
 """
 
 from math import sqrt
 
 from ..units import const
 
-# Symbol = default  # unit: what it is. "Larger:" says what raising it does.
-_SHORT_S = const(3.0)  # s: time constant of the short means. Larger: fewer leans are hidden, and wrong ones later.
-_LONG_S = const(10.0)  # s: time constant of the other means. Larger: as for the short means.
-_MOST = const(4.0)  # standard deviations: larger innovations are limited to this. Larger: a blow counts for more.
-# Limits of the means. Larger: fewer leans are hidden, both right and wrong ones. The comments give the largest mean of
+# The comment of each parameter has its unit, its meaning and, after "Larger:", the effect of a larger value.
+
+# s: time constant of the short means. Larger: fewer right leans are hidden, and wrong leans are hidden later.
+_SHORT_S = const(3.0)
+# s: time constant of all other means. Larger: fewer right leans are hidden, and wrong leans are hidden later.
+_LONG_S = const(10.0)
+# standard deviations: limit to which larger innovations are reduced. Larger: a single blow counts for more.
+_MOST = const(4.0)
+# Limits of the means. Larger: fewer leans are hidden, both right and wrong ones. Each comment gives the largest mean in
 # rides without a fault, on good and bad roads and mounts.
-LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations: .4 and .25 without a fault
-UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations: .7 and .25 without a fault
-# ratio: factor on the limits of up without the six positions. The data sheet allows the accelerometer 3 % of scale
-# error and 80 mg of offset, which otherwise only rest shows. Larger: fewer leans are hidden.
+LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations. Without a fault: at most 0.4 and 0.25
+UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations. Without a fault: at most 0.7 and 0.25
+# ratio: factor on the limits of up if the six positions were not done. The data sheet allows the accelerometer a scale
+# error of 3 % and an offset of 80 mg. Without the six positions, these errors show only at rest. Larger: fewer leans
+# are hidden.
 _UNMEASURED = const(2.0)
-_SIDEWAYS = const(0.15)  # ratio: force to the side over force up, less the trim: .12 without a fault
-_STEEP = const(0.21)  # rad: pitch: .14 without a fault
-_SLOPE = const(0.12)  # rad: root mean square of a pitch without its force: .096 on a recorded ride without a fault
-# standard deviations, squared: above this spread the limits of left and up grow with its root. The spread is the mean
-# of half the squared change between windows. Larger: more is hidden on the roughest roads.
+# ratio: force to the side divided by force up, minus the trim. Without a fault: at most 0.12
+_SIDEWAYS = const(0.15)
+_STEEP = const(0.21)  # rad: pitch. Without a fault: at most 0.14
+# rad: root mean square of the pitch that the forward force does not confirm. On a recorded ride without a fault: 0.096
+_SLOPE = const(0.12)
+# square of standard deviations: spread above which the limits of left and up grow with the root of the spread. The
+# spread is the mean of half the squared change between windows. Larger: more leans are hidden on the roughest roads.
 _SPREAD = const(0.4)
-# rad: limit of a steady mean lean after a doubt. Larger: less is hidden in bends, and on straights that seem bends.
+# rad: limit of a steady mean lean after a doubt. Larger: fewer leans are hidden in bends, and on straights that look
+# like bends.
 _ONE_SIDE = const(0.13)
-# rad: a larger steady lean is hidden only after _LONG_S, because the force up confirms it. Smaller: less is hidden.
+# rad: steady lean above which the lean is hidden only after _LONG_S, because the upward force confirms it. Smaller:
+# fewer leans are hidden.
 _SURE_LEAN = const(0.3)
-# ratio: the lean is steady if its squared mean exceeds this share of its mean square. Larger: less is hidden.
+# ratio: share of the lean's mean square that its squared mean exceeds if the lean is steady. Larger: fewer leans are
+# hidden.
 _STEADY = const(0.75)
-_MOST_SIDEWAYS = const(0.5)  # ratio: larger forces to the side are limited to this. Larger: a blow counts for more.
-_STRICT = const(0.85)  # ratio: share of the limits after a doubt. Larger: a lasting fault is detected later.
-# ratio: while doubted, the means fit within this share of their limits. Larger: the lean is shown again sooner.
+# ratio: limit to which larger forces to the side are reduced. Larger: a single blow counts for more.
+_MOST_SIDEWAYS = const(0.5)
+_STRICT = const(0.85)  # ratio: factor on the limits after a doubt. Larger: a lasting fault is detected later.
+# ratio: share of the limits below which the means fit again during a doubt. Larger: the lean is shown again sooner.
 _FIT = const(0.6)
-# s: everything must fit for this time after the first doubt, the second and so on. Larger: after a fault the lean stays
-# hidden for longer.
+# s: time for which everything must fit after the first doubt, after the second doubt, and so on. Larger: after a fault
+# the lean stays hidden for longer.
 HOLDS_S = (3.0, 4.0, 4.0, 20.0, 60.0)
-_GAP_S = const(4.5)  # s: the same after a gap in the readings. Larger: after a gap the lean stays hidden for longer.
-# doubts: with more of them only time in turns counts as fitting, because on a straight nearly everything fits.
+# s: time for which everything must fit after a gap in the readings. Larger: after a gap the lean stays hidden for
+# longer.
+_GAP_S = const(4.5)
+# Number of doubts above which only time in turns counts as fitting, because on a straight nearly everything fits.
 MILD = 3
-# s: least time between doubts after MILD of them, so that rest can be detected. Larger: changed errors are found later.
+# s: shortest time between two doubts after more than MILD doubts, so that rest can be detected. Larger: errors that
+# have changed are found later.
 _AGAIN_S = const(12.0)
-_TURNING = const(0.05)  # rad/s: least yaw rate of a turn. Larger: the lean stays hidden for longer.
-FORGET_S = 60.0  # s: one doubt is forgotten after fitting this long. Larger: a repeated fault is hidden for longer.
+_TURNING = const(0.05)  # rad/s: smallest yaw rate of a turn. Larger: the lean stays hidden for longer.
+# s: time of fitting after which one doubt is forgotten. Larger: after a repeated fault the lean is hidden for longer.
+FORGET_S = 60.0
 
 last_odd = None  # the last code of `odd`, for `kickstand status`
 
@@ -75,7 +91,7 @@ class Consistency:
 
     Read-only attributes:
         doubt   True if the lean must not be shown
-        doubts  number of misfits, less the forgotten ones
+        doubts  number of misfits that are not forgotten
         odd     None, or the code of repeated misfits: "odd-left", "odd-up" (the forces) or "odd-pitch"
     """
 
@@ -85,7 +101,7 @@ class Consistency:
         self.odd = None
         self.doubts = 0
         self._fits_s = 0.0
-        self._since_s = 0.0  # since the last doubt
+        self._since_s = 0.0  # time since the last doubt
         self._in_rest = True  # rest counts as fitting
         self._forget_means()
 
@@ -113,8 +129,13 @@ class Consistency:
     def add(self, left, up, sideways, pitch, push, lean, yaw_rate, seconds):
         """Take a window of `seconds` while riding. Return True if a misfit has just begun.
 
-        left, up: innovations of these forces in standard deviations. sideways: force to the side over force up. pitch,
-        lean: rad. push: estimated forward acceleration, g. yaw_rate: rad/s."""
+        Args:
+            left, up: innovations of the forces to the left and up, in standard deviations.
+            sideways: force to the side divided by force up.
+            pitch, lean: in rad.
+            push: estimated forward acceleration in g.
+            yaw_rate: in rad/s.
+        """
         gain, long_gain = min(1.0, seconds / _SHORT_S), min(1.0, seconds / _LONG_S)
         left, up = max(-_MOST, min(_MOST, left)), max(-_MOST, min(_MOST, up))
         self._left += gain * (left - self._left)

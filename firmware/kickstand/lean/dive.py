@@ -12,19 +12,22 @@ sum(a' pitch rate) / sum(a'^2). Each sum begins with a prior.
 
 from ..units import STANDARD_GRAVITY, const
 
-# Symbol = default  # unit: what it is. "Larger:" says what raising it does.
+# The comment of each parameter has its unit, its meaning and, after "Larger:", the effect of a larger value.
+
 PRIOR_SHARE = 0.026  # rad per g: 1.5 degrees per g. Larger: before the share is found, more pitch counts as dive.
-# (g/s)^2: weight of that prior in the sum of a'^2. Larger: the share is found later, and varies less.
+# (g/s)^2: weight of PRIOR_SHARE in the sum of a'^2. Larger: the share is found later, and varies less.
 _PRIOR_SQUARE = const(5.3)
-_MIN_SHARE = const(-0.035)  # rad per g: anti-dive forks lift the nose a little
-_MAX_SHARE = const(0.14)  # rad per g: 8 degrees per g, as soft, long forks have
-_MIN_SPEED = const(5.0)  # m/s: slower windows do not count. Larger: the share is found later.
-_MAX_JERK = const(3.0)  # g/s: a larger a' does not count. Larger: bumps and lost readings count as braking.
+_MIN_SHARE = const(-0.035)  # rad per g: smallest share. It is negative, because an anti-dive fork may lift the nose
+_MAX_SHARE = const(0.14)  # rad per g: largest share, 8 degrees per g, as with soft, long forks
+_MIN_SPEED = const(5.0)  # m/s: lowest speed of a window that counts. Larger: the share is found later.
+_MAX_JERK = const(3.0)  # g/s: largest a' that counts. Larger: bumps and lost readings count as braking.
 
 
 class Dive:
-    """Estimates how braking pitches the bike, in fixed memory. share (read-only): rad per g, > 0 if the nose goes down
-    in braking."""
+    """Estimates how braking pitches the bike, in fixed memory.
+
+    share (read-only): pitch in rad per g, positive if the nose goes down in braking.
+    """
 
     def __init__(self):
         self.share = PRIOR_SHARE
@@ -38,16 +41,19 @@ class Dive:
         self._pitch_rate = 0.0
 
     def update(self, push, pitch_rate, speed, seconds):
-        """Take one window: push, the mean of the forward acceleration in g, pitch_rate in rad/s, speed in m/s.
+        """Take one window. Return speed x dive' / g, in g. Without this term (4) and (5) would be wrong by it.
 
-        Returns speed x dive' / g, in g: the acceleration that (4) and (5) would wrongly contain.
+        Args:
+            push: mean forward acceleration in g.
+            pitch_rate: in rad/s.
+            speed: in m/s.
         """
         last_push, last_rate = self._push, self._pitch_rate
         self._push, self._pitch_rate = push, pitch_rate
         if last_push is None:
             return 0.0
         jerk = (push - last_push) / seconds  # in g/s, from the middle of the last window to the middle of this one
-        if not -_MAX_JERK < jerk < _MAX_JERK:  # also not-a-number
+        if not -_MAX_JERK < jerk < _MAX_JERK:  # also true for NaN
             return 0.0
         if speed > _MIN_SPEED:
             self._product += jerk * 0.5 * (pitch_rate + last_rate)

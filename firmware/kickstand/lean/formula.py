@@ -8,11 +8,11 @@ With lean t > 0 to the right, s the centripetal acceleration in g (> 0 in a left
 
 from math import asin, atan2, degrees, sqrt
 
-_TOO_SMALL = 0.01  # (0.1 g)^2: in free fall no force gives a direction
+_TOO_SMALL = 0.01  # (0.1 g)^2: smallest squared force that has a direction. In free fall the force is smaller
 
 
 def static_lean_deg(force):
-    """Lean of a standing bike in degrees, > 0 to the right: (21) with a sign, and exact near upright.
+    """Return the lean of a standing bike in degrees, > 0 to the right. It is (21) with a sign, and exact near upright.
 
     force: left, up, forward in g.
     """

@@ -14,7 +14,8 @@ from ..units import const
 _MIN_VARIANCE = const(1e-10)  # a lower bound, because rounding in 32-bit floats could make a variance negative
 # Terms of a Jacobian's row between two yields. Without machine code three terms take a millisecond.
 _TERMS_PER_STEP = const(3)
-# Variances: larger squared innovations (over 5 sigma) get less weight. They are used, because the state may be wrong.
+# Largest squared innovation, in variances, with full weight (5 sigma). Larger ones get less weight. They are not
+# rejected, because the state may be wrong.
 _GATE = const(25.0)
 
 
@@ -39,7 +40,8 @@ try:
 except NO_MACHINE_CODE:
     add_products = add_products_python
 else:
-    # Some of these sums grow, vanish, change their sign or are rounded. Their products are exact in 32 bits.
+    # Values for the comparison. Some of the sums grow, vanish, change their sign or are rounded. All products are exact
+    # in 32 bits.
     _TRIAL = array("f", (0.65625, 0, 0, -0.75, 8388609, 0, 1e-9, 3e9, -0.984))
     _FACTORS, _SOURCE = array("f", (1.5, -2.6875, 0.75)), array("f", (-0.4375, 98304.5, 1.3125))
     add_products = checked(add_products, add_products_python, _TRIAL, _FACTORS, _SOURCE, 3, 3)

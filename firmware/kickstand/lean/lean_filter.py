@@ -35,7 +35,7 @@ from .upright_trim import UprightTrim
 _WINDOW_US = const(200_000)
 _FIRST_WINDOW_US = const(50_000)
 WORK_STEPS = 21  # steps of the work on a window; a test counts them
-_SLOW_STEP_US = const(12_000)  # samples that are further apart leave time for all steps at once
+_SLOW_STEP_US = const(12_000)  # if samples are further apart than this, there is time for all steps at once
 DELAY_S = 0.0048  # delay of the MPU6050's gyro at DLPF 3
 # m/s: above this speed the filter restarts. A board that lies on its nose seems to accelerate, but standstill is
 # detected long before.
@@ -45,8 +45,12 @@ _MAX_SPEED = const(250.0)
 class LeanFilter:
     """Estimates lean from force and rate in the vehicle's axes, in fixed memory.
 
-    delay_s: delay of the gyro's low-pass, by which lean is extrapolated. trim: rad, see UprightTrim. posed: see
-    LeanMeter.use(). gyro_variances: see gyro_variances(). six_done: the six positions have measured the accelerometer.
+    Args:
+        delay_s: delay of the gyro's low-pass. The lean is extrapolated by this time.
+        trim: in rad, see UprightTrim.
+        posed: see LeanMeter.use().
+        gyro_variances: see gyro_variances().
+        six_done: True if the six positions have measured the accelerometer.
     """
 
     def __init__(self, delay_s=DELAY_S, trim=0.0, posed=False, gyro_variances=None, six_done=False):
@@ -55,12 +59,12 @@ class LeanFilter:
         self._posed = posed
         self._gyro_variances = gyro_variances
         self._p = None
-        # Relative error of the accelerometer's magnitude, from bias and scale error. Rest shows it, where the magnitude
-        # should be 1 g.
+        # Relative error of the force's magnitude, caused by the accelerometer's bias and scale error. It is measured at
+        # rest, where the magnitude should be 1 g.
         self._force_error = 0.0
         self.dive = Dive()
         self.consistency = Consistency(six_done)
-        self._failed = False  # a misfit has just begun
+        self._failed = False  # True if a misfit has just begun
         # The sensor's errors (the states from BIAS_LEFT on) at two earlier times while everything fitted
         self._good = self._next_good = [0.0] * (STATES - BIAS_LEFT)
         self._good_s = 0.0
@@ -87,12 +91,12 @@ class LeanFilter:
         # since then. _straight_s: seconds since straight_or_prior_speed() was used.
         self._speed = self._last_speed = None
         self._speed_s = self._straight_s = 0.0
-        self._moving_s = 0.0  # for this time a measured speed still proves that the bike moves
+        self._moving_s = 0.0  # remaining time for which the last measured speed proves that the bike moves
         self._work = None  # the generator of _process() until it is finished
         self._steps = 1  # steps of _work that each sample runs
         self._sums = [0.0] * 9  # see predict()
         self._count = self._window_us = 0
-        self._astray_s = 0.0  # how long the lean has been impossible
+        self._astray_s = 0.0  # time for which the lean has been impossible
         self._axis = 0  # the axis of the gyro whose bias the next window at rest measures
         self._roll_rate = self._last_roll_rate = 0.0
 
@@ -118,8 +122,10 @@ class LeanFilter:
             self._good, self._next_good = self._next_good, self._x[BIAS_LEFT:STATES]
 
     def _doubt(self):
-        """Restart because the readings do not fit. The first two times take the sensor's earlier errors, because the
-        fault may be over. Later take no prior knowledge, because a bias may have stepped."""
+        """Restart because the readings do not fit.
+
+        The first two times, use the sensor's earlier errors, because the fault may be over. Later, use no prior
+        knowledge, because a bias may have jumped."""
         good = self.consistency.doubts <= 2
         speed, variance, rest = self._x[SPEED], self._p.rows[SPEED][SPEED], self._rest
         moving_s = self._moving_s
@@ -179,7 +185,13 @@ class LeanFilter:
         return self._x[SPEED] > measurements.ROLLING_SIGMAS * sqrt(self._p.rows[SPEED][SPEED])
 
     def update(self, force, rate, dt_us):
-        """Take one sample: force (3, g), rate (3, rad/s), dt_us since the previous one. Return lean in degrees."""
+        """Take one sample. Return the lean in degrees.
+
+        Args:
+            force: 3 values in g.
+            rate: 3 values in rad/s.
+            dt_us: microseconds since the previous sample.
+        """
         x, sums = self._x, self._sums
         self._roll_rate = predict(x, force, rate, dt_us * 1e-6, sums)
         self._count += 1
@@ -209,9 +221,9 @@ class LeanFilter:
         if self._p is None:
             self._start(means)
             return
-        if not (abs(x[LEAN]) < 2 * pi and x[SPEED] < _MAX_SPEED):  # also not-a-number
+        if not (abs(x[LEAN]) < 2 * pi and x[SPEED] < _MAX_SPEED):  # also true for NaN
             self.consistency.gap()
-            self._forget()  # the sensor's errors may be not-a-number too
+            self._forget()  # the sensor's errors may be NaN too
             return
         if self._impossible(means, seconds):
             self.consistency.fail("odd-up")

@@ -1,12 +1,17 @@
 """The measurements of the lean filter in a window, their noise, and every parameter of the filter.
 
-Each function returns the arguments of Covariance.update(): ((state, d measurement / d state), ...), the innovation
-(measured minus expected) and the variance of its noise. model: a Linearisation. x: the state. means: see
-bike_model.predict().
+Each function returns the arguments of Covariance.update():
+    derivatives: ((state, d measurement / d state), ...)
+    innovation: measured minus expected value
+    variance: variance of the measurement's noise
+These arguments are the same in all functions:
+    model: a Linearisation
+    x: the state
+    means: see bike_model.predict()
 
-SIGMA_... are standard deviations (1 sigma). If a disturbance lasts tau seconds, measurements share it, and must not
-count as independent. So its variance in windows of T seconds is sigma^2 2 tau / T. The parameters of standstill and
-trim are in rest.py and upright_trim.py, in the same form.
+SIGMA_... are standard deviations (1 sigma). A disturbance that lasts tau seconds affects several measurements, so their
+errors are not independent. Therefore its variance in windows of T seconds is sigma^2 2 tau / T. The parameters of
+standstill and trim are in rest.py and upright_trim.py, in the same form.
 """
 
 from math import radians
@@ -14,40 +19,47 @@ from math import radians
 from ..units import STANDARD_GRAVITY, const
 from .bike_model import BIAS_LEFT, LEAN, PITCH, SCALE_LEFT, SPEED, YAW_ERROR
 
-# Symbol = default  # unit: what it is. "Larger:" says what raising it does.
+# The comment of each parameter has its unit, its meaning and, after "Larger:", the effect of a larger value.
 
-# The start: before anything is measured
+# The start, before anything is measured
 START_MAX_RATE = 0.02  # rad/s: largest rate that counts as standing. Larger: riding is mistaken for standing.
-START_MAX_FORCE = 0.05  # g: largest deviation from 1 g that counts as standing. Larger: riding is mistaken for it.
-# Standard deviations of the prior. Larger: this state is found sooner, but absorbs the errors of other states.
+# g: largest deviation of the force from 1 g that counts as standing. Larger: riding is mistaken for standing.
+START_MAX_FORCE = 0.05
+# Standard deviation of each state before the first measurement. Larger: the state is found sooner, but absorbs the
+# errors of other states.
 SIGMA_START = (
-    radians(1.5),  # rad: lean of a bike that stands, by the force
+    radians(1.5),  # rad: lean of a standing bike, computed from the force
     radians(5.0),  # rad: pitch
     15.0,  # m/s: speed
     radians(1.0),  # rad/s: drift of the gyro's bias since the calibration, left
     radians(1.0),  # rad/s: up
     radians(1.0),  # rad/s: forward
     radians(5.0),  # rad: yaw error of the kickstand pose
-    0.020,  # ratio: scale error of the gyro's left axis less the up axis' error. The data sheet allows 0.03 for each.
-    0.014,  # ratio: what the left axis reads of a rate about up. The data sheet allows 0.02.
-    0.014,  # ratio: what the forward axis reads of a rate about left
-    0.014,  # ratio: what the forward axis reads of a rate about up
+    # ratio: scale error of the gyro's left axis minus the scale error of its up axis. The data sheet allows 0.03 each.
+    0.020,
+    0.014,  # ratio: reading of the left axis per rate about up. The data sheet allows 0.02.
+    0.014,  # ratio: reading of the forward axis per rate about left
+    0.014,  # ratio: reading of the forward axis per rate about up
     0.014,  # ratio: scale error of the forward axis
 )
 # If the readings no longer fit (consistency.py), the filter restarts. The first two times it keeps the speed, and the
 # sensor's errors as estimated REMEMBER_S to 2 x REMEMBER_S earlier. Later it keeps nothing.
 REMEMBER_S = 10.0  # s. Larger: the remembered errors are older.
-SIGMA_GOOD_BIAS = radians(0.6)  # rad/s: of a remembered bias. Larger: a changed bias is found sooner.
-GOOD_SHARE = 0.7  # ratio: share of SIGMA_START for other remembered errors. Larger: changed errors are found sooner.
-SIGMA_GOOD_SPEED = 3.0  # m/s: added to the speed's standard deviation. Larger: the kept speed counts for less.
-# rad/s: of a bias without prior knowledge. Larger: a stepped bias is found sooner.
+# rad/s: standard deviation of a remembered bias. Larger: a bias that has changed is found sooner.
+SIGMA_GOOD_BIAS = radians(0.6)
+# ratio: standard deviation of all other remembered errors, as a share of SIGMA_START. Larger: errors that have changed
+# are found sooner.
+GOOD_SHARE = 0.7
+# m/s: amount added to the standard deviation of the kept speed. Larger: the kept speed counts for less.
+SIGMA_GOOD_SPEED = 3.0
+# rad/s: standard deviation of a bias about which nothing is known. Larger: a bias that has jumped is found sooner.
 SIGMA_DOUBT_BIAS = radians(2.5)
 # A lean above IMPOSSIBLE_LEAN that the force contradicts for IMPOSSIBLE_S is impossible. Larger: a wrong filter
 # restarts later.
 IMPOSSIBLE_LEAN = radians(80.0)  # rad
 IMPOSSIBLE_S = 1.0  # s
 # For MOVING_S after a measured speed above MOVING_SPEED the bike is not at rest.
-MOVING_SPEED = 2.0  # m/s. Larger: slow riding on a smooth road is taken for rest.
+MOVING_SPEED = 2.0  # m/s. Larger: slow riding on a smooth road is mistaken for rest.
 MOVING_S = 2.5  # s. Larger: a stop is detected later.
 # A bike is in balance above BALANCE_SPEED if the speed's standard deviation is below SIGMA_BALANCE_SPEED.
 BALANCE_SPEED = 2.0  # m/s. Larger: a slipped mount is detected at fewer speeds.
@@ -57,29 +69,34 @@ MOST_FORWARD = 1.5
 # ratio: change of the gyro's scale and cross-axis errors with temperature since the six positions. The data sheet
 # allows 2 % from -40 to 85 C. Larger: the measured errors count for less.
 _SIGMA_GYRO_DRIFT = const(0.002)
-# rad/s: of a bias that the pose on the kickstand has just measured. Larger: the first lean is shown later.
+# rad/s: standard deviation of a bias that the kickstand pose has just measured. Larger: the first lean is shown later.
 SIGMA_FRESH_BIAS = radians(0.2)
-# rad: of the first lean if the bike moves. Larger: lean is shown later, and follows forces more.
+# rad: standard deviation of the first lean if the bike moves. Larger: the lean is shown later, and follows the forces
+# more.
 SIGMA_START_LEAN_MOVING = radians(30.0)
-# m/s: mean of the speed's prior without a measured speed. Larger: leans that began before power-on come out larger.
+# m/s: assumed speed if no speed is measured. Larger: if power comes on in a turn, the estimated lean is larger.
 PRIOR_SPEED = 15.0
 
 # Process noise, per square root of a second
-NOISE_ANGLE = radians(0.24)  # rad: vibration of the gyro. Larger: lean follows the forces more and the gyro less.
-NOISE_SPEED = 0.35  # m/s. Larger: speed follows turns sooner, and is less steady on straights.
+# rad: error of the integrated rates, caused by vibration. Larger: the lean follows the forces more and the gyro less.
+NOISE_ANGLE = radians(0.24)
+NOISE_SPEED = 0.35  # m/s. Larger: the estimated speed adapts sooner in turns, and is less steady on straights.
 NOISE_BIAS = radians(0.01)  # rad/s: 0.6 deg/s in five minutes of warming up. Larger: long turns are mistaken for bias.
 # Lost readings
 # rad/s: unknown roll rate during lost readings. The unknown pitch rate is a quarter of it. Larger: after a gap the lean
 # is hidden for longer.
 SIGMA_LOST_RATE = radians(30.0)
-SIGMA_LOST_FORCE = 0.3  # g: unknown forward force during lost readings. Larger: as for SIGMA_LOST_RATE.
+# g: unknown forward force during lost readings. Larger: after a gap the lean is hidden for longer.
+SIGMA_LOST_FORCE = 0.3
 
-# Measurement noise while riding
-_SIGMA_LEFT = const(0.04)  # g: force to the left. Larger: lean follows it less, and the gyro and level roads more.
-_SIGMA_UP = const(0.07)  # g: upward force, which bumps disturb. Larger: in held turns scale errors are found later.
-# ratio: speed x pitch rate / g times this ratio is the noise (1 sigma) of the upward force. The force to the left has
-# sin(lean) times this noise. Reason: the springs pitch the bike, but its wheels do not rise. Larger: braking disturbs
-# less.
+# Measurement noise while riding g: noise of the force to the left. Larger: the lean follows this force less, and
+# follows the gyro and the assumption of level roads more.
+_SIGMA_LEFT = const(0.04)
+# g: noise of the upward force, which bumps disturb. Larger: in long turns scale errors are found later.
+_SIGMA_UP = const(0.07)
+# ratio: noise (1 sigma) of the upward force, divided by speed x pitch rate / g. The force to the left has sin(lean)
+# times this noise. The cause is that the springs pitch the bike, but its wheels do not rise. Larger: braking disturbs
+# the lean less.
 _PITCHING_SHARE = const(2.0)
 # ratio: share of the vibration's variance that stays in a window's mean. It is added to the noise of the force to the
 # left. Larger: forces count less on rough roads.
@@ -87,58 +104,65 @@ _SHAKEN_SHARE = const(0.1)
 # m: h, the sensor's height above the roll axis. Larger: rolling explains more of the force.
 _ROLL_HEIGHT_M = const(0.4)
 _SIGMA_ROLL_HEIGHT_M = const(0.4)  # m: standard deviation of h. Larger: forces count less while the bike rolls quickly.
-_SIGMA_MEASURED_SPEED = const(1.0)  # m/s: speed by a receiver or a wheel sensor. Larger: it counts for less.
+# m/s: error of a speed from a receiver or a wheel sensor. Larger: measured speeds count for less.
+_SIGMA_MEASURED_SPEED = const(1.0)
 # ratio: scale error of the measured speed. A leaning tyre has a smaller radius, and slips. The scale error of the
 # gyro's up axis adds to it, because speed x yaw rate has both. Larger: measured speeds count for less, most at high
 # speed.
 _SIGMA_SPEED_SCALE = const(0.05)
-_MEASURED_SPEED_S = const(4.0)  # s: how long _SIGMA_MEASURED_SPEED lasts. Larger: measured speeds count for less.
-# s: how long the scale error lasts. A wheel's radius is smaller during a whole bend. Larger: measured speeds count for
-# less, most in long bends.
+# s: time for which the error _SIGMA_MEASURED_SPEED stays the same. Larger: measured speeds count for less.
+_MEASURED_SPEED_S = const(4.0)
+# s: time for which the scale error of the speed stays the same. A wheel's radius is smaller during a whole bend.
+# Larger: measured speeds count for less, most of all in long bends.
 SPEED_SCALE_S = 40.0
-# s: possible delay of the speed. Larger: it counts for less during acceleration and braking.
+# s: possible delay of a measured speed. Larger: it counts for less during acceleration and braking.
 _MEASURED_SPEED_LATE_S = const(1.0)
-# s: least time between two speeds in use. Between them straight_or_prior_speed() is used. Larger: speeds in use are
-# older.
+# s: shortest time between two measured speeds that are used. In the windows between, straight_or_prior_speed() is used.
+# Larger: the measured speeds in use are older.
 MEASURED_SPEED_EVERY_S = 0.3
 
-# ratio: standard deviation of the lean's errors over the covariance's standard deviation. The noises above are wide,
-# because disturbances last, so the covariance is too large. On simulated rides two thirds of the errors are within this
-# share. Larger: the stated sigma is larger, and the lean is the same.
+# ratio: real standard deviation of the lean's error, divided by the filter's own standard deviation. The filter's is
+# too large, because the noises above are increased for disturbances that last. In simulated rides, two thirds of the
+# errors are within this share of it. Larger: the claimed sigma is larger, and the lean stays the same.
 SIGMA_SHARE = 0.46
 
 # Assumptions that take the place of measurements
-SIGMA_SLOPE = radians(1.6)  # rad: slopes of roads. Larger: slopes are followed better, bends are found less well.
-_SLOPE_S = const(3.0)  # s: how long a slope lasts. Fitted: real slopes last longer. Larger: bends are found less well.
-# rad: at this pitch the level road has half its weight, at twice this pitch a fifth. Larger: wheelies are mistaken
-# for slopes.
+# rad: slope of roads. Larger: the pitch follows slopes better, and the lean in bends is found less well.
+SIGMA_SLOPE = radians(1.6)
+# s: duration of a slope. The value is fitted to rides; real slopes last longer. Larger: the lean in bends is found less
+# well.
+_SLOPE_S = const(3.0)
+# rad: pitch at which the assumption of a level road has half its weight. At twice this pitch it has a fifth. Larger:
+# wheelies are mistaken for slopes.
 STEEP = radians(6.0)
-# The bike rides straight where lean and yaw rate are under the first two of these and the speed is over the third.
+# The bike rides straight if lean and yaw rate are below the first two of the next three limits, and the speed is above
+# the third.
 STRAIGHT_MAX_LEAN = radians(8.0)  # rad. Larger: the lean of wide turns is drawn towards upright.
 STRAIGHT_MAX_RATE = radians(2.5)  # rad/s, about the vertical. Larger: the lean of slow turns is drawn towards upright.
 STRAIGHT_MIN_SPEED = 4.0  # m/s. Larger: drift on slow straights is not removed.
-SIGMA_STRAIGHT = radians(0.8)  # rad: lean on straights, by wind and camber. Larger: drift is removed later.
-_STRAIGHT_S = const(3.0)  # s: how long such a lean lasts. Larger: drift is removed later.
-_SIGMA_PRIOR_SPEED = const(20.0)  # m/s: difference from PRIOR_SPEED. Larger: PRIOR_SPEED counts for less.
-_PRIOR_SPEED_S = const(60.0)  # s: how long a speed lasts. Larger: PRIOR_SPEED counts for less.
+SIGMA_STRAIGHT = radians(0.8)  # rad: lean on straights, caused by wind and camber. Larger: drift is removed later.
+_STRAIGHT_S = const(3.0)  # s: duration of a lean caused by wind or camber. Larger: drift is removed later.
+# m/s: difference between the real speed and PRIOR_SPEED. Larger: PRIOR_SPEED counts for less.
+_SIGMA_PRIOR_SPEED = const(20.0)
+_PRIOR_SPEED_S = const(60.0)  # s: time for which a bike keeps its speed. Larger: PRIOR_SPEED counts for less.
 
 # Standing still
-# rad: lean and pitch, as set from the force when the bike comes to rest. Larger: later forces count more.
+# rad: error of lean and pitch that are set from the force when the bike comes to rest. Larger: later forces count more.
 SIGMA_STAND = radians(0.5)
-SIGMA_REST_RATE = radians(0.1)  # rad/s: rates of a bike that feet hold. Larger: bias is found later.
-_SIGMA_REST_FORCE = const(0.02)  # g: force at rest, with the engine idling. Larger: lean settles later.
-# ratio: weight of a window in the mean magnitude of the force at rest. Larger: the mean is found sooner, and varies
+SIGMA_REST_RATE = radians(0.1)  # rad/s: rates of a standing bike that feet hold. Larger: the bias is found later.
+_SIGMA_REST_FORCE = const(0.02)  # g: noise of the force at rest while the engine idles. Larger: the lean settles later.
+# ratio: weight of each window in the mean magnitude of the force at rest. Larger: the mean is found sooner, and varies
 # more.
 REST_FORCE_SHARE = 0.1
-SIGMA_REST_SPEED = 0.02  # m/s: speed at rest, measured as 0. Larger: speed is drawn to 0 less.
-# g: limit of the forward force that pitch does not explain; more is braking. Larger: steady braking is mistaken for
-# rest.
+SIGMA_REST_SPEED = 0.02  # m/s: error of the speed 0 at rest. Larger: the estimated speed goes to 0 more slowly.
+# g: largest forward force at rest that the pitch does not explain. A larger force is braking. Larger: steady braking is
+# mistaken for rest.
 MAX_REST_PUSH = 0.08
 # The bike certainly rolls if the estimated speed is above both of these. Larger: a smooth road is mistaken for rest.
 ROLLING_SPEED = 3.0  # m/s
 ROLLING_SIGMAS = 3.0  # standard deviations of the speed
-# The trim is measured while the standard deviations of speed and lean are below these. Larger: it is found sooner, but
-# less exactly.
+# The trim is measured while the standard deviations of speed and lean are below these limits. Larger: the trim is found
+# sooner, but less exactly.
 SIGMA_TRIM_SPEED = 8.0  # m/s
 SIGMA_TRIM_LEAN = radians(1.4)  # rad
 
@@ -146,13 +170,16 @@ SIGMA_TRIM_LEAN = radians(1.4)  # rad
 def gyro_variances(sigma, r):
     """Return the prior variances of the last five states, or None if the six positions have not measured the gyro.
 
-    sigma (9): standard errors of the gyro matrix' entries in the sensor's axes, treated as independent, or zeros. r
-    (9): vehicle_from_sensor."""
+    Args:
+        sigma: standard errors of the gyro matrix' entries in the sensor's axes, 9 values, treated as independent. All
+            are zero if the gyro was not measured.
+        r: vehicle_from_sensor, 9 values.
+    """
     if not any(sigma):
         return None
 
     def variance(i, j):
-        """The variance for the reading of the vehicle's axis i from a rate about its axis j."""
+        """Return the variance of the reading of the vehicle's axis i per rate about its axis j."""
         total = _SIGMA_GYRO_DRIFT**2
         for a in range(3):
             for b in range(3):
@@ -164,20 +191,26 @@ def gyro_variances(sigma, r):
 
 
 def forces(model, means, roll_acceleration, force_error, dive=0.0):
-    """Return two measurements: the force to the left, (4), and up, (5). roll_acceleration: rad/s^2. force_error:
-    relative error of the accelerometer's magnitude, as found at rest. dive: see Dive.update(), in g."""
-    rolling = roll_acceleration / STANDARD_GRAVITY  # g per metre of height, like `square` below
+    """Return two measurements: the force to the left (4), and the force up (5).
+
+    Args:
+        roll_acceleration: in rad/s^2.
+        force_error: relative error of the accelerometer's magnitude, as found at rest.
+        dive: the result of Dive.update(), in g.
+    """
+    rolling = roll_acceleration / STANDARD_GRAVITY  # in g per metre of height, like `square` below
     uncertain = _SIGMA_ROLL_HEIGHT_M * rolling
     left = means[0]
     shaken = max(0.0, means[8] - left * left)
-    # If the springs pitch the bike, its wheels do not rise: v times this pitch rate is not an acceleration. Braking
-    # explains a part of it: dive, by (8). The rest is noise.
+    # When the springs pitch the bike, its wheels do not rise. So v times this part of the pitch rate is not an
+    # acceleration. The argument `dive` is the part that braking explains by (8). The rest is noise.
     pitching = _PITCHING_SHARE * model.pitching
     sideways = pitching * model.sin_lean
     left_variance = _SIGMA_LEFT**2 + _SHAKEN_SHARE * shaken + uncertain**2 + sideways * sideways
     left += _ROLL_HEIGHT_M * rolling * model.cos_lean + dive * model.sin_lean
-    # In a steady turn the upward force, 1 / cos(lean), shows the lean without the gyro's scale factor. A window shows
-    # little of it, a minute much. An error of this force that keeps its sign must therefore be removed: force_error.
+    # In a steady turn the upward force is 1 / cos(lean), so it shows the lean independently of the gyro's scale factor.
+    # One window shows little of it, but a minute shows much. A constant error of this force would add up during this
+    # minute, so force_error is subtracted.
     square = means[4] * means[4] / STANDARD_GRAVITY
     up = means[1] + _ROLL_HEIGHT_M * square - force_error * means[6] + dive * model.cos_lean
     up_variance = (
@@ -190,15 +223,15 @@ def forces(model, means, roll_acceleration, force_error, dive=0.0):
 
 
 def level_road(model, x, seconds):
-    """Return the measurement of (6): roads are level on average. Its noise grows with the pitch, in case of a
-    wheelie."""
+    """Return the measurement of (6), which assumes that roads are level on average. Its noise grows with the pitch,
+    because a large pitch may be a wheelie."""
     innovation = -x[PITCH] - x[YAW_ERROR] * model.sin_lean
     steep = innovation / STEEP
     return model.level_row, innovation, SIGMA_SLOPE**2 * (1.0 + steep * steep) * 2 * _SLOPE_S / seconds
 
 
 def straight_or_prior_speed(lean, speed, yaw_rate, seconds):
-    """Return the measurement of a lean of 0 if the bike rides straight, otherwise of PRIOR_SPEED."""
+    """Return an assumed measurement: a lean of 0 if the bike rides straight, otherwise the speed PRIOR_SPEED."""
     if abs(lean) < STRAIGHT_MAX_LEAN and abs(yaw_rate) < STRAIGHT_MAX_RATE and speed > STRAIGHT_MIN_SPEED:
         return ((LEAN, 1.0),), -lean, SIGMA_STRAIGHT**2 * 2 * _STRAIGHT_S / seconds
     return ((SPEED, 1.0),), PRIOR_SPEED - speed, _SIGMA_PRIOR_SPEED**2 * 2 * _PRIOR_SPEED_S / seconds

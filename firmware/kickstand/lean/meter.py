@@ -9,11 +9,11 @@ from .lean_filter import DELAY_S, LeanFilter
 from .measurements import SIGMA_SHARE, gyro_variances
 
 _SMOOTH_US = const(300_000)  # time constant of smooth_force
-# A lean with a larger variance is not shown. Standard deviation: 1.4 degrees, SIGMA_SHARE of the covariance's 3.
+# Largest variance of a lean that is shown. The standard deviation is 1.4 degrees: SIGMA_SHARE times 3 degrees.
 MAX_VARIANCE = (SIGMA_SHARE * radians(3.0)) ** 2
-DOUBTED_VARIANCE = (SIGMA_SHARE * radians(2.0)) ** 2  # the same after repeated misfits
-TRIM_MAX_VARIANCE = radians(0.5) ** 2  # a trim less certain than this is not kept
-_TRIM_STEP_DEG = const(0.3)  # a smaller change of the trim is not saved: flash wears
+DOUBTED_VARIANCE = (SIGMA_SHARE * radians(2.0)) ** 2  # largest variance of a lean that is shown after repeated misfits
+TRIM_MAX_VARIANCE = radians(0.5) ** 2  # largest variance of a trim that is kept
+_TRIM_STEP_DEG = const(0.3)  # smallest change of the trim that is saved, to protect the flash from wear
 FALLEN_DEG = 65.0  # the bike has fallen after _FALLEN_US of at least this lean
 _FALLEN_US = const(1_000_000)
 HELD_US = 75_000  # a maximum must last twice as long, because a pothole jerks the sensor for a shorter time
@@ -21,8 +21,11 @@ _WHEELIE_DEG = const(20.0)  # pitch. No road is so steep, and the filter's equat
 
 
 class LeanMeter:
-    """Computes lean and acceleration of the vehicle. leans: False for a car, whose lean stays 0. delay_s: delay of the
-    gyro's low-pass.
+    """Computes lean and acceleration of the vehicle.
+
+    Args:
+        leans: False for a car, whose lean stays 0.
+        delay_s: delay of the gyro's low-pass.
 
     Attributes after update_sum():
         force              left, up, forward, in g
@@ -48,7 +51,9 @@ class LeanMeter:
 
     def use(self, calibration, posed=False):
         """Use a calibration whose scale is set, and restart the filter. Another calibration clears suppressed_reason.
-        posed: the alignment's poses have just ended, so the bike is still and the gyro's bias is freshly measured."""
+
+        posed: True if the poses of the alignment have just ended. Then the bike is still, and the gyro's bias was just
+            measured."""
         if calibration is not self.calibration:
             self.suppressed_reason = None
         self.calibration = calibration
@@ -123,7 +128,7 @@ class LeanMeter:
     @property
     def lean_formula_deg(self):
         """Nicolae's lean from only the last reading."""
-        from .formula import formula_lean_deg  # one page shows it
+        from .formula import formula_lean_deg  # imported only for the page that shows this lean
 
         return formula_lean_deg(self.force, self.rate[1])
 
@@ -138,9 +143,15 @@ class LeanMeter:
         return [value / self._n for value in self._reading]
 
     def update_sum(self, sums, n, dt_us):
-        """Take the mean of n samples. sums: array('i', 7), their sum in counts, in the chip's order; dt_us: integer
-        microseconds since the previous samples (0 for the first). These are the samples of one pass of the main loop:
-        float computations for each sample would take too long."""
+        """Take the mean of the samples of one pass of the main loop.
+
+        The mean is used, because float computations for each sample would take too long.
+
+        Args:
+            sums: sums of the samples' counts in the chip's order, array('i', 7).
+            n: number of samples.
+            dt_us: microseconds since the previous samples, an integer; 0 for the first samples.
+        """
         self._reading, self._n = sums, n
         self._transform.apply_sum(sums, n, self.force, self.rate)
         self._follow(dt_us)
@@ -155,7 +166,7 @@ class LeanMeter:
                 self.filter.inflate_covariance(dt_us * 1e-6)
         if self._fresh:
             self._fresh = False
-            dt_us, gain = 0, 1.0  # there is no previous sample: the same on the board and in a replay
+            dt_us, gain = 0, 1.0  # without a previous sample, board and replay must do the same
         else:
             gain = dt_us / (_SMOOTH_US + dt_us)
         force, smooth = self.force, self.smooth_force

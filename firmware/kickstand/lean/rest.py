@@ -3,24 +3,28 @@ averages out."""
 
 from ..units import const
 
-# Symbol = default  # unit: what it is. "Larger:" says what raising it does.
-# Largest deviation of a window's mean from the recent average. Larger: smooth roads are mistaken for rest.
+# The comment of each parameter has its unit, its meaning and, after "Larger:", the effect of a larger value.
+
+# Largest deviation of a window's mean from the recent average at rest. Larger: smooth roads are mistaken for rest.
 _MAX_FORCE_G = const(0.010)  # g
 _MAX_RATE_RADPS = const(0.009)  # rad/s (0.5 deg/s)
-MAX_BIAS_RADPS = 0.02  # rad/s (1.2 deg/s): mean rate that may be bias. Larger: smooth turns are mistaken for rest.
-# rad/s: the same limit before the first rest, because the bias has drifted since the calibration. Larger: more turns
-# are mistaken for rest.
+# rad/s (1.2 deg/s): largest mean rate that may be bias. Larger: smooth turns are mistaken for rest.
+MAX_BIAS_RADPS = 0.02
+# rad/s: largest mean rate that may be bias before the first rest, because the bias has drifted since the calibration.
+# Larger: more turns are mistaken for rest.
 _MAX_FIRST_BIAS_RADPS = const(0.1)
-_REST_S = const(1.5)  # s: stillness for this time is rest. Larger: rest is detected later and more reliably.
-_REST_ROLLING_S = const(10.0)  # s: the same if the bike seems to move or brake. No road is smooth for this long.
+_REST_S = const(1.5)  # s: duration of stillness that counts as rest. Larger: rest is detected later, but more reliably.
+# s: duration of stillness that counts as rest if the bike seems to move or brake. No road is smooth for this long.
+_REST_ROLLING_S = const(10.0)
 _AVERAGE_S = const(0.5)  # s: time constant of the recent average. Larger: rest is detected later after a movement.
 
 
 class RestDetector:
-    """Detects rest. update() takes the means of each window. resting (read-only): True after _REST_S of stillness, or
-    _REST_ROLLING_S if the bike seems to move.
+    """Detects rest. update() takes the means of each window.
 
-    first: no rest since power-on, so the bias may be far off.
+    first: True if there was no rest since power-on, so the bias may be far off.
+
+    resting (read-only): True after _REST_S of stillness, or after _REST_ROLLING_S if the bike seems to move.
     """
 
     def __init__(self, first=True):
@@ -31,9 +35,16 @@ class RestDetector:
         self._max_bias = _MAX_FIRST_BIAS_RADPS if first else MAX_BIAS_RADPS
 
     def update(self, rates, force, bias, seconds, rolling=False, moving=False):
-        """Take the means over a window of `seconds`. rates: 3, rad/s, less the estimated bias. bias: 3, rad/s, the
-        estimated bias. force: 3, g. rolling: other evidence suggests that the bike moves. moving: a measured speed
-        proves that it moves."""
+        """Take the means over a window.
+
+        Args:
+            rates: 3 values in rad/s, without the estimated bias.
+            force: 3 values in g.
+            bias: the estimated bias, 3 values in rad/s.
+            seconds: duration of the window.
+            rolling: True if other evidence suggests that the bike moves.
+            moving: True if a measured speed proves that the bike moves.
+        """
         readings = [rates[i] + bias[i] for i in range(3)] + force
         if self._average is None:
             self._average = readings

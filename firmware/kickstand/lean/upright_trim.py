@@ -10,28 +10,40 @@ from math import radians, sin
 
 from ..units import const
 
-MAX_TRIM = radians(3.5)  # rad: a pose off by 2 degrees, and the rest of the accelerometer's errors
-# Symbol = default  # unit: what it is. "Larger:" says what raising it does.
-SIGMA_START = radians(2.5)  # rad: prior of the trim after new poses. Larger: it is found sooner, and varies more.
-SIGMA_KEPT = radians(0.7)  # rad: prior of a trim from an earlier, colder or hotter ride. Larger: as for SIGMA_START.
-# rad: force to the side over force up on straights, by rider, camber and wind. Larger: the trim is found later.
+# rad: largest trim. It is the sum of 2 degrees for an inexact upright pose, and the accelerometer's remaining errors
+MAX_TRIM = radians(3.5)
+# The comment of each parameter has its unit, its meaning and, after "Larger:", the effect of a larger value.
+
+# rad: standard deviation of the trim after new poses. Larger: the trim is found sooner, and varies more.
+SIGMA_START = radians(2.5)
+# rad: standard deviation of a trim from an earlier ride, which was colder or hotter. Larger: the trim is found sooner,
+# and varies more.
+SIGMA_KEPT = radians(0.7)
+# rad: force to the side divided by force up on straights, caused by rider, camber and wind. Larger: the trim is found
+# later.
 SIGMA_STRAIGHT = radians(1.5)
-# times sin(lean): prior of the force to the side in turns, by tyres and rider. Larger: turns to one side count less.
+# ratio: standard deviation of the force to the side in turns, divided by sin(lean). Tyres and rider cause this force.
+# Larger: turns to one side count less.
 _SIGMA_LEAN_SHARE = const(0.15)
-# times sin(lean): how much this force differs from turn to turn, because of the rider. Larger: turns count less.
+# ratio: variation of this force from turn to turn, divided by sin(lean), caused by the rider. Larger: turns count less.
 _SIGMA_TURN = const(0.04)
-_SIGMA_YAW_S = const(0.03)  # rad per rad/s: further measurement noise, times the yaw rate. Larger: turns count less.
-# ratio: larger innovations do not count. Larger: a sensor in a hand counts as a balanced bike.
+# rad per rad/s: additional measurement noise, divided by the yaw rate. Larger: turns count less.
+_SIGMA_YAW_S = const(0.03)
+# ratio: largest innovation that counts. Larger: a sensor in a hand counts as a balanced bike.
 _MAX_SIDEWAYS = const(0.1)
-_DISTURBANCE_S = const(2.0)  # s: how long wind or camber lasts. Larger: the trim is found later, and varies less.
+_DISTURBANCE_S = const(2.0)  # s: duration of wind or camber. Larger: the trim is found later, and varies less.
 NOISE = radians(0.01)  # rad per square root of a second: process noise. Larger: changes are followed sooner.
 
 
 class UprightTrim:
-    """A Kalman filter of two states. angle: the trim in rad, to subtract from the lean, within MAX_TRIM. variance: its
-    uncertainty, rad^2. Both are read-only.
+    """A Kalman filter of two states.
 
-    angle at the start: the trim found on earlier rides, or 0.
+    Args:
+        angle: the trim found on earlier rides, in rad, or 0.
+
+    Read-only attributes:
+        angle: the trim in rad, within MAX_TRIM. It is subtracted from the lean.
+        variance: the variance of the trim in rad^2.
     """
 
     def __init__(self, angle):
@@ -43,8 +55,14 @@ class UprightTrim:
         self._covariance = 0.0
 
     def update(self, sideways, lean, yaw_rate, seconds):
-        """Take one measurement while riding. sideways: force to the left over force up. lean (rad) and yaw_rate (rad/s)
-        increase its noise in bends. seconds: since the previous update."""
+        """Take one measurement while riding.
+
+        Args:
+            sideways: force to the left divided by force up.
+            lean: in rad. Like the yaw rate, it increases the noise in bends.
+            yaw_rate: in rad/s.
+            seconds: time since the previous update.
+        """
         sine = sin(lean - self.angle)
         innovation = sideways - self.angle - sine * self._lean_share
         if not -_MAX_SIDEWAYS < innovation < _MAX_SIDEWAYS:

@@ -51,11 +51,12 @@ class Glance:
     moved_count: Number of rows in the table of moved mounts.
     moved_vehicles: Number of mounts that moved, including those with an unknown time of the move.
     errors: Number of rows in the table of errors.
-    first_errors: The first errors, each as the log or vehicle and the message.
-    decelerations: Two columns for all brake tests, the time in s since 1970 or NaN, and the deceleration in m/s2.
+    first_errors: The first errors. Each has the name of the log or vehicle, and the message.
+    decelerations: Two columns with one value per brake test: the time in s since 1970, or NaN, and the deceleration in
+        m/s2.
     worst: Rows of the least certain alignments.
-    moved: Rows of the largest rotations of mounts, each with the path of its picture.
-    below: The folder that all names share, with its slash. None before the first result.
+    moved: Rows of the largest rotations of mounts, each with the path of the vehicle's picture.
+    below: The folder at the start of all names, with its slash. None before the first result.
     """
 
     def __init__(self) -> None:
@@ -69,7 +70,7 @@ class Glance:
         self.below: str | None = None
         self.worst: list[Row] = []
         self.moved: list[tuple[Row, str]] = []
-        # Rows of the table of vehicles, each with its decelerations. The key is True for aligned vehicles
+        # Rows of the table of vehicles, each with its decelerations. True: rows of aligned vehicles. False: all others
         self._rows: dict[bool, list[tuple[Row, list[float]]]] = {False: [], True: []}
 
     def add(self, result: PeriodResult) -> None:
@@ -141,9 +142,9 @@ def _quality(values: Sequence[float]) -> Markup:
 
 
 def _braking(utc_s: Sequence[float], values: Sequence[float]) -> list[Markup]:
-    """Draw the decelerations as a histogram and, if their times are known, over time.
+    """Draw a histogram of the decelerations. If their times are known, also draw them over time.
 
-    Returns the pictures, none without decelerations.
+    Returns the pictures. The list is empty without decelerations.
     """
     if not values:
         return []
@@ -191,8 +192,8 @@ def _spark(values: Sequence[float]) -> Markup:
 
 _PAGE = Path(__file__).parent / "page.html"
 _SCRIPT = _PAGE.read_text(encoding="utf-8").partition("<script>")[2].partition("</script>")[0]
-# The page loads nothing, and only its own script runs. The widths of bars are in style attributes. A policy can only
-# allow all style attributes or none, so it allows all.
+# The policy lets the page load nothing and run only its own script. The widths of bars are in style attributes. A
+# policy allows either all style attributes or none, so this policy allows all.
 _POLICY = (
     "default-src 'none'; base-uri 'none'; form-action 'none'; style-src 'unsafe-inline'; "
     f"script-src {source_hash(_SCRIPT)}"

@@ -1,4 +1,4 @@
-"""Draws the picture of one vehicle. It shows how well the aligned axes fit the drive, and the brake tests over time."""
+"""Draws the picture of one vehicle: how well the aligned axes fit the drive, and the brake tests over time."""
 
 from collections.abc import Sequence
 

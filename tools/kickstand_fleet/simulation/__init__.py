@@ -1,1 +1,1 @@
-"""A simulated fleet with its manifest and its truth, to try `kickstand fleet` on."""
+"""Simulates a fleet with its manifest and its truth, to test `kickstand fleet`."""

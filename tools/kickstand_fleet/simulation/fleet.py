@@ -18,7 +18,7 @@ from kickstand_tools.signals import Array, rotation_matrix
 from .route import random_route
 from .vehicle import HANDLING, Receiver, drive_log, random_sensor
 
-# Faults of vehicles and their logs, each with its share of the fleet. The other vehicles have no fault
+# The share of the fleet with each fault of the vehicle or of its logs. The other vehicles have no fault
 TROUBLES = {
     "moved-between": 0.06,  # the mount was turned between two logs
     "moved-within": 0.06,  # the mount was turned during a log
@@ -55,7 +55,7 @@ class MadeVehicle:
     kind: "car", "bus" or "motorcycle".
     trouble: The vehicle's fault, a key of TROUBLES, or "".
     paths: Paths of the logs.
-    mounts: Rotation of each mounting, shape (3, 3), as in VehicleSensor. Two if the mount moved.
+    mounts: Rotation of each mounting, shape (3, 3), as in VehicleSensor. There are two mountings if the mount moved.
     moved_deg: Angle by which the mount moved.
     moved_log: Index of the log in which the mount moved, or of the first log after it moved.
     moved_s: Time in that log at which the mount moved. NaN if it moved before that log.
@@ -72,7 +72,7 @@ class MadeVehicle:
 
     @property
     def reasons(self) -> str:
-        """The codes that are correct for the refusal, separated by spaces. "" if the vehicle must be aligned."""
+        """The correct codes of a refusal, separated by spaces. "" if the fleet command must align the vehicle."""
         return _REASONS.get(self.trouble, "")
 
 
@@ -87,16 +87,17 @@ def make_fleet(
 ) -> list[MadeVehicle]:
     """Simulate a fleet, and write drives/*.csv.gz, MANIFEST.csv and TRUTH.csv to a directory.
 
-    A third of the vehicles each are cars, buses and motorcycles. Each has one to three drives. The same seed always
-    gives the same fleet.
+    One third of the vehicles are cars, one third buses, and one third motorcycles. Each has one to three drives. The
+    same seed always gives the same fleet.
 
     Args:
         out: The directory.
         vehicles: Number of vehicles.
         seed: Seed of the random numbers.
-        seconds: About the length of each drive.
+        seconds: Approximate duration of each drive.
         rate_hz: Samples per second.
-        troubles: The fault of each vehicle, a key of TROUBLES, or "". None draws them with the shares of TROUBLES.
+        troubles: The fault of each vehicle, a key of TROUBLES, or "". None draws faults at random, with the shares of
+            TROUBLES.
         progress: Function that is called with the number of finished vehicles and the number of all.
 
     Raises InputError if the directory cannot be written.

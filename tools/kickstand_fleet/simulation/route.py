@@ -6,7 +6,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.signals import Array, moving_mean
 
-_SMOOTH_S = 0.6  # about the time in which a driver moves the pedal or the steering wheel
+_SMOOTH_S = 0.6  # approximate time in which a driver moves the pedal or the steering wheel
 # Slope and camber get a new random value every _SLOPE_M metres, with these standard deviations in degrees
 _SLOPE_M, _SLOPE_DEG, _CAMBER_DEG = 120.0, 1.2, 0.7
 _FASTEST_LATERAL_MPS2 = 3.0
@@ -14,7 +14,7 @@ _FASTEST_LATERAL_MPS2 = 3.0
 
 @dataclass
 class Handling:
-    """The driving of a kind of vehicle. Each field is a range, as (least, most).
+    """The way a kind of vehicle is driven. Each field is a range (smallest, largest).
 
     cruise_mps: Cruising speed.
     speed_up_mps2: Acceleration when speeding up.
@@ -32,10 +32,10 @@ class Handling:
 class Route:
     """A route of n samples. Each field has shape (n).
 
-    time: In s.
-    speed: In m/s.
+    time: Time in s.
+    speed: Speed in m/s.
     acceleration: Acceleration forward, in m/s2.
-    yaw_rate: In rad/s, positive to the left.
+    yaw_rate: Yaw rate in rad/s, positive to the left.
     slope: Slope of the road, in rad, positive uphill.
     camber: Sideways slope of the road, in rad, positive if the road falls to the right.
     """
@@ -53,7 +53,7 @@ def random_route(
 ) -> Route:
     """Simulate a route with stops, bends and braking in straight lines.
 
-    straight: False drives in circles only, as in a car park. Then there is no braking in a straight line.
+    straight: False for a drive in circles only, as in a car park. Such a drive never brakes in a straight line.
     """
     legs = _Legs(chance, handling)
     legs.stand(chance.uniform(7.0, 14.0))
@@ -68,7 +68,7 @@ def random_route(
     width = max(2, round(_SMOOTH_S * rate_hz))
     speed = moving_mean(np.interp(time, knots[:, 0], knots[:, 1]), width)
     place = np.searchsorted(knots[:, 0], time, side="right").clip(1, len(knots) - 1)
-    lateral = moving_mean(knots[place, 2], 2 * width)  # the knot at the end of a leg has the leg's lateral acceleration
+    lateral = moving_mean(knots[place, 2], 2 * width)  # the knot at the end of each leg holds its lateral acceleration
     yaw_rate = np.where(speed > 0.3, lateral / np.maximum(speed, 1.5), 0.0)
     distance = np.cumsum(speed) / rate_hz
     return Route(
@@ -84,8 +84,8 @@ def random_route(
 class _Legs:
     """Collects the legs of a route.
 
-    knots: One tuple for the end of each leg. It contains the time, the speed, and the lateral acceleration during the
-    leg.
+    knots: One tuple per leg. It contains the time and the speed at the end of the leg, and the lateral acceleration
+        during the leg.
     """
 
     def __init__(self, chance: np.random.Generator, handling: Handling) -> None:
@@ -149,5 +149,5 @@ def _along(chance: np.random.Generator, distance: Array, mean: float, sigma: flo
 
 
 def balance_lean(route: Route) -> Array:
-    """The lean of a motorcycle in balance on this route, shape (n), in rad; positive to the right."""
+    """Compute the lean of a motorcycle in balance on this route, shape (n), in rad, positive to the right."""
     return -np.arctan(route.speed * route.yaw_rate / STANDARD_GRAVITY)

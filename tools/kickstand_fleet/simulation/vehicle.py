@@ -15,8 +15,7 @@ HANDLING = {
     "bus": Handling((7.0, 14.0), (0.7, 1.3), (1.0, 2.0), (0.7, 1.6)),
     "motorcycle": Handling((9.0, 22.0), (1.5, 3.2), (1.6, 4.5), (1.5, 4.0)),
 }
-# Angle by which the body rolls outwards per g of lateral acceleration, and by which it dives per g of braking, in
-# degrees
+# Roll of the body outwards in degrees per g of lateral acceleration, and dive in degrees per g of braking
 _ROLL_DEG, _DIVE_DEG = {"car": 4.0, "bus": 5.5, "motorcycle": 0.0}, {"car": 2.5, "bus": 2.0, "motorcycle": 4.0}
 _COUNT_G, _COUNT_DPS = 1.0 / 16384.0, 1.0 / 131.0
 
@@ -42,8 +41,8 @@ class Receiver:
     """The receiver that measures the speed.
 
     every_s: Time between two values.
-    late_s: Delay of a value.
-    factor: Factor on each value, 3.6 for a receiver that wrongly gives km/h.
+    late_s: Delay of each value.
+    factor: Factor on each value. It is 3.6 for a receiver that wrongly sends km/h.
     until_s: Time of the last value.
     """
 
@@ -99,11 +98,11 @@ def _readings(chance: np.random.Generator, kind: str, route: Route) -> tuple[Arr
     """Compute the readings of a sensor without errors, along the vehicle's left, up and forward.
 
     Returns:
-        The specific force, shape (n, 3), in m/s2.
-        The rate, shape (n, 3), in rad/s.
+        force: specific force, shape (n, 3), in m/s2.
+        rate: angular rate, shape (n, 3), in rad/s.
 
-    Two simplifications make this hundreds of times faster than the package simulation/physics. Pitch and slope are
-    under 5 degrees and count to first order. The sensor is on the axis about which the body rolls.
+    Two simplifications make this function hundreds of times faster than the package simulation/physics. Pitch and slope
+    are treated as small angles, because both are under 5 degrees. The sensor is on the axis about which the body rolls.
     """
     step_s = route.time[1]
     lateral = route.speed * route.yaw_rate
@@ -126,9 +125,13 @@ def _readings(chance: np.random.Generator, kind: str, route: Route) -> tuple[Arr
 
 
 def _mount_rates(time: Array, at_s: float, turn: Array, seconds: float = 0.3) -> Array:
-    """Compute the rates of a mount that rotates at the time at_s, about the vehicle's axes.
+    """Compute the rates about the vehicle's axes while the mount rotates.
 
-    turn: the rotation, shape (3, 3). Returns the rates, shape (n, 3), in rad/s.
+    at_s: time of the middle of the rotation, in s.
+    turn: the rotation, shape (3, 3).
+    seconds: duration of the rotation.
+
+    Returns the rates, shape (n, 3), in rad/s.
     """
     turning = (time >= at_s - seconds / 2) & (time < at_s + seconds / 2)
     return np.outer(turning, rotation_vector(turn) / seconds)

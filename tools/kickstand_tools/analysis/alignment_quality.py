@@ -24,18 +24,18 @@ YAW_COSTS_DEG, PITCH_COSTS_DEG = 3.0, 5.0  # rms error of the lean, divided by t
 
 SMOOTH_S = 0.5
 STRAIGHT_DPS, STRAIGHT_DEG = 2.0, 8.0  # largest yaw rate and largest lean on a straight
-ENOUGH_S = 10.0  # least time of straight riding, in all
-LEVEL_S = 60.0  # least time of riding in which uphill and downhill cancel out
-ENOUGH_G = 0.05  # least standard deviation of braking and speeding up on straights
+ENOUGH_S = 10.0  # shortest total time of straight riding that shows roll and yaw
+LEVEL_S = 60.0  # shortest time of riding in which uphill and downhill roughly cancel out
+ENOUGH_G = 0.05  # smallest standard deviation of the forward force on straights that shows yaw
 
 
 @dataclass
 class Quality:
-    """Angles by which the aligned axes seem to be off, and their data. Angles are None if the ride does not show them.
+    """Angles by which the aligned axes seem to be off. An angle is None if the ride does not show it.
 
-    roll_deg: positive if "up" leans to the right of the bike's own up.
-    pitch_deg: positive if "forward" points up.
-    yaw_deg: positive if "forward" points to the right of the direction in which the bike speeds up.
+    roll_deg: positive if the aligned up axis leans to the right of the bike's own up.
+    pitch_deg: positive if the aligned forward axis points up.
+    yaw_deg: positive if the aligned forward axis points to the right of the direction in which the bike speeds up.
     gravity_g: mean force at rest; None without a standstill.
     straight_s: seconds of straight riding, which show roll and yaw.
     lateral_g, forward_g: forces during straight riding, averaged over SMOOTH_S.
@@ -52,7 +52,7 @@ class Quality:
 
 @dataclass
 class LeanCost:
-    """The approximate rms error of the shown lean that each angle causes, in degrees; None for an unknown angle."""
+    """The approximate rms error of the shown lean, in degrees, that each angle causes. None for an unknown angle."""
 
     roll_deg: float | None
     pitch_deg: float | None

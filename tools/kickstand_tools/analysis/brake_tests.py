@@ -33,7 +33,7 @@ def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
 
 
 def car_channels(log: Source, calibration: CalibrationFile) -> list[Channels]:
-    """Return the channels of a car's log in the vehicle's axes, without a lean, one item per block."""
+    """Return the channels of a car's log, in the vehicle's axes and without a lean. The list has one item per block."""
     found = []
     for whole in read_blocks(log):
         block = whole.measured

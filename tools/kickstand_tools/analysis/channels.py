@@ -31,14 +31,14 @@ class Channels(Table):
     yaw_rate_dps: positive in a left turn.
     roll_rate_dps: positive to the right.
     speed_mps, temp_c: speed and temperature in the log.
-    shown_g: forward force, smoothed as on the display.
+    shown_g: forward force in g, smoothed as on the display.
     lean_sigma_deg: standard deviation of the lean.
     resting: 1 if the meter has detected a standstill, otherwise 0.
     rolling: 1 if the speed that the meter estimates is surely not 0, otherwise 0.
     sure: 1 if the meter trusts its lean, otherwise 0.
-    doubtful: 1 if smooth() says so, otherwise 0; also 0 if the lean is not smoothed.
-    lat_deg, lon_deg: degrees north and east; NaN if not new.
-    utc_s: seconds since 1970; NaN if not new.
+    doubtful: 1 if smooth() doubts the lean, otherwise 0. It is 0 if the lean is not smoothed.
+    lat_deg, lon_deg: degrees north and east. NaN in a sample without a new position.
+    utc_s: Universal Time in s since 1970. NaN in a sample without a new time.
     """
 
     t_s: Array
@@ -123,7 +123,7 @@ def channels(block: Block, calibration: CalibrationFile, lean: dict[str, Array],
 def joined(parts: Iterable[Channels]) -> Channels:
     """Join the parts of a ride.
 
-    The parts are read one by one to limit memory. A column without any value takes no memory, and is read-only.
+    The parts are read one by one to limit memory. A column without any value uses no memory, and is read-only.
     """
     columns: list[Array | None] = [None for _ in fields(Channels)]
     length = 0
@@ -136,7 +136,7 @@ def joined(parts: Iterable[Channels]) -> Channels:
                     continue
                 column = columns[k] = np.full(end, np.nan)
             if end > len(column):
-                longer = np.empty(2 * end)  # memory that is not written takes no room, except in a browser
+                longer = np.empty(2 * end)  # the system reserves memory only when it is written, except in a browser
                 longer[:length] = column[:length]
                 column = columns[k] = longer
             column[length:end] = values
@@ -160,7 +160,7 @@ def spacing_s(course: Channels) -> float:
 
 
 def downsampled(blocks: Iterable[Channels], step_s: float, rounded: bool = False) -> Iterator[Channels]:
-    """Yield the means over each stretch of step_s that has samples. NaNs do not count.
+    """Yield the means over each stretch of step_s that has samples. The means ignore NaN.
 
     For positions and their time, the last value of a stretch is used, because longitudes on both sides of 180 degrees
     have no mean. A ride with at most one sample per stretch is not changed. A stretch may extend over several blocks.

@@ -18,10 +18,10 @@ from .stops.brake_test import RATE_S, Stop, stops_of
 from .stops.standstill import standing
 from .summary import Summary
 
-# These columns would take a quarter of the memory for a long ride.
+# Columns of the course that are not kept. In a long ride, they would use a quarter of the memory.
 _NOT_KEPT = ("lean_formula_deg", "temp_c", "shown_g", "lean_sigma_deg", "utc_s")
-# A vehicle has moved if it turned, sped up or braked by this much for OVER_S. An engine that idles at standstill shakes
-# as much as a road, but the mean over OVER_S hardly changes.
+# Averaging time of rates and forces that show whether a vehicle has moved. An idling engine at standstill shakes as
+# much as a road, but the means over OVER_S hardly change.
 OVER_S = 1.0
 TURNS_DPS, PUSHES_G = 3.0, 0.05
 MOVES_MPS = 1.0
@@ -82,7 +82,7 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
             yield replace(block, **dict.fromkeys(_NOT_KEPT, np.full(len(block.t_s), np.nan)))
 
     course = joined(downsampled(blocks(), RATE_S))
-    # A speed that is always 0 does not prove a standstill. A broken contact at the wheel also reads 0.
+    # A speed that is always 0 does not prove a standstill, because a broken contact at the wheel also gives 0.
     if total.speed_mps.time_s is None:
         course = replace(course, speed_mps=np.broadcast_to(np.nan, len(course.t_s)))
     frozen_s = sum((notice.seconds for notice in notices if isinstance(notice, FrozenReadings)), 0.0)

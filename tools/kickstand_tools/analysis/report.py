@@ -17,9 +17,9 @@ from .summary import Peak
 if TYPE_CHECKING:
     from rich.console import Group
 
-COSTS_DEG = 0.25  # least error of the lean that the display can show, so that it is worth a remedy
+COSTS_DEG = 0.25  # smallest error of the lean for which the report names a remedy; the display cannot show smaller ones
 GRAVITY_G = 0.02  # largest accepted difference of the force at rest from 1 g, as in the check of the six positions
-RIDDEN_S = 10.0  # least time of riding; with less, the bike was only pushed around
+RIDDEN_S = 10.0  # shortest riding time for a report; a shorter time means that the bike was only pushed around
 STOPS_TITLE = "Stops"
 STOPS_UNITS = {"at": "", "from": "km/h", "time": "s", "distance": "m", "MFDD": "m/s²", "peak": "m/s²", "jerk": "m/s³"}
 STOPS_UNITS |= {"pulls": "m"}  # a stop must fit one line of 80 columns, without room for units
@@ -224,7 +224,7 @@ def _gravity(found_g: float | None, on_page: bool) -> str:
 
 
 def judged(seen: Overview) -> bool:
-    """True if the ride shows how well the sensor is aligned. False if it contradicts the calibration altogether."""
+    """Return True if the ride shows how well the sensor is aligned, False if it contradicts the whole calibration."""
     return not any(
         isinstance(notice, WrongAxes) or (isinstance(notice, WrongMount) and not notice.judged)
         for notice in seen.notices

@@ -205,11 +205,11 @@ def _divergence_notice(block: Block, at: int) -> Message:
 def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str, Array], Array, Bools]:
     """Run the firmware's meter over a block of n samples.
 
-    shown: compute the displayed lean. Without it, lean_deg and sure are 0, which saves a tenth of the time.
+    shown: True to compute the displayed lean. False leaves lean_deg and sure at 0, which saves a tenth of the time.
     Returns:
         lean: the argument `lean` of channels().
         variance: variance of the lean, shape (n), in rad2; negative if the filter diverged.
-        odd: True where the meter blamed the sensor because its readings do not fit, shape (n).
+        odd: True where the meter reports that the sensor's readings contradict each other, shape (n).
     """
     names = ("lean_deg", "shown_g", "variance", "resting", "rolling", "odd", "sure")
     columns: list[list[float]] = [[] for _ in names]

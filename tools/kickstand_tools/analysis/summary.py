@@ -27,7 +27,7 @@ class Peak:
     time_s: float | None = None
 
     def add(self, t_s: Array, values: Array) -> None:
-        """Add values (n) at the times t_s (n). A value that does not count is NaN."""
+        """Add values and their times, both of shape (n). A value that does not count is NaN."""
         if len(values) and np.nanmax(values, initial=-np.inf) > self.value:
             at = int(np.nanargmax(values))
             self.value, self.time_s = float(values[at]), float(t_s[at])
@@ -44,9 +44,9 @@ class Summary:
     left_deg, right_deg: largest lean to each side that lasted for HELD_S.
     brake_g, accel_g: largest forces, smoothed as on the display.
     speed_mps: largest speed.
-    riding_s: time in which the lean filter finds no rest. A stop with a shaking engine counts as riding, unlike in
-        Overview.riding_s.
-    beyond_s: for each key, the time at a lean of at least so many degrees.
+    riding_s: time in which the lean filter finds no rest. Unlike Overview.riding_s, it includes stops with a shaking
+        engine.
+    beyond_s: time at or above each lean. The key is the lean in degrees.
     histogram_s: time at the leans of each bin of BINS_DEG, while riding with a trusted lean.
     not_sure_s: time in which the display would not show the lean.
     missing_s: total length of the gaps in the readings. A gap is longer than LOST_US and 4 usual steps.
@@ -75,7 +75,7 @@ class Summary:
         t = block.t_s
         self._begin_s = t[0] if not self.samples else self._begin_s
         step = np.diff(t, prepend=self._begin_s + self.duration_s)
-        longest_s = max(LOST_US / 1e6, 4.0 * float(np.median(step)))  # in a slow log, long steps are not gaps
+        longest_s = max(LOST_US / 1e6, 4.0 * float(np.median(step)))  # at a low sample rate, all steps are long
         self.missing_s += float(np.sum(step[step > longest_s]))
         step = np.where(step * 1e6 > GAP_US, 0.0, step)  # readings were missing
         self.samples += len(t)

@@ -40,7 +40,7 @@ def command(entry_point: EntryPoint) -> click.Command:
 
 
 def help_line(entry_point: EntryPoint) -> str:
-    """Return the line for a command in the list of commands. For a command that cannot be loaded it is the reason."""
+    """Return the help line of a command. If the command cannot be loaded, return the reason."""
     try:
         return command(entry_point).get_short_help_str(limit=80)
     except InputError as error:

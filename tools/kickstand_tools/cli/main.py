@@ -16,8 +16,8 @@ import click
 from ..common.errors import DISTRIBUTION, InputError, cause, printable
 from . import added
 
-# Each command with the module that has its function NAME_command, and its line of help. A module is imported only when
-# its command runs, because most modules import numpy, which is slow
+# Each command with its module and its line of help. The module contains the function NAME_command. It is imported only
+# when the command runs, because most modules import numpy, and this takes long
 COMMANDS = {
     "calibrate": (".calibrate", "Compute a calibration from recorded poses or drives."),
     "check": (".board", "Measure a board and everything wired to it, in two minutes."),
@@ -76,8 +76,8 @@ def kickstand(context: click.Context) -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run a command and exit with its status. This is the console script."""
-    # Set this before a command imports numpy. The matrices are small, so more threads would only double the processor
-    # time
+    # Limit numpy to one thread, before a command imports it. The matrices are small, so more threads would only double
+    # the processor time
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         with _ended_by_signals():
@@ -104,7 +104,7 @@ def main(arguments: list[str] | None = None) -> None:
     except UnicodeError as error:
         _refuse(f"a file name or a text has characters that cannot be used here ({error}): rename the file")
     except Exception as error:
-        if sys.flags.dev_mode:  # python -X dev: for debugging
+        if sys.flags.dev_mode:  # python -X dev shows the traceback for debugging
             raise
         _refuse(f"unexpected {type(error).__name__}: {error}: a fault in {added.owner(error)}, please report it")
 
@@ -128,7 +128,7 @@ class _Ended(BaseException):
 
 @contextlib.contextmanager
 def _ended_by_signals() -> Iterator[None]:
-    """A context in which `kill` and a closed terminal raise _Ended. So temporary files are removed before the end."""
+    """A context in which `kill` and a closed terminal raise _Ended, so temporary files are removed."""
 
     def end(number: int, _frame: object) -> None:
         raise _Ended(number)

@@ -14,7 +14,7 @@ from ..simulation.physics.road import CLASSES
 from ..simulation.profiles import MAIN, PROFILES
 from .common import OUT_DIRECTORY, Command, echo
 
-LINES_S = 10.0  # time between two lines of progress, which replace the progress bar without a terminal
+LINES_S = 10.0  # time between two lines of progress if there is no terminal for a progress bar
 PROFILE_NAMES = f"{', '.join(MAIN)}; hard ones: {', '.join(name for name in PROFILES if name not in MAIN)}."
 
 

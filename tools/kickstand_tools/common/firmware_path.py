@@ -19,15 +19,15 @@ def _packaged() -> Path:
 
 
 def installed() -> bool:
-    """True if these tools were installed as a package. False in a checkout, where the user may edit the files."""
+    """Return True if these tools were installed as a package, False in a checkout with files that the user may edit."""
     return _packaged().is_dir()
 
 
 def config() -> Path:
     """Return the path of the user's config.py.
 
-    If the current directory is a checkout, it is the checkout's file. If these tools are an installed package, it is a
-    config.py in the current directory. Otherwise it is the file of these tools.
+    In a checkout as the current directory, this is the checkout's file. For tools that were installed as a package, it
+    is config.py in the current directory, if there is one. Otherwise it is the file that belongs to these tools.
     """
     here = Path("firmware").resolve()
     if (here / "kickstand").is_dir() and (here / "config.py").is_file():

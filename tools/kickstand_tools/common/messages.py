@@ -51,9 +51,9 @@ NOTHING_TO_DO = Remedy()
 
 @dataclass(frozen=True)
 class Message:
-    """A notice, or the reason for a refusal. JSON has the values of its fields in the order of the fields.
+    """A notice, or the reason for a refusal.
 
-    code: a name for programs.
+    code: a short name of the message, for programs.
     text: template of the sentence, in which {name} is a field.
     todo: template of the remedy, in which {name} is a field.
     """

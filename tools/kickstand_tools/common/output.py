@@ -18,7 +18,7 @@ def check_output(path: Path, inputs: list[Path]) -> None:
     _resolved(path)
     if path.is_dir():
         raise InputError(f"{path} is a directory: give --out the name of a file")
-    if _is_open_here(path):  # the shell has opened this file, and replacing it would lose its content
+    if _is_open_here(path):  # replacing a file that the shell has opened would lose its content
         raise InputError(f"{path} is this command's own input or output: give --out the name of another file")
     if path.exists() and not path.is_file():
         raise InputError(f"{path} is not an ordinary file: give --out the name of one")
@@ -38,7 +38,7 @@ def _resolved(path: Path) -> Path:
 
 
 def _is_open_here(path: Path) -> bool:
-    """True if the path names an open file of this process: standard input, output or error, or such as /dev/fd/3."""
+    """Return True if the path is an open file of this process: /dev/stdin, /dev/stdout, /dev/stderr or /dev/fd/3."""
     with contextlib.suppress(OSError):
         there = path.stat()
         for number in (0, 1, 2):
@@ -89,12 +89,12 @@ def make_directory(path: Path) -> None:
 
 @contextlib.contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Give a temporary path to write to, as a context. At its end, the file is renamed to `path`.
+    """A context that yields a temporary path to write to. At its end, the file is renamed to `path`.
 
-    The finished file survives a power loss. If writing fails, an earlier file at `path` stays. The temporary name ends
-    like `path`, because libraries choose the format by the ending. Raises InputError.
+    The finished file survives a power loss. If writing fails, an earlier file at `path` remains. The temporary name has
+    the same ending as `path`, because libraries choose the format by the ending. Raises InputError.
     """
-    path = _resolved(path)  # replace the file that a symbolic link leads to, not the link
+    path = _resolved(path)  # replace the target of a symbolic link, not the link
     temporary = path.with_name(f".{os.getpid()}-{path.name}")
     try:
         yield temporary
@@ -104,32 +104,32 @@ def whole_file(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise InputError(f"{path} cannot be written: {cause(error)}; choose another place") from error
     finally:
-        with contextlib.suppress(OSError):  # on a read-only file system, this second error would hide the first
+        with contextlib.suppress(OSError):  # this error must not hide the first, for example on a read-only file system
             temporary.unlink(missing_ok=True)
 
 
 def flush_to_disk(path: Path) -> None:
     """Wait until a file, or the entries of a directory, are on the disk. Raises OSError.
 
-    Without this, a file system may store the new name before the content. A power loss would then leave neither the
-    old content nor the new content (fsync(2)).
+    Without flushing, a file system may store the new name before the content. A power loss would then leave neither the
+    old nor the new content (see fsync(2)).
     """
     directory = path.is_dir()
-    # a browser has no disk; Windows cannot open directories
+    # A browser has no disk, and Windows cannot open directories
     if sys.platform == "emscripten" or (directory and os.name == "nt"):
         return
     number = os.open(path, os.O_RDONLY if directory else os.O_RDWR)
     try:
         os.fsync(number)
     except OSError as error:
-        if not (directory and error.errno in (errno.EINVAL, errno.ENOTSUP)):  # some network disks cannot do this
+        if not (directory and error.errno in (errno.EINVAL, errno.ENOTSUP)):  # network disks may not flush directories
             raise
     finally:
         os.close(number)
 
 
 def write_packed(path: Path, parts: Iterable[bytes]) -> None:
-    """Write these parts to a file, whole or not at all. Gzip it if its name ends in .gz. Raises InputError."""
+    """Write bytes to a file, completely or not at all. Gzip the file if its name ends in .gz. Raises InputError."""
     opened = gzip.open if path.suffix == ".gz" else open
     with whole_file(path) as temporary, opened(temporary, "wb") as file:
         file.writelines(parts)

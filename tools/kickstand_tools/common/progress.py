@@ -1,6 +1,6 @@
-"""Shows a progress bar or a spinner for work that takes over a second, if standard error is a terminal.
+"""Shows a progress bar or a spinner during work that takes over a second, if standard error is a terminal.
 
-Otherwise, work that takes minutes can print its progress in lines (see lines_s of Bar).
+If standard error is not a terminal, long work can print lines of progress instead (see lines_s of Bar).
 """
 
 import contextlib
@@ -21,7 +21,7 @@ class Bar:
 
     what: text in front of the bar.
     total: amount of work; None if unknown.
-    patience_s: the bar appears at the first call after this time.
+    patience_s: the bar appears at the first progress after this time.
     lines_s: seconds between two lines if standard error is not a terminal; None for no lines.
     """
 

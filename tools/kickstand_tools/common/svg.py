@@ -1,6 +1,6 @@
 """Writes SVG drawings for the pages and the READMEs.
 
-A fleet has thousands of pictures. The elements are written as text, because a picture then takes only a millisecond.
+The elements are written as text, which takes a millisecond per picture. A fleet has thousands of pictures.
 """
 
 from markupsafe import Markup, escape

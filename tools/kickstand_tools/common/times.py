@@ -9,5 +9,5 @@ def clock(seconds: float) -> str:
 
 
 def tick_s(seconds: float) -> float:
-    """Return a round time between the ticks of an axis, so that it has 6 to 12 ticks."""
+    """Return a round interval in s between the ticks of a time axis. The axis then has 6 to 12 ticks."""
     return next((tick for tick in (1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800) if seconds < 12 * tick), 3600)

@@ -12,11 +12,11 @@ from ..signals import Array
 from .csv_reader import cells_of
 
 COLUMNS = ("t_s", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")
-# columns from a satellite receiver, which have values in some rows only
+# Columns from a satellite receiver. Only some rows have values, because the receiver is slower than the sensor.
 TRACK = ("speed_mps", "lat_deg", "lon_deg", "utc_s")
-OPTIONAL = (*TRACK, "temp_c")  # cells of these columns may be empty
+OPTIONAL = (*TRACK, "temp_c")  # columns that may be missing or have empty cells
 
-# The sensor's widest ranges are 16 g and 2000 deg/s. Larger values are in another unit (m/s2, counts).
+# The sensor's widest ranges are 16 g and 2000 deg/s. Values over these limits are in another unit (m/s2, counts).
 MOST_G, MOST_DPS = 20.0, 2500.0
 _LIMITS = {"t_s": 1e10, "ax_g": MOST_G, "ay_g": MOST_G, "az_g": MOST_G, "temp_c": 200.0, "speed_mps": 200.0}
 _LIMITS |= {"gx_dps": MOST_DPS, "gy_dps": MOST_DPS, "gz_dps": MOST_DPS}
@@ -69,7 +69,7 @@ def header(log: str, line: str) -> list[str]:
 
 
 def _made_from(log: str) -> str:
-    """ ", RIDE.csv" if only one ride with a calibration is beside the log, otherwise ""."""
+    """Return ", RIDE.csv" if the log's folder has exactly one other ride with a calibration, otherwise ""."""
     rides = [
         path.with_name(path.name.removesuffix(".cal.json") + ending)
         for path in Path(log).parent.glob("*.cal.json")
@@ -80,7 +80,11 @@ def _made_from(log: str) -> str:
 
 
 def plausible(table: Array, names: list[str], before_us: int | None) -> bool:
-    """True if read() would accept these values (n, columns of names; NaN for an empty cell)."""
+    """Return True if read() would accept these values.
+
+    table: one column per name, NaN for an empty cell, shape (n, number of names).
+    before_us: time of the previous sample, None for the first.
+    """
     for k, name in enumerate(names):
         within = np.abs(table[:, k]) <= _LIMITS[name]
         if not np.all(within | np.isnan(table[:, k]) if name in OPTIONAL else within):
@@ -90,15 +94,23 @@ def plausible(table: Array, names: list[str], before_us: int | None) -> bool:
 
 
 def read(log: str, text: str, width: int, places: dict[str, int], lines_before: int, before_us: int | None) -> Array:
-    """Convert text to numbers (n, columns in the order of places). An empty optional cell becomes NaN.
+    """Convert the text of n rows to numbers. An empty cell in an optional column becomes NaN.
 
-    Raises InputError for the first mistake, naming its line.
+    Args:
+        log: the log's name in messages.
+        width: number of cells per row.
+        places: index of each column in a row, by its name.
+        lines_before: number of lines before the text.
+        before_us: time of the previous sample, None for the first.
+
+    Returns the columns in the order of places, shape (n, number of places). Raises InputError for the first mistake
+    and names its line.
     """
     columns = [(place, name, _LIMITS[name]) for name, place in places.items()]
     values = []
     for number, line in enumerate(text.split("\n"), lines_before + 1):
         if not line.strip():
-            continue  # often the last line
+            continue  # the text often ends in a line feed
         try:
             cells = cells_of(line)
             if len(cells) != width:
@@ -118,7 +130,7 @@ def read(log: str, text: str, width: int, places: dict[str, int], lines_before: 
 
 
 class _Mistake(Exception):
-    """A mistake in a row. Its text describes it."""
+    """A mistake in a row, with a text for the user."""
 
 
 def _number(cell: str, name: str, limit: float) -> float:

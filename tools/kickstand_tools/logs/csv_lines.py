@@ -1,6 +1,6 @@
-"""Writes tables of numbers as CSV, fast. Writes a log in memory, or a stretch of a log, to a file.
+"""Writes tables of numbers, logs in memory and stretches of logs as CSV.
 
-The texts equal those of Python's own formatting. Formatting a whole column at once takes a seventh of the time.
+The module formats a whole column at once. The text is the same as with Python's format(), in a seventh of the time.
 """
 
 import itertools
@@ -19,23 +19,26 @@ from .reader import read_blocks
 from .source import File, Progress
 
 _DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
-_ROWS = 15_000  # rows written at a time; their letters fit into a processor's cache
-_MOST = 2.0**53  # in units of the last digit; neighbouring doubles above this are more than one unit apart
+_ROWS = 15_000  # rows formatted at once; their text fits into a processor's cache
+_MOST = 2.0**53  # largest value in units of its last decimal; above it, a double does not hold every whole number
 _POINT, _MINUS, _ZERO, _COMMA, _END = b".-0,\n"
 
-Letters = NDArray[np.uint8]  # (m, n): the ASCII letters of n texts, one text per column; 0 means no letter
+Letters = NDArray[np.uint8]  # ASCII letters of n texts, one text per column, shape (m, n); 0 means no letter
 
 
 def csv_lines(table: Array, digits: Sequence[int]) -> Iterator[bytes]:
-    """Yield the lines of table (n, m), many lines at a time, with digits[k] decimals in column k. NaN gives an empty
-    cell."""
+    """Yield the lines of a table, many lines at a time.
+
+    table: the numbers, shape (n, m). NaN becomes an empty cell.
+    digits: number of decimals of each of the m columns.
+    """
     for begin in range(0, len(table), _ROWS):
         columns = table[begin : begin + _ROWS].T
         yield joined_cells([number_cells(column, digit, nan="") for column, digit in zip(columns, digits, strict=True)])
 
 
 def joined_cells(columns: Sequence[Letters]) -> bytes:
-    """Lines of CSV from the cells of each column."""
+    """Join columns of cells to lines of CSV."""
     n = columns[0].shape[1]
     comma, end = np.full((1, n), _COMMA, dtype=np.uint8), np.full((1, n), _END, dtype=np.uint8)
     parts = [part for letters in columns for part in (letters, comma)]
@@ -49,14 +52,15 @@ def text_cells(texts: Sequence[str]) -> Letters:
 
 
 def number_cells(values: Array, digits: int, nan: str = "nan") -> Letters:
-    """The letters of f"{value:.{digits}f}" for each of values (n). nan: the text for a value that is not a number."""
+    """Format n values like f"{value:.{digits}f}". nan: the text for a value that is NaN."""
     scaled = np.abs(values) * 10.0**digits
     missing = np.isnan(scaled)
     scaled = np.where(missing, 0.0, scaled)
     if not np.all(scaled < _MOST):  # also for infinity
         return text_cells([nan if value != value else f"{value:.{digits}f}" for value in values.tolist()])
     whole = np.rint(scaled)
-    # The product was rounded, so near the middle between two texts it may give the wrong text.
+    # Rounding of the product can put a value that is almost halfway between two texts on the wrong side. Python's
+    # format() decides these values.
     for k in np.flatnonzero(np.abs(np.abs(scaled - whole) - 0.5) <= scaled * 2.0**-52).tolist():
         whole[k] = int(f"{abs(values[k]):.{digits}f}".replace(".", ""))
     most = int(np.max(whole, initial=0.0))
@@ -68,8 +72,13 @@ def number_cells(values: Array, digits: int, nan: str = "nan") -> Letters:
 
 
 def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, least_rows: int) -> Letters:
-    """The letters of integers (n) of up to `most` digits, with a point before the last `digits` digits. The first row
-    stays free."""
+    """Format n integers with a decimal point before the last `digits` digits.
+
+    most: largest number of digits of an integer.
+    least_rows: smallest number of rows of the result.
+
+    The first row of the result stays empty. It is for the sign.
+    """
     places = max(most, digits + 1)
     letters = np.zeros((max(places + 2, least_rows), len(number)), dtype=np.uint8)
     row = len(letters) - 1
@@ -90,8 +99,14 @@ def write_lines(path: Path, names: Sequence[str], lines: Iterable[bytes]) -> Non
 
 
 def write_lean(out: Path, columns: Sequence[str], digits: Sequence[int], rows: Iterable[tuple[Block, Array]]) -> int:
-    """Write a LEAN.csv: the log's own times, then these columns, with digits[k] decimals in column k. rows: blocks of
-    the log with their values (n, columns). Returns the number of samples. Raises InputError."""
+    """Write a LEAN.csv with the log's own times as the first column.
+
+    columns: names of the other columns.
+    digits: number of decimals of each of these columns.
+    rows: blocks of the log, each with its values, shape (n, number of columns).
+
+    Returns the number of samples. Raises InputError.
+    """
     count = 0
 
     def lines() -> Iterator[bytes]:
@@ -106,9 +121,10 @@ def write_lean(out: Path, columns: Sequence[str], digits: Sequence[int], rows: I
 
 
 def write_log(path: Path | str, log: Log) -> None:
-    """Write a log, gzipped if the name ends in .gz, whole or not at all. Raises InputError.
+    """Write a log in memory to a CSV file, gzipped if the name ends in .gz. Raises InputError.
 
-    Optional columns without any value are left out. t_s is the recorder's own time.
+    After an error, no incomplete file remains. Optional columns without any value are left out. The column t_s has the
+    recorder's own time.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as directory:
@@ -132,10 +148,17 @@ def cut_log(
     progress: Progress | None = None,
     notices: list[Message] | None = None,
 ) -> tuple[int, float]:
-    """Copy the lines of a log between from_s and to_s to out, whole or not at all. Gzip out if its name ends in .gz.
+    """Copy the lines of a stretch of a log to the file `out`, gzipped if its name ends in .gz. Raises InputError.
 
-    from_s, to_s: seconds since the log's first sample; negative: before its last sample; None: the log's start or end.
-    Returns the number of samples and their duration, s. progress, notices: see read_blocks(). Raises InputError.
+    After an error, no incomplete file remains.
+
+    Args:
+        from_s, to_s: limits of the stretch, see Stretch.
+        progress, notices: see read_blocks().
+
+    Returns:
+        count: number of samples.
+        duration: time from the first to the last sample, in s.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as directory:

@@ -1,12 +1,14 @@
-"""Reads all CSV: logs and the tables of other apps.
+"""Reads CSV: logs and the tables of other apps.
 
 Each line is one row, so an unclosed quotation mark does not affect the following lines. In a log, the first mistake
-raises an error that names the line (cells.read()). In another app's table, damaged rows are left out and counted
-(columns_of_text()).
-Memory is bounded: a log comes in blocks (source.chunks()), and the cells of a table are limited.
+raises an error that names the line (see cells.read()). In another app's table, damaged rows are left out and counted
+(see columns_of_text()).
 
-numbers_in() reads logs with plain numbers only, as Kickstand writes them, in 0.7 s for an hour at 200 Hz.
-cells.read() reads all other logs, in 1.7 s.
+Memory is limited in both cases. A log is read in blocks (see source.chunks()), and a table has a maximum number of
+cells.
+
+Kickstand's own logs contain only plain numbers. numbers_in() reads an hour of such a log at 200 Hz in 0.7 s.
+cells.read() reads any log, and takes 1.7 s for an hour.
 """
 
 import csv
@@ -22,21 +24,22 @@ from numpy.typing import NDArray
 from ..common.errors import InputError
 from ..signals import Array, Bools
 
-# (n) cells of one column: int64, or float64 with NaN for no number, or str as objects with "" for an empty cell
+# The n cells of one column. The type is int64, or float64 with NaN for an empty cell, or object with a str per cell, ""
+# for an empty cell.
 Cells = NDArray[Any]
 
-ROWS = 50_000  # rows converted at once, because text takes ten times the memory of numbers
+ROWS = 50_000  # rows converted at once; as text they take ten times the memory of the numbers
 LONGEST = 40  # most characters in a number
-LONGEST_LINE = 100_000  # most characters in a line; Python's csv refuses cells a little longer than this
-# Limits of a table: seven hours of twelve columns at 100 Hz. A number takes 8 bytes, and 8 more while parts are joined.
-# A string object uses 60 bytes.
+LONGEST_LINE = 100_000  # most characters in a line; Python's csv module refuses a cell over 131072 characters
+# Most cells of a table, and most cells with text. The first limit is seven hours of twelve columns at 100 Hz. A number
+# uses 8 bytes, and 8 more while the parts of a column are joined. A string object uses 60 bytes.
 MOST_CELLS, MOST_TEXTS = 30_000_000, 3_000_000
 _NOTHING = {"", "-", "na", "n/a", "nan", "nil", "none", "null", "#n/a"}
 _PLAIN = b"0123456789.-,\n"
 
 
 def separator_of(line: str) -> str:
-    """The separator of a line's cells, comma, semicolon or tab, whichever is most frequent outside quotation marks."""
+    """Find the separator of a line's cells: the most frequent of comma, semicolon and tab outside quotation marks."""
     bare = re.sub(r'"[^"]*"', "", line)
     return max(",;\t", key=bare.count)
 
@@ -45,16 +48,16 @@ def cells_of(line: str, separator: str = ",") -> list[str]:
     """The cells of one line. Raises csv.Error for a line of over LONGEST_LINE characters."""
     if len(line) > LONGEST_LINE:
         raise csv.Error(f"a line of over {LONGEST_LINE} characters")
-    if '"' not in line:  # much faster than csv: half the time
+    if '"' not in line:  # split() takes half the time of the csv module
         return line.split(separator)
     return next(csv.reader((line,), delimiter=separator, skipinitialspace=True), [])
 
 
 def numbers_in(text: bytes, count: int) -> Array | None:
-    """Return the numbers in n lines of `count` cells, shape (n, count), NaN for an empty cell. They equal those of
-    float().
+    """Convert n lines of `count` plain numbers, as float() does. An empty cell becomes NaN.
 
-    Return None if the text is not n lines of `count` plain numbers. Then the caller must use another reader.
+    Returns the numbers, shape (n, count), or None if the text contains anything else. Then the caller must use another
+    reader.
     """
     if text.translate(None, _PLAIN) or not text.strip(b"\n"):
         return None
@@ -62,7 +65,7 @@ def numbers_in(text: bytes, count: int) -> Array | None:
         return None
     text = text if text.endswith(b"\n") else text + b"\n"
     filled_up = b"\n" + text
-    for empty in (b",,", b",,", b",\n", b"\n,"):  # b",,": twice, because adjacent empty cells share a comma
+    for empty in (b",,", b",,", b",\n", b"\n,"):  # b",,": replaced twice, because adjacent empty cells share a comma
         filled_up = filled_up.replace(empty, empty[:1] + b"nan" + empty[1:])
     try:
         found = np.loadtxt(io.BytesIO(filled_up[1:]), delimiter=",", comments=None, ndmin=2)
@@ -72,10 +75,16 @@ def numbers_in(text: bytes, count: int) -> Array | None:
 
 
 def columns_of_text(text: str, separator: str, width: int) -> tuple[list[Cells], int]:
-    """The columns of CSV without a header, and the number of rows left out.
+    """Read CSV without a header.
 
-    A row is damaged if it has more cells than the names and the first row, or if its line is too long. The missing
-    cells of a short row are empty. Raises InputError for a table that is too large.
+    A damaged row is left out. A row is damaged if its line is too long, or if it has more cells than `width` and more
+    than the first row. The missing cells of a short row are empty.
+
+    Returns:
+        columns: the cells of each column.
+        left_out: number of damaged rows.
+
+    Raises InputError for a table that is too large.
     """
     most, left_out = 0, 0
 
@@ -96,7 +105,7 @@ def columns_of_text(text: str, separator: str, width: int) -> tuple[list[Cells],
 
 
 def _lines(text: str) -> Iterator[str]:
-    """Yield the lines that are not blank. A list of all lines would take several times the memory of the text."""
+    """Yield the lines that are not blank. A list of all lines would use several times the memory of the text."""
     begin = 0
     while begin < len(text):
         end = text.find("\n", begin)
@@ -107,7 +116,7 @@ def _lines(text: str) -> Iterator[str]:
 
 
 def columns_of(rows: Iterable[Sequence[str]], width: int) -> list[Cells]:
-    """The columns of rows of cells."""
+    """Convert rows of cells to `width` columns. Raises InputError for a table that is too large."""
     parts: list[list[Cells]] = [[np.empty(0, dtype=np.int64)] for _ in range(width)]
     rows, cells_read, texts = iter(rows), 0, 0
     while block := list(itertools.islice(rows, max(1, min(ROWS, 20 * ROWS // max(1, width))))):
@@ -126,7 +135,10 @@ def columns_of(rows: Iterable[Sequence[str]], width: int) -> list[Cells]:
 
 
 def numbers_of(cells: Cells) -> NDArray[Any]:
-    """Cells (n) as integers if all are integers, otherwise as floats, NaN for a cell that is not a number."""
+    """Convert the cells of a column to numbers: integers if all are integers, otherwise floats.
+
+    A cell that is not a number becomes NaN.
+    """
     if cells.dtype.kind in "iuf":
         return cells
     numbers = [_number(str(cell)) for cell in cells.tolist()]
@@ -134,7 +146,7 @@ def numbers_of(cells: Cells) -> NDArray[Any]:
 
 
 def filled(cells: Cells) -> Bools:
-    """True for cells that are not empty, shape (n)."""
+    """Return True for each cell that is not empty, shape (n)."""
     if cells.dtype.kind in "iuf":
         return ~np.isnan(cells.astype(float))
     return np.array([cell != "" for cell in cells.tolist()], dtype=bool)
@@ -171,7 +183,7 @@ def _text(cells: Iterable[str]) -> Cells:
 
 
 def _number(cell: str) -> float | None:
-    """The number in a cell; NaN for an empty cell, None for text."""
+    """Convert a cell to a number. An empty cell becomes NaN. Returns None for text."""
     cell = cell.strip()
     if cell.lower() in _NOTHING:
         return np.nan

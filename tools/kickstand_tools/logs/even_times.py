@@ -1,8 +1,9 @@
-"""Spreads rounded times of a recorder evenly, within the limits of the rounding.
+"""Makes the times of a log even again if the recorder rounded them.
 
-Some recorders write times in whole hundredths or thousandths of a second, or write the same time for several samples
-that they received together. Steps are then uneven, and some are 0, although a sensor samples evenly. Each time is
-therefore replaced by the mean of the recorded times around it, within the tick of the recorder's clock.
+A sensor takes samples at even intervals. However, some recorders round times to hundredths or thousandths of a second.
+Others write the same time for several samples that they received together. Then the recorded steps are uneven, and
+some are 0. This module replaces each time by the mean of the recorded times around it. The change is limited to about
+half a tick of the recorder's clock.
 """
 
 from collections.abc import Callable, Iterator
@@ -16,27 +17,33 @@ from ..common.messages import Message
 from ..signals import Array, Ints, window_means
 from .log import Block
 
-COARSE = 0.05  # times with a smaller tick, as a share of the time between samples, are not changed
-OFTEN = 0.05  # a larger share of repeated times means that the recorder stamps several samples at once
-EXACT = 0.98  # with a larger share of equal steps, the times are a grid with some lost samples
+COARSE = 0.05  # smallest tick, as a share of the time between samples, for which times are changed
+OFTEN = 0.05  # over this share of repeated times, the recorder writes one time for several samples
+EXACT = 0.98  # from this share of equal steps, the times are already even, and only some samples are missing
 GAP = 1.5  # a step is a gap if it is longer than 1.5 median steps plus a tick
-# The mean is taken over at least AROUND samples and at least TICKS ticks
+# The mean around a sample uses at least AROUND samples and at least TICKS ticks.
 AROUND = 64
 TICKS = 8
-# A clock has stopped if over CROWD samples, and over CROWDED times the usual number per tick, have the same time
+# A clock has stopped if more than CROWD samples have the same time, and also more than CROWDED times the usual number
+# of samples per tick.
 CROWDED = 10.0
 CROWD = 50
-# Largest shift of a time, in ticks: half a tick, plus a margin for the ends, where the mean is less exact
+# Largest change of a time, in ticks. Rounding explains half a tick. The rest is a margin for the ends of the log, where
+# the mean is less exact.
 ALLOWED = 0.6
-SHORTEST_S = 2e-6  # shortest step, because times become whole microseconds
-CONTEXT = 2000  # samples before and after a block that are used for its times
-REPORTED_S = 0.002  # a larger shift of the times is reported in a notice
+SHORTEST_S = 2e-6  # shortest step in s; steps stay over 0 when times are rounded to microseconds
+CONTEXT = 2000  # number of samples before and after a block that are used to compute its times
+REPORTED_S = 0.002  # smallest change of a time, in s, that is reported in a notice
 
 
 @dataclass(frozen=True)
 class TimesSpread(Message):
-    """The recorder rounded the times. repeated: number of times that equal the previous time. samples: number of all
-    times. shift_s: the largest shift."""
+    """The recorder rounded the times.
+
+    repeated: number of times that equal the previous time.
+    samples: number of all times.
+    shift_s: largest change of a time, in s.
+    """
 
     repeated: int
     samples: int
@@ -50,13 +57,18 @@ class TimesSpread(Message):
 
 
 def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
-    """Spread the times of samples (n, s) evenly if rounding has made them uneven or equal. Returns (n, s).
+    """Make the times of n samples even if rounding has made them uneven or equal.
 
-    Each result is within 0.6 ticks of the recorded time. All recorded times are multiples of the tick. If many times
-    are repeated, the tick is the usual step between different times. All steps of the result are over 0. Gaps are kept,
-    and sufficiently fine times are not changed.
-    Raises InputError for a time that decreases or is not a number, and for a clock that has stopped. name: the log's
-    name in messages.
+    Each result is within 0.6 ticks of the recorded time. The tick is the largest step of which all recorded steps are
+    multiples. If many times are repeated, the tick is at least the usual step between different times. All steps of
+    the result are over 0. Gaps remain, and times with a fine tick are not changed.
+
+    Args:
+        t_s: recorded times in s, shape (n).
+        name: the log's name in messages.
+
+    Returns the new times in s, shape (n). Raises InputError for a time that decreases or is not a number, and for a
+    clock that has stopped.
 
     >>> even_times([0.0, 0.01, 0.01, 0.02, 0.03, 0.03, 0.04]).round(4).tolist()
     [0.0007, 0.0071, 0.0136, 0.02, 0.0264, 0.0329, 0.0393]
@@ -102,7 +114,14 @@ def _one_step(between_us: Ints) -> bool:
 
 
 def _spread_repeated(recorded: Array, starts: Ints, counts: Ints, period_s: float) -> Array:
-    """Spread samples of the same time up to the next time, or over their usual duration."""
+    """Spread samples with the same time evenly.
+
+    They are spread up to the next recorded time, but with steps of at most one usual sample period.
+
+    starts: index of the first sample of each recorded time.
+    counts: number of samples with each recorded time.
+    period_s: usual time between samples.
+    """
     until = np.append(recorded[starts[1:]], np.inf)
     longest = np.minimum((until - recorded[starts]) / counts, np.maximum(period_s, 0.0))
     number = np.arange(len(recorded)) - np.repeat(starts, counts)
@@ -110,7 +129,11 @@ def _spread_repeated(recorded: Array, starts: Ints, counts: Ints, period_s: floa
 
 
 def _smooth(recorded: Array, times: Array, tick_s: float, period_s: float) -> Array:
-    """The mean recorded time around each sample between two gaps, limited to ALLOWED ticks from the recorded time."""
+    """Replace each time by the mean of the recorded times around it. The mean never extends across a gap.
+
+    The result differs from the recorded time by at most ALLOWED ticks. A sample alone between two gaps keeps its time
+    in `times`.
+    """
     half = max(AROUND, round(TICKS * tick_s / period_s)) // 2
     cuts = np.flatnonzero(np.diff(recorded) > GAP * period_s + tick_s) + 1
     found = times.copy()
@@ -123,7 +146,7 @@ def _smooth(recorded: Array, times: Array, tick_s: float, period_s: float) -> Ar
 
 
 def _mean(values: Array, half: int) -> Array:
-    """Moving mean over `half` samples on each side. Beyond the ends values are extrapolated along straight lines."""
+    """Moving mean over `half` samples on each side. Straight lines continue the values beyond both ends."""
     n = len(values)
     span = min(n, 2 * half + 1)
     k = np.arange(n, dtype=float)
@@ -131,12 +154,12 @@ def _mean(values: Array, half: int) -> Array:
     if n <= 2 * half:
         return first(k)
     before, after = first(np.arange(-half, 0.0)), last(np.arange(n, n + half, dtype=float))
-    base = values[0]  # subtracted first, because sums of small numbers are more exact
+    base = values[0]  # subtracted before summing, because sums of small numbers have smaller rounding errors
     return base + window_means(np.concatenate((before, values, after)) - base, 2 * half + 1)
 
 
 def _line(k: Array, values: Array) -> Callable[[Array], Array]:
-    """The least-squares line through values, as a function of k."""
+    """Fit a straight line to values at positions k. Returns the line as a function of the position."""
     middle, mean = float(np.mean(k)), float(np.mean(values))
     away = k - middle
     slope = float(away @ (values - mean)) / max(float(away @ away), 1e-12)
@@ -144,10 +167,13 @@ def _line(k: Array, values: Array) -> Callable[[Array], Array]:
 
 
 def even_blocks(blocks: Iterator[Block], name: str, remarks: list[Message]) -> Iterator[Block]:
-    """Yield the blocks with increasing times (see even_times()). name: the log's name. remarks: a notice about the
-    changes is appended.
+    """Yield the blocks of a log with even, increasing times, as even_times() makes them.
 
-    Blocks with even or fine times are not changed. The last samples of other blocks are moved to the next block.
+    name: the log's name in messages.
+    remarks: a notice about changed times is appended.
+
+    A block whose times need no change is returned as it is. The last samples of other blocks are moved to the next
+    block, because their times depend on it.
     """
     spread = _Spread(name)
     held: Block | None = None
@@ -172,18 +198,23 @@ def _joined(first: Block, second: Block) -> Block:
 
 
 class _Spread:
-    """Spreads the times of a log block by block. name: the log's name in messages."""
+    """Makes the times of a log even, block by block. name: the log's name in messages."""
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._before_s = np.zeros(0)  # recorded times of the last returned samples
-        self._from_us: int | None = None  # time of the first sample, after spreading
+        self._before_s = np.zeros(0)  # recorded times of the last samples that were returned
+        self._from_us: int | None = None  # new time of the first sample
         self._last_us = -1
         self._samples = self._repeated = 0
         self._shift_s = 0.0
 
     def take(self, block: Block) -> tuple[Block | None, Block | None]:
-        """Return the finished part, and the part that must wait for the next block."""
+        """Process one block.
+
+        Returns:
+            ready: the part with final times, or None.
+            held: the part that must be joined with the next block, or None.
+        """
         recorded = np.concatenate((self._before_s, block.t_s))
         steady = not np.any(np.diff(block.time_us) == 0)
         if not steady and len(block.time_us) < 2 * CONTEXT:
@@ -198,7 +229,7 @@ class _Spread:
         return self._ready(block.part(slice(0, wait)), times[len(self._before_s) :][:wait]), held
 
     def rest(self, block: Block) -> Block:
-        """Return the last samples, with their times spread."""
+        """Return the last block of the log with even times."""
         times = even_times(np.concatenate((self._before_s, block.t_s)), self._name)
         return self._ready(block, times[len(self._before_s) :])
 

@@ -1,10 +1,12 @@
-"""Finds stretches of a log with frozen readings, caused by a sensor that hangs or a phone that repeats its last
-reading.
+"""Finds frozen readings in a log: the same reading repeated for half a second or longer.
 
-Noise changes the readings of a working sensor from sample to sample, even at rest. If all six axes stay the same to the
-last digit for half a second, they were not measured. In a log with few digits, however, rounding may hide the noise of
-a vehicle at rest. There, equal readings are kept if the readings before or after continue at the same values, and left
-out if these jump.
+The cause is a sensor that hangs, or a phone that repeats its last reading. Noise changes the readings of a working
+sensor from sample to sample, even at rest. If all six axes stay the same to the last digit for half a second, they were
+not measured.
+
+In a log with few digits, rounding may hide the noise of a vehicle at rest. In such a log, equal readings are compared
+with the readings before and after them. They are kept if the values on one side are about the same. They are left out
+if the values jump on both sides.
 """
 
 from dataclasses import dataclass
@@ -15,10 +17,10 @@ from ..common.messages import Message
 from ..signals import Array, Bools, Ints
 from .log import Log
 
-FROZEN_S, FROZEN_SAMPLES = 0.5, 10  # least duration and number of equal readings
-COARSE_G, COARSE_DPS = 0.002, 0.05  # with last digits this large, rounding may hide the noise of a phone's sensor
-BESIDE_S = 0.5  # a stretch is compared with this time before and after it
-# at a standstill, the means before and after a stretch differ from the stretch by at most this
+FROZEN_S, FROZEN_SAMPLES = 0.5, 10  # shortest duration and least number of equal readings that count as frozen
+COARSE_G, COARSE_DPS = 0.002, 0.05  # if readings are rounded to steps this large, rounding may hide the sensor's noise
+BESIDE_S = 0.5  # equal readings are compared with the readings of this time before and after them
+# Largest difference between equal readings at a standstill and the mean of the readings beside them
 NEAR_G, NEAR_DPS = 0.02, 0.5
 
 _MOTION = [0, 1, 2, 4, 5, 6]  # columns in the chip's order, without the temperature
@@ -26,7 +28,12 @@ _MOTION = [0, 1, 2, 4, 5, 6]  # columns in the chip's order, without the tempera
 
 @dataclass(frozen=True)
 class FrozenReadings(Message):
-    """The readings froze. seconds: total time. begin_s, end_s: limits of the first stretch."""
+    """The readings froze.
+
+    stretches: number of stretches with frozen readings.
+    seconds: their total duration.
+    begin_s, end_s: times of the first stretch.
+    """
 
     stretches: int
     seconds: float
@@ -49,15 +56,17 @@ class FrozenFinder:
     def __init__(self) -> None:
         self._last = np.zeros((0, 6))  # last reading of the previous block
         self._last_s = 0.0
-        self._since_s = 0.0  # time since which the reading has not changed
-        self._since_samples = 1
+        self._since_s = 0.0  # time of the last change of the reading
+        self._since_samples = 1  # number of equal readings since then
         self._was_frozen = False
-        self._step = np.full(6, np.inf)  # smallest change seen on each axis, which is its last digit
+        self._step = np.full(6, np.inf)  # smallest change seen on each axis, used as the size of its last digit
         self._stretches: list[tuple[float, float]] = []
 
     def mark(self, time_us: Ints, readings: Array) -> Bools:
-        """Return True for each frozen reading, shape (n). readings: (n, 7), as in a Block. The first of several equal
-        readings counts as measured."""
+        """Return True for each frozen reading, shape (n). The first of several equal readings counts as measured.
+
+        readings: as in a Block, shape (n, 7).
+        """
         n = len(time_us)
         values, time_s = np.vstack((self._last, readings[:, _MOTION])), time_us.astype(float) * 1e-6
         time_s = np.concatenate(([self._last_s], time_s)) if len(self._last) else time_s
@@ -65,7 +74,7 @@ class FrozenFinder:
         self._step = np.minimum(self._step, np.min(np.where(change > 1e-9, change, np.inf), axis=0, initial=np.inf))
         same = np.concatenate(([False], ~np.any(change > 0.0, axis=1)))
         frozen = np.zeros(len(same), dtype=bool)
-        begins = np.flatnonzero(~same)  # each run of equal readings
+        begins = np.flatnonzero(~same)  # index of the first reading of each run of equal readings
         ends = np.append(begins[1:], len(same))
         long = ends > begins + 1
         for begin, end in zip(begins[long].tolist(), ends[long].tolist()):
@@ -86,7 +95,7 @@ class FrozenFinder:
         return frozen[-n:]
 
     def notices(self) -> list[Message]:
-        """The notices about the log so far."""
+        """The notices about the blocks so far."""
         if not self._stretches:
             return []
         first, last = self._stretches[0]
@@ -94,10 +103,10 @@ class FrozenFinder:
         return [FrozenReadings(len(self._stretches), seconds, first, last)]
 
     def _doubtful(self, values: Array, time_s: Array, begin: int, end: int) -> bool:
-        """True if the equal readings from begin to end are certainly frozen, not a standstill whose noise is hidden by
-        rounding."""
+        """Return True if the equal readings from begin to end are frozen. Return False if they may be a standstill
+        whose noise is hidden by rounding."""
         if not np.any(np.isfinite(self._step)):
-            return False  # no change was seen yet, so there is nothing to compare with
+            return False  # without any change so far, the size of the last digit is unknown
         if np.any(self._step[:3] < COARSE_G) or np.any(self._step[3:] < COARSE_DPS):
             return True
         near = 0.5 * np.where(np.isfinite(self._step), self._step, 0.0) + np.repeat([NEAR_G, NEAR_DPS], 3)
@@ -107,7 +116,7 @@ class FrozenFinder:
         return not any(np.all(np.abs(mean - values[begin]) <= near) for mean in means)
 
     def _add(self, begin_s: float, end_s: float) -> None:
-        if self._stretches and self._stretches[-1][1] == begin_s:  # the stretch continues from the previous block
+        if self._stretches and self._stretches[-1][1] == begin_s:  # this stretch began in the previous block
             begin_s = self._stretches.pop()[0]
         self._stretches.append((begin_s, end_s))
 

@@ -27,17 +27,19 @@ FirmwareRow = tuple[int, list[float], float]
 
 @dataclass
 class Table:
-    """A dataclass whose arrays have one row per sample; its other fields belong to the whole table."""
+    """A dataclass whose arrays have one row per sample. Fields that are not arrays describe the whole table."""
 
     def columns(self) -> dict[str, NDArray[Any]]:
-        """The arrays (n,) by the names of their fields."""
+        """The arrays of the table, by the names of their fields."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
 
     def part(self, which: slice | Bools) -> Self:
-        """The samples of a slice, or the samples for which an array of n is True. A slice gives views of this table's
-        arrays. Other fields are shared."""
-        # use the fields, because the columns of a Log are named as in a CSV
+        """Select samples.
+
+        which: a slice, or an array of n booleans. With a slice, the result's arrays are views of this table's arrays.
+        """
+        # Call Table.columns(), because Log.columns() uses the names of the CSV columns, not of the fields.
         return replace(self, **{name: values[which] for name, values in Table.columns(self).items()})
 
     def to_pandas(self) -> "DataFrame":
@@ -50,8 +52,12 @@ class Table:
 
 
 def float_schema(units: Mapping[str, str], fine: Container[str], about: dict[str, str]) -> "Schema":
-    """The schema of a Parquet file: columns with their units. Columns in fine are 64-bit floats, the rest 32-bit
-    floats. about: the metadata."""
+    """The schema of a Parquet file.
+
+    units: the unit of each column, by the column's name.
+    fine: names of the columns that are 64-bit floats. All others are 32-bit floats.
+    about: the file's metadata.
+    """
     import pyarrow
 
     return pyarrow.schema(
@@ -64,15 +70,21 @@ def float_schema(units: Mapping[str, str], fine: Container[str], about: dict[str
 
 
 def firmware_rows(time_us: Ints, readings: Array, speed_mps: Array) -> Iterator[FirmwareRow]:
-    """Yield each sample for a replay by the firmware's modules: time (us), reading (7, the chip's order: g, deg C,
-    deg/s), speed (m/s, NaN if missing). A missing temperature is ROOM_TEMP_C."""
+    """Yield each sample for a replay by the firmware's modules.
+
+    Yields:
+        time: in us.
+        reading: list of acceleration (3 values, g), temperature (deg C) and rate (3 values, deg/s). A missing
+            temperature is replaced by ROOM_TEMP_C.
+        speed: in m/s, NaN if missing.
+    """
     readings = np.column_stack((readings[:, :3], np.nan_to_num(readings[:, 3], nan=ROOM_TEMP_C), readings[:, 4:]))
     return zip(time_us.tolist(), readings.tolist(), speed_mps.tolist())
 
 
 @dataclass(eq=False)
 class Log(Table):
-    """One recording in the sensor's own axes: n samples.
+    """One recording of n samples, in the sensor's own axes.
 
     t_s: time in s since the first sample, increasing, shape (n).
     accel_g: specific force in g, shape (n, 3).
@@ -87,8 +99,8 @@ class Log(Table):
 
     Optional arrays are NaN in samples without a new value.
 
-    You can pass t_s with any start: its first value is added to start_s and subtracted from t_s. Raises InputError for
-    shapes that do not fit and for a time that does not increase.
+    t_s may start at any value. The first value is added to start_s and subtracted from t_s. Raises InputError for
+    wrong shapes and for times that do not increase.
 
     >>> import numpy as np
     >>> t_s = np.arange(300) / 100.0
@@ -127,8 +139,9 @@ class Log(Table):
 
     @classmethod
     def from_readings(cls, readings: ArrayLike, rate_hz: float, name: str = "the log") -> "Log":
-        """Make a log from readings (n, 7): acceleration (3, g), temperature (C), rate (3, deg/s), in the chip's order.
+        """Make a log from readings in the chip's order.
 
+        readings: acceleration (3 columns, g), temperature (deg C) and rate (3 columns, deg/s), shape (n, 7).
         rate_hz: samples per second.
         """
         table = np.asarray(readings, dtype=float)
@@ -146,17 +159,17 @@ class Log(Table):
 
     @property
     def start_utc_s(self) -> float | None:
-        """Universal Time at the first sample, s; None if unknown. The median over the rows is used, because some
-        values come late."""
+        """Universal Time at the first sample in s, None if unknown. It is a median, because the receiver sends some
+        times late."""
         starts = (self.utc_s - self.t_s)[np.isfinite(self.utc_s)]
         return float(np.median(starts)) if len(starts) else None
 
     def rows(self) -> Iterator[FirmwareRow]:
-        """The samples as firmware_rows() has them, for a replay by the firmware's modules."""
+        """Yield the samples for a replay by the firmware's modules. See firmware_rows()."""
         return firmware_rows(self.time_us, self.readings, self.speed_mps)
 
     def columns(self) -> dict[str, Array]:
-        """The samples by the names of the columns in a CSV."""
+        """The log's arrays, by the names of the columns in a CSV."""
         named: dict[str, Array] = {"t_s": self.t_s}
         named |= {f"a{axis}_g": values for axis, values in zip(AXES, self.accel_g.T)}
         named |= {f"g{axis}_dps": values for axis, values in zip(AXES, self.gyro_dps.T)}
@@ -172,9 +185,10 @@ class Block(Table):
     """Some successive rows of a log, in the units of the firmware's modules.
 
     time_us: time in us since the log's first sample, shape (n).
-    readings: acceleration (3 columns, g), temperature (C) and rate (3 columns, deg/s), shape (n, 7).
+    readings: acceleration (3 columns, g), temperature (deg C) and rate (3 columns, deg/s), shape (n, 7).
     speed_mps, lat_deg, lon_deg, utc_s: as in a Log. Missing values are NaN.
     frozen: True for repeated readings (see frozen.py), shape (n).
+    has_temp: True if the log has temperatures.
     start_s: the recorder's own time at the log's first sample, in s.
     """
 
@@ -187,13 +201,13 @@ class Block(Table):
     frozen: Bools
     has_temp: bool
     start_s: float
-    done: int  # bytes read of the (packed) file; for a log in memory, samples
-    lines: list[str] = field(default_factory=list)  # the rows as CSV; empty for a log in memory
+    done: int  # bytes read of the file before unpacking; for a log in memory, number of samples
+    lines: list[str] = field(default_factory=list)  # the rows as CSV, empty for a log in memory
     names: tuple[str, ...] = ()  # names of the columns in lines
-    own_times: bool = True  # False if the times were changed (see even_times.py) and differ from those in lines
+    own_times: bool = True  # False if even_times.py changed the times, so they differ from the times in lines
 
     def rows(self) -> Iterator[FirmwareRow]:
-        """The samples as firmware_rows() has them, for a replay by the firmware's modules."""
+        """Yield the samples for a replay by the firmware's modules. See firmware_rows()."""
         return firmware_rows(self.time_us, self.readings, self.speed_mps)
 
     @property
@@ -203,14 +217,14 @@ class Block(Table):
 
     @property
     def time_text(self) -> list[str]:
-        """The times as texts, from the file or as changed."""
+        """The times in s as texts. Unchanged times are copied from the file."""
         if not self.lines or not self.own_times:
             return [f"{self.start_s + t:.6f}" for t in self.t_s.tolist()]
         place = self.names.index("t_s")
         return [cells_of(line)[place].strip() for line in self.lines]
 
     def part(self, which: slice | Bools) -> "Block":
-        """The rows of a slice, or the rows for which an array of n is True."""
+        """Select rows. See Table.part()."""
         if isinstance(which, slice):
             lines = self.lines[which]
         else:
@@ -219,18 +233,21 @@ class Block(Table):
 
     @property
     def measured(self) -> "Block":
-        """The rows that are not frozen."""
+        """The block without frozen rows."""
         return self.part(~self.frozen) if np.any(self.frozen) else self
 
 
 @dataclass
 class Stretch:
-    """The part of a log between from_s and to_s, seconds since the log's first sample. Negative: before its last
-    sample. None: the log's start or end.
+    """A part of a log.
 
-    A Stretch can be used like a log. If it is read as a log, its times count from its own first sample. Functions that
-    compute the lean read the whole log, because the lean depends on earlier readings. They return the stretch in the
-    log's times.
+    source: the log.
+    from_s, to_s: its limits, in s since the log's first sample. A negative value counts back from the log's last
+        sample. None means the log's start or end.
+
+    A Stretch can be used like a log. If it is read as a log, its times count from the first sample of the stretch.
+    Functions that compute the lean read the whole log, because the lean depends on earlier readings. They return only
+    the samples of the stretch, with times that count from the start of the whole log.
 
     >>> import numpy as np
     >>> from kickstand_tools.api import Log, read_log
@@ -249,13 +266,15 @@ class Stretch:
         return name_of(self.source)
 
     def of_length(self, length_s: float) -> "Stretch":
-        """The stretch with both times from the log's start. length_s: length of the log."""
+        """The same stretch, with both limits counted from the log's start. length_s: duration of the log."""
         times = [None if t is None else t if t >= 0.0 else length_s + t for t in (self.from_s, self.to_s)]
         return Stretch(self.source, *times)
 
     def holds(self, block: Block) -> Bools:
-        """Return True for each sample of a block that is in the stretch, shape (n). The block must be of the whole log.
-        Both times of the stretch must count from the log's start."""
+        """Return True for each sample of a block that is in the stretch, shape (n).
+
+        The block's times and both limits of the stretch must count from the start of the whole log.
+        """
         begin_us, end_us = self._ends_us()
         return (block.time_us >= begin_us) & (block.time_us <= end_us)
 
@@ -263,7 +282,7 @@ class Stretch:
         return round(1e6 * (self.from_s or 0.0)), float("inf") if self.to_s is None else round(1e6 * self.to_s)
 
     def cut(self, blocks: Iterator[Block]) -> Iterator[Block]:
-        """The blocks of the whole log, cut to the stretch. Raises InputError if the stretch has no sample."""
+        """Yield the samples of the stretch. blocks: the whole log. Raises InputError if the stretch has no sample."""
         begin_us, end_us = self._ends_us()
         if end_us <= begin_us:
             raise InputError(f"{self.name}: the stretch ends before it begins: give --from the smaller time")
@@ -283,8 +302,12 @@ class Stretch:
 
 
 def within(stretch: Stretch | None, block: Block, values: Array) -> Iterator[tuple[Block, Array]]:
-    """Yield the rows of a block of the whole log that are in the stretch, with their values (n, ...). If stretch is
-    None, all rows."""
+    """Yield the rows of a block that are in the stretch, and the values of these rows. Yield nothing if there are none.
+
+    stretch: None selects all rows.
+    block: a block of the whole log.
+    values: one row per row of the block, shape (n, ...).
+    """
     if stretch is None:
         yield block, values
     elif (which := stretch.holds(block)).any():

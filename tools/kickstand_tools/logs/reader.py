@@ -23,9 +23,9 @@ from .frozen import FrozenFinder
 from .log import Block, Log, Stretch
 from .source import File, Progress, chunks, name_of, total_bytes
 
-BLOCK_BYTES = 1 << 20  # bytes of text in a block, some 15000 samples
-BLOCK_SAMPLES = 60_000  # samples in a block of a log in memory
-MOST_SAMPLES = 10_000_000  # largest log that is read as a whole: 14 hours at 200 Hz take 1 GB of memory
+BLOCK_BYTES = 1 << 20  # bytes of text per block, about 15000 samples
+BLOCK_SAMPLES = 60_000  # samples per block of a log in memory
+MOST_SAMPLES = 10_000_000  # most samples of a log: 14 hours at 200 Hz, which use 1 GB of memory
 _READINGS = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")  # in the order of Block.readings
 
 Source = File | Log | Stretch  # everything that can be read as a log
@@ -33,7 +33,7 @@ Source = File | Log | Stretch  # everything that can be read as a log
 
 @dataclass(frozen=True)
 class CutLine(Message):
-    """The last line was cut, as in an interrupted recording."""
+    """The last line is incomplete, as after an interrupted recording."""
 
     line_number: int
 
@@ -45,11 +45,16 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None,
     """Read a whole log: CSV with the columns t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps and optionally
     speed_mps,lat_deg,lon_deg,utc_s,temp_c.
 
-    source: a path (gzipped if it ends in .gz), an open file of text or bytes, a Log, which is checked, or a Stretch of
-    one of these. minimum: the least number of samples. progress: called with the bytes read and the bytes of the file.
-    axes: check whether rates and accelerations fit each other, which takes most of the time. Repeated times are spread,
-    and a cut end is left out. Raises InputError that names the file and the line of a mistake, also for common wrong
-    units (m/s2, milliseconds, km/h).
+    Repeated times are spread evenly. An incomplete last line is left out. A Log as the source is only checked.
+
+    Args:
+        source: a path (of a gzip file if it ends in .gz), an open file of text or bytes, a Log, or a Stretch of these.
+        minimum: least number of samples.
+        progress: called with the number of bytes read and the size of the file.
+        axes: check that rates and accelerations fit each other. This takes most of the time.
+
+    Raises InputError, which names the file and the line of a mistake. Common wrong units (m/s2, milliseconds, km/h)
+    also raise it.
 
     >>> import io
     >>> log = read_log(io.StringIO("t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\\n0.00,0,1,0,0,0,0\\n0.01,0,1,0,0,0,0\\n"))
@@ -82,9 +87,13 @@ def read_blocks(
     lines: bool = True,
     calibration: CalibrationFile | None = None,
 ) -> Iterator[Block]:
-    """Read a log of any length block by block. Frozen readings are marked in each block. notices: at the end, notices
-    about the log and about contradictions to `calibration` are appended. lines: also keep the rows as CSV, which takes
-    the most memory. For the other arguments see read_log()."""
+    """Read a log block by block. Frozen readings are marked in each block.
+
+    Args:
+        source, minimum, progress, axes: see read_log().
+        notices: after the last block, notices about the log and its contradictions to `calibration` are appended.
+        lines: also keep the rows as CSV. They use most of a block's memory.
+    """
     name, count = name_of(source), 0
     remarks: list[Message] = []
     checks, frozen, health = Checks(name), FrozenFinder(), SensorHealth()
@@ -112,7 +121,7 @@ def read_blocks(
 
 
 def check_first_line(log: Path) -> None:
-    """Raise InputError if a file does not begin with a log's line of names, or has no other line."""
+    """Raise InputError if the first line of a file is not the header of a log, or if no other line follows."""
     pieces = (text for text, _ in chunks(log, BLOCK_BYTES, []))
     _, rest = _header(str(log), next(pieces, b""))
     if not rest.strip() and not any(text.strip() for text in pieces):
@@ -120,7 +129,7 @@ def check_first_line(log: Path) -> None:
 
 
 def is_log(path: Path) -> bool:
-    """True if a file begins with the first line of a log."""
+    """Return True if a file begins with the header of a log and has another line."""
     try:
         check_first_line(path)
         return True
@@ -129,15 +138,21 @@ def is_log(path: Path) -> bool:
 
 
 def read_twice(source: Source) -> Source:
-    """Return a source that can be read twice: a Log for an open file, otherwise the same source."""
+    """Return a source that can be read twice. An open file is read into a Log."""
     if isinstance(source, Stretch):
         return replace(source, source=_rereadable(source.source))
     return _rereadable(source)
 
 
 def split_stretch(source: Source) -> tuple[File | Log, Stretch | None]:
-    """Split a source into its whole log and its stretch. The stretch, with times from the log's start, is None if the
-    source is not a Stretch. Raises InputError if the stretch has no sample."""
+    """Split a source into the whole log and the stretch.
+
+    Returns:
+        whole: the log.
+        stretch: the stretch with both limits counted from the log's start, or None if the source is not a Stretch.
+
+    Raises InputError if the stretch has no sample.
+    """
     if not isinstance(source, Stretch):
         return source, None
     stretch = _from_beginning(replace(source, source=_rereadable(source.source)))
@@ -146,8 +161,10 @@ def split_stretch(source: Source) -> tuple[File | Log, Stretch | None]:
 
 
 def _from_beginning(stretch: Stretch) -> Stretch:
-    """The stretch with both times from the log's start. If a time counts from the end, the log is read to find its
-    length."""
+    """Return the stretch with both limits counted from the log's start.
+
+    If a limit counts from the end, the log is read to find its duration.
+    """
     if min(stretch.from_s or 0.0, stretch.to_s or 0.0) >= 0.0:
         return stretch
     whole = _rereadable(stretch.source)
@@ -160,7 +177,8 @@ def _rereadable(source: File | Log) -> File | Log:
 
 
 def _unchecked(source: Source, remarks: list[Message]) -> Iterator[Block]:
-    """The blocks, with units and number of samples not yet checked. remarks: notices about the file are appended."""
+    """The blocks of a source before units and number of samples are checked. remarks: notices about the file are
+    appended."""
     if isinstance(source, Log):
         return _blocks_of(source)
     if not isinstance(source, Stretch):
@@ -193,7 +211,7 @@ def _parsed(source: File, name: str, remarks: list[Message]) -> Iterator[Block]:
 
 
 def _header(name: str, first: bytes) -> tuple[list[str], bytes]:
-    """The names of a log's columns, and the rest of its first chunk."""
+    """Split the first chunk of a log into the names of its columns and the bytes after the header."""
     first = first.removeprefix(b"\xef\xbb\xbf")
     if not first.strip():
         raise InputError(f"{name} is empty: a log starts with the line {','.join(COLUMNS)}")
@@ -207,7 +225,7 @@ def _header(name: str, first: bytes) -> tuple[list[str], bytes]:
 
 
 def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], remarks: list[Message]) -> Iterator[Block]:
-    """The blocks with the times of the file, which may repeat."""
+    """Yield the blocks with the times as recorded. Some times may be repeated."""
     places = {column: names.index(column) for column in COLUMNS + OPTIONAL if column in names}
     line, start_us, last_us = 1, None, None
     for text, done, is_last in _last_marked(pieces):
@@ -240,7 +258,12 @@ def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], rema
 def _numbers(
     name: str, text: bytes, names: list[str], places: dict[str, int], line: int, before_us: int | None
 ) -> Array:
-    """The numbers in a text (n, columns in the order of places). line: number of lines before the text."""
+    """Convert the text of n rows to numbers.
+
+    line: number of lines before the text.
+
+    Returns the columns in the order of places, shape (n, number of places).
+    """
     table = numbers_in(text, len(names))
     if table is not None and cells.plausible(table[:, list(places.values())], list(places), before_us):
         return table[:, list(places.values())]
@@ -260,11 +283,14 @@ def _last_marked(parts: Iterator[tuple[bytes, int]]) -> Iterator[tuple[bytes, in
 
 
 def _without_cut_line(text: bytes, names: list[str], places: dict[str, int]) -> tuple[bytes, bytes]:
-    """Remove the last line from the end of a log if it was cut. Returns the text and the cut line, empty if not cut.
+    """Remove the last line of a log if it was cut.
 
-    text: whole lines; the last line may have no line end. The last line was cut if it has fewer cells than there are
-    columns. Without a line end, it was also cut if it cannot be read, or if its last number has fewer decimals than in
-    the previous line, because half a number also looks like a number.
+    The last line was cut if it has fewer cells than the log has columns. If it has no line end, two more signs count.
+    Either it cannot be read, or its last number has fewer decimals than the last number of the previous line.
+
+    Returns:
+        text: the text without the cut line.
+        cut: the cut line, empty if no line was cut.
     """
     kept = text.rstrip()
     before, _, last = kept.rpartition(b"\n")

@@ -14,7 +14,7 @@ from typing import IO, Any, cast
 from ..common.errors import InputError, cause
 from ..common.messages import Message, Remedy
 
-# Most bytes in a line, and most NUL bytes at the end, which a file system may leave in a file that was not closed
+# Limit in bytes for one line, and for the NUL bytes that a file system may leave at the end of a file after a power cut
 LONGEST_LINE = 16_000_000
 SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # suffixes of logs and of other apps' tables
 File = Path | str | IO[bytes] | IO[str]
@@ -23,7 +23,7 @@ Progress = Callable[[int, int], None]  # called with (done, total) in the same u
 
 @dataclass(frozen=True)
 class NulEnd(Message):
-    """The file ends in NUL bytes. count: their number."""
+    """The file ends in NUL bytes. count: number of NUL bytes."""
 
     count: int
 
@@ -43,7 +43,7 @@ class CutGzip(Message):
 def open_input(path: Path | str) -> IO[bytes]:
     """Open an ordinary file for reading. Raises InputError for a device or a pipe, because it may never end."""
     try:
-        # Do not wait for a writer to a pipe
+        # O_NONBLOCK: opening a pipe must not wait for a writer.
         file = open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb")
         if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             return file
@@ -71,12 +71,19 @@ def log_stem(name: str) -> str:
 
 
 def chunks(source: File, size: int, remarks: list[Message] | None = None) -> Iterator[tuple[bytes, int]]:
-    """Yield the text, unpacked, in chunks of about `size` bytes of whole lines, each with the number of bytes read so
-    far.
+    """Yield the unpacked text in chunks of whole lines.
 
-    All lines end in a line feed, whatever the file uses; the last line may have no end. remarks: notices about the end
-    of the file are appended, about NUL bytes, which are left out, and about a cut gzip file. If remarks is None, a cut
-    file is refused. Raises InputError with the file's name.
+    Line ends are converted to line feeds. The last line may have no line end. NUL bytes at the end are left out.
+
+    Args:
+        size: approximate bytes per chunk.
+        remarks: notices about NUL bytes and about a cut gzip file are appended. If None, a cut file is refused.
+
+    Yields:
+        text: the chunk.
+        read: bytes of the file read so far.
+
+    Raises InputError with the file's name.
     """
     name = name_of(source)
     if isinstance(source, (Path, str)) and Path(source).is_dir():
@@ -115,8 +122,10 @@ def total_bytes(source: object) -> int:
 
 
 def _pieces(name: str, file: Any, packed: Any, size: int, remarks: list[Message] | None) -> Iterator[tuple[bytes, int]]:
-    """See chunks(). packed: the packed file below `file`, or `file` itself; its position is the number of bytes
-    read."""
+    """Yield the chunks of an open file, as chunks() does.
+
+    packed: the gzip file from which `file` is unpacked, or `file` itself. Its position shows how much was read.
+    """
     pending, read = b"", 0
     for data in _data(file, size, remarks):
         read += len(data)
@@ -141,7 +150,7 @@ def _data(file: Any, size: int, remarks: list[Message] | None) -> Iterator[bytes
     packed, there = isinstance(file, gzip.GzipFile), False
     while True:
         try:
-            # read1(), because read() would not return the data before the cut
+            # read1() returns the data before a cut. read() would raise EOFError and lose that data.
             data = file.read1(size) if packed else file.read(size)
         except EOFError:
             if remarks is None or not there:
@@ -155,7 +164,7 @@ def _data(file: Any, size: int, remarks: list[Message] | None) -> Iterator[bytes
 
 
 def _with_line_feeds(text: bytes) -> bytes:
-    if b"\r" not in text:  # searching one letter is fifty times as fast as searching two
+    if b"\r" not in text:  # searching for one byte is fifty times as fast as searching for two
         return text
     text = text.replace(b"\r\n", b"\n")
     return text if b"\n" in text else text.replace(b"\r", b"\n")

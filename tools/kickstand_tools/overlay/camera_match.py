@@ -10,10 +10,10 @@ from ..joining.motion import STEP_S, CellMotion
 from ..signals import Array, correlations, log_likelihood_ratio, moving_mean, peak_offset, peaks
 from .gpmf import Telemetry
 
-_SLOW_S = 5.0  # slower changes are removed, because they may be the gyros' bias
-_QUICK_S = 0.2  # faster changes are vibration, which differs between two places
-_ALIKE_S = 0.5  # readings closer together than this are not independent
-_LEAST_S = 8.0  # least time of the video within the ride
+_SLOW_S = 5.0  # changes of rate that take longer are removed, because they may come from the gyros' bias
+_QUICK_S = 0.2  # changes of rate that take less time are removed as vibration, which is different at each place
+_ALIKE_S = 0.5  # smallest time between two readings that count as independent
+_LEAST_S = 8.0  # shortest part of the video that must be within the ride
 _LEAST_EVIDENCE, _LEAST_LEAD, _LEAST_CORRELATION = 15.0, 6.0, 0.5
 _APART_S = 2.0
 
@@ -48,6 +48,6 @@ def camera_offset_s(ride: CellMotion, camera: Telemetry) -> tuple[float, float]:
 
 
 def _turning(rate_dps: Array) -> Array:
-    """The magnitude of the rate without slow and quick changes, shape (n)."""
+    """Compute the magnitude of the rate, shape (n), and remove its slow and quick changes."""
     size = moving_mean(np.linalg.norm(rate_dps, axis=1), round(_QUICK_S / STEP_S))
     return size - moving_mean(size, round(_SLOW_S / STEP_S))

@@ -11,21 +11,23 @@ from PIL import Image, ImageChops, ImageDraw
 from . import parts
 from .parts import ACCENT, DIM, PANEL, WHITE
 
-MOST_DEG = 60.0  # end of the dial
-MOST_G = 1.2  # edge of the circle of forces
-SHARE = 0.3  # height of the gauge as a share of the video's height
-LEGIBLE_PX, MOST_SHARE = 216.0, 0.45  # least height for legible text; largest share of the video's height
-UPRIGHT_DEG = 0.5  # a smaller lean counts as upright
-_WIDTH = 1.72  # width over height
-_SPREAD = 1.5  # degrees in the picture per degree of lean
-_MIDDLE, _SIDE = 60.0, 146.0  # x of the middle of the dial, and of speed and forces
+MOST_DEG = 60.0  # lean at each end of the dial
+MOST_G = 1.2  # force at the edge of the circle of forces
+SHARE = 0.3  # usual height of the gauge as a share of the video's height
+# For a small video the gauge is higher, because its text must be legible. It then has LEGIBLE_PX pixels, but at most
+# MOST_SHARE of the video's height
+LEGIBLE_PX, MOST_SHARE = 216.0, 0.45
+UPRIGHT_DEG = 0.5  # largest lean that counts as upright
+_WIDTH = 1.72  # width of the gauge divided by its height
+_SPREAD = 1.5  # degrees on the dial per degree of lean
+_MIDDLE, _SIDE = 60.0, 146.0  # horizontal position of the dial's centre, and of speed and forces
 _KMH, _MPH = 3.6, 3.6 / 1.609344
 
 
 class Gauge:
     """Draws the gauge with lean and forces.
 
-    video_height: height of the target video in pixels.
+    video_height: height in pixels of the video that the gauge is for.
     has_speed: also show the speed.
     mph: show the speed in miles per hour instead of kilometres per hour.
     width, height: size of the pictures in pixels. Both are even, as videos require.
@@ -35,7 +37,7 @@ class Gauge:
         height = max(SHARE * video_height, min(LEGIBLE_PX, MOST_SHARE * video_height))
         self.height = 2 * round(height / 2.0)
         self.width = 2 * round(self.height * _WIDTH / 2.0)
-        self._unit = self.height / 100.0  # lengths below are in hundredths of the height
+        self._unit = self.height / 100.0  # pixels per unit of length; the gauge is 100 units high
         self._has_speed, self._mph = has_speed, mph
         self._dial, self._radius = self._px(_MIDDLE, 62.0), round(50.0 * self._unit)
         forces_y, forces_radius = (63.0, 21.0) if has_speed else (46.0, 30.0)
@@ -81,7 +83,7 @@ class Gauge:
         pen.ellipse([inner, inner, size - 1 - inner, size - 1 - inner], fill=0)
 
     def _still_picture(self) -> Image.Image:
-        """The part of the picture that never changes."""
+        """Draw the part of the gauge that never changes."""
         picture = Image.new("RGBA", (self.width, self.height), parts.CLEAR)
         panel = parts.smooth_mask(
             picture.size,

@@ -31,7 +31,7 @@ class Telemetry:
 
 
 def telemetry(video: Video) -> Telemetry | None:
-    """The Telemetry of a video; None if it has none that can be read."""
+    """Read the gyro of the camera that took a video. Returns None if the video contains no readable gyro."""
     if video.telemetry is None:
         return None
     times, rates = [], []
@@ -58,7 +58,7 @@ def streams(packet: bytes, key: bytes) -> Iterator[Array]:
 
 
 def _of_stream(body: bytes, key: bytes) -> Iterator[Array]:
-    """Yield the scaled values of one stream. An item SCAL, the divisor, comes before the values."""
+    """Yield the values of one stream, divided by the number in its item SCAL. SCAL comes before the values."""
     scale = np.ones(1)
     for name, kind, size, values in _items(body):
         if kind not in _NUMBERS or name not in (b"SCAL", key):
@@ -74,7 +74,7 @@ def _of_stream(body: bytes, key: bytes) -> Iterator[Array]:
 
 
 def _items(data: bytes) -> Iterator[tuple[bytes, bytes, int, bytes]]:
-    """Yield (key, type, size of a sample, bytes of all samples) of each item. Items are padded to four bytes."""
+    """Yield key, type, size of one sample and bytes of all samples for each item. Items are padded to four bytes."""
     place = 0
     while place + 8 <= len(data):
         name, kind, size, count = struct.unpack_from(">4scBH", data, place)

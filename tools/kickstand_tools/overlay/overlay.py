@@ -19,8 +19,8 @@ from .gpmf import telemetry
 from .shown import Shown, shown
 from .video import Video, ffmpeg, input_of, open_video, write_video
 
-MARGIN = 0.03  # distance from the video's edges to the gauge, over the video's height
-_BEYOND_S = 1.0  # a video may begin this long before the ride, or end this long after it
+MARGIN = 0.03  # distance from the video's edges to the gauge, as a share of the video's height
+_BEYOND_S = 1.0  # longest time by which a video may begin before the ride or end after the ride
 _FPS = 30.0
 _CLIP_HEIGHT = 1080
 _TRANSPARENT = {
@@ -35,13 +35,13 @@ _SOLID = ("-c:v", "libx264", "-preset", "fast", "-crf", "18", "-pix_fmt", "yuv42
 
 @dataclass
 class Overlaid:
-    """A written overlay.
+    """The result of overlay().
 
     pictures: number of pictures.
     fps: pictures per second.
-    begin_s, end_s: begin and end of the drawn part of the ride.
-    offset_s: the ride's time at the video's first picture; None without a video.
-    correlation: correlation of camera and ride if the offset was found from it, otherwise None.
+    begin_s, end_s: limits of the drawn part of the ride, in s since its first sample.
+    offset_s: the ride's time at the video's first picture. None without a video.
+    correlation: correlation between the rates of camera and bike. None if the offset was passed.
     notices: remarks about the ride.
     """
 
@@ -68,14 +68,22 @@ def overlay(
     live: bool = False,
     progress: Progress | None = None,
 ) -> Overlaid:
-    """Write a gauge of lean, forces, speed and maxima: over a video (.mp4), or as a transparent clip (.mov, .webm).
+    """Draw a gauge with lean, forces, speed and maxima over a video (.mp4), or write a transparent clip (.mov, .webm).
 
-    ride, calibration: as for open_ride(). video: a video of the ride. offset_s: the ride's time at the video's first
-    picture, s since the ride's first sample: 12.5 if the video begins 12.5 s after the ride, -3 if it begins 3 s before
-    it. None: found from the sensors of a GoPro. fps: pictures per second; None: the video's, or 30. from_s, to_s: the
-    part of the ride; negative: before its end. height: height of the target video of a clip, pixels; None: 1080. mph:
-    speed in miles per hour. live: the lean that the display showed, not the smoothed one. progress: called with (done,
-    total) of reading the ride, then of drawing pictures. Raises InputError.
+    Args:
+        ride, calibration: see open_ride().
+        out: path of the file to write.
+        video: a video of the ride. None writes a clip.
+        offset_s: the ride's time at the video's first picture, in s since the ride's first sample. It is negative if
+            the video begins before the ride. None finds it from the gyro of a GoPro.
+        fps: pictures per second. None takes the video's, or 30 for a clip.
+        from_s, to_s: limits of the part of the ride, see Stretch.
+        height: height in pixels of the video that a clip is for. None means 1080.
+        mph: True to show the speed in miles per hour.
+        live: True to show the lean of the display, False to show the smoothed lean.
+        progress: called with (done, total), first while the ride is read, then while the pictures are drawn.
+
+    Raises InputError.
 
     >>> overlay("ride.csv", "clip.avi")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
@@ -116,13 +124,13 @@ def overlay(
         assert offset_s is not None
         arguments = _laid_over(filmed, begin_s - offset_s, end_s - begin_s, fps, given, round(MARGIN * size))
     with whole_file(out) as temporary:
-        temporary.touch()  # if this fails, the user sees the system's reason, which ffmpeg would hide
+        temporary.touch()  # if this fails, the system gives the reason; ffmpeg would not report it
         write_video(temporary, arguments, pictures(), drawn)
     return Overlaid(count, rate, begin_s, end_s, offset_s, correlation, notices)
 
 
 def _check(out: Path, video: Path | str | None, offset_s: float | None, height: int | None) -> Video | None:
-    """Raise InputError if a file cannot be written or read. Call this before any other work."""
+    """Check the files and options before any other work. Returns the opened video, or None. Raises InputError."""
     if video is None:
         if out.suffix.lower() not in _TRANSPARENT:
             raise InputError(f"{out}: the name of a transparent clip ends in .mov or .webm; an .mp4 needs --video")
@@ -151,7 +159,10 @@ def _found_offset(log: Source, video: Video, progress: Progress | None) -> tuple
 def _part(
     seen: Shown, video: Video | None, offset_s: float | None, from_s: float | None, to_s: float | None, name: str
 ) -> tuple[float, float]:
-    """Start and end of the part to draw, s in the ride. Raises InputError if it is not in the ride."""
+    """Compute start and end of the part to draw, in s since the ride's first sample.
+
+    Raises InputError if the part is not in the ride.
+    """
     last_s = float(seen.t_s[-1])
     begin_s, end_s = (s if s is None or s >= 0.0 else max(0.0, last_s + s) for s in (from_s, to_s))
     if video is not None and offset_s is not None:
@@ -175,7 +186,7 @@ def _part(
 def _laid_over(
     video: Video, begin_s: float, seconds: float, fps: float | None, gauge: list[str], margin: int
 ) -> list[str]:
-    """ffmpeg's arguments to draw the gauge over the video's lower left corner. Sound is copied."""
+    """Return ffmpeg's arguments to draw the gauge over the video's lower left corner and to copy the sound."""
     even = "crop=iw-mod(iw\\,2):ih-mod(ih\\,2)"
     rate = f",fps={fps:g}" if fps else ""
     laid = f"overlay=x={margin}:y=main_h-overlay_h-{margin}:eof_action=repeat"

@@ -14,13 +14,13 @@ ACCENT: Colour = (255, 176, 0, 255)  # amber, which colour-blind people can dist
 PANEL: Colour = (12, 14, 18, 120)
 CLEAR: Colour = (0, 0, 0, 0)
 _LAMP: Colour = (214, 40, 40, 255)
-_FINER = 4  # shapes are drawn larger by this factor and then reduced, which smooths their edges
+_FINER = 4  # shapes are first drawn larger by this factor; reducing them smooths their edges
 
 
 def smooth_mask(size: tuple[int, int], draw, finer: int = _FINER) -> Image.Image:
     """Draw a mask with smooth edges, values 0 to 255.
 
-    draw: called with a larger ImageDraw, and the number of its pixels per pixel of the mask.
+    draw: called with an enlarged ImageDraw and with the factor of enlargement.
     """
     mask = Image.new("L", (size[0] * finer, size[1] * finer), 0)
     draw(ImageDraw.Draw(mask), finer)
@@ -28,7 +28,7 @@ def smooth_mask(size: tuple[int, int], draw, finer: int = _FINER) -> Image.Image
 
 
 def outlined(mask: Image.Image, colour: Colour, width: int) -> Image.Image:
-    """The shape of a mask in a colour, with a dark edge of `width` pixels."""
+    """Draw the shape of a mask in a colour, with a dark edge of `width` pixels."""
     edge = mask.filter(ImageFilter.MaxFilter(2 * width + 1)).filter(ImageFilter.GaussianBlur(width * 0.4))
     picture = Image.new("RGBA", mask.size, DARK[:3] + (0,))
     picture.putalpha(edge)
@@ -39,7 +39,7 @@ def outlined(mask: Image.Image, colour: Colour, width: int) -> Image.Image:
 
 @lru_cache(maxsize=2000)
 def text(words: str, height: float, colour: Colour) -> Image.Image:
-    """Words with a dark outline, in a picture that fits the letters. height: font height in pixels."""
+    """Draw words with a dark outline, in a picture of the size of the words. height: font height in pixels."""
     stroke = max(1, round(height * 0.09))
     font = ImageFont.load_default(height)
     left, top, right, bottom = font.getbbox(words, stroke_width=stroke)

@@ -10,16 +10,16 @@ from ..common.messages import Message
 from ..logs.source import Progress
 from ..signals import Array, Ints, smoothed
 
-_FORCE_S = 0.3  # forces are averaged over this time, because engine and road shake the sensor
-_GAP_S = 0.2  # readings older than this are not shown
-_SPEED_S = 3.0  # speeds older than this are not shown; most receivers send one per second
+_FORCE_S = 0.3  # averaging time of the forces, because engine and road shake the sensor
+_GAP_S = 0.2  # longest gap between readings over which values are interpolated
+_SPEED_S = 3.0  # longest gap between speeds over which the speed is interpolated; most receivers send one per second
 
 
 @dataclass
 class Shown:
     """The values at n moments of a ride. Values that are unknown or not trusted are NaN.
 
-    t_s: time since the ride's first sample.
+    t_s: time in s since the ride's first sample.
     lean_deg: lean, positive to the right.
     forward_g: forward acceleration, positive when speeding up.
     left_g: acceleration to the left, parallel to the road.
@@ -46,7 +46,7 @@ class Shown:
         return self.lean_deg, self.forward_g, self.left_g, self.speed_mps, self.left_deg, self.right_deg
 
     def at(self, t_s: Array) -> "Shown":
-        """Interpolate the values at m other times. They are NaN before the ride, after it and in gaps."""
+        """Interpolate the values at other times. The values are NaN before the ride, after it and in gaps."""
         before = np.clip(np.searchsorted(self.t_s, t_s, side="right") - 1, 0, len(self.t_s) - 2)
         lean, forward, left = (
             _along_lines(self.t_s, value, before, t_s, _GAP_S) for value in (self.lean_deg, self.forward_g, self.left_g)
@@ -63,8 +63,10 @@ class Shown:
 
 
 def shown(ride: Ride, progress: Progress | None = None, notices: list[Message] | None = None) -> Shown:
-    """Compute the values of a whole ride, with the lean chosen in open_ride(). progress, notices: see Ride.blocks().
-    Raises InputError."""
+    """Compute the values of a whole ride. open_ride() has selected the live or the smoothed lean.
+
+    progress, notices: see Ride.blocks(). Raises InputError.
+    """
     columns: list[Array] = []
     for block in ride.blocks(progress, notices):
         lean = np.where(block.trusted, block.lean_deg, np.nan)
@@ -75,7 +77,7 @@ def shown(ride: Ride, progress: Progress | None = None, notices: list[Message] |
 
 
 def _maximum(t_s: Array, lean: Array) -> Array:
-    """The largest lean so far that lasted for HELD_S, shape (n)."""
+    """Find the largest lean up to each moment that lasted at least HELD_S, shape (n). It is 0 if there is none."""
     count = round(HELD_S / float(np.median(np.diff(t_s)))) + 1
     value = np.where(np.isfinite(lean), lean, 0.0)
     padded = np.append(np.zeros(count - 1), value)
@@ -84,7 +86,12 @@ def _maximum(t_s: Array, lean: Array) -> Array:
 
 
 def _along_lines(at_s: Array, values: Array, before: Ints, t_s: Array, gap_s: float) -> Array:
-    """Interpolate values at t_s along straight lines; NaN outside, and between values further apart than gap_s."""
+    """Interpolate linearly. The result is NaN outside the values, and between values further apart than gap_s.
+
+    at_s: times of the values.
+    before: for each result, index of the last value before its time.
+    t_s: times of the results.
+    """
     step_s = at_s[before + 1] - at_s[before]
     share = (t_s - at_s[before]) / step_s
     result = values[before] * (1.0 - share) + values[before + 1] * share

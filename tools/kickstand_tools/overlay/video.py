@@ -10,7 +10,7 @@ from pathlib import Path
 from ..common.errors import InputError, extra
 
 _QUIET = ("-hide_banner", "-loglevel", "error", "-nostdin", "-y")
-_LARGEST, _FASTEST = 16_384, 1000.0  # no camera exceeds these pixels per side and pictures per second
+_LARGEST, _FASTEST = 16_384, 1000.0  # limits of real cameras: pixels per side, and pictures per second
 
 
 @dataclass
@@ -20,7 +20,7 @@ class Video:
     width, height: size in pixels, as a player shows the video.
     fps: pictures per second.
     seconds: duration.
-    telemetry: number of the stream with a GoPro's sensor readings, None without one.
+    telemetry: number of the stream with a GoPro's sensor readings, None if the file has no such stream.
     """
 
     path: Path
@@ -35,7 +35,7 @@ def ffmpeg() -> str:
     """The path of the program ffmpeg. Raises InputError if it is not installed."""
     try:
         import imageio_ffmpeg
-        import PIL  # noqa: F401  the gauge needs it, too
+        import PIL  # noqa: F401  the gauge needs Pillow
     except ImportError as error:
         raise InputError("overlay needs imageio-ffmpeg and Pillow: " + extra("video")) from error
     try:
@@ -45,8 +45,11 @@ def ffmpeg() -> str:
 
 
 def input_of(path: Path) -> list[str]:
-    """ffmpeg's arguments to read a file safely. With only a name, ffmpeg would take 12:30.mp4 for a protocol, and a
-    file that poses as a video could make ffmpeg read from the network."""
+    """Return ffmpeg's arguments to read a file safely.
+
+    The prefix file: is needed, because ffmpeg would read the name 12:30.mp4 as a protocol. The list of protocols keeps
+    a malicious file from making ffmpeg read from the network.
+    """
     return ["-protocol_whitelist", "file,pipe", "-i", f"file:{path}"]
 
 
@@ -103,9 +106,15 @@ def packets(video: Video, stream: int) -> list[tuple[float, float, bytes]]:
 def write_video(
     out: Path, arguments: Iterable[str], pictures: Iterable[bytes], each: Callable[[], None] | None = None
 ) -> None:
-    """Run ffmpeg with these arguments and out, and write the pictures to its standard input.
+    """Run ffmpeg to write a video.
 
-    each: called after every picture. Raises InputError with ffmpeg's own words if it fails.
+    Args:
+        out: path of the video, ffmpeg's last argument.
+        arguments: ffmpeg's other arguments.
+        pictures: written to ffmpeg's standard input.
+        each: called after every picture.
+
+    Raises InputError with ffmpeg's last line of text if it fails.
     """
     with tempfile.TemporaryFile() as words:
         command = [ffmpeg(), "-hide_banner", "-loglevel", "error", "-y", *arguments, f"file:{out}"]

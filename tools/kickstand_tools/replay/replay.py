@@ -25,8 +25,8 @@ from .meter_along import MeterAlong, Misfit
 
 _RESULT_BYTES = struct.calcsize(replay_engine.RESULT)
 
-# A function that runs replay_engine.run() on another Python. It gets the records and the progress. It returns a context
-# that yields a file with the results. It may raise InputError
+# A function that runs replay_engine.run() on another Python. Its arguments are the records and the progress function.
+# It returns a context that yields a file with the results, and may raise InputError
 Engine = Callable[[Iterator[bytes], Progress | None], contextlib.AbstractContextManager[IO[bytes]]]
 
 _SIGMA = replay_engine.COLUMNS.index("lean_sigma_deg")
@@ -66,7 +66,7 @@ class LeanTable(Table):
 
 @dataclass(frozen=True)
 class CarReplayed(Message):
-    """The log comes from a car, and a car does not lean."""
+    """The log is from a car. A car's display shows no lean."""
 
     code = "car-replayed"
     text = (
@@ -152,7 +152,7 @@ def _replayed(
 
 
 def _with_frozen(block: Block, results: Array) -> Array:
-    """Return results for all rows of the block. They are NaN for frozen rows. results: those of the other rows."""
+    """Add rows of NaN for the frozen rows of the block. results: the results of all other rows."""
     found = np.full((len(block.time_us), len(replay_engine.COLUMNS)), np.nan)
     found[~block.frozen] = results
     sigma = found[:, _SIGMA]
@@ -188,8 +188,8 @@ def micropython(records: Iterator[bytes], _progress: Progress | None) -> Iterato
             yield process.stdout
 
 
-# Engines on another Python. The engine rp2040, an emulated Pico, is in the package kickstand_emulator. pyproject.toml
-# names it
+# Engines on another Python. The engine rp2040, an emulated Pico, is None here, because it is in the package
+# kickstand_emulator. It is found by its entry point in pyproject.toml
 _BY_RECORDS: dict[str, Engine | None] = {"micropython": micropython, "rp2040": None}
 
 

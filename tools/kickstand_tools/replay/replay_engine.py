@@ -2,8 +2,8 @@
 
     micropython replay_engine.py RECORDS > RESULTS
 
-RECORDS begins with 46 doubles, the calibration's parameters() and matrices(), and a double, the gyro's delay in s. One
-record per sample follows:
+RECORDS begins with 46 doubles for the calibration's parameters() and matrices(), and one double for the gyro's delay in
+s. Then one record per sample follows:
 
     int64          time in microseconds
     7 doubles      readings in the chip's order, in g, C and deg/s
@@ -36,7 +36,7 @@ COLUMNS = (
 CALIBRATION = "<47d"
 RECORD = "<q8d"
 RESULT = "<9d"
-# Values of lean_sigma_deg while the display shows no lean. ODD means that it also reports contradicting readings
+# Values of lean_sigma_deg while the display shows no lean. ODD means that the readings contradict each other
 NOT_SHOWN, ODD = -1.0, -2.0
 NO_SPEED = -1.0  # negative instead of NaN, because the module struct on a board does not read NaN correctly
 

@@ -15,15 +15,16 @@ _HEAD_LENGTH = struct.calcsize(block_format.HEAD)
 _TAIL_LENGTH = struct.calcsize(block_format.TAIL)
 _START = _HEAD_LENGTH + store.BODY_LENGTH  # start of the entries if the calibration has no matrices
 _PLACE_LENGTH = struct.calcsize(block_format.PLACE)
-# Samples were lost if a turn is late by more than this number of sample periods. Same rule as in kickstand.imu.sensor.
+# Samples were lost if a turn of the loop is late by more than this number of sample periods. kickstand.imu.sensor uses
+# the same rule.
 _LATE_PERIODS = 2
 _DEGREE = 60 * 100_000  # a degree in the unit of stored positions, which is 0.00001 minutes
-_MOST = 1e4  # largest accepted parameter of a calibration; the parameters of a board are far smaller
-CUT_SHORT = "cut short"  # common for the last block of a ride, because the ignition cuts the power during the write
+_MOST = 1e4  # largest accepted parameter of a calibration; real parameters are far smaller
+CUT_SHORT = "cut short"  # usual for the last block of a ride, because the ignition cuts the power during a write
 
 
 class BadBlock(Exception):
-    """These bytes are not a complete, valid block. The text gives the reason in a few words."""
+    """Bytes that are not a complete, valid block. The text gives the reason in a few words."""
 
 
 @dataclass
@@ -167,7 +168,7 @@ def _places(data: bytes) -> Iterator[tuple[int, Place]]:
     """Yield the number of the entry and the position, for each position."""
     for entry, date, day_ms, lat, lon in struct.iter_unpack(block_format.PLACE, data):
         if abs(lat) > 90 * _DEGREE or abs(lon) > 180 * _DEGREE:
-            continue  # a receiver's error, which would make the log invalid
+            continue  # an impossible position from the receiver would make the log invalid
         try:
             midnight_s = datetime(2000 + (date >> 9), date >> 5 & 15, date & 31, tzinfo=UTC).timestamp()
         except ValueError:

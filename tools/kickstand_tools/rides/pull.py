@@ -19,7 +19,7 @@ from ..deploy.connection import UPDATE, ConnectedBoard, Port, Progress, connecte
 from . import ride_log
 from .block_reader import CUT_SHORT, StoredBlock, missing_note, read
 
-_SILENT_S = 60  # longest wait for an answer; an emulated board is slow
+_SILENT_S = 60  # longest wait for an answer in s; an emulated board is slow
 
 # Prints (directory, vehicle), then (ride, part, number of bytes, path) for each part of a ride in the directory
 _LIST = """

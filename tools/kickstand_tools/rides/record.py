@@ -69,7 +69,7 @@ def record(
             stopped = threading.Event()
             recorded = StreamLog(stopped, live)
             notes: list[str] = []
-            # Write the calibration first, because the disk may be full at the end
+            # Write the calibration before the log, because the log may fill the disk
             with whole_file(out) as temporary, whole_file(beside) as calibration, _signals(stopped):
                 with _GrowingFile(temporary, out.suffix == ".gz") as file:
                     made = _save_first_calibration(blocks(transport, name, notes, stopped), calibration)

@@ -32,7 +32,8 @@ except KeyboardInterrupt:
     port.rest_watchdog()
 """
 _VEHICLE = b"vehicle "  # start of the line that _START prints; base64 has no space
-_SILENT_S = 60.0  # longest wait for data: an emulated board starts slowly, and without its sensor a board sends nothing
+# Longest wait for data. An emulated board starts slowly, and a board without its sensor sends nothing
+_SILENT_S = 60.0
 CHANGED = "the board's calibration has changed: the log ends here"
 
 
@@ -111,7 +112,7 @@ class StreamLog:
                 replay = Replay(calibration.to_firmware(), calibration.delay_s(), not car, block.time_us)
                 aligned = calibration.aligned
             rows = list(ride_log.rows([block], TRACK, self.first.time_us))
-            try:  # write a whole block, because an incomplete line cannot be read
+            try:  # write each block as a whole, because an incomplete line cannot be read
                 file.write(head + "".join(",".join(row) + "\n" for row in rows))
             except OSError as error:
                 notes.append(f"writing the log failed ({cause(error)}): the log up to there is kept")

@@ -22,10 +22,10 @@ Ints = NDArray[np.integer[Any]]
 
 
 def window_means(values: Array, n: int) -> Array:
-    """Average each n successive ones of m values.
+    """Average each window of n successive values.
 
-    values: shape (m, ...).
-    Returns shape (m - n + 1, ...).
+    values: m values, shape (m, ...).
+    Returns one mean per window, shape (m - n + 1, ...).
     """
     sums = np.zeros((len(values) + 1, *values.shape[1:]))
     np.cumsum(values, axis=0, out=sums[1:])
@@ -33,12 +33,13 @@ def window_means(values: Array, n: int) -> Array:
 
 
 def window_spreads(values: Array, n: int) -> Array:
-    """Compute the standard deviation of each n successive ones of m values.
+    """Compute the standard deviation of each window of n successive values.
 
-    values: shape (m, ...).
-    Returns shape (m - n + 1, ...).
+    values: m values, shape (m, ...).
+    Returns one standard deviation per window, shape (m - n + 1, ...).
     """
-    values = values - np.mean(values, axis=0)  # otherwise the rounding of large squares would hide the spread
+    # Subtract the mean first, because the rounding errors of large squares would hide a small standard deviation
+    values = values - np.mean(values, axis=0)
     squared = window_means(values, n)
     squared *= -squared
     values *= values
@@ -47,12 +48,12 @@ def window_spreads(values: Array, n: int) -> Array:
 
 
 def moving_mean(values: Array, n: int) -> Array:
-    """Compute the moving mean of m values over n values.
+    """Compute the moving mean over n values.
 
-    Each mean begins n // 2 values before its own value. Beyond the ends, the first and the last value are repeated.
+    The window of value i begins at value i - n // 2. Beyond the ends, the first and the last value are repeated.
 
-    values: shape (m, ...).
-    Returns shape (m, ...).
+    values: m values, shape (m, ...).
+    Returns one mean per value, shape (m, ...).
     """
     return values if n < 2 or not len(values) else window_means(_padded(values, n), n)
 
@@ -63,11 +64,11 @@ def moving_spread(values: Array, n: int) -> Array:
 
 
 def smoothed(values: Array, time_s: Array, over_s: float) -> Array:
-    """Compute the moving mean over about over_s seconds, which are an odd number of samples.
+    """Compute the moving mean over about over_s seconds. The window has an odd number of samples.
 
-    values: shape (m).
-    time_s: times of the samples, shape (m), in s.
-    Returns shape (m).
+    values: m values, shape (m).
+    time_s: times of the values, shape (m), in s.
+    Returns one mean per value, shape (m).
     """
     if len(values) < 2:
         return values
@@ -78,8 +79,8 @@ def integral(time_s: Array, values: Array) -> Array:
     """Integrate values from the first sample to each sample, by the trapezoidal rule.
 
     time_s: times of the samples, shape (m), in s.
-    values: shape (m).
-    Returns shape (m).
+    values: values of the samples, shape (m).
+    Returns the integral up to each sample, shape (m).
     """
     return np.append(0.0, np.cumsum(np.diff(time_s) * (values[1:] + values[:-1]) / 2.0))
 
@@ -95,20 +96,23 @@ def _padded(values: Array, n: int) -> Array:
 def cell_numbers(time_s: Array, cell_s: float) -> Ints:
     """Return the number of the cell that contains each time, shape (n).
 
-    A time on the edge of two cells, within rounding, belongs to the later cell.
+    A time on the border of two cells belongs to the later cell, even if rounding made it slightly smaller.
     """
     return np.floor(time_s / cell_s + 1e-6).astype(np.int64)
 
 
 def runs(values: NDArray[np.generic]) -> Ints:
-    """Return the first index of each of the m runs of equal values, shape (m). At least one value is needed."""
+    """Return the first index of each run of equal values. There must be at least one value.
+
+    Returns one index per run, shape (m).
+    """
     return np.flatnonzero(np.append(True, values[1:] != values[:-1]))
 
 
 def stretches(true: Bools) -> Ints:
-    """Find the m runs of True among n values.
+    """Find the runs of True.
 
-    Returns shape (m, 2): the first index of each run, and the index after its last.
+    Returns the first index of each of the m runs and the index after its end, shape (m, 2).
     """
     return np.flatnonzero(np.diff(np.concatenate(([False], true, [False])))).reshape(-1, 2)
 
@@ -119,8 +123,8 @@ class EvenCells:
 
     first: number of the first cell.
     count: number of samples in each cell, shape (n).
-    means: averaged values, shape (n, k); NaN for no value. See Cells.add().
-    latest: last values, shape (n, j); NaN for no value. See Cells.add().
+    means: averaged values of each cell, shape (n, k); NaN in a cell without samples. See Cells.add().
+    latest: last values of each cell, shape (n, j); NaN in a cell without this value. See Cells.add().
     """
 
     first: int
@@ -227,12 +231,12 @@ class Correlation:
 
 
 def correlation(effect: Array, cause: Array, whole: bool = False) -> Correlation:
-    """Correlate an effect with the component of its cause along the direction of their largest covariance.
+    """Correlate an effect with one component of its cause, the component with the largest covariance with the effect.
 
-    effect: shape (n).
-    cause: shape (n, k).
-    whole: normalise by the variance of all components of the cause, not only of the component along `direction`. The
-        value is then smaller if the cause also varies across that direction.
+    effect: n values, shape (n).
+    cause: n vectors, shape (n, k).
+    whole: True to normalise by the variance of all components of the cause, not only of the component along
+        `direction`. The value is then smaller if the cause also varies in other directions.
     """
     effect, cause = effect - np.mean(effect), cause - np.mean(cause, axis=0)
     both = effect @ cause
@@ -293,11 +297,11 @@ def peak_offset(three: Array) -> float:
 def correlations(first: Array, first_good: Bools, second: Array, second_good: Bools) -> tuple[Array, Array]:
     """Correlate two signals of zero mean and equal sample rate at each shift.
 
-    At shift j, sample second[i] belongs to sample first[i + j - (m - 1)].
+    At shift j, sample second[i] is compared with sample first[i + j - (m - 1)].
 
-    first: shape (n).
+    first: first signal, shape (n).
     first_good: True for the samples of `first` to use, shape (n).
-    second: shape (m).
+    second: second signal, shape (m).
     second_good: True for the samples of `second` to use, shape (m).
     Returns:
         correlation: correlation at each shift, shape (n + m - 1).
@@ -312,17 +316,17 @@ def correlations(first: Array, first_good: Bools, second: Array, second_good: Bo
 
     there, other = first_good.astype(float), second_good.astype(float)
     count = np.maximum(np.rint(crossed(there, other)), 0.0)
-    # The rounding errors of the transforms are a share of the total sums of squares. Smaller results are only rounding
-    # errors, so they are limited.
+    # The transforms have rounding errors, about 1e-9 of the total sum of squares or less. A sum below this is only
+    # rounding error, so it is replaced by the limit.
     square = np.maximum(crossed(a * a, other), 1e-9 * (a @ a)) * np.maximum(crossed(there, b * b), 1e-9 * (b @ b))
     return crossed(a, b) / np.sqrt(np.maximum(square, 1e-30)), count
 
 
 def log_likelihood_ratio(correlation: Array, count: Array, per_sample: float) -> Array:
-    """Return the natural logarithm of a likelihood ratio.
+    """Compute the evidence that two signals belong together, as the natural logarithm of a likelihood ratio.
 
-    The ratio compares two normal signals of this correlation with two independent signals. The result is 0 for a
-    negative correlation.
+    The ratio is the likelihood of two normal signals with this correlation, divided by the likelihood of two
+    independent signals. The result is 0 for a negative correlation.
 
     correlation, count: see correlations().
     per_sample: number of independent values per sample.
@@ -398,25 +402,25 @@ def rotation_vector(matrix: Array) -> Array:
 
 # At a standstill, the readings hardly change. Standstills are used for zero-velocity updates and for the gyro's bias.
 
-STANDING_MPS = 0.3  # a speed under this counts as standing, because a receiver's speed is never quite 0
-STANDS = 4.0  # factor on the limits of the changes if the speed is under STANDING_MPS
+STANDING_MPS = 0.3  # speed under which a vehicle counts as standing, because a receiver's speed is never exactly 0
+STANDS = 4.0  # factor on both limits of motionless() if the speed is under STANDING_MPS
 
 
 def motionless(
     rate: Array, force: Array, n: int, most_rate: float, most_force: float, speed_mps: Array | None = None
 ) -> Bools:
-    """Find the samples at which the bike seems to stand still.
+    """Find the samples at which the bike seems to stand still, because the readings around them hardly change.
 
-    At these samples, the readings of the n samples around hardly change. Each of the m samples must be a mean over a
-    fifth of a second, which averages out an idling engine. A constant rate counts as a standstill, because it may be a
-    bias. In a steady bend the rate is also constant, so check the mean rate too.
+    Each sample must be a mean over a fifth of a second, which averages out an idling engine. A constant rate counts as
+    a standstill, because it may be a bias. In a steady bend the rate is constant too, so the caller must also check the
+    mean rate.
 
-    rate: shape (m, 3).
-    force: shape (m, 3).
+    rate: rate of each of the m samples, shape (m, 3).
+    force: force of each sample, shape (m, 3).
     n: number of samples around each sample.
     most_rate: largest standard deviation of each component of the rate.
     most_force: largest standard deviation of each component of the force.
-    speed_mps: shape (m), in m/s; NaN if unknown.
+    speed_mps: speed at each sample, shape (m), in m/s; NaN if unknown.
     Returns shape (m), True where the bike seems to stand still.
     """
     speed = np.full(len(rate), np.nan) if speed_mps is None else speed_mps

@@ -12,14 +12,15 @@ from kickstand.units import STANDARD_GRAVITY
 
 from . import Array, Bools, moving_mean, moving_spread
 
-WINDOW_S = 0.2  # rates and forces are means over windows of this length
-SMOOTH_S = 0.6  # rates are moving means over this time before their changes are compared
-SLOW_S = 12.0  # changes of lean that take longer than this cannot be separated from the gyro's drift
-# If a Leaning exceeds all three limits, its rates are in rad/s. In simulated and recorded rides, the share was 1.0 to
-# 1.6 for rates in deg/s, and 57 to 92 for rates in rad/s, at over 5 sigmas. Cars had a likeness under 0.6.
+WINDOW_S = 0.2  # length of the windows over which rates and forces are averaged
+SMOOTH_S = 0.6  # length of the moving mean that smooths rates before their changes are compared
+SLOW_S = 12.0  # longest change of lean that can be distinguished from the gyro's drift
+# If share, sigmas and likeness of a Leaning exceed these limits, its rates are in rad/s. In simulated and recorded
+# rides, the share was 1.0 to 1.6 for rates in deg/s. It was 57 to 92 for rates in rad/s, at over 5 sigmas. Cars had a
+# likeness under 0.6.
 SHARE, SIGMAS, LIKENESS = 15.0, 4.5, 0.65
-# Least rms of the lean; a ride with less lean is nearly straight. It is small enough for rates in rad/s, in which a
-# lean of 2 degrees looks like 2 / 57.3 degrees.
+# Smallest rms of the lean, in rad, for a ride that is not nearly straight. The limit is this small, because a lean of
+# 2 degrees looks like 2 / 57.3 degrees if rates in rad/s are read as deg/s.
 LEAST_LEAN = np.radians(2.0 / 57.3)
 
 
@@ -50,7 +51,7 @@ def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
     """Compute the Leaning of n windows of WINDOW_S.
 
     rate: rates without bias, shape (n, 3), in rad/s.
-    force: shape (n, 3).
+    force: forces in any unit, shape (n, 3).
     riding: True for the windows to use, shape (n).
     """
     up = _unit(force[riding].mean(axis=0))
@@ -99,8 +100,8 @@ def leans(found: Leaning) -> bool:
 def leaned(rolled: Array, yaw: Array, speed: Array | float) -> Array:
     """Return the lean, shape (n), in rad.
 
-    Quick changes come from `rolled`. Changes slower than SLOW_S come from the lean that balances the yaw rate at this
-    speed.
+    Changes faster than SLOW_S come from `rolled`. Slower changes come from the lean at which a bike with this speed and
+    yaw rate is in balance.
     """
     balanced = np.arctan(-speed * yaw / STANDARD_GRAVITY)
     return rolled + balanced - without_drift(balanced)
@@ -112,15 +113,15 @@ def averaged(values: Array, seconds: float) -> Array:
 
 
 def without_drift(values: Array) -> Array:
-    """Return values (n) without their slow changes. Their moving mean over SLOW_S, taken twice, is subtracted."""
+    """Remove the slow changes of n values: subtract their moving mean over SLOW_S, applied twice."""
     return values - averaged(averaged(values, SLOW_S), SLOW_S)
 
 
 def unrest(values: Array, over_s: float) -> Array:
-    """Return the moving standard deviation over over_s seconds, the largest of the three components.
+    """Compute the moving standard deviation of three components over over_s seconds.
 
-    values: shape (n, 3).
-    Returns shape (n).
+    values: three components at each time, shape (n, 3).
+    Returns the largest of the three standard deviations at each time, shape (n).
     """
     return moving_spread(values, _windows(over_s)).max(axis=1, initial=0.0)
 

@@ -6,12 +6,12 @@ import numpy as np
 
 from .physics.signals import Signal, integral, smoothed, smoothstep
 
-_SPEED_SMOOTHING_S = 0.15  # time in which a hand changes throttle or brake
+_SPEED_SMOOTHING_S = 0.15  # time that a hand needs to change throttle or brake
 
 
 @dataclass
 class Leg:
-    """A part of a ride. A value of None keeps the value of the previous leg.
+    """A part of a ride. None keeps the value of the previous leg.
 
     phase: Name of the rider's action.
     seconds: Duration of the leg.
@@ -41,7 +41,7 @@ class Leg:
 
 @dataclass
 class RiderCommands:
-    """The commands of a ride as signals of n samples, in s, m, m/s, m/s2 and rad. See Leg for their meaning.
+    """The commands of a ride as signals of n samples. The units are s, m, m/s, m/s2 and rad. See Leg for the fields.
 
     phase: Index of each sample's phase in the list `phases`.
     """

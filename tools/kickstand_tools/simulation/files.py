@@ -16,7 +16,7 @@ from .ride import SimulatedRide, ride
 
 _LOG = (*COLUMNS, "temp_c")
 _FORMATS = ["%.3f", *["%.6f"] * 6, "%.2f"]
-START = 47.6, 8.0  # the ride starts here, in degrees north and east, and heads east
+START = 47.6, 8.0  # start of the ride, in degrees north and east. The ride first heads east
 START_UTC_S = 1_779_008_400.0  # 09:00 on 17 May 2026
 _DEGREE_M = np.radians(6_371_000.0)
 _TRACK_S = 1  # time between two fixes, as from a GPS receiver
@@ -93,9 +93,9 @@ def positions(made: SimulatedRide) -> tuple[NDArray[np.float64], NDArray[np.floa
     """Compute the position of each reading by integrating the true speed and yaw rate.
 
     Returns:
-        Latitude of each reading, in degrees north.
-        Longitude of each reading, in degrees east.
-        Universal Time of each reading, in s since 1970.
+        latitude: in degrees north, shape (n).
+        longitude: in degrees east, shape (n).
+        time: Universal Time in s since 1970, shape (n).
     """
     course = np.cumsum(np.radians(made.truth["yaw_rate_dps"])) / made.rate_hz  # rad from east, > 0 to the left
     speed = made.truth["speed_mps"] / made.rate_hz

@@ -1,4 +1,4 @@
-"""Simulates one recording of the six positions: a hand puts a sensor on each side and turns it in between."""
+"""Simulates one recording of the six positions: a hand holds a sensor still on each side, and turns it to the next."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -14,8 +14,8 @@ from .physics.signals import band_noise, smoothstep
 class Hand:
     """The movements of a hand that turns a sensor.
 
-    still_s: Range of the time for holding still, as (least, most).
-    turn_s: Range of the time for a turn by 90 degrees. A half turn takes 1.6 times as long.
+    still_s: Range (shortest, longest) of the time for holding still.
+    turn_s: Range (shortest, longest) of the time for a turn by 90 degrees. A half turn takes 1.6 times as long.
     heading_deg: Largest rotation about the vertical during a turn.
     detour_deg: Deviation from the shortest rotation.
     push_g: Acceleration during a turn, rms.

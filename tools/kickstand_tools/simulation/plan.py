@@ -10,7 +10,7 @@ from kickstand.units import STANDARD_GRAVITY
 from .commands import Leg
 from .physics.road import CLASS_B
 
-_SHORTEST_S = 3.0  # a leg is not shortened below this duration
+_SHORTEST_S = 3.0  # shortest duration to which fit() shortens a leg
 _CLOSING_S = 45.0  # time for the straight and the stop at the end of every ride
 
 
@@ -27,10 +27,10 @@ class Conditions:
     slip_deg: Angle between the bike's heading and its motion, rms.
     start_c: Temperature of the chip at power-on.
     rise_c: Rise of the temperature while the chip warms up, most of it within 10 to 15 minutes.
-    drift: Factor on an ordinary sensor's change of the biases with temperature.
+    drift: Factor on the temperature drift of an ordinary sensor's biases.
     creep_deg: Angle by which the sensor's mount has rotated at the end of the ride.
-    bumps: Bumps in the road, each as (phase, spacing in m, height in m, length in m). The road has them during this
-        phase of the ride.
+    bumps: Tuples (phase, spacing in m, height in m, length in m). During this phase of the ride, the road has bumps of
+        this size.
     """
 
     roughness: float = CLASS_B
@@ -135,7 +135,7 @@ class Plan:
 
         lean_deg: Lean, positive to the right.
         speed_mps: Speed at the end.
-        heading_deg: About the change of heading, if `seconds` is None.
+        heading_deg: Approximate change of heading. It is used if `seconds` is None.
         seconds: Time for which the lean is held.
         roll_s: Time for the change of lean. It is longer if the roll rate would exceed roll_dps.
         phase: Name of the leg.

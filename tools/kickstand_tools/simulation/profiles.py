@@ -157,7 +157,7 @@ def _bends(plan: Plan, lean_deg: float, speeds: tuple[float, float], linked: flo
 def banked(plan: Plan) -> Conditions:
     """A road that is banked into its turns by up to 10 degrees and cambered by 3 to 6 degrees on the straights.
 
-    On a straight the tyres roll beside their middle, and the bank changes at each turn.
+    On the cambered straights, the tyres roll beside their middle. The bank changes at each turn.
     """
     conditions = street(plan)
     camber = plan.uniform(3.0, 6.0)
@@ -229,7 +229,8 @@ def weight(plan: Plan) -> Conditions:
 def held(plan: Plan) -> Conditions:
     """Turns of 60 s at 38 degrees to alternate sides without a break, by a rider who moves around.
 
-    No straight shows the upright direction. So for a minute, the error of the lean depends only on the sensor's errors.
+    Without a straight, the filter cannot see the upright direction. So during each turn the sensor's errors alone
+    determine the error of the lean.
     """
     plan.begin()
     plan.slope_percent = 1.5

@@ -82,16 +82,16 @@ def ride(
     dive: tuple[float, float] | None = None,
     exact: bool = False,
 ) -> SimulatedRide:
-    """Simulate a ride of about this length. The same profile and seed always give the same ride.
+    """Simulate a ride. The same profile and seed always give the same ride.
 
     profile: A key of PROFILES.
     seed: Seed of the random numbers.
-    seconds: Length of the ride.
+    seconds: Approximate length of the ride.
     upright_error_deg: Lean of the bike to the right in the upright pose.
     pitch_change_deg: Pitch on the kickstand minus pitch in the upright pose. None for a random value within 1 degree.
     share: Factor on the sensor's tolerances.
-    road: A class of ISO 8608. None uses the profile's own road. A road of a class is cambered, the rider moves around,
-        and the tyres slip a little.
+    road: A class of ISO 8608. None uses the profile's own road. With a class, the road is also cambered, the rider
+        moves around, and the tyres slip a little.
     mount: A key of MOUNTS. None for a firm mount.
     dive: Pitch on the springs in degrees per g, as (nose down in braking, nose up in acceleration). None for random
         values, about 3 and 1.4.
@@ -110,8 +110,8 @@ def ride(
     mounting = random_rotation(chance)
     if dive is not None:
         bike = replace(bike, dive_deg_per_g=dive[0], squat_deg_per_g=dive[1])
-    # The options use a separate source of random numbers. So a seed without options gives the same ride as in earlier
-    # versions
+    # The options have their own source of random numbers. So a seed without options gives the same ride as in versions
+    # of this program without these options
     more = np.random.default_rng([seed, *profile.encode(), 1])
     if road is not None:
         _rough(more, plan, conditions, CLASSES[road])
@@ -122,7 +122,8 @@ def ride(
     command = commands(plan.legs, RATE_HZ)
     slip = _slip(more, command, conditions)
     motion, extra = _motion(chance, command, bike, conditions)
-    # An hour at 1 kHz takes 29 MB per column, so arrays are freed early. For this, no array may be a view of another.
+    # An hour at 1 kHz needs 29 MB per column, so arrays are freed early. This requires that no array is a view of
+    # another.
     temp = conditions.start_c + conditions.rise_c * (1.0 - np.exp(-command.time / _WARMING_S))
     time, phase = command.time[::DIVIDER].copy(), np.array(command.phases)[command.phase[::DIVIDER]]
     del command
@@ -144,7 +145,7 @@ def ride(
     readings = chip.read(chance, force, rates, temp)
     del force, rates, temp
     home_c = chance.uniform(18.0, 25.0)
-    nose = chance.uniform(-0.5, 0.5)  # slope of the ground at both poses, degrees
+    nose = chance.uniform(-0.5, 0.5)  # slope of the ground in both poses, in degrees
     change = chance.uniform(-1.0, 1.0) if pitch_change_deg is None else pitch_change_deg
     lean = -chance.uniform(8.0, 15.0)
     seven = poses.seven(chance, chip, home_c)
@@ -190,7 +191,7 @@ def _motion(
 ) -> tuple[Motion, Shaking]:
     n, rate = len(command.time), command.rate_hz
     command.crosswind += conditions.gust_mps2 * band_noise(chance, n, 0.05, 0.5, rate)
-    # A rider who moves around makes a moving bike lean, but not a standing bike
+    # A rider who moves around makes the bike lean only while it rides
     command.hang += conditions.sway_m * band_noise(chance, n, 0.02, 0.3, rate) * smoothstep(command.speed / 5.0)
     rolled = roll(command, bike, weave(chance, command, conditions.unrest_deg))
     surface = profile_slope(chance, float(command.distance[-1]) + 10.0, conditions.roughness)

@@ -51,10 +51,10 @@ class RowsShare(Message):
 def export(
     ride: Ride, form: str, out: Path | str, progress: Progress | None = None, notices: list[Message] | None = None
 ) -> int:
-    """Write a ride of open_ride() to a file, whole or not at all.
+    """Write a ride of open_ride() to a file. After an error, no incomplete file remains.
 
-    gpx needs positions. gpx, racechrono and vbo need date and time, which a satellite receiver gives. A board without a
-    receiver has no clock. Therefore its ride is assumed to end when the file was last written.
+    The format gpx needs positions. The formats gpx, racechrono and vbo need date and time, which a satellite receiver
+    gives. A board without a receiver has no clock. Its ride is assumed to end when the log's file was last written.
 
     form: "csv" (gzipped if `out` ends in .gz), "gpx", "parquet", "racechrono" or "vbo".
     progress: called with (done, total) of the log.

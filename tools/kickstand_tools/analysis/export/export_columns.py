@@ -14,7 +14,7 @@ from ...logs.csv_lines import csv_lines
 from ...logs.log import float_schema
 from ..channels import Channels
 
-# Each name has (digits after the decimal point, unit).
+# Number of decimals and unit of each column.
 COLUMNS = {
     "t_s": (6, "s"),
     "lean_deg": (3, "deg"),

@@ -49,7 +49,7 @@ OTHER = (
 )
 _STANDARD_ROW = "%03d %09.2f %+013.6f %+013.6f %07.3f %06.2f +00000.00 %+07.3f %+07.3f"
 _SATELLITES = 4
-_SAME_M = 1e-3  # least movement between two rows, 0.01 s apart, that gives a new heading
+_SAME_M = 1e-3  # smallest movement between two rows, 0.01 s apart, from which a new heading is computed
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
@@ -57,7 +57,7 @@ def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
 
     blocks: should have positions in as many rows as possible.
     """
-    first = next(blocks)  # a channel that the log does not have is NaN in the first block too
+    first = next(blocks)  # shows which channels the log has; a missing channel is NaN in all blocks
     other = [column for column in OTHER if not np.all(np.isnan(getattr(first, column[2])))]
     lean = "lean-angle in degrees, > 0 to the right; " if OTHER[0] in other else ""
     satellites = f"satellites {_SATELLITES} stands for a position, 0 for none"

@@ -24,8 +24,8 @@ GG_BIN_G = 0.025
 GAP_S = 1.0  # longest time without a value that does not interrupt a line
 SPEED_GAP_S = 5.0  # GAP_S for the speed, which has fewer values
 _HIGH, _LOW, _SQUARE = 2.5, 1.5, 3.0  # heights of charts in the picture, in inches
-_MARKED = 0.82  # height of the lines of the maxima, as a share of the chart; higher lines would cross the words
-_UPRIGHT_DEG = 5.0  # bars of smaller leans may be cut off, because they would make all other bars too low
+_MARKED = 0.82  # height of the lines that mark the maxima, as a share of the chart; higher lines would cross the text
+_UPRIGHT_DEG = 5.0  # largest lean whose bars may be cut off, because they would make all other bars too low
 
 
 @dataclass
@@ -34,7 +34,7 @@ class Line:
 
     x, y: the points, shape (n). A y may be NaN.
     name: name of the quantity; "" for an auxiliary line.
-    gap_s: NaNs that last longer than this interrupt the line.
+    gap_s: longest gap of NaNs that does not interrupt the line.
     width: factor on the usual width.
     """
 
@@ -58,7 +58,7 @@ class Sides:
 
 @dataclass
 class Dots:
-    """n points. x, y: shape (n)."""
+    """n points. x, y: their coordinates, shape (n)."""
 
     x: Array
     y: Array
@@ -68,7 +68,7 @@ class Dots:
 
 @dataclass
 class Bars:
-    """n bars from zero to y, in the colours of both sides. Each bar is around x, and as wide as `width`."""
+    """n bars from zero to y, in the colours of both sides. Each bar is centred on its x, and has the width `width`."""
 
     x: Array
     y: Array
@@ -81,7 +81,7 @@ class CellMap:
     """A map of n x n cells. Cells with larger values are darker.
 
     edges: edges of the cells, the same on both axes, shape (n + 1).
-    values: shape (n, n), in rows along y; 0 for an empty cell.
+    values: value of each cell, shape (n, n), one row per step along y; 0 for an empty cell.
     """
 
     edges: Array
@@ -94,7 +94,7 @@ Trace = Line | Sides | Dots | Bars | CellMap
 
 @dataclass
 class Note:
-    """Words at a point. side: where the words are, as seen from the point: "above", "below", "left" or "right"."""
+    """Words beside a point. side: their position, "above", "below", "left" or "right" of the point."""
 
     x: float
     y: float

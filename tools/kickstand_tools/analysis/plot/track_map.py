@@ -32,8 +32,8 @@ class MapPoints:
     t_s: seconds since the log's first sample, shape (m).
     east_m, north_m: distances from the position lat_deg, lon_deg, shape (m). Each gap in the positions has one point
         that is NaN.
-    lean_deg: shape (m); NaN where the display shows no lean.
-    speed_kmh: shape (m); NaN if the log has no speed.
+    lean_deg: lean, shape (m); NaN where the display shows no lean.
+    speed_kmh: speed in km/h, shape (m); NaN if the log has no speed.
     lat_deg, lon_deg: position of the map's origin.
     """
 

@@ -30,9 +30,10 @@ from .standstill import standing
 
 RATE_S = 0.02  # time between samples for the search of stops
 MIN_SPEED_MPS = 10.0 / 3.6
-MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0  # least and largest deceleration of a stop; a larger one is a fall or a fault
-LONGEST_S = 60.0  # longest time before a standstill that is searched for its stop
-FEWEST = 10  # least number of samples of a standstill that show slope and bias
+# Smallest and largest mean deceleration of a stop. A larger deceleration means a fall or a fault.
+MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0
+LONGEST_S = 60.0  # longest time before a standstill in which the start of the braking is searched
+FEWEST = 10  # least number of samples at a standstill from which slope and bias are computed
 GAP_S = 0.5  # longest gap in the readings over which speed and pitch are integrated
 REST_S = 2.5  # duration of the standstill that is used
 SETTLE_S = 0.5  # first part of a standstill that is not used, because the fork rebounds
@@ -47,13 +48,13 @@ SENSOR_HEIGHT_M = 0.65
 MAX_SPEED_MPS = 250.0 / 3.6
 MAX_SIDE_M, MAX_HEADING_DEG = 15.0, 30.0  # largest deviation of a stop from a straight line; more is a bend
 # The speed is integrated backwards from a standstill to the previous standstill, where it should be 0. It may differ
-# from 0 by OPEN_MPS, plus OPEN_MPS2 per second between both. A degree of pitch causes 0.17 m/s2, and a gyro's drift
-# adds to the error. After more than SHOWING_S, the integrated speed proves nothing.
+# from 0 by OPEN_MPS, plus OPEN_MPS2 for each second between the two standstills. A pitch error of one degree causes
+# 0.17 m/s2, and the gyro's drift adds to it. If more than SHOWING_S are between the standstills, this is not tested.
 OPEN_MPS, OPEN_MPS2, SHOWING_S = 3.0, 0.7, 30.0
-SPEED_S, SURELY_MPS2 = 15.0, 1.5  # longest time and least deceleration of a stop that only the log's speed shows
+SPEED_S, SURELY_MPS2 = 15.0, 1.5  # longest duration and smallest deceleration of a stop that only the log's speed shows
 
-STRAIGHT_S = 0.1  # first part of the braking, whose mean heading is the direction before the braking
-SMOOTH_S = 0.2  # accelerations and jerks are means over this time
+STRAIGHT_S = 0.1  # start of the braking, whose mean heading is used as the direction of the straight line
+SMOOTH_S = 0.2  # averaging time of accelerations and jerks
 
 
 @dataclass
@@ -178,7 +179,7 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
     time = part.t_s
     acceleration, pitch_rate, yaw_rate = _acceleration(part, rest)
     integrated = integral(time, acceleration)
-    # The speed is integrated backwards from the standstill. A pitching bike moves the sensor forward or backward.
+    # Integrate the speed backwards from the standstill. Correct it for the sensor, which moves when the bike pitches.
     speed = integrated - integrated[-1] + SENSOR_HEIGHT_M * np.radians(pitch_rate)
     smooth = smoothed(acceleration, time, SMOOTH_S)
     begin = _onset(smooth, time, rest)
@@ -227,8 +228,8 @@ def _acceleration(part: Channels, rest: int) -> tuple[Array, Array, Array]:
 
     Returns:
         acceleration: along the road, shape (n), in m/s2.
-        pitch_rate: shape (n), in deg/s.
-        yaw_rate: shape (n), in deg/s.
+        pitch_rate: rate of pitch, shape (n), in deg/s.
+        yaw_rate: yaw rate, shape (n), in deg/s.
     """
     time = part.t_s
     settled = int(np.searchsorted(time, time[rest] + SETTLE_S))

@@ -1,7 +1,7 @@
 """Corrects a speed integrated from the acceleration by the speed in the log.
 
-A log with one speed per second has only two or three speeds in a hard stop. They do not show how the speed falls
-between them. The acceleration shows how it falls, but its integral drifts.
+A log with one speed per second has only two or three speeds in a hard stop. They do not show the course of the speed in
+between. The acceleration shows this course, but its integral drifts.
 """
 
 import numpy as np
@@ -10,11 +10,11 @@ from kickstand.units import STANDARD_GRAVITY
 from ...signals import Array, best_lag, integral, smoothed
 from ..channels import Channels
 
-SMOOTH_S = 0.2  # the acceleration is averaged over this time; acceleration x delay is the error of a late speed
-LEAD_S = 4.0  # time before the braking in which the log's speed is used for the fit
-DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # delays of the speed that are tried
-# The search for a delay needs ENOUGH_SPEEDS, one per second. Their changes need a standard deviation of
-# ENOUGH_CHANGE_MPS.
+SMOOTH_S = 0.2  # averaging time of the acceleration that is multiplied by the delay of the speed
+LEAD_S = 4.0  # time before the braking from which logged speeds are used for the fit
+DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # delays of the speed to try, in s
+# A delay is searched only with at least ENOUGH_SPEEDS speeds, one per second. The standard deviation of their changes
+# must be at least ENOUGH_CHANGE_MPS.
 ENOUGH_SPEEDS, ENOUGH_CHANGE_MPS = 30, 0.5
 
 # Standard deviations of each fitted parameter, and of a logged speed
@@ -64,7 +64,7 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
     """
     time = part.t_s
     values = np.flatnonzero(~np.isnan(part.speed_mps))
-    # The indices of the samples at which the vehicle had the logged speeds.
+    # Indices of the samples at which the vehicle really had the logged speeds.
     wanted = np.minimum(np.searchsorted(time, time[values] - delay_s - 1e-6), len(time) - 1)
     values, wanted = (these[time[wanted] >= time[begin] - LEAD_S] for these in (values, wanted))
     if len(wanted) < 2 or wanted[-1] < begin:
@@ -86,8 +86,8 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
 def _prior(knots: int) -> Array:
     """Return the matrix of the prior, shape (knots + 2, knots + 2).
 
-    The unknowns are k, then b at each knot, the last knot first, then d. The prior of the matrix times the unknowns has
-    mean 0 and standard deviation 1.
+    The unknowns are k, then b at each knot, the last knot first, then d. The product of the matrix and the unknowns has
+    a prior with mean 0 and standard deviation 1.
     """
     walk = [SIGMA_WALK_MPS2 * KNOT_S**0.5] * (knots - 1)
     sigma = np.array([SIGMA_SCALE, SIGMA_SLOPE_MPS2, *walk, SIGMA_DELAY_S])

@@ -1,8 +1,8 @@
 """Detects standstills, for the stops of a ride.
 
-The limits are relative to the shaking of the ride. In simulated rides they find all of the standing time, but the fixed
-limits of signals.motionless, in deg/s and g, find only 54 to 92 %. Relative limits are worse only if an idling engine
-shakes as much as the road: they then find 17 to 41 %, and fixed limits 91 %.
+The limits are relative to the shaking of the ride. In simulated rides, these limits find all of the standing time. The
+fixed limits of signals.motionless, in deg/s and g, find only 54 to 92 %. Relative limits are worse only if an idling
+engine shakes as much as the road. Then they find 17 to 41 % of the standing time, and fixed limits find 91 %.
 """
 
 import numpy as np
@@ -10,19 +10,22 @@ import numpy as np
 from ...signals import STANDING_MPS, Array, Bools, smoothed, stretches, window_means, window_spreads
 from ..channels import Channels, spacing_s
 
-STALE_S = 3.0  # largest age of a speed that is used
+STALE_S = 3.0  # largest age in s of a speed that is used
 
-# Without a speed, the shaking shows a standstill. The shaking over QUIET_S must be less than a share of the shaking
-# while moving.
+# Without a speed, standstills are found by the shaking. At a standstill, the shaking over QUIET_S is less than a share
+# of the shaking while moving.
 QUIET_S = 1.0
-QUIET_SHARE = 0.15  # the share for pitch and yaw
-# The share for up and down. A fork at a stop shakes less than this share. Smooth roads and idling engines shake more.
+QUIET_SHARE = 0.15  # this share for the rates of pitch and yaw
+# This share for the vertical force. After a stop, the fork's shaking is below it. Smooth roads and idling engines shake
+# more.
 QUIET_UP_SHARE = 0.2
 RIDING_PERCENTILE = 90.0  # percentile of the shaking that belongs to moving, even in a ride with long pauses
-ENGINE_S, BEND_S = 0.1, 0.5  # the road's shaking is slower than the engine's, and faster than bends and fork dive
-STILL_DPS, STILL_G = 1.0, 0.01  # at standstill, largest rate, and largest change of the forward force over QUIET_S
-MAX_OFF_G = 0.05  # largest difference from the force at rest; even smooth braking and gentle bends exceed it
-UNCALIBRATED_G = 0.12  # largest difference from 1 g if the ride has no rest; the sensor may not be calibrated
+# Limits of the road's shaking. Shaking faster than ENGINE_S is the engine's. Changes slower than BEND_S are bends and
+# the dive of the fork
+ENGINE_S, BEND_S = 0.1, 0.5
+STILL_DPS, STILL_G = 1.0, 0.01  # at a standstill, largest rate, and largest change of the forward force over QUIET_S
+MAX_OFF_G = 0.05  # at a standstill, largest difference from the force at rest; even gentle braking and bends exceed it
+UNCALIBRATED_G = 0.12  # the same for a ride without a rest, as a difference from 1 g; the sensor may be uncalibrated
 
 
 def standing(ride: Channels) -> Bools:
@@ -80,7 +83,7 @@ def _shaking_by_road(values: Array, time: Array) -> Array:
 
 
 def _is_calm(values: Array, n: int, share: float) -> Bools:
-    """True where the standard deviation of n successive samples is under this share of the deviation while moving."""
+    """Return True where the standard deviation of n successive samples is below a share of its value while moving."""
     spread = window_spreads(values, n)
     return spread < share * np.percentile(spread, RIDING_PERCENTILE)
 

@@ -1,4 +1,4 @@
-"""Simulates how a two-wheeler leans and yaws. Also has its dimensions and the position of the sensor.
+"""Simulates how a two-wheeler leans and yaws. Defines its dimensions and the position of the sensor.
 
 The rider commands a lean, and the bike stays in roll balance. The lean is positive to the right, the yaw rate is
 positive in a left turn. The balance lean b is the lean of the line from the contact point to the centre of mass. The
@@ -13,7 +13,7 @@ from kickstand.units import STANDARD_GRAVITY
 from ..commands import RiderCommands
 from .signals import Signal, band_noise, derivative, second_order, smoothed, smoothstep
 
-_STEERING_S = 0.04  # the steering is smoothed over this time, because its rate is limited
+_STEERING_S = 0.04  # smoothing time of the yaw rate, because a rider turns the handlebar at a limited speed
 _WANDER = 0.06  # rms of the lean's changes in a bend, as a share of the lean
 _STANDS_MPS, _RIDES_MPS = 0.4, 1.5  # feet hold the bike below the first speed, steering balances it above the second
 
@@ -34,8 +34,8 @@ class Bike:
     sensor_height: float = 0.70
     sensor_forward: float = 0.75  # distance of the sensor in front of the rear contact point
     sensor_left: float = 0.0
-    # Pitch caused by the springs, from a superbike's suspension sensors. The wheels stay on the road.
-    dive_deg_per_g: float = 2.8  # nose down in braking, for a telescopic fork. An anti-dive fork has less than 0
+    # Pitch caused by the springs while both wheels are on the road, measured by a superbike's suspension sensors.
+    dive_deg_per_g: float = 2.8  # nose down in braking, for a telescopic fork. It is negative for an anti-dive fork
     squat_deg_per_g: float = 1.3  # nose up in acceleration
     dive_hz: float = 1.7
     dive_damping: float = 0.45

@@ -1,7 +1,8 @@
 """Simulates the readings of an MPU6050 from the motion of its own axes.
 
 The figures are from the data sheet PS-MPU-6000A rev 3.4, sections 6.1 and 6.2. The chip converts at 1 kHz, and filters
-with DLPF 3 (44 Hz, delay of 4.9 ms). Every fifth result is read. Frequencies above 100 Hz that pass the filter alias.
+with DLPF 3 (44 Hz, delay of 4.9 ms). The host reads every fifth result. Frequencies above 100 Hz that pass the filter
+alias.
 """
 
 from dataclasses import dataclass
@@ -72,9 +73,9 @@ class Chip:
         drift: Factor on an ordinary sensor's drift with temperature.
 
         Offsets and biases are uniformly distributed within the data sheet's limits. Scale and cross-axis sensitivity
-        are normally distributed, with the limit at two standard deviations. For a change of 45 to 60 C, the data sheet
-        allows a drift of 35 to 60 mg and of 20 deg/s. An ordinary sensor has a third of the drift in mg, and a fifth
-        of the drift in deg/s.
+        are normally distributed, with the limit at two standard deviations. For a change of temperature of 45 to 60 C,
+        the data sheet allows drifts of 35 to 60 mg for the accelerometer and 20 deg/s for the gyro. An ordinary sensor
+        has a third of the accelerometer's drift and a fifth of the gyro's.
         """
 
         def near_one(scale: float, cross: float) -> NDArray[np.float64]:

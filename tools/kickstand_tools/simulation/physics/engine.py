@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from .signals import Signal, integral, smoothed
 
 _RPM_PER_MPS = (370.0, 260.0, 205.0, 170.0, 150.0, 135.0)  # engine speed per road speed in each gear
-# Frequencies of the vibration as multiples of the crankshaft's speed: firing, primary, secondary of a four-stroke twin
+# Frequencies of a four-stroke twin's vibration as multiples of the crankshaft's speed: firing, primary and secondary
 _ORDERS = (0.5, 1.0, 2.0)
 _IDLE_SHARE = 0.25  # vibration at idle, divided by the vibration at _FULL_RPM
 _IDLE_RPM, _FULL_RPM = 1250.0, 6000.0
@@ -41,8 +41,8 @@ def vibration(
         rate_hz: Number of samples per second.
 
     Returns:
-        The specific force, shape (n, 3), in m/s2.
-        The rates, shape (n, 3), in rad/s.
+        force: specific force, shape (n, 3), in m/s2.
+        rates: angular rates, shape (n, 3), in rad/s.
     """
     rpm = crank_rpm(speed, shift_rpm, rate_hz)
     turns = integral(rpm / 60.0, rate_hz)

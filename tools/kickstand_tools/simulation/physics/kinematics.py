@@ -22,7 +22,7 @@ class Motion:
     """The motion of the rear contact point, and the attitude of the chassis.
 
     rate_hz: Number of samples per second.
-    speed: In m/s.
+    speed: Speed in m/s.
     slope: Slope of the road, in rad.
     yaw_rate: Rate about the vertical, in rad/s.
     lean: Lean of the chassis, in rad.
@@ -58,7 +58,7 @@ def specific_force(motion: Motion, bike: Bike) -> NDArray[np.float64]:
     """Compute the specific force at the sensor along left, up and forward, shape (n, 3), in m/s2.
 
     The specific force is the sensor's acceleration minus gravity. The body rotates about the centre of the rear tyre's
-    cross-section, which is a tyre radius above the road.
+    cross-section, which is above the road by the radius of this cross-section.
     """
     rate, v, slope = motion.rate_hz, motion.speed, motion.slope
     left = v * motion.yaw_rate * np.cos(slope)

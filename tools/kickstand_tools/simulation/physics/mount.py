@@ -1,6 +1,6 @@
 """Simulates imperfect mounts and loggers with random properties in a realistic range.
 
-A holder resonates, a logger aliases, readings are clipped, or a sensor warms up.
+The holder resonates, the logger aliases or clips readings, or the sensor warms up.
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ _SAG_LIMIT = np.radians(3.0)  # largest sag of a holder, because springs are onl
 
 @dataclass(frozen=True)
 class Holder:
-    """A soft holder. Sensor and holder are a mass on springs along and about each axis.
+    """A soft holder. Sensor and holder behave like a mass on springs, along each axis and about each axis.
 
     hz: Natural frequency along and about left, up and forward, shape (3).
     damping: Damping ratio along and about these axes, shape (3).
@@ -46,8 +46,8 @@ class Holder:
             rate_hz: Number of samples per second.
 
         Returns:
-            The force of the sensor, shape (n, 3), in g.
-            The rates of the sensor, shape (n, 3), in deg/s.
+            force: force of the sensor, shape (n, 3), in g.
+            rates: rates of the sensor, shape (n, 3), in deg/s.
         """
         held = np.column_stack([self._by_spring(column, k, rate_hz) for k, column in enumerate(force.T)])
         turned = np.zeros_like(held)
@@ -86,7 +86,7 @@ class Mount:
 def holder(chance: np.random.Generator, chip: Chip) -> Mount:
     """Return a holder that resonates at 5 to 40 Hz with a damping of 0.02 to 0.1.
 
-    A holder of 10 Hz sags by about a fifth of a degree per g, a softer holder by more.
+    A holder that resonates at 10 Hz sags by about 0.2 degrees per g. A softer holder sags more.
     """
     return Mount(chip, Holder.random(chance))
 

@@ -1,8 +1,8 @@
 """Simulates how a rough road shakes the bike through tyres and suspension.
 
-The road is a random profile of ISO 8608. Its slope is white noise over distance. So the same road shakes the bike more
-at higher speed. The rear wheel meets the same bumps as the front wheel, but later. Each end of the bike is a
-quarter-car model: the wheel moves on its tyre, and the chassis on its spring.
+The road is a random profile of ISO 8608, whose slope is white noise over distance. So the same road shakes the bike
+more at higher speed. The rear wheel meets the same bumps as the front wheel, but later. Each end of the bike is
+simulated by a quarter-car model: the wheel moves on its tyre, and the chassis on its spring.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from .signals import Signal, band_noise, smoothed, through
 CLASSES = {"A": 16e-6, "B": 64e-6, "C": 256e-6, "D": 1024e-6}
 CLASS_A, CLASS_B, CLASS_C, _ = CLASSES.values()
 _STEP_M = 0.02
-_CONTACT_M = 0.10  # length of a tyre's contact patch, which averages out shorter waves
+_CONTACT_M = 0.10  # length of a tyre's contact patch, which averages out shorter waves of the road
 
 # One end of a motorcycle with half of its rider: two masses in kg, spring in N/m, damper in Ns/m, tyre in N/m
 _SPRUNG, _UNSPRUNG, _SPRING, _DAMPER, _TYRE = 120.0, 15.0, 17e3, 1100.0, 150e3

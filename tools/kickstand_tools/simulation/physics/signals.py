@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Signal = NDArray[np.float64]
-_NOISE_MARGIN_S = 10.0  # noise is computed with a margin at both ends. It is cut off, because it contains padding
+_NOISE_MARGIN_S = 10.0  # margin at both ends of computed noise. The margins contain padding, so they are cut off
 _BLOCK = 100_000  # number of frequencies that are computed at a time, to limit memory
-_PAD_S = 4.0  # a signal is padded with its first and last value for this time, because an FFT joins end and start
+# A signal is padded with its first and last value for this time, because an FFT joins its end to its start
+_PAD_S = 4.0
 
 
 def smoothstep(u: Signal) -> Signal:
@@ -38,7 +39,8 @@ def through(x: Signal, transfer: Callable[[Signal], NDArray], rate_hz: float) ->
     spectrum = np.fft.rfft(padded)
     del padded
     frequency = np.linspace(0.0, rate_hz / 2.0, len(spectrum))
-    for start in range(0, len(spectrum), _BLOCK):  # a transfer function needs several times the memory of its argument
+    # Work in blocks, because a transfer function needs several times the memory of its argument
+    for start in range(0, len(spectrum), _BLOCK):
         part = slice(start, start + _BLOCK)
         spectrum[part] *= transfer(frequency[part])
     del frequency

@@ -2,11 +2,11 @@
 
 This is plain Python for CPython and MicroPython. It does not use the firmware's mathematics, because it tests them.
 
-The vehicle's axes are left, up and forward (right-handed). The lean is positive to the right, the yaw rate in a left
-turn, the slope uphill. The attitude consists of three rotations in this order: heading about the vertical, slope about
-the lateral axis, lean about the forward axis. A lean to the right turns the left axis upward, which is a positive
-rotation about forward. So on a level road the rate about forward is d(lean)/dt. The sensor is on the roll axis, and
-the tyres have no width.
+The vehicle's axes are left, up and forward (right-handed). The lean is positive to the right, the yaw rate is positive
+in a left turn, and the slope is positive uphill. The attitude consists of three rotations in this order: heading about
+the vertical, slope about the lateral axis, lean about the forward axis. A lean to the right turns the left axis upward.
+This is a positive rotation about forward, so on a level road the rate about forward is d(lean)/dt. The sensor is on the
+roll axis, and the tyres have no width.
 
     ride = Ride([kickstand(8), upright(8), accelerate(15, 5), turn(-30, 5), brake(0, 4)])
     ride.motion(20.0)   # (left, up, forward in g, then rates about left, up, forward in deg/s)
@@ -28,8 +28,8 @@ _ROAD_HZ = (2.3, 5.9, 11.7, 19.3, 31.1)
 _ROAD_G = (0.5, 1.0, 0.5)  # shares of vibration_g along left, up, forward
 _ROAD_DPS = (25.0, 10.0, 15.0)  # rates about left, up, forward, in deg/s per g of vibration
 _IDLE_HZ = 20.0
-_ENGINE_CYCLES_PER_M = 3.7  # additional cycles, which make 75 Hz at 15 m/s
-_ENGINE_SHARE = 0.5  # the engine's share of vibration_g
+_ENGINE_CYCLES_PER_M = 3.7  # additional cycles of the engine per metre. At 15 m/s, its frequency is 75 Hz
+_ENGINE_SHARE = 0.5  # share of vibration_g that comes from the engine
 
 
 class Segment:
@@ -64,7 +64,7 @@ def upright(seconds, lean_deg=0.0, slope_deg=None):
 
 
 def wait(seconds):
-    """Keep all values for this time."""
+    """Keep all values for `seconds`."""
     return (Segment("wait", seconds),)
 
 
@@ -174,7 +174,7 @@ class Ride:
         self._at = 0
 
     def _find(self, t_s):
-        """Return the segment at t_s. Before the start this is the first segment, after the end the last."""
+        """Return the segment at t_s: the first segment before the start, and the last segment after the end."""
         i = self._at
         while i > 0 and t_s < self._segments[i][0]:
             i -= 1
@@ -184,10 +184,10 @@ class Ride:
         return self._segments[i]
 
     def state(self, t_s):
-        """Return the state at t_s, in rad, m and s.
+        """Return the state at t_s. Units are rad, m and s.
 
-        It is (phase, lean, lean rate, speed, acceleration, yaw rate, slope, slope rate, distance, engine). The engine
-        is 0 (off) to 1 (running).
+        The state is a tuple: (phase, lean, lean rate, speed, acceleration, yaw rate, slope, slope rate, distance,
+        engine). The engine is 0 (off) to 1 (running).
         """
         start, segment, before, after, distance = self._find(t_s)
         seconds = segment.seconds

@@ -145,7 +145,7 @@ def turning(sensor, before, after, begin_s, end_s):
     n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
     size, along = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     angle = atan2(size, along)
-    if size < 1e-6:  # a half turn has no shortest way: use any perpendicular axis
+    if size < 1e-6:  # for a half turn, all perpendicular axes are equally good, so use any of them
         n = [a[1] - a[2], a[2] - a[0], a[0] - a[1]]
         if n[0] * n[0] + n[1] * n[1] + n[2] * n[2] < 0.1:
             n = [a[1], -a[0], 0.0]
@@ -157,7 +157,8 @@ def turning(sensor, before, after, begin_s, end_s):
         at = angle * u * u * u * (10.0 + u * (6.0 * u - 15.0))
         rate = angle * 30.0 * u * u * (1.0 - u) * (1.0 - u) / (end_s - begin_s)
         up = [cos(at) * a[i] + sin(at) * across[i] for i in range(3)]
-        turn = [-degrees(rate) * n[i] for i in range(3)]  # negative, because `up` turns against the sensor's rotation
+        # Negative, because `up` seems to turn in the direction opposite to the sensor's rotation
+        turn = [-degrees(rate) * n[i] for i in range(3)]
         return tuple(
             [m[3 * i] * v[0] + m[3 * i + 1] * v[1] + m[3 * i + 2] * v[2] for v in (up, turn) for i in range(3)]
         )

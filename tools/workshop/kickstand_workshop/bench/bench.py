@@ -21,7 +21,7 @@ from rich.table import Table
 from . import boot
 from .sample_count import SampleCount
 
-SAMPLE_HZ = 200  # the same as in bench_guest.py
+SAMPLE_HZ = 200  # samples per second, as in bench_guest.py
 _GUEST = ("bench_guest", "stages_guest", "bluetooth_guest")  # modules of this folder that run on the board
 _SENSOR = Sensor(seed=1, share=0.0)  # a sensor without errors, mounted at some angle
 _SPEED_MPS = 15.0

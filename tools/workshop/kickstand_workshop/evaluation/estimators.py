@@ -54,7 +54,7 @@ def calibrated(log: Log, calibration: CalibrationFile) -> Samples:
 
 
 def trailing_mean(x: NDArray, seconds: float, rate_hz: float) -> NDArray[np.float64]:
-    """Return the mean over the last `seconds` at each sample. At the start the window is shorter."""
+    """Return the mean over the last `seconds` at each sample. The first samples have shorter windows."""
     n = max(round(seconds * rate_hz), 1)
     total = np.cumsum(np.concatenate((np.zeros((1, *x.shape[1:])), x)), axis=0)
     first = np.maximum(np.arange(1, len(x) + 1) - n, 0)
@@ -149,8 +149,8 @@ def _xyz(samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return rates and forces in the axes forward, left, up.
 
     Returns:
-        The rates, shape (N, 3), in rad/s.
-        The forces, shape (N, 3), in m/s^2.
+        rates: shape (N, 3), in rad/s.
+        forces: shape (N, 3), in m/s^2.
     """
     gyro = np.ascontiguousarray(np.radians(samples.rate[:, _TO_XYZ]))
     return gyro, np.ascontiguousarray(samples.force[:, _TO_XYZ] * STANDARD_GRAVITY)

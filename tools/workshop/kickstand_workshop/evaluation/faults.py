@@ -2,9 +2,9 @@
 
 There are three kinds of faults:
 
-SEEN: The sensor's counts and registers show the fault. An axis is dead, in standby or at the end of its range.
-ILL: The fault only shows when readings contradict each other.
-HARMLESS: The lean stays nearly right.
+SEEN: The sensor's counts and registers reveal the fault. An axis is dead, in standby or at the end of its range.
+ILL: Only contradictions between readings reveal the fault.
+HARMLESS: The lean stays nearly right in spite of the fault.
 """
 
 from collections.abc import Callable, Iterator
@@ -22,7 +22,7 @@ ACCEL_RANGE_G, GYRO_RANGE_DPS = 16.0, 500.0  # the board's defaults
 
 @dataclass
 class Part:
-    """The n readings while a fault lasts. A fault changes the first three arrays in place.
+    """The n readings during a fault. The fault changes force, rate and lost in place.
 
     force: Force in the chip's axes, shape (n, 3), in g.
     rate: Rate in the chip's axes, shape (n, 3), in deg/s.
@@ -256,7 +256,7 @@ def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: i
     first = 0 if fault.from_start else round(begin_s * rate_hz)
     end = len(made) if fault.seconds is None else min(len(made), first + round(fault.seconds * rate_hz))
     span = slice(first, end)
-    # A fault of the kind SEEN must be in the chip's own axes, otherwise the counts would not show it
+    # Apply a fault of the kind SEEN along the chip's own axes. Otherwise the counts would not reveal it
     square = seed // 3 % 2 == 0 and fault.kind != SEEN
     turned = vehicle_from_sensor if square else np.eye(3)
     part = Part(

@@ -1,7 +1,7 @@
-"""Tests whether the lean meter ever shows a wrong lean as good. It runs over simulated rides with each fault.
+"""Tests whether the lean meter ever shows a wrong lean as good, in simulated rides with each fault.
 
-The result is judged as in aviation. At each instant a lean is good (shown and right), hidden, or misleading. A lean is
-right if its error is at most WRONG_DEG. A wrong lean counts as misleading if it is shown for over STANDS_S.
+The lean is judged as in aviation. At each moment it is good (shown and right), hidden, or misleading. A lean is right
+if its error is at most WRONG_DEG. A wrong lean is misleading if it is shown for over STANDS_S.
 """
 
 from collections.abc import Callable
@@ -28,13 +28,14 @@ Array = NDArray[np.float64]
 WRONG_DEG = 8.0
 STANDS_S = 1.0
 RECOVERY_S = 10.0
-TURN = 2  # number of readings in one turn of the app's loop
+TURN = 2  # readings per turn of the app's loop
 GPS_LATE_S = 0.4
 PROFILES = "street", "track", "hills", "city", "sweeper"
-SIGMA_EDGES = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0])  # edges of the classes of claimed sigma, degrees
+SIGMA_EDGES = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0])  # limits of the classes of claimed sigma, in degrees
 # Classes of claimed accuracy. "display" is for the lean on the display of the whole device, which shows no sigma
 CLAIMS = [f"{low:g}-{high:g}" for low, high in pairwise(SIGMA_EDGES)] + ["display", "hidden"]
-ERROR_EDGES = np.array([0.0, 1.0, 2.0, 3.0, 5.0, WRONG_DEG, 12.0, 20.0, 40.0, 180.0])  # edges of error classes, degrees
+# Limits of the classes of error, in degrees
+ERROR_EDGES = np.array([0.0, 1.0, 2.0, 3.0, 5.0, WRONG_DEG, 12.0, 20.0, 40.0, 180.0])
 
 
 @dataclass(frozen=True)
@@ -72,14 +73,14 @@ class FaultJob:
 
 @dataclass
 class Trace:
-    """What the rider saw during a ride, and the truth. The arrays have one entry per turn of the loop, shape (n).
+    """The display during a ride, and the truth. The arrays have one entry per turn of the loop, shape (n).
 
-    time: In s.
+    time: Time in s.
     lean: Lean of the meter, in degrees.
     sigma: Standard deviation that the meter claims, in degrees.
     shown: True if the lean is shown.
     true: True lean, in degrees.
-    speed: In m/s.
+    speed: True speed, in m/s.
     named_s: Time at which the display named a fault, or NaN.
     first_s: Start of the fault.
     end_s: End of the fault.

@@ -17,9 +17,10 @@ from rich.table import Table
 from .integrity import CLAIMS, ERROR_EDGES, STANDS_S, WRONG_DEG, Outcome
 
 CAPTION = (
-    f"misleading: seconds a ride in which a lean over {WRONG_DEG:.0f} degrees wrong stood for over {STANDS_S:.0f} s, "
-    "mean and most; shown: share of the riding with a lean; hidden, named: seconds after the fault began, median, and "
-    "in how many of the rides; right again: 10 s after a fault that ends"
+    f"misleading: seconds per ride in which an error over {WRONG_DEG:.0f} degrees was shown for over {STANDS_S:.0f} s, "
+    "mean and largest; shown: share of the riding time with a lean; hidden, named: median of the seconds from the "
+    "start of the fault, and share of the rides; right again: share of the rides whose lean is right 10 s after the "
+    "end of the fault"
 )
 _UNKNOWN = "--"
 

@@ -6,25 +6,33 @@ import numpy as np
 from kickstand_tools.signals import peak_offset
 from numpy.typing import NDArray
 
-LEANED_DEG = 10.0  # the slope is fitted at larger true leans: most of a ride is nearly upright
-_LAG_RANGE_S = (-0.2, 0.8)  # searched
+LEANED_DEG = 10.0  # smallest true lean for the fit of the slope, because most of a ride is nearly upright
+_LAG_RANGE_S = (-0.2, 0.8)  # smallest and largest lag to try
 _LAG_SMOOTHING_S = 0.05
-_STILL_DPS = 1.0  # rms of the true roll rate below which no lag can be found
-# A straight: for at least this time, yaw rate and lean are below their limits and the speed is above its limit
+_STILL_DPS = 1.0  # smallest rms of the true roll rate for which a lag is computed
+# On a straight, yaw rate and lean stay below the first two limits and the speed above the third. It lasts _STRAIGHT_S
+# or longer
 _STRAIGHT_DPS, _STRAIGHT_DEG, _STRAIGHT_MPS, _STRAIGHT_S = 2.0, 6.0, 5.0, 1.0
 
 
 @dataclass
 class LeanScore:
-    """Errors in degrees. slope: shown over true lean. lag: > 0 if the lean is shown late. A figure is NaN if the ride
-    cannot show it."""
+    """The errors of a shown lean. A figure is NaN if the ride does not determine it.
+
+    rms_deg: Root of the mean square of the error.
+    p95_deg: 95th percentile of the absolute error.
+    worst_deg: Largest absolute error.
+    slope: Shown lean divided by true lean.
+    lag_ms: Delay of the shown lean. Positive if the lean is late.
+    straight_bias_deg: Mean error on straights in the last tenth of the ride.
+    """
 
     rms_deg: float
-    p95_deg: float  # 95 % of the absolute errors are smaller
+    p95_deg: float
     worst_deg: float
     slope: float
     lag_ms: float
-    straight_bias_deg: float  # mean error on straights in the last tenth of the ride
+    straight_bias_deg: float
 
 
 def rms(error: NDArray) -> float:
@@ -33,15 +41,20 @@ def rms(error: NDArray) -> float:
 
 
 def slope(shown: NDArray, true: NDArray, beyond: float = LEANED_DEG) -> float:
-    """The ratio of shown to true lean where the true lean exceeds `beyond` degrees: least squares through the origin.
-    NaN if undefined."""
+    """Fit a line through the origin to the shown lean over the true lean. Returns its slope, or NaN without samples.
+
+    beyond: only samples with a larger true lean are used, in degrees.
+    """
     leaned = np.abs(true) > beyond
     square = float(np.sum(true[leaned] ** 2))
     return float(np.sum(shown[leaned] * true[leaned]) / square) if square > 0.0 else float("nan")
 
 
 def lag_ms(shown: NDArray, true: NDArray, rate_hz: float) -> float:
-    """The delay in ms at which shown and true roll rate correlate best, refined by a parabola. NaN if none is found."""
+    """Find the delay of the shown roll rate at which it correlates best with the true roll rate.
+
+    The delay is refined by a parabola. Returns it in ms, or NaN if no delay is found.
+    """
     width = max(round(_LAG_SMOOTHING_S * rate_hz), 1)
     window = np.full(width, 1.0 / width)
     a, b = (np.convolve(np.gradient(x) * rate_hz, window, mode="same") for x in (shown, true))
@@ -69,9 +82,12 @@ def straights(truth: dict[str, NDArray], rate_hz: float) -> NDArray[np.bool_]:
 
 
 def score(shown: NDArray, truth: dict[str, NDArray], rate_hz: float) -> LeanScore:
-    """Score a shown lean (N, degrees) from setting off to the end of the ride, or all of it if it never sets off.
+    """Score a shown lean from the moment the bike sets off to the end of the ride.
 
-    truth: lean_deg, speed_mps and yaw_rate_dps, each (N,).
+    If the bike never sets off, only the first second of the ride is left out.
+
+    shown: lean in degrees, shape (N).
+    truth: lean_deg, speed_mps and yaw_rate_dps, each of shape (N).
     """
     off = truth["speed_mps"] > 0.5
     first = int(np.argmax(off)) if off.any() else round(rate_hz)

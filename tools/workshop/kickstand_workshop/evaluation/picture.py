@@ -60,7 +60,7 @@ def draw(path: Path, rides: dict[str, dict[str, NDArray[np.float64]]]) -> None:
 
 
 def zoom_start(time: NDArray, true: NDArray) -> float:
-    """Find the stretch of ZOOM_S with the largest variance of the lean. Returns its start, in s."""
+    """Find the ZOOM_S seconds in which the true lean has the largest variance. Returns their start, in s."""
     n = max(int(np.searchsorted(time, time[0] + ZOOM_S)), 1)
     if n >= len(time):
         return float(time[0])

@@ -1,8 +1,8 @@
-"""Computes the best possible leans, from data that no board has.
+"""Computes leans for comparison, from data that a board does not have.
 
-oracle() runs the firmware's own filter with the true alignment, the true speed, and readings that have noise but no
-other sensor errors. So the filter only has to estimate the motion. gps_lean() computes the lean that phone apps show,
-from the speed and the change of course of a GPS receiver.
+oracle() runs the firmware's own filter with the true alignment and the true speed. Its readings have noise, but no
+other sensor errors, so the filter must only estimate the motion. gps_lean() computes the lean as phone apps do, from
+the speed and the change of course of a GPS receiver.
 """
 
 from collections.abc import Iterator

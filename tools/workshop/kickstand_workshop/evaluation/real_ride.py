@@ -2,8 +2,9 @@
 
 The calibration comes from `kickstand calibrate ride`. The reference lean is atan(v * yaw rate / g), averaged over 1 s,
 with the yaw rate about the bike's own up axis. Do not trust its values in degrees. The reference lean is too small for
-three reasons: the speed changes only once per second, tyres are wide, and the up axis leans with the bike. It also
-ignores slope and bank of the road. But it can compare methods, and reveal a lean that decays in a turn.
+three reasons. The speed changes only once per second, tyres are wide, and the up axis leans with the bike. The
+reference also ignores slope and bank of the road. Use it to compare methods, and to reveal a lean that decays in a
+turn.
 """
 
 from dataclasses import dataclass, field
@@ -24,8 +25,8 @@ from .estimators import calibrated, estimate
 from .metrics import rms, slope
 
 AVERAGE_S = 1.0
-_RIDING_MPS = 2.0  # only samples with a higher speed are scored
-_LEANED_DEG = 5.0  # the slope is fitted at larger leans. The limit is low, because the reference is rarely over 10
+_RIDING_MPS = 2.0  # smallest speed of samples that are scored
+_LEANED_DEG = 5.0  # smallest lean for the fit of the slope. The reference is rarely over 10 degrees
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""Reports an evaluation, as tables for a terminal, data for JSON, and files. Figures are pooled over the seeds."""
+"""Reports an evaluation: tables for a terminal, data for JSON, and files. Each figure is computed over all seeds."""
 
 import json
 from collections.abc import Mapping
@@ -16,19 +16,20 @@ from .real_ride import RealScore
 from .runs import Evaluation, Result
 
 CAPTION = (
-    "possible: this filter with a sensor without errors and the true speed; ratio: rms over that of possible; "
-    "rms: over all rides; worst ride: rms of the worst; 95 %: mean over rides; worst: of all; "
-    "slope: shown over true beyond 10 deg, mean, then lowest to highest; lag: mean; "
-    "bias: the largest on straights in the last tenth; --: not observable in these rides"
+    "possible: our filter with the true speed and a sensor with noise only; rms: over all rides; "
+    "ratio: rms divided by the rms of possible; worst ride: largest rms of a ride; "
+    "95 %: mean of the rides' 95th percentiles; worst: largest error; "
+    "slope: shown lean divided by true lean for leans over 10 deg, mean, then lowest to highest; "
+    "lag: mean; bias: largest mean error on straights in the last tenth of a ride; --: unknown from these rides"
 )
 
 _UNKNOWN = "--"
 
 
 def pooled(scores: list[LeanScore]) -> dict[str, float]:
-    """Pool the scores of one estimator on one profile over the seeds.
+    """Summarize the scores of one estimator on one profile over all seeds.
 
-    Returns the figures by name, in degrees, the lag in ms. A figure is NaN if no ride can give it.
+    Returns the figures by name, in degrees, except the lag in ms. A figure is NaN if no ride determines it.
     """
     rms = np.array([s.rms_deg for s in scores])
     slopes, lags, biases = (
@@ -96,7 +97,7 @@ def real_table(scores: dict[str, RealScore], name: str) -> Table:
     """Return a table of the recorded ride. name: name of its file."""
     made = _table(
         f"{name}: against atan(v * yaw rate / g) averaged over 1 s",
-        "a rough reference that reads low: it compares methods, it claims no degrees",
+        "The reference is rough and too small. Use it to compare methods, not to measure errors in degrees.",
     )
     made.add_column("recorded ride", no_wrap=True)
     for head in ("rms", "slope beyond\n5 deg"):

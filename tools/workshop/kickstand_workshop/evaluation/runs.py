@@ -134,7 +134,7 @@ def on_all_processors(function: Callable, jobs: list, chunk: int = 1, ordered: b
     """
     with multiprocessing.Pool(min(len(jobs), os.cpu_count() or 1), _begin_worker) as pool:
         yield from (pool.imap if ordered else pool.imap_unordered)(function, jobs, chunk)
-        # Do not stop the workers by SIGTERM. A worker that gets SIGTERM before _begin_worker() would wait forever
+        # Do not stop the workers with SIGTERM. A worker that receives SIGTERM before _begin_worker() would hang
         pool.close()
         pool.join()
 
@@ -171,8 +171,8 @@ def as_log(made: SimulatedRide) -> Log:
 def _begin_worker() -> None:
     """Prepare a worker process.
 
-    Close standard error, because every worker would print a traceback after Ctrl-C. Let SIGTERM end the worker at once.
-    The handler that it inherits from the command would wait for a lock.
+    Close standard error, because every worker would print a traceback after Ctrl-C. Restore the default handler of
+    SIGTERM, which ends the worker at once. The command's handler, which the worker inherits, would wait for a lock.
     """
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     sys.stderr = open(os.devnull, "w", encoding="utf-8")

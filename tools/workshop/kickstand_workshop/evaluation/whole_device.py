@@ -21,7 +21,7 @@ LOOK_S = 0.1
 # Texts that name a fault of the sensor. `Lean --` and texts about a speed source or a display do not match
 NAMES = re.compile("Sensor|Gyro|Accel|No sensor", re.IGNORECASE)
 STARTED_S = 2.0  # before this time, the display shows the start
-WRITING = 2  # largest number of successive reads that see a half-written line
+WRITING = 2  # most successive reads that can see a half-written line
 
 
 def display_of(
@@ -41,9 +41,9 @@ def display_of(
         speed: Function that returns the speed of a GPS receiver in m/s at a time in s. None for no receiver.
 
     Returns:
-        The times, shape (n), in s.
-        The lean on the display, shape (n), in degrees. NaN where the display shows no lean.
-        The time at which the display first names a fault, in s, or NaN.
+        times: shape (n), in s.
+        leans: leans on the display, shape (n), in degrees. NaN where the display shows no lean.
+        named: time at which the display first names a fault, in s, or NaN.
     """
     rows = readings[:, [0, 1, 2, 4, 5, 6, 3]].tolist()
     last = len(rows) - 1
@@ -87,7 +87,7 @@ def display_of(
 
 
 def _read(leans: list[float]) -> NDArray[np.float64]:
-    """Return the leans as a rider reads them. Reads of a half-written line are replaced by the previous lean."""
+    """Return the leans as a rider sees them. A read of a half-written line is replaced by the previous lean."""
     read = np.array(leans)
     absent = np.isnan(read)
     for k in range(1, len(read)):

@@ -1,4 +1,4 @@
-"""Changes the code of a package one place at a time and says which changes its tests do not notice.
+"""Changes the code of a package in one place at a time, and lists the changes that its tests do not notice.
 
     python3 tools/dev.py mutants imu              all changes of the package
     python3 tools/dev.py mutants imu --sample 50  50 random changes, always the same for the same --seed
@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[4]
 
 def main() -> int:
     options = _options()
-    # End by an exception after this signal, so that the copy is removed
+    # Convert SIGTERM to an exception, so that the copy is removed
     signal.signal(signal.SIGTERM, lambda *_: sys.exit("stopped"))
     package = PACKAGES[options.package]
     with tempfile.TemporaryDirectory(prefix="mutants-") as directory:

@@ -23,7 +23,7 @@ ARGUMENTS = ("-x", "-q", "-k", "not micropython", "-p", "no:cacheprovider", "-p"
 KILLED, SURVIVED, TIMED_OUT = "killed", "survived", "timed out"
 # The tests of a change may use TIMES the processor time of the tests of the unchanged code, plus EXTRA_S
 TIMES, EXTRA_S = 3, 5
-WALL_TIMES = 10  # a change is timed out after this multiple of the same time on the wall clock
+WALL_TIMES = 10  # the same limit on the wall clock, as a multiple of the limit of processor time
 
 
 class Tests:
@@ -67,7 +67,7 @@ class Tests:
         file = self.root / path
         original = file.read_text("utf-8")
         for bytecode in file.parent.glob(f"__pycache__/{file.stem}.*"):
-            bytecode.unlink()  # Python would use it for a text of the same length, written in the same second
+            bytecode.unlink()  # Python would use it again for a text of the same length, written in the same second
         try:
             file.write_text(mutant, "utf-8")
             return self._run(sorted(self._files, key=lambda name: file.stem not in name))

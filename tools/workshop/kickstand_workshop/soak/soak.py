@@ -26,7 +26,8 @@ from .watch import Watch
 
 # Number of trips with the same bike. The next bike has another sensor, mounting and speed source, and an empty flash
 TRIPS_WITH_A_BIKE = 8
-# Limits of the sensor's errors, as a share of the data sheet's limits. Offset and scale are calibrated
+# Limits of the sensor's errors, as a share of the data sheet's limits. The six positions calibrate offset and scale
+# before the first trip
 PART_SHARE = 0.5
 WHO_AM_I, RANGE_G = 0x68, 8
 WARM_TRIPS = 3  # memory may grow in the first trips, because modules are imported when they are first needed

@@ -9,9 +9,9 @@ from kickstand_tools.simulated_board.simulator import Board
 from .trip import QUIET_S, SENSOR, Trip
 
 LOOK_S = 0.1
-WRONG_DEG, WRONG_S = 10.0, 5.0  # a lean with a larger error may be shown for at most this time
-LAG_S = 0.6  # the display may show the lean of any instant within this time
-STILL_S = 2.0  # the program counts as hanging after this time without a transfer to the sensor
+WRONG_DEG, WRONG_S = 10.0, 5.0  # longest time WRONG_S for which a lean with an error over WRONG_DEG may be shown
+LAG_S = 0.6  # the shown lean may be the true lean at any moment within this time
+STILL_S = 2.0  # time without a transfer to the sensor after which the program counts as hanging
 # Longest time for which a lean may be shown without new readings: half a second, and the time for a page and a check
 STALE_S = 0.7
 SAYS_WHY = re.compile("No sensor|Sensor |Readings lost|Kickstand|Lean  --")
