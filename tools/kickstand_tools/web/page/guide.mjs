@@ -1,13 +1,14 @@
-// What to do next, from what the firmware shows: the first minute, and what to look at after a fault.
+// Tells the visitor what to do next: in the first minute, and after a fault. It depends on what the firmware shows.
 
 import { shows } from "./shows.mjs";
 
-const RIDE_S = 3; // that the lean is held before the last step counts as done
-const WELL_DEG = 15;
-const SURE_S = 7; // that a lean is shown straight on, until a bend does not make the firmware doubt it again
-const STRAIGHT_DEG = 3; // a smaller lean is seen as none
+const RIDE_S = 3; // the last step is done after the lean was held for this time
+const WELL_DEG = 15; // smallest lean for the last step
+// When the display has shown a lean on a straight road for this time, a bend no longer makes the firmware doubt it
+const SURE_S = 7;
+const STRAIGHT_DEG = 3; // a smaller lean is treated as riding straight
 
-// The pose that the firmware wants; after a refusal it is still the one before
+// The pose that the firmware wants, by the kind of view. A view that is not listed here does not change it.
 const WANTED = {
   unaligned: "kickstand",
   "ask-stand": "kickstand",
@@ -30,7 +31,8 @@ const UPRIGHT = ["Hold it upright", "upright"];
 const RIDE = ["Ride", "ride"];
 const STRAIGHT = ["Ride straight", "straight"];
 
-/** A step: number (1 to 4, 5 when all are done, 0 for none), text, and its button's [label, action], or none. */
+/** Return a step. number: 1 to 4, 5 when all are done, 0 for advice that is not a step. text: the advice. action:
+ * [label, action] of its button, or undefined for no button. */
 const step = (number, text, action) => ({ number, text, action });
 
 export class Guide {
@@ -38,19 +40,23 @@ export class Guide {
   #heldSince = null;
   #ridden = false;
   #shownSince = null;
-  #sure = false; // since the power came on
-  #cut = false; // the power has gone in a save, and since then nothing has been ridden or aligned
+  #sure = false; // true if the firmware has become sure of its lean since power-on
+  #cut = false; // true from a power cut during a save until the next ride or alignment
 
-  /** The power has gone. inSave: in the middle of one. */
+  /** Note that the power was cut. inSave: true if this was during a save. */
   dark(inSave) {
     this.#cut = inSave;
     this.#sure = false;
   }
 
   /**
-   * The step that fits, or null for the one before. view: as shows() takes it; shown: the lean that it shows, or null.
-   * pose: "kickstand", "upright", "ride"; standing: it has come to rest in it. state: {powered, plugged, armed (a save
-   * will be cut), time (s), lean_deg: the true one}.
+   * Return the next step, or null to keep the previous step.
+   *
+   * view: the firmware's view, as for shows().
+   * shown: the lean on the display, or null if it shows none.
+   * pose: "kickstand", "upright" or "ride".
+   * standing: true if the motorcycle has come to rest in this pose.
+   * state: {powered, plugged, armed: the next save will be cut, time: in s, lean_deg: the true lean}.
    */
   next(view, shown, pose, standing, state) {
     const { kind } = shows(view) ?? {};
@@ -149,7 +155,7 @@ export class Guide {
     return step(number, "The old alignment is still there: nothing half written is believed. Ride!", RIDE);
   }
 
-  /** How to have the firmware save a calibration, which is to be cut. */
+  /** Tell the visitor how to start a save of a calibration, during which the power will be cut. */
   #save(kind, view, pose) {
     if (pose !== "kickstand") {
       return step(0, "The power goes in the middle of the next save. Stop for a new alignment.", ON_STAND);
@@ -162,7 +168,7 @@ export class Guide {
   #ride(shown, state) {
     if (!this.#sure && !this.#ridden) return this.#straight(shown, state);
     if (shown === null) {
-      // In a bend that never changes no reading tells a lean from an error of the sensor: riding on is no help there
+      // In a steady bend no reading distinguishes a lean from a sensor error, so waiting does not help
       if (Math.abs(state.lean_deg) > STRAIGHT_DEG) {
         return step(4, "Not sure yet, and not in a steady bend: ride straight, or lean the other way.", STRAIGHT);
       }
@@ -175,7 +181,7 @@ export class Guide {
     return step(4, "Lean it: drag the motorcycle or the slider. Compare both figures.");
   }
 
-  /** Until the firmware is sure of the lean. */
+  /** Return the step until the firmware is sure of the lean. */
   #straight(shown, state) {
     if (shown === null) this.#shownSince = null;
     else this.#shownSince ??= state.time;
