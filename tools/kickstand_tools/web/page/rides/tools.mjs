@@ -60,7 +60,7 @@ export class Tools {
     worker.onmessage = ({ data }) => {
       if (data.of !== undefined) return this.#tell(data.done, data.of, data.loading);
       if (data.ready) return this.#tell(1, 1, true);
-      if (!this.#answer) return this.stop(); // fetching in advance has failed; the next call tries again, and reports it
+      if (!this.#answer) return this.stop(); // fetching in advance has failed; the next call tries again
       const { resolve, reject } = this.#answer;
       this.#answer = null;
       if (data.failed || data.said.refused) reject(new Error(data.failed ?? data.said.refused));

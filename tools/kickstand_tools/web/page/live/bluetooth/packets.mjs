@@ -27,7 +27,7 @@ export function decodeNow(view) {
   };
 }
 
-/** Decode a packet of the kind `ride`. view: its DataView. The result's names are as in LiveReading (rides/stream.py). */
+/** Decode a packet of the kind `ride`. view: its DataView. The result has the names in LiveReading (rides/stream.py). */
 export function decodeRide(view) {
   return {
     max_left_deg: view.getUint16(2, true) / 10,
