@@ -1,5 +1,5 @@
-"""The guide's next step for each state of the real firmware. The page's device runs at full speed, with orders as a
-rider gives them. The page's own guide then gets each state that the rider could see."""
+"""Tests the guide's next step for each state of the real firmware. The page's device runs at full speed, and gets the
+orders of a rider. The page's own guide then gets each state that the rider could see."""
 
 import json
 from pathlib import Path
