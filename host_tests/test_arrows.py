@@ -14,7 +14,7 @@ from kickstand_tools.common import firmware_path
 
 ROOT = {"errors", "units", "rotation"}  # modules above the folders, which any folder may import
 
-# folder or module: the other parts of the firmware that it may import
+# {folder or module: the other parts of the firmware that it may import}
 ARROWS = {
     "errors": set(),
     "units": set(),
@@ -50,7 +50,8 @@ ARROWS = {
     "start": {"board", "devices", "settings"},
     "__init__": {"status_report"},
 }
-# Imported only by the function that needs it, because it costs memory or words that most boards never need.
+# {part: the parts that it imports only in the function that needs them}. They cost memory, and most boards never need
+# them.
 LATE = {
     "settings": {"setting_table"},  # the module is unloaded after use
     "errors": {"console"},  # report() prints a refusal in words
@@ -63,9 +64,9 @@ LATE = {
 HARDWARE = {"machine", "micropython", "esp32", "rp2", "neopixel", "network", "bluetooth"}
 DRIVERS = {"board", "imu", "speed", "devices", "diagnosis", "start", "live.radio"}
 
-# For the tools: a folder or module of kickstand_tools, or another package: the other parts of the tools that it may
-# import
 LEAVES = {"kickstand_fleet", "kickstand_emulator", "kickstand_workshop"}
+# {part of the tools: the other parts that it may import}. A part is a folder or module of kickstand_tools, or another
+# package.
 TOOL_ARROWS = {
     "common": set(),
     "signals": set(),  # numpy only, no log and no file
@@ -284,7 +285,7 @@ def tool_packages():
 
 
 def dotted(package, path):
-    """The dotted name of a module, or of a package's folder."""
+    """Return the dotted name of a module, or of a package's folder."""
     parts = [package.name, *path.relative_to(package).with_suffix("").parts]
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
@@ -297,8 +298,11 @@ def is_tool(name):
 
 
 def tool_imports(text, within):
-    """The full names of the tools' modules that a module imports, also within functions and for type checking only.
-    within: the parts of its package's name."""
+    """Return the full names of the tools' modules that a module imports, also within functions and for type checking.
+
+    text: source of the module.
+    within: the parts of its package's name.
+    """
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
@@ -314,7 +318,7 @@ def tool_imports(text, within):
 
 
 def tool_modules():
-    """{full name: the full names of its imports} of each module of the tools."""
+    """Return {full name: the full names of its imports} of each module of the tools."""
     found = {}
     for package in tool_packages().values():
         for path in sorted(package.rglob("*.py")):
@@ -325,7 +329,7 @@ def tool_modules():
 
 
 def shortened(name):
-    """A full name in the form of TOOL_ARROWS: without kickstand_tools for a module of the core."""
+    """Convert a full name to the form in TOOL_ARROWS, which omits kickstand_tools for a module of the core."""
     return name.removeprefix("kickstand_tools.")
 
 

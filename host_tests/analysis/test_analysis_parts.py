@@ -1,4 +1,4 @@
-"""The figures, words and charts of a report, from small channels with results computed by hand."""
+"""Tests the figures, words and charts of a report with small channels. The expected results were computed by hand."""
 
 from dataclasses import fields, replace
 
@@ -18,7 +18,10 @@ from kickstand_tools.logs.reader import read_blocks
 
 
 def made(n: int, step_s: float = 0.01, **columns) -> Channels:
-    """n samples of an upright bike that the meter trusts; columns: other values, a number or (n)."""
+    """Return n samples of an upright bike whose lean is trusted.
+
+    columns: {name of a channel: another value, a number or shape (n)}.
+    """
     usual = {"up_g": 1.0, "sure": 1.0, "speed_mps": np.nan, "lat_deg": np.nan, "lon_deg": np.nan, "utc_s": np.nan}
     usual |= {"temp_c": np.nan, "t_s": np.arange(n) * step_s} | columns
     return Channels(*(np.full(n, 0.0) + usual.get(field.name, 0.0) for field in fields(Channels)))
@@ -46,7 +49,7 @@ def test_forces_and_rates_are_along_left_up_forward():
 
 
 def test_samples_are_averaged_over_each_stretch():
-    """Steps of 0.02 s: two samples each. NaNs do not count; positions are the last ones."""
+    """Each stretch of 0.02 s has two samples. A NaN does not count. The last position of a stretch is kept."""
     lean, lat = np.array([1.0, 3.0, np.nan, 5.0, np.nan, np.nan]), np.array([1.0, 2.0, 3.0, np.nan, np.nan, np.nan])
     course = made(6, lean_deg=lean, lat_deg=lat)
     found = joined(downsampled([course.part(slice(0, 3)), course.part(slice(3, 6))], 0.02))
@@ -71,7 +74,8 @@ def test_a_peak_keeps_the_first_of_the_largest_values():
 
 
 def test_a_maximum_of_the_lean_must_be_held():
-    """A lean of 40 degrees for one sample does not count; one of 35 to the right and 30 to the left for a second do."""
+    """A lean of 40 degrees lasts for one sample and does not count. Leans of 35 degrees to the right and 30 degrees to
+    the left last for a second and count."""
     lean = np.zeros(1000)
     lean[100], lean[200:301], lean[500:601] = 40.0, 35.0, -30.0
     total = summary(made(1000, lean_deg=lean))
@@ -79,14 +83,15 @@ def test_a_maximum_of_the_lean_must_be_held():
     assert total.right_deg.time_s == pytest.approx(2.0) and total.left_deg.time_s == pytest.approx(5.0)
     parts = Summary()
     course = made(1000, lean_deg=lean)
-    for begin in range(0, 1000, 50):  # a lean may be held over several blocks
+    for begin in range(0, 1000, 50):  # a lean may continue over several blocks
         parts.add(course.part(slice(begin, begin + 50)))
     assert (parts.right_deg.value, parts.left_deg.value) == (35.0, 30.0)
     assert (parts.samples, parts.duration_s) == (1000, pytest.approx(9.99))
 
 
 def test_a_summary_by_hand():
-    """10 s. From 2 to 4 s at 30 degrees, from 4 to 5 s at 40; from 6 to 7 s unsure; from 8 s at rest."""
+    """The ride takes 10 s. The bike leans by 30 degrees from 2 to 4 s, and by 40 degrees from 4 to 5 s. From 6 to 7 s
+    the lean is uncertain. From 8 s on the bike is at rest."""
     t_s, lean, sure, rest = np.arange(1000) / 100.0, np.zeros(1000), np.ones(1000), np.zeros(1000)
     lean[200:400], lean[400:500], lean[600:700], sure[600:700], rest[800:] = 30.0, 40.0, 60.0, 0.0, 1.0
     shown = np.where(t_s < 1.0, 0.3, np.where(t_s < 2.0, -0.6, np.where(sure > 0.0, 0.0, 2.0)))
@@ -96,7 +101,8 @@ def test_a_summary_by_hand():
     assert total.not_sure_s == pytest.approx(1.0)
     assert total.riding_s == pytest.approx(8.0, abs=0.011)
     assert float(np.sum(total.histogram_s)) == pytest.approx(7.0, abs=0.011)
-    assert total.histogram_s[[100, 110]] == pytest.approx([2.0, 1.0])  # bins of a degree from -70
+    # the bins are one degree wide and begin at -70 degrees
+    assert total.histogram_s[[100, 110]] == pytest.approx([2.0, 1.0])
     assert (total.speed_mps.value, total.speed_mps.time_s) == (9.99, 9.99)
     assert (total.missing_s, total.frozen_s) == (0.0, 0.0)
 
@@ -111,7 +117,8 @@ def test_time_without_readings_is_missing():
 
 
 def test_the_alignment_of_a_straight_ride_by_hand():
-    """A lean of 2 degrees to the right all the time; braking and speeding up by 0.2 g, a tenth of it to the left."""
+    """The bike always leans by 2 degrees to the right. It brakes and accelerates by 0.2 g. A tenth of this force is
+    along left."""
     n, push = 10_000, 0.2 * np.where(np.arange(10_000) // 100 % 2, 1.0, -1.0)
     tilt = np.tan(np.radians(2.0))
     standing = (np.arange(n) < 500) | (np.arange(n) >= n - 500)
@@ -135,14 +142,15 @@ def test_what_a_ride_must_have_to_show_its_alignment():
         return quality(made(n, forward_g=push, yaw_rate_dps=yaw_dps), standing)
 
     assert of(yaw_dps=1.9).roll_deg is not None and of(yaw_dps=2.1).roll_deg is None
-    assert of(seconds=12.6).roll_deg is not None and of(seconds=11.4).roll_deg is None  # 2 s of it standing
+    assert of(seconds=12.6).roll_deg is not None and of(seconds=11.4).roll_deg is None  # it stands for 2 s of this
     assert of(push_g=0.06).yaw_deg is not None and of(push_g=0.04).yaw_deg is None
     assert of(seconds=63.0).pitch_deg is not None and of(seconds=61.0).pitch_deg is None
     assert of(stands=False).pitch_deg is None and of(stands=False).gravity_g is None
 
 
 def test_the_cost_of_an_angle_in_degrees_of_lean():
-    """Yaw costs 3 degrees times its sine, pitch 5; roll costs what the trim does not correct."""
+    """A yaw error costs 3 degrees times its sine, and a pitch error 5 degrees times its sine. A roll error costs the
+    part that the trim does not correct."""
     assert yaw_cost_deg(-30.0) == pytest.approx(1.5)
     none = np.zeros(1)
     cost = lean_cost(Quality(-9.0, -30.0, 30.0, 1.0, 30.0, none, none))
@@ -160,7 +168,7 @@ def test_a_vehicle_has_moved_if_it_turned_pushed_or_had_a_speed():
     bump = (np.arange(n) > 2000) & (np.arange(n) < 2500)
     assert moved(yaw_rate_dps=3.1 * bump) and not moved(yaw_rate_dps=2.9 * bump)
     assert moved(forward_g=-0.052 * bump) and not moved(forward_g=0.048 * bump)
-    assert not moved(forward_g=0.3, yaw_rate_dps=9.0)  # the ground's slope and the gyro's bias
+    assert not moved(forward_g=0.3, yaw_rate_dps=9.0)  # such constant values are the ground's slope and the gyro's bias
     assert moved(speed_mps=1.1) and not moved(speed_mps=0.9, yaw_rate_dps=50.0 * bump)
     assert not overviews._has_moved(made(100, yaw_rate_dps=np.arange(100.0)))
     assert overviews._changes(np.array([1.0, 2.0, 8.0])) == 6.0
@@ -274,7 +282,7 @@ def test_the_figures_of_a_report_are_rounded():
 def test_absurd_readings_are_those_of_the_second_before():
     t_s = np.arange(300) / 100.0
     force, rates = np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3))
-    force[50, 0], rates[60, 0] = 99.0, 9999.0  # more than a second before
+    force[50, 0], rates[60, 0] = 99.0, 9999.0  # more than a second before 2.5 s
     force[160, 2], rates[250, 1] = -30.0, -5000.0
     (block,) = read_blocks(api.Log(t_s, force, rates))
     notice = _divergence_notice(block, 250)
@@ -311,7 +319,7 @@ def test_the_charts_of_force_and_speed_have_a_margin():
 
 
 def test_the_chart_of_shares_is_cut_above_small_leans():
-    """90 % upright and 10 % at 30 degrees: the bars end at 1.5 times 10 %."""
+    """The bike is upright for 90 % of the time, and leans by 30 degrees for 10 %. The chart ends at 1.5 times 10 %."""
     lean = np.where(np.arange(6000) >= 5400, 30.5, 0.5)
     chart = charts.charts(seen(made(6000, lean_deg=lean))).below[1]
     assert chart.y_range == pytest.approx((0.0, 15.0), abs=0.02) and chart.right == "90 % upright"
@@ -326,7 +334,7 @@ def test_the_chart_of_shares_is_cut_above_small_leans():
 
 
 def test_the_chart_of_g_against_g_counts_seconds():
-    """0.25 g to the right while braking with 0.5 g for 30 s, then at rest."""
+    """The bike has 0.26 g to the right and brakes with 0.51 g for 30 s. Then it is at rest."""
     course = made(6000, lateral_g=-0.26, forward_g=-0.51, resting=np.arange(6000) >= 3000)
     cells, *rings = charts.charts(seen(course)).below[0].traces
     assert isinstance(cells, charts.CellMap)
@@ -362,7 +370,7 @@ def test_an_envelope_breaks_the_line_in_the_middle_of_a_gap():
     assert x.tolist() == [0.0, 1.0, 2.5, 4.0, 5.0] and y[:2].tolist() == [1.0, 2.0] and np.isnan(y[2])
     assert len(charts.envelope(time, values, 10, gap_s=3.0)[0]) == 4
     few = charts.envelope(np.arange(8.0), np.array([0.0, 9.0, 1.0, -9.0, 2.0, 2.0, 5.0, 1.0]), 4)
-    assert few[0].tolist() == [1.0, 3.0, 6.0, 7.0]  # the least and the largest of each four
+    assert few[0].tolist() == [1.0, 3.0, 6.0, 7.0]  # the smallest and the largest of each four values
 
 
 def test_numbers_of_a_page_are_rounded_and_nan_is_none():
@@ -376,7 +384,8 @@ def test_a_filled_line_keeps_the_ends_of_its_zeros():
 
 
 def test_the_page_of_charts_fits_its_window():
-    """Heights of 2.5, 2.5 and 3 inches of 86 pixels, two gaps of 62, margins of 100 and 80."""
+    """The charts have heights of 2.5, 2.5 and 3 inches, and an inch has 86 pixels. The two gaps have 62 pixels, and the
+    margins 100 and 80."""
     figure = interactive.figure(charts.charts(seen(made(6000))), linked=True)
     layout, narrow = figure["layout"], figure["narrow"]
     assert layout["height"] == 215 + 215 + 258 + 2 * 62 + 180
@@ -398,7 +407,8 @@ def test_the_page_of_charts_fits_its_window():
 
 
 def test_a_track_is_in_metres_from_its_middle():
-    """At 60 degrees north 0.01 degrees of longitude are 556 m, 0.01 of latitude 1112 m. Steps are 0.2 s or more."""
+    """At 60 degrees north, 0.01 degrees of longitude are 556 m, and 0.01 degrees of latitude are 1112 m. The points are
+    at least 0.2 s apart."""
     course = made(1001, lat_deg=60.0 + np.arange(1001) * 1e-5, lon_deg=8.0 + np.arange(1001) * 1e-5, speed_mps=10.0)
     one = seen(course)
     points = track_map.map_points(one)
@@ -426,7 +436,8 @@ def test_points_of_a_map_that_hardly_move_are_left_out():
 
 
 def test_the_tiles_are_placed_by_mercator():
-    """The world is 40 030 km wide at the equator, and half of it at 60 degrees north, 1.3170 radii from the equator."""
+    """The world is 40 030 km wide at the equator, and half as wide at 60 degrees north. In the Mercator projection this
+    latitude is 1.3170 radii from the equator."""
     none = np.zeros(1)
     found = page.tiles_at(track_map.MapPoints(none, none, none, none, none, 60.0, 90.0))
     assert found["world_m"] == pytest.approx(40_030_174.0 / 2.0, rel=1e-3)

@@ -1,4 +1,5 @@
-"""The noise, the priors and the first guess of the estimation by hand, and the figures of one smoothed ride."""
+"""Tests the noise, the priors and the first guess of the estimation. The expected values were computed by hand. Also
+compares the figures of one smoothed ride with known figures."""
 
 from dataclasses import replace
 from typing import Any
@@ -16,7 +17,7 @@ G = 9.80665
 
 
 def windows(n: int = 20, speed: Any = np.nan, rate=(0.0, 0.0, 0.0), force=(0.0, 1.0, 0.0), **more) -> Windows:
-    """n windows of 0.2 s."""
+    """Return n windows of 0.2 s each."""
     made = Windows(
         np.asarray(np.arange(n + 1) * 0.2, dtype=float),
         np.tile(np.array(rate), (n, 1)), np.tile(np.array(force), (n, 1)), np.zeros(n),
@@ -33,7 +34,8 @@ def noise_of(made: Windows, still=False, speed=20.0, lean=0.0, pitch=0.0) -> Noi
 
 
 def test_the_noise_of_riding_by_hand():
-    """20 m/s, windows of 0.2 s. Errors that last for t seconds count sqrt(2 t / 0.2) times."""
+    """The speed is 20 m/s, and the windows are 0.2 s long. An error that lasts for t seconds is the same in many
+    windows, so its standard deviation is multiplied by sqrt(2 t / 0.2)."""
     row = noise_of(windows(speed=20.0)).sigma()[5]
     root = np.sqrt(0.2)
     assert row[of.LEAN] == row[of.PITCH] == pytest.approx(np.radians(0.2) * root)
@@ -93,7 +95,8 @@ def test_a_jolt_makes_the_angles_uncertain():
 
 
 def test_outliers_weigh_less():
-    """Of the process over 4 sigmas, of measurements over 2 sigmas of the error itself; the bias never."""
+    """An error of the process is an outlier over 4 sigmas. An error of a measurement is one over 2 sigmas of the error
+    itself. The bias has no outliers."""
     noise, sigma = noise_of(windows()), np.ones((20, eq.ROWS))
     found = noise.robust(sigma, np.full((20, eq.ROWS), 4.0))[5]
     assert found[: of.BIAS.start] == pytest.approx(np.full(5, np.sqrt(2.0)))
@@ -103,7 +106,8 @@ def test_outliers_weigh_less():
 
 
 def test_roughness_follows_the_residuals():
-    """Residuals of the expected size give 1, of half of it 0.5; the limits are 0.1 and 4."""
+    """Residuals of the expected size give a roughness of 1. Residuals of half this size give 0.5. The roughness is
+    limited to 0.1 to 4."""
     expected = np.zeros((400, eq.ROWS))
     expected[:, [of.LEAN, of.PITCH, of.LEFT, of.UP, of.FORWARD]], expected[:, [eq.SLIDING, eq.CLIMBING]] = 0.38, 0.5
     for factor, roughness in ((1.0, 1.0), (0.5, 0.5), (0.01, 0.1), (9.0, 4.0)):
@@ -120,12 +124,13 @@ def test_roughness_follows_the_residuals():
 
 
 def test_unbalance_follows_the_force_to_the_side():
-    """A force of 0.011 g that changes its sign every 10 s leaves its size in means over 3 s; a constant force none."""
+    """A force of 0.011 g changes its sign every 10 s. Means over 3 s keep its size. A constant force counts as no
+    unbalance, so the result is the lowest value."""
     force = 0.011 * np.where(np.arange(2000) // 50 % 2, 1.0, -1.0)
     noise = noise_of(windows(2000))
     noise.estimate_unbalance(force, 3.0)
-    left = 2.0 * np.exp(-1.0)  # of the variance of an error that lasts as long as the mean
-    assert noise.unbalance == pytest.approx(np.sqrt(0.8 / left), abs=0.05)  # a mean over a change is less
+    left = 2.0 * np.exp(-1.0)  # factor on the variance of an error that lasts as long as the mean
+    assert noise.unbalance == pytest.approx(np.sqrt(0.8 / left), abs=0.05)  # a mean across a change of sign is smaller
     noise.estimate_unbalance(np.full(2000, 0.1), 3.0)
     assert noise.unbalance == pytest.approx(0.12)
     noise.estimate_unbalance(1000.0 * force, 10.0)
@@ -228,8 +233,8 @@ def test_a_bike_without_changes_stands_still():
 
 
 def test_lean_and_speed_of_a_steady_bend():
-    """Leaning by 0.5 to the left, 15 m/s: 0.357 rad/s. The force shows the speed, with the weight of 0.14 rad/s at
-    10 m/s."""
+    """The bike leans by 0.5 rad to the left at 15 m/s, so its yaw rate is 0.357 rad/s. The force shows the speed. A
+    prior speed of 10 m/s has the weight of a yaw rate of 0.14 rad/s."""
     yaw = G * np.tan(0.5) / 15.0
     made = windows(600, force=(0.0, 1.0 / np.cos(0.5), 0.0), rate=(-yaw * np.sin(0.5), yaw * np.cos(0.5), 0.0))
     still = np.zeros(600, dtype=bool)
@@ -275,7 +280,8 @@ FIGURES = {"lean_deg": 3.0298, "lean_sigma_deg": 0.87673, "pitch_deg": 1.6246, "
 
 
 def test_the_figures_of_a_smoothed_ride():
-    """The rms of lean, its standard deviation, pitch and speed. Nearly every number of the model changes them."""
+    """The figures are the rms of the lean, of its standard deviation, of the pitch and of the speed. A change of nearly
+    any number of the model changes them."""
     made = simulate_ride("street", seed=4, seconds=60.0)
     log = Log.from_readings(made.readings[::4], made.rate_hz / 4)
     found = smooth(log, CalibrationFile(vehicle_from_sensor=made.vehicle_from_sensor, aligned=True))

@@ -1,9 +1,17 @@
 """Runs one program of firmware/examples on the simulated board, under MicroPython.
 
-As a script: reads {"program", "until", "turn_to"} as JSON from standard input and runs it in the current directory (the
-board's flash), on a bike that is aligned and rides a long right turn. Without a program the lean meter is run, with
-what is in flash. What the program prints comes first, then on the last line, as JSON, {"frames": what the display said
-every second, "sent": what went to a UART, "lamp": the level of GPIO 16 every second}.
+As a script: reads JSON from standard input and runs the program in the current directory, which is the board's flash.
+The bike is aligned and rides a long right turn. The input has these entries:
+
+    program: path of the program. Without a program the lean meter runs with the files in flash.
+    until: end of the run in s.
+    turn_to: see run().
+
+The output begins with the program's own output. The last line is JSON with these entries:
+
+    frames: text of the display, once per second.
+    sent: the bytes that were sent to a UART.
+    lamp: level of GPIO 16, once per second.
 """
 
 import json
@@ -31,8 +39,12 @@ def save_calibration(part, directory=""):
 
 
 def run(program, until_s, turn_to):
-    """Run the program as described at the top of this file. until_s: s. turn_to: [[at_s, name of a view], ...]: from
-    at_s on, the button is pressed until the view is shown. Raises AssertionError if it never is."""
+    """Run the program as described at the top of this file.
+
+    turn_to: [[at_s, name of a view], ...]. From at_s on, the button is pressed until this view is shown.
+
+    Raises AssertionError if a view is never shown.
+    """
     part = Sensor(seed=3)
     board = Board(part.world(Ride(RIDE).motion))
     board.install()

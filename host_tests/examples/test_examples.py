@@ -1,4 +1,4 @@
-"""The programs in firmware/examples on MicroPython: what each prints or shows on the display."""
+"""Tests the output of each program in firmware/examples on MicroPython."""
 
 import json
 import re
@@ -14,13 +14,13 @@ TURN_DEG = 35.0  # lean in the ride of example_run.py
 
 
 def run(flash, name, until, turn_to=()):
-    """Return what the program printed, and the display's two lines each second. A user.py is run as one."""
+    """Return the program's output, and the display's two lines in each second. A user.py runs as the user's program."""
     printed, seen = run_all(flash, name, until, turn_to)
     return printed, seen["frames"]
 
 
 def run_all(flash, name, until, turn_to=()):
-    """Return what the program printed, and the results of example_run.py. name: None for the user.py in flash."""
+    """Return the program's output, and the results of example_run.py. name: None for the user.py in flash."""
     program = name and str(EXAMPLES / name)
     if name and name.startswith("user_"):
         (flash / "user.py").write_bytes((EXAMPLES / name).read_bytes())

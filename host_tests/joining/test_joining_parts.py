@@ -1,4 +1,4 @@
-"""The parts of joining and comparing, with small inputs and results computed by hand."""
+"""Tests the parts of joining and comparing with small inputs. The expected results were computed by hand."""
 
 from types import SimpleNamespace
 
@@ -20,7 +20,7 @@ def cells(rates, there=None, force=(0.0, 1.0, 0.0)) -> CellMotion:
 
 
 def bends(seconds: float, seed: int = 1) -> np.ndarray:
-    """(n, 3) smooth random rates of about 10 deg/s."""
+    """Return smooth random rates of about 10 deg/s, shape (n, 3)."""
     n = round(seconds / STEP_S)
     at_s, knots_s = np.arange(n) * STEP_S, np.arange(0.0, seconds + 2.0, 1.0)
     chance = np.random.default_rng(seed)
@@ -38,7 +38,7 @@ def test_times_are_converted_by_offset_and_drift():
 
 
 def test_up_is_the_force_weighted_by_the_rate():
-    """40 deg/s weigh as much as 20."""
+    """The weight is limited. So a rate of 40 deg/s has the same weight as 20 deg/s."""
     moved = CellMotion(
         np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), np.array([[0.0, 0.0, 10.0], [0.0, 40.0, 0.0]]),
         np.ones(2, dtype=bool), False, False,
@@ -49,7 +49,7 @@ def test_up_is_the_force_weighted_by_the_rate():
 
 
 def test_motion_subtracts_the_median_rate_and_marks_gaps():
-    """2 s at 5 deg/s, then 0.5 s at 25 deg/s; nothing from 1.0 to 1.5 s."""
+    """The rate is 5 deg/s for 2 s, then 25 deg/s for 0.5 s. Samples are missing from 1.0 to 1.5 s."""
     t_s = np.arange(500) / 200.0
     t_s = t_s[(t_s < 1.0) | (t_s >= 1.5)]
     chance = np.random.default_rng(1)
@@ -82,11 +82,11 @@ def test_rates_are_limited_to_60_before_clocks_are_compared():
     assert clocks._size(cells(rates, np.arange(40) >= 25))[[0, -1]] == pytest.approx([-60.0, 0.0])
     along = clocks._along(cells(rates), np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
     assert along[-1] == pytest.approx([0.0, -60.0, 0.0])
-    assert along[20, 1] == pytest.approx(-36.0)  # three of five cells
+    assert along[20, 1] == pytest.approx(-36.0)  # the mean of five cells, of which three have the rate -60
 
 
 def test_rotation_brings_the_rates_of_b_to_those_of_a():
-    """B begins 0.5 s later; its sensor is turned by 40 degrees."""
+    """B begins 0.5 s later than A. Its sensor is turned by 40 degrees."""
     rates, turn = bends(60.0), turn_about_z(40.0)
     assert clocks._rotation(cells(rates), cells(rates[10:] @ turn), 0.5) == pytest.approx(turn, abs=1e-3)
 
@@ -114,7 +114,7 @@ def test_calibrations_up_to_15_degrees_apart_are_accepted():
 
 
 def test_drift_of_b_is_found_and_too_much_is_refused():
-    """B's clock loses 200 ppm: 0.12 s in ten minutes."""
+    """B's clock is slow by 200 ppm, which is 0.12 s in ten minutes."""
     a = cells(bends(600.0))
     plain = api.CalibrationFile(vehicle_from_sensor=np.eye(3), aligned=True)
 
@@ -152,7 +152,8 @@ def test_a_lean_is_unknown_in_gaps_and_outside_the_log():
 
 
 def test_a_difference_by_hand():
-    """B leans 3 more, 1 less, 3 more ...: 1 on average, and 2 around it. 1.2 and 1.6 degrees make 2.0."""
+    """B's lean differs by 3 and by -1 degrees in turn. The mean difference is 1, and the rms around it is 2. The
+    standard deviations of 1.2 and 1.6 degrees together are 2.0 degrees."""
     n, zeros = 1200, np.zeros(1200)
     other = np.where(np.arange(n) % 2, 3.0, -1.0)
     seen = agreement._difference((zeros, zeros + 1.2), (other, zeros + 1.6))
@@ -161,7 +162,8 @@ def test_a_difference_by_hand():
     assert (seen.p95_deg, seen.worst_deg, seen.expected_deg) == pytest.approx((2.0, 2.0, 2.0))
     assert (seen.within_1, seen.within_2) == (0.5, 1.0)
     assert (seen.slope, seen.delay_s) == (None, None)
-    twice = agreement._difference((zeros, zeros + 0.3), (other, zeros + 0.4))  # 6 and 2 times 0.5
+    # the differences are 6 and 2 times the sigma of 0.5 degrees
+    twice = agreement._difference((zeros, zeros + 0.3), (other, zeros + 0.4))
     assert twice is not None and (twice.within_1, twice.within_2) == (0.0, 0.5)
     assert agreement._difference((zeros[:1000], zeros[:1000]), (zeros[:1000], zeros[:1000])) is not None
     assert agreement._difference((zeros[:999], zeros[:999]), (zeros[:999], zeros[:999])) is None
@@ -211,12 +213,13 @@ def steps(n: int, turn_deg: float = 9.0, speed: float = 10.0, bad=()) -> Course:
 
 
 def test_a_tracks_change_of_course_is_over_four_seconds():
-    """9 deg/s at 10 m/s: 36 degrees in 4 s; a lateral force of 0.160 g has the cosine 0.98741."""
+    """The track turns by 9 deg/s at 10 m/s, which is 36 degrees in 4 s. Its lateral force of 0.160 g belongs to a lean
+    whose cosine is 0.98741."""
     change, known = match._changes_of_track(steps(30))
     assert change[20] == pytest.approx(36.0 * 0.98741, abs=0.001)
-    assert len(change) == 60 and np.flatnonzero(known)[[0, -1]].tolist() == [4, 56]  # 2 to 28 s
-    known = match._changes_of_track(steps(30, bad=[15]))[1]  # from 15 to 16 s
-    assert known[25] and not known[27:36].any() and known[37]  # in 12.5 and 18.5 s the step is outside
+    assert len(change) == 60 and np.flatnonzero(known)[[0, -1]].tolist() == [4, 56]  # these cells are 2 to 28 s
+    known = match._changes_of_track(steps(30, bad=[15]))[1]  # the bad step is from 15 to 16 s
+    assert known[25] and not known[27:36].any() and known[37]  # at 12.5 and 18.5 s the 4 s do not contain the bad step
 
 
 def test_a_rides_change_of_course_is_over_four_seconds():
@@ -226,16 +229,16 @@ def test_a_rides_change_of_course_is_over_four_seconds():
     change, known = match._changes_of_ride(moved)
     assert change[20] == pytest.approx(36.0)
     assert np.flatnonzero(known)[[0, -1]].tolist() == [4, 56] and known[4:57].all()
-    moved.there[300:309] = False  # 0.45 s is not
+    moved.there[300:309] = False  # a gap of 0.45 s is too long
     assert not match._changes_of_ride(moved)[1][30]
 
 
 def test_a_match_needs_a_minute_and_360_degrees_of_bends():
     bend = [0.0, 4.0, 0.0]
-    match._check_turns(cells(np.tile(bend, (1820, 1))), steps(61))  # 364 degrees
+    match._check_turns(cells(np.tile(bend, (1820, 1))), steps(61))  # the ride turns by 364 degrees
     with pytest.raises(InputError, match="the ride turns by 356 degrees"):
         match._check_turns(cells(np.tile(bend, (1780, 1))), steps(61))
-    with pytest.raises(InputError, match="the ride turns by 0 degrees"):  # under 3 deg/s
+    with pytest.raises(InputError, match="the ride turns by 0 degrees"):  # rates under 3 deg/s do not count
         match._check_turns(cells(np.tile([0.0, 2.9, 0.0], (9000, 1))), steps(61))
     match._check_turns(cells(np.tile([0.0, 40.0, 0.0], (1200, 1))), steps(60))
     with pytest.raises(InputError, match="the ride lasts 60 s: at least 60 s"):
@@ -251,12 +254,13 @@ def some_segments(begins_s) -> Segments:
 
 
 def test_only_segments_within_the_ride_are_compared():
-    """A ride of 100 s that begins at 10 s of the track, with a margin of 2 s: segments of 30 s from 12 to 108 s."""
+    """The ride has 100 s and begins at 10 s of the track. With a margin of 2 s, the segments must be between 12 and
+    108 s of the track. Each has 30 s."""
     moved = cells(bends(100.0))
     found = compare.Comparison(moved, steps(200), some_segments([11.9, 12.1, 40.0, 77.9, 78.1]), 10.0, 2.0)
     assert found.given.begin_s[:, 0] == pytest.approx([12.1, 40.0, 77.9])
     assert found.middle_s == pytest.approx((12.1 + 40.0 + 77.9) / 3.0 + 15.0)
-    moved.there[600:629] = False  # 1.45 s of 30 s, under 5 %
+    moved.there[600:629] = False  # 1.45 s of 30 s are missing, which is under 5 %
     assert len(compare.Comparison(moved, steps(200), some_segments([40.0]), 10.0, 2.0).given.begin_s) == 1
     moved.there[600:632] = False
     none = compare.Comparison(moved, steps(200), some_segments([40.0]), 10.0, 2.0)
@@ -264,8 +268,8 @@ def test_only_segments_within_the_ride_are_compared():
 
 
 def test_the_rides_yaw_and_force_are_integrated_over_each_step():
-    """The rate about up grows by 0.1 deg/s each second: a parabola of 0.05 t^2 degrees, without its trend; the force
-    likewise. Shifting the ride by 2 s changes only the trend."""
+    """The rate about up grows by 0.1 deg/s per second, so the angle is a parabola of 0.05 t^2 degrees. Its trend is
+    subtracted. The force forward is integrated in the same way."""
     n = 2000
     moved = cells(np.outer(np.arange(n) * STEP_S * 0.1, [0.0, 1.0, 0.0]))
     moved.force_g[:, 2] = np.arange(n) * STEP_S * 0.01
@@ -286,7 +290,7 @@ def test_integrals_begin_with_zero():
 
 
 def test_the_cost_is_minus_the_log_likelihood_of_students_distribution():
-    """With 4 degrees of freedom: 2.5 ln(1 + e^2 / 4)."""
+    """For an error e and 4 degrees of freedom the cost is 2.5 ln(1 + e^2 / 4)."""
     given = SimpleNamespace(course_weight=np.array([[1.0, 0.25, 0.0]]))
     cost = fit._cost(given, np.array([[2.0, 4.0, 9.0]]))  # type: ignore[arg-type]
     assert cost == pytest.approx([2 * 2.5 * np.log(2.0)])
@@ -299,8 +303,12 @@ def test_least_squares_leave_out_what_has_no_weight():
 
 
 def test_the_standard_deviation_of_a_fit_by_hand():
-    """Three segments pull by 1, 1 and -2: 6 * 3 / 1 = 18, by 0.1^2 0.18 s2. The drift adds 1e-12 * 1e8 = 1e-4, at the
-    end, 70 s from the middle, 0.49 s2. Receivers add 0.05 s."""
+    """The variance of the shift is a sum of three terms.
+
+    * Three segments pull by 1, 1 and -2. This gives 6 * 3 / 1 * 0.1^2 = 0.18 s2, where 6 is the sum of the squares.
+    * The end is 70 s from the middle. With its standard deviation of the drift of 0.01 this gives 0.49 s2.
+    * The receiver's delay has a standard deviation of 0.05 s, which gives 0.0025 s2.
+    """
     turned = np.array([[1.0, -1.0], [2.0, 0.0], [0.0, -2.0]])
     given = SimpleNamespace(
         begin_s=np.array([[0.0]]), end_s=np.array([[120.0]]), course_weight=np.ones((3, 2)), turned_deg=turned
@@ -322,8 +330,10 @@ START_S, SLOW = 50.3, -200e-6  # the track's time at the ride's first sample, an
 
 @pytest.fixture(scope="module")
 def exact() -> tuple[CellMotion, Course]:
-    """A ride of 1500 s from 50.3 s of a track with a step per second, on a road of random bends at changing speed. The
-    ride's clock is fast."""
+    """Simulate a ride of 1500 s and its track, on a road with random bends, at a changing speed.
+
+    The track has one step per second. The ride begins at 50.3 s of the track, and its clock is fast.
+    """
     at_s, knots_s = np.arange(0.0, 1700.0, 0.01), np.arange(0.0, 1706.0, 5.0)
     chance = np.random.default_rng(1)
     yaw, speed = (np.interp(at_s, knots_s, chance.uniform(*bounds, len(knots_s))) for bounds in ((-0.4, 0.4), (10, 20)))
@@ -355,7 +365,8 @@ def test_the_fit_finds_the_shift_and_the_drift(exact):
 
 
 def test_the_rough_fit_tries_shifts_and_drifts(exact):
-    """The shift in the middle of the ride differs from that at its start by the drift: 200 ppm of about 700 s."""
+    """The clocks drift apart by 200 ppm. So the shift in the middle of the ride, after about 700 s, differs from the
+    shift at its start."""
     moved, track = exact
     compared = compare.Comparison(moved, track, segments(track), START_S + 2.0, 7.0)
     shift_s, drift, evidence = fit._try_shifts(compared, START_S + 2.0)
@@ -365,7 +376,7 @@ def test_the_rough_fit_tries_shifts_and_drifts(exact):
 
 
 def test_a_single_shift_costs_little_on_the_same_ride(exact):
-    """If every second segment is a second late, each wants its own shift."""
+    """If every second segment is one second late, no single shift fits all segments."""
     moved, track = exact
     found = fit.fitted(moved, track, segments(track), START_S)
     assert found is not None and fit.cost_of_one_shift(moved, track, segments(track), found) < 1.0
@@ -384,7 +395,7 @@ def test_the_forward_axis_follows_from_the_speed(exact):
     assert np.std(step.model_deg - compared.given.turned_deg) < 1.5
     late = fit._step(compared, np.array([START_S + 0.5, SLOW, 0.0, 0.0, *forward]))
     by = late.inverse @ late.pulls.sum(axis=0)
-    assert by[0] == pytest.approx(-0.5, abs=0.15)  # one step of Gauss and Newton leads most of the way back
+    assert by[0] == pytest.approx(-0.5, abs=0.15)  # a single step of the Gauss-Newton method corrects most of the error
 
 
 def test_the_rough_shifts_contain_the_right_one(exact):
@@ -407,7 +418,8 @@ def point(k: float, lat=48.0, lon=11.0, speed: str | None = None) -> str:
 
 
 def test_bad_points_and_speeds_of_a_track_are_left_out(tmp_path):
-    """The first of two points with the same time is kept; positions that are not on the Earth are left out."""
+    """Of two points with the same time the first is kept. Points with an impossible latitude or longitude are left
+    out."""
     pytest.importorskip("gpxpy")
     good = "".join(point(k, speed="5") for k in range(10, 40))
     speeds = "".join(point(k, speed=text) for k, text in enumerate(["0", "100", "-1", "101", "fast", ""], 40))

@@ -1,4 +1,4 @@
-"""The readings of a sensor on a bike, from the equations of motion alone. For tests that also run on MicroPython."""
+"""Simulates the readings of a sensor on a bike from the equations of motion. For tests that also run on MicroPython."""
 
 from math import cos, degrees, pi, radians, sin, tan
 
@@ -11,7 +11,12 @@ DT_S = DT_US * 1e-6
 
 
 def force_and_rate(lean_deg=0.0, speed_mps=0.0, roll_dps=0.0, forward_mps2=0.0):
-    """Force (left, up, forward in g) and rate (rad/s) of a bike on a level road, in balance from 1 m/s on."""
+    """Compute the motion of a bike on a level road. Above 1 m/s the bike is in balance.
+
+    Returns:
+        force: specific force along left, up, forward, in g.
+        rate: about the same axes, in rad/s.
+    """
     t = radians(lean_deg)
     yaw = -GRAVITY_MPS2 * tan(t) / speed_mps if speed_mps > 1.0 else 0.0
     left = speed_mps * yaw / GRAVITY_MPS2
@@ -20,12 +25,12 @@ def force_and_rate(lean_deg=0.0, speed_mps=0.0, roll_dps=0.0, forward_mps2=0.0):
 
 
 def reading(force, rate):
-    """Seven numbers in the chip's order: g, C, deg/s."""
+    """Return seven readings in the chip's order: three forces in g, the temperature in C, three rates in deg/s."""
     return list(force) + [25.0] + [degrees(value) for value in rate]
 
 
 def meter(calibration=None, **options):
-    """A meter whose sensor is mounted along the bike's axes: x left, y up, z forward."""
+    """Return a meter whose sensor is mounted along the bike's axes, with x left, y up and z forward."""
     calibration = calibration or Calibration()
     for i in range(9):
         calibration.vehicle_from_sensor[i] = 1.0 if i % 4 == 0 else 0.0
@@ -33,7 +38,7 @@ def meter(calibration=None, **options):
 
 
 def ride(shown, seconds, speed_mps=None, **motion):
-    """A steady motion. speed_mps only affects the readings; no other sensor measures it."""
+    """Pass the readings of a steady motion to the meter. speed_mps only affects these readings. It is not measured."""
     readings = reading(*force_and_rate(speed_mps=speed_mps or 0.0, **motion))
     for _ in range(int(seconds / DT_S + 0.5)):
         shown.update(readings, DT_US)
@@ -41,7 +46,7 @@ def ride(shown, seconds, speed_mps=None, **motion):
 
 
 def roll(shown, from_deg, to_deg, speed_mps=0.0, dps=60.0):
-    """Change the lean, at this many degrees per second."""
+    """Change the lean from one angle to another, at dps degrees per second."""
     steps = int(abs(to_deg - from_deg) / (dps * DT_S) + 0.5)
     rate = (to_deg - from_deg) / (steps * DT_S)
     for k in range(steps):
@@ -51,7 +56,7 @@ def roll(shown, from_deg, to_deg, speed_mps=0.0, dps=60.0):
 
 
 def speed_up(shown, from_mps, to_mps, seconds):
-    """Ride straight from one speed to another."""
+    """Ride straight, and change from one speed to another."""
     rate = (to_mps - from_mps) / seconds
     steps = int(seconds / DT_S + 0.5)
     for k in range(steps):
@@ -70,5 +75,5 @@ def nose_up(shown, from_deg, to_deg, dps=30.0):
 
 
 def near(value, expected, within):
-    """Both are equal within this: a plain assert, because MicroPython has no pytest."""
+    """Assert that both values are equal within a tolerance. MicroPython has no pytest.approx()."""
     assert abs(value - expected) <= within, (value, expected)

@@ -1,4 +1,4 @@
-"""The model's partial derivatives compared with numerical differentiation of its own equations."""
+"""The bike model's partial derivatives are compared with numerical derivatives of its own equations."""
 
 import math
 
@@ -21,14 +21,17 @@ from kickstand.lean.bike_model import (
 from kickstand.units import STANDARD_GRAVITY
 
 STEP_S = 0.01
-DISTANCE = 1e-4  # of a state, for the difference quotient
+DISTANCE = 1e-4  # change of a state for a numerical derivative
 TOLERANCE = 1e-6
 MOTION = ("lean_row", "pitch_row", "speed_row")
 FORCES = ("left_row", "up_row")
 
 
 def random_state(chance):
-    """A state without errors of the gyro's scale and axes, at a speed that no step brings to zero; force; rate."""
+    """Return a random state, force and rate.
+
+    The state has no errors of the gyro's scale and axes. Its speed is so high that no step brings it to zero.
+    """
     x = np.zeros(STATES)
     x[[LEAN, PITCH, SPEED, YAW_ERROR]] = chance.uniform([-1.0, -0.3, 5.0, -0.2], [1.0, 0.3, 40.0, 0.2])
     x[BIAS_LEFT : BIAS_LEFT + 3] = chance.uniform(-0.05, 0.05, 3)
@@ -36,7 +39,10 @@ def random_state(chance):
 
 
 def equations(x, force, rate):
-    """Return the rates of change (1) to (3) and the expected (4) to (6) at x, by the model's own step: 6 values."""
+    """Compute the six equations of the model at the state x, with the model's own step.
+
+    Returns the rates of change in (1) to (3), and the expected values of (4) to (6).
+    """
     after, sums = list(x), [0.0] * 9
     predict(after, force, rate, STEP_S, sums)
     motion = [(after[i] - x[i]) / STEP_S for i in (LEAN, PITCH, SPEED)]
@@ -56,7 +62,12 @@ def numerical(x, force, rate):
 
 
 def linearised(x, force, rate):
-    """Return the model's derivatives, shape (6, STATES), and the corrected rates that it used."""
+    """Linearise the model at the state x.
+
+    Returns:
+        derivatives: the model's partial derivatives, shape (6, STATES).
+        rates: the corrected rates that the model used.
+    """
     sums = [0.0] * 9
     predict(list(x), force, rate, STEP_S, sums)
     model = Linearisation(list(x), sums[2:5], sums[7])
@@ -84,7 +95,7 @@ def left_out(x, rates):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_every_partial_derivative_is_that_of_the_equations(seed, monkeypatch):
-    monkeypatch.setattr(bike_model, "turn_rates", lambda *arguments: arguments[-2:])  # the measured ones
+    monkeypatch.setattr(bike_model, "turn_rates", lambda *arguments: arguments[-2:])  # use the measured rates
     x, force, rate = random_state(np.random.default_rng(seed))
     jacobian, rates = linearised(x, force, rate)
     np.testing.assert_allclose(jacobian + left_out(x, rates), numerical(x, force, rate), rtol=0, atol=TOLERANCE)
@@ -102,12 +113,12 @@ def test_near_balance_the_turn_rates_give_no_force_to_the_side(lean):
     x, sums = [0.0] * STATES, [0.0] * 9
     x[LEAN], x[SPEED] = lean, speed
     predict(x, (0.0, 1.0, 0.0), (left, up, 0.0), STEP_S, sums)
-    assert sums[0] == pytest.approx(0.0, abs=1e-12)  # the force to the left that was expected is that of 0 g
-    assert x[PITCH] == pytest.approx(0.0, abs=1e-12)  # and the rates are about the vertical
+    assert sums[0] == pytest.approx(0.0, abs=1e-12)  # the expected force to the left is 0 g
+    assert x[PITCH] == pytest.approx(0.0, abs=1e-12)  # the rates are about the vertical, so the pitch does not change
 
 
 def test_slow_or_far_from_balance_turn_rates_are_measured():
-    assert rates_at(0.5, 20.0, 0.1, 0.4) == (0.1, 0.4)  # a turn to the other side
+    assert rates_at(0.5, 20.0, 0.1, 0.4) == (0.1, 0.4)  # the bike leans to one side and turns to the other
     assert rates_at(0.5, 3.0, 0.1, -1.6) == (0.1, -1.6)
 
 
@@ -122,8 +133,8 @@ def test_the_state_stays_within_its_bounds():
 @pytest.mark.parametrize("lean", [-0.6, 0.0, 0.6])
 @pytest.mark.parametrize("pitch", [-0.2, 0.2])
 def test_pitch_seen_by_the_yaw_error_is_not_lean(lean, pitch):
-    """The test takes the vertical along the bike's axes, rotates it into the axes of a sensor that is turned about up,
-    and computes lean and pitch there. (7) must give the bike's lean."""
+    """The test takes the direction of the vertical in the bike's axes. It rotates this direction into the axes of a
+    sensor that is turned about up, and computes lean and pitch there. Equation (7) must return the bike's lean."""
     yaw_error = 0.1
     left, up, forward = math.cos(pitch) * math.sin(lean), math.cos(pitch) * math.cos(lean), math.sin(pitch)
     s, c = math.sin(yaw_error), math.cos(yaw_error)

@@ -1,4 +1,4 @@
-"""The lean filter's check of itself: misfits, the end of a doubt, and the code of repeated misfits."""
+"""Tests how the lean filter checks itself, with misfits, the end of a doubt, and the code of repeated misfits."""
 
 from math import radians
 
@@ -12,8 +12,10 @@ WINDOW_S = 0.2
 
 
 def windows(judge, seconds, left=0.0, up=0.0, sideways=0.0, pitch=0.0, push=0.0, lean=0.0, yaw_rate=0.0, shaken=0.0):
-    """The number of misfits in the windows of this many seconds. shaken: added to both forces, with alternating
-    sign."""
+    """Judge equal windows for some seconds. Return the number of misfits.
+
+    shaken: force that is added to both forces, with the opposite sign in each next window.
+    """
     failed = 0
     for _ in range(int(seconds / WINDOW_S + 0.5)):
         failed += judge.add(left + shaken, up + shaken, sideways, pitch, push, lean, yaw_rate, WINDOW_S)
@@ -153,8 +155,11 @@ def test_after_a_gap_it_must_fit_or_rest_first():
 
 
 def weave(shown, seconds, bias_dps=0.0, gain=1.0, then=lambda lean_deg: None):
-    """Ride bends of 25 degrees to either side, 5 s each, at 15 m/s, the last 5 s upright, with an error of the roll
-    rate."""
+    """Ride bends of 25 degrees to alternate sides at 15 m/s, 5 s each. The bike is upright in the last 5 s.
+
+    bias_dps, gain: error of the measured roll rate.
+    then: function that is called with the true lean after each sample.
+    """
     lean_deg, target = 0.0, 25.0
     for k in range(int(seconds / 0.01)):
         if k % 500 == 0:
@@ -178,8 +183,12 @@ def riding():
 
 
 def longest_wrong_s(shown, **error):
-    """The longest time with a shown error of over 8 degrees in 40 s of bends, and the share of time with a shown
-    lean."""
+    """Ride 40 s of bends.
+
+    Returns:
+        wrong_s: longest time during which the shown lean has an error of over 8 degrees.
+        share: share of the time in which a lean is shown.
+    """
     seen = [0.0, 0.0, 0]
 
     def look(lean_deg):
@@ -210,7 +219,7 @@ def test_a_mirrored_roll_rate_is_hidden_and_named():
 
 
 def test_an_impossible_lean_does_not_last():
-    """As after a blow that the gyro could not measure: 150 degrees, while the force says that the bike is upright."""
+    """The filter's lean jumps by 150 degrees, as after a blow that the gyro could not measure."""
     shown = riding()
     shown.filter._x[0] += radians(150.0)
     weave(shown, 3.0)
@@ -227,7 +236,7 @@ def test_a_bike_that_has_fallen_stays_so():
 
 
 def test_a_measured_speed_vetoes_rest():
-    """A straight without a tremor at 20 m/s."""
+    """The readings are as calm as at rest, with a measured speed of 20 m/s or of 0."""
     for speed_mps, rests in ((20.0, False), (0.0, True)):
         estimator = LeanFilter()
         for k in range(1500):
@@ -249,7 +258,7 @@ def test_a_speed_from_before_a_gap_vetoes_no_rest():
 
 
 def test_an_accelerometer_of_six_positions_has_the_narrow_limits():
-    """Also where they have not measured the gyro, as in version 0.4.0."""
+    """The narrow limits also apply if the six positions have not measured the gyro, as in version 0.4.0."""
     for six_done in (True, False):
         calibration = Calibration()
         calibration.six_done = six_done

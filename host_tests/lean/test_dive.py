@@ -10,8 +10,11 @@ WINDOW_S = 0.2
 
 
 def ridden(share, seconds, road=0.0, dive=None, speed=20.0):
-    """Dive after so long of braking and accelerating with a bike of this share (rad per g). road: rad/s of pitch rate
-    by the road."""
+    """Return a Dive after alternate braking and acceleration for some seconds.
+
+    share: true dive of the bike, in rad per g.
+    road: amplitude of the pitch rate that the road causes, in rad/s.
+    """
     dive = dive or Dive()
     for k in range(int(seconds / WINDOW_S)):
         t_s = k * WINDOW_S
@@ -33,7 +36,7 @@ def test_no_dive_is_found_beyond_that_of_any_bike():
 
 def test_until_the_bike_has_braked_an_average_dive_is_assumed():
     assert Dive().share == PRIOR_SHARE
-    assert ridden(0.1, 10.0, speed=4.0).share == PRIOR_SHARE  # too slow to tell
+    assert ridden(0.1, 10.0, speed=4.0).share == PRIOR_SHARE  # at this low speed the dive cannot be found
 
 
 def test_the_dive_is_the_speed_times_the_springs_pitch_rate():
@@ -54,5 +57,5 @@ def test_after_lost_readings_the_dive_found_before_holds():
     dive = ridden(radians(4.0), 100.0)
     before = dive.share
     dive.restart()
-    assert dive.update(0.9, 1.0, 20.0, WINDOW_S) == 0.0  # nothing to compare the push with
+    assert dive.update(0.9, 1.0, 20.0, WINDOW_S) == 0.0  # no earlier force exists for a comparison
     near(dive.share, before, 1e-9)

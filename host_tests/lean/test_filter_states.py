@@ -1,4 +1,4 @@
-"""The lean filter's states: start, rest, rolling, and the states kept by a restart. Also runs on MicroPython."""
+"""Tests the lean filter at its start, at rest, while rolling, and after a restart. Also runs on MicroPython."""
 
 from math import atan2, cos, degrees, pi, radians, sin, sqrt
 
@@ -10,7 +10,7 @@ LEVEL, NO_RATE = [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]
 
 
 def hold(estimator, seconds, force=LEVEL, rate=NO_RATE, dt_us=DT_US):
-    """Apply the same force and rate for this time; return the last lean."""
+    """Apply the same force and rate for some seconds. Return the last lean."""
     lean = 0.0
     for _ in range(int(seconds * 1e6 / dt_us + 0.5)):
         lean = estimator.update(force, rate, dt_us)
@@ -18,7 +18,7 @@ def hold(estimator, seconds, force=LEVEL, rate=NO_RATE, dt_us=DT_US):
 
 
 def sigma_deg(estimator):
-    """The standard deviation of the lean without the trim, from the covariance."""
+    """Return the standard deviation of the lean, computed from the covariance without the trim."""
     return degrees(sqrt(estimator._p.rows[LEAN][LEAN] if estimator._p else pi * pi))
 
 
@@ -32,10 +32,10 @@ def test_before_the_first_window_nothing_is_known():
 
 
 def test_power_on_under_way_leaves_lean_and_speed_uncertain():
-    """At rest the force is the vertical; a rate, or a force that is not 1 g, means that it moves."""
+    """At rest the force shows the vertical. A rate, or a force other than 1 g, shows that the bike moves."""
     for force, rate, moves in (
-        (LEVEL, [0.0, 0.0, 0.015], False),  # the gyro's bias
-        ([0.0, 0.96, 0.0], NO_RATE, False),  # the accelerometer's error
+        (LEVEL, [0.0, 0.0, 0.015], False),  # this small rate can be the gyro's bias
+        ([0.0, 0.96, 0.0], NO_RATE, False),  # this small difference can be the accelerometer's error
         (LEVEL, [0.0, 0.03, 0.0], True),
         ([0.0, 1.08, 0.0], NO_RATE, True),
     ):
@@ -46,7 +46,11 @@ def test_power_on_under_way_leaves_lean_and_speed_uncertain():
 
 
 def speed_sigma_mps(forward_g, before_mps, now_mps):
-    """1 sigma after ten speeds, measured a second apart, these two in turns, with such a force forward."""
+    """Return the standard deviation of the speed after ten measured speeds, one per second.
+
+    forward_g: the constant force forward.
+    before_mps, now_mps: the two measured speeds, which alternate.
+    """
     estimator = LeanFilter()
     force = [0.0, 1.0, forward_g]
     hold(estimator, 0.05, [0.0, 1.1, 0.0])
@@ -59,14 +63,15 @@ def speed_sigma_mps(forward_g, before_mps, now_mps):
 
 
 def test_a_changing_measured_speed_counts_less():
-    """A pitch error looks like a force forward, and the speed that would contradict it must not have less weight."""
+    """A pitch error looks like a force forward, and a steady measured speed contradicts it. So a force forward must not
+    reduce the weight of the speed."""
     steady, changing = speed_sigma_mps(0.0, 12.0, 12.0), speed_sigma_mps(0.0, 6.0, 12.0)
     assert changing > steady + 0.2
     near(speed_sigma_mps(0.3, 12.0, 12.0), steady, 0.1)
 
 
 def test_coming_to_rest_the_force_is_the_vertical():
-    """Whatever was estimated before: here a lean of 10 degrees that the gyro did not see."""
+    """This is true for any earlier estimate. Here the bike has a lean of 10 degrees that the gyro did not measure."""
     estimator = LeanFilter()
     hold(estimator, 3.0)
     hold(estimator, 4.0, [0.0, 1.0, 2.0 / GRAVITY_MPS2])
@@ -85,7 +90,7 @@ def test_coming_to_rest_the_force_is_the_vertical():
 
 
 def biased(bias_dps, seconds=30.0):
-    """A filter that has seen a bias at rest."""
+    """Return a filter that was at rest with this gyro bias, and the bias in rad/s."""
     estimator = LeanFilter()
     rate = [radians(value) for value in bias_dps]
     hold(estimator, seconds, LEVEL, rate)
@@ -94,7 +99,7 @@ def biased(bias_dps, seconds=30.0):
 
 
 def test_rest_shows_every_bias_and_a_restart_keeps_it():
-    """Then the bike is rocked: a bias that was not found would be seen as a lean."""
+    """The bike is then rocked. If a bias was not found, the lean is wrong."""
     bias_dps = (1.2, -0.9, 1.5)
     for restarted in (False, True):
         estimator, bias = biased(bias_dps)
@@ -126,7 +131,7 @@ def test_values_that_are_not_numbers_are_dropped():
 
 
 def test_a_lean_beyond_half_a_turn_comes_from_the_other_side():
-    """A sensor in the hand, turned over to the right or left, and on."""
+    """A sensor in the hand is turned to the right or left by a whole turn."""
     for sign in (1.0, -1.0):
         estimator = LeanFilter()
         hold(estimator, 3.0)
@@ -140,8 +145,8 @@ def test_a_lean_beyond_half_a_turn_comes_from_the_other_side():
 
 
 def test_a_large_correction_is_made_once():
-    """Power-on in a turn of 30 degrees; then the speed is measured, and the lean found at once. While that is computed
-    more innovations are summed up, which still show the old error."""
+    """The power is switched on in a turn of 30 degrees. The first measured speed then shows the lean. During the
+    computation, more innovations are summed up. They still contain the old error, which must not be corrected twice."""
     estimator, leans = LeanFilter(), []
     force, rate = force_and_rate(30.0, 20.0)
     for k in range(400):
@@ -154,7 +159,7 @@ def test_a_large_correction_is_made_once():
 
 
 def test_rest_corrects_a_large_bias_at_once():
-    """Of 5 deg/s, on a bike that stands at 20 degrees: neither lean nor pitch drifts from then on."""
+    """The bias is 5 deg/s, and the bike is at rest with a lean of 20 degrees. Lean and pitch must not drift then."""
     force, _ = force_and_rate(20.0)
     for axis in range(3):
         estimator, rate = LeanFilter(), [0.08 * (axis == i) for i in range(3)]
@@ -166,7 +171,8 @@ def test_rest_corrects_a_large_bias_at_once():
 
 
 def test_a_sensor_pointing_up_or_down_comes_to_rest():
-    """A board on the table, not aligned: where pitch is a right angle, lean has no meaning, but nothing may fail."""
+    """An unaligned board lies on the table, so its pitch may be a right angle. Then lean has no meaning, but the filter
+    must not fail."""
     for forward in (1.0, -1.0):
         for left, up in ((0.0, 0.0), (1e-5, 0.0), (1e-4, -1e-4), (0.01, 0.02), (0.0, -0.3)):
             estimator, rested = LeanFilter(), False
@@ -178,7 +184,7 @@ def test_a_sensor_pointing_up_or_down_comes_to_rest():
 
 
 def test_after_a_restart_a_smooth_turn_is_no_rest():
-    """The bias is known by then: a rate of 2 deg/s that does not change is the bike's."""
+    """The bias is already known, so a constant rate of 2 deg/s is a turn."""
     estimator, _ = biased((0.0, 0.0, 0.0), 5.0)
     estimator.restart()
     for _ in range(1500):

@@ -1,4 +1,4 @@
-"""Lean from forces: equations 21-26 against numpy."""
+"""The lean from forces, by equations 21 to 26, is compared with numpy."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from support import engines
 
 
 def formula(left, up, yaw_rate):
-    """(25)-(26) in numpy, float64."""
+    """Compute equations 25 and 26 with numpy in double precision."""
     square = left**2 + up**2
     s = np.sign(yaw_rate) * np.sqrt(np.maximum(0, square - 1))
     return np.degrees(np.arcsin(np.clip((left - s * up) / square, -1, 1)))

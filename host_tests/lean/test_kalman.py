@@ -1,4 +1,4 @@
-"""The covariance's sparse arithmetic against the textbook's matrices, and its machine code against exact sums."""
+"""The covariance's sparse arithmetic is compared with the textbook's matrices, and its machine code with exact sums."""
 
 from copy import deepcopy
 from math import inf, isnan, nan
@@ -9,7 +9,8 @@ from kickstand.lean.kalman import Covariance
 from support.mpy import run_mpy
 
 N = 12
-RATES = [(2, 0.7), (4, -1.3), (0, 0.2), (11, 2.1), (7, -0.4)]  # of state 5, by others
+# Partial derivatives of the rate of state 5: (other state, derivative)
+RATES = [(2, 0.7), (4, -1.3), (0, 0.2), (11, 2.1), (7, -0.4)]
 H = [(0, 0.8), (3, -0.5), (5, 2.0), (8, 0.1), (11, -0.3)]
 
 
@@ -21,7 +22,7 @@ def spread(terms):
 
 
 def some(seed=0):
-    """A Covariance with correlations, made by measuring sums of states, and its matrix."""
+    """Return a Covariance with correlations, and its matrix. Measured sums of states cause the correlations."""
     chance = np.random.default_rng(seed)
     p = Covariance([1.0 + i for i in range(N)])
     matrix = np.diag(np.arange(1.0, N + 1.0))
@@ -58,12 +59,12 @@ def test_sequential_measurements_give_the_textbooks_gain(terms):
         matrix = matrix - np.outer(gain, h @ matrix)
         np.testing.assert_allclose(p.rows, matrix, rtol=0, atol=1e-12)
     np.testing.assert_allclose([p.take_correction(i) for i in range(N)], x, rtol=0, atol=1e-12)
-    assert [p.take_correction(i) for i in range(N)] == [0.0] * N  # taken once
+    assert [p.take_correction(i) for i in range(N)] == [0.0] * N  # each correction can be taken only once
 
 
 @pytest.mark.parametrize(("innovation", "variance"), [(4.9, 1.0), (-4.9, 1.0), (10.0, 4.0), (-50.0, 100.0)])
 def test_beyond_five_sigma_an_innovation_counts_for_less(innovation, variance):
-    """Where 1 is expected: as if its variance were such that it is five sigma from there."""
+    """Its variance is raised until the innovation is five standard deviations. The expected variance is 1."""
     p = Covariance([0.5])
     list(p.update(((0, 1.0),), innovation, 0.5))
     assert p.correction[0] == pytest.approx(innovation * 0.5 / variance)
@@ -103,7 +104,7 @@ def test_noise_is_added_to_one_state():
 
 
 def added(cases):
-    """Return `out` as the machine code leaves it, for each case (out, factors, source, rows)."""
+    """Run the machine code for each case (out, factors, source, rows). Return the changed `out` of each case."""
     script = (
         "from array import array\n"
         "from math import inf, nan\n"

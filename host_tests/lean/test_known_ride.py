@@ -1,9 +1,13 @@
-"""The lean filter's results for one ride. A change of them changes every rider's lean, so it must be intended.
+"""The lean filter's results for one ride are compared with known results. A change of these results changes every
+rider's lean, so it must be intended.
 
-The ride has all that the filter knows: rest, bias, a yaw error, scale errors, slopes, vibration, turns, slow samples,
-measured speeds, lost samples, a restart under way. Other tests say what each parameter does; this one notices that
-any has changed. After a change that is meant, in host_tests/lean, with firmware and tools on PYTHONPATH:
-python test_known_ride.py > known_ride.csv
+The ride has everything that affects the filter: rest, bias, a yaw error, scale errors, slopes, vibration, turns, slow
+samples, measured speeds, lost samples, and a restart while riding. Other tests show the effect of each parameter. This
+test notices that a parameter has changed. After an intended change, run this in host_tests/lean, with firmware and
+tools on PYTHONPATH:
+
+    python test_known_ride.py > known_ride.csv
+
 Runs on MicroPython too.
 """
 
@@ -12,7 +16,8 @@ from math import cos, degrees, radians, sin, sqrt
 from bike_motion import force_and_rate
 from kickstand.lean.lean_filter import LeanFilter
 
-# seconds, then at their end: lean in degrees, speed in m/s, slope in degrees; whether the speed is measured each second
+# Each leg is (seconds, lean in degrees, speed in m/s, slope in degrees, True if the speed is measured each second).
+# Lean, speed and slope are the values at the end of the leg.
 LEGS = (
     (6, 3, 0, 2, False),
     (6, 0, 16, 0, False),
@@ -32,7 +37,7 @@ LEGS = (
     (4, 0, 0, 0, False),
     (6, 0, 0, 0, False),
     (4, 0, 14, 0, False),
-    (2, -35, 14, 0, False),  # the restart comes here
+    (2, -35, 14, 0, False),  # the filter is restarted in this leg
     (6, -33, 15, 0, False),
     (2, 7, 16, 0, False),
     (12, 7, 16, 0, False),
@@ -42,16 +47,22 @@ LEGS = (
     (10, 0, 24, 0, False),
 )
 RESTART_S = 95.0
-LOST = (0.01, 0.3), (60.07, 0.2), (119.12, 0.4)  # when readings of so many seconds were lost
-SLOW_S = 30.0, 44.0  # where samples are 20 ms apart
+LOST = (0.01, 0.3), (60.07, 0.2), (119.12, 0.4)  # (time in s, seconds of lost readings before it)
+SLOW_S = 30.0, 44.0  # begin and end of the time in which samples are 20 ms apart
 BIAS = radians(0.4), radians(-0.3), radians(0.6)
 YAW_ERROR = radians(4.0)
-TOLERANCE = 0.001  # beyond the four digits of known_ride.csv
+TOLERANCE = 0.001  # allowed difference besides the rounding to the four digits of known_ride.csv
 
 
 def states():
-    """Yield one tuple per 10 ms: time in s, lean in degrees, speed in m/s, slope in degrees, the rates of change of
-    these three, and whether the speed is measured."""
+    """Yield one tuple per 10 ms.
+
+    Each tuple has four elements:
+        time in s.
+        values: [lean in degrees, speed in m/s, slope in degrees].
+        rates: rates of change of the three values.
+        True if the speed is measured.
+    """
     t_s, before = 0.0, (3, 0, 2)
     for seconds, *after, measured in LEGS:
         rates = [(b - a) / seconds for a, b in zip(before, after)]
@@ -61,7 +72,7 @@ def states():
 
 
 def sensed(t_s, values, rates):
-    """Force and rate as a part with errors measures them."""
+    """Return the force and the rate that a sensor with errors measures."""
     lean, speed, slope = values
     (left, up, forward), (x, y, z) = force_and_rate(lean, speed, rates[0], rates[1])
     forward += sin(radians(slope))
@@ -75,7 +86,11 @@ def sensed(t_s, values, rates):
 
 
 def figures():
-    """Each second: lean and 1 sigma in degrees, speed in m/s, pitch and trim in degrees, 1 at rest."""
+    """Return one row per second.
+
+    A row has the lean and its standard deviation in degrees, the speed in m/s, pitch and trim in degrees, and 1 at rest
+    or 0 otherwise.
+    """
     estimator, before_s, rows = LeanFilter(), 0.0, []
     for k, (t_s, values, rates, measured) in enumerate(states()):
         if SLOW_S[0] <= t_s < SLOW_S[1] and k % 2:

@@ -1,4 +1,4 @@
-"""The lean filter on rides from its own equations: the effects of vibration and the gyro's errors."""
+"""Tests the lean filter on rides that follow its own equations, with vibration and errors of the gyro."""
 
 import math
 
@@ -16,9 +16,15 @@ DT_US = 1_000_000 // HZ
 
 
 def balanced(seconds, lean, speed):
-    """Return force (n, 3, in g) and rate (n, 3, in rad/s) of a bike in balance on a level road.
+    """Compute the motion of a bike in balance on a level road.
 
-    lean: (n) or one value, rad. speed: (n) or one value, m/s."""
+    lean: in rad, shape (n), or one value.
+    speed: in m/s, shape (n), or one value.
+
+    Returns:
+        force: in g, shape (n, 3).
+        rate: in rad/s, shape (n, 3).
+    """
     t = np.arange(int(seconds * HZ)) / HZ
     yaw = np.where(speed > 1.0, -GRAVITY_MPS2 * np.tan(lean) / np.maximum(speed, 1.0), 0.0)
     left = speed * yaw / GRAVITY_MPS2
@@ -28,7 +34,8 @@ def balanced(seconds, lean, speed):
 
 
 def held_turns(seconds):
-    """Lean and speed: ten seconds of standing, then turns of half a minute to either side, ten seconds between."""
+    """Return lean and speed of a ride. After ten seconds at rest come turns of half a minute to alternate sides, with
+    ten seconds between them."""
     t = np.arange(int(seconds * HZ)) / HZ
     lean = np.radians(30.0) * (t > 20.0) * (t % 40.0 > 10.0) * np.where(t % 80.0 > 40.0, 1.0, -1.0)
     lean = np.convolve(lean, np.full(HZ, 1.0 / HZ), mode="same")
@@ -36,7 +43,7 @@ def held_turns(seconds):
 
 
 def weaving(seconds):
-    """Lean and speed: turns up to 40 degrees one after the other, and stretches straight on, at 8 to 22 m/s."""
+    """Return lean and speed of a ride at 8 to 22 m/s. It has turns of up to 40 degrees, and straights."""
     t = np.arange(int(seconds * HZ)) / HZ
     riding = 1.0 - np.exp(-np.maximum(t - 10.0, 0.0))
     lean = riding * (0.5 * np.sin(0.31 * t) + 0.2 * np.sin(0.83 * t + 1.0)) * (np.sin(0.021 * t) > -0.3)
@@ -44,7 +51,7 @@ def weaving(seconds):
 
 
 def leans(force, rate, speeds=None):
-    """The filter's lean in degrees. speeds: measured speeds by sample."""
+    """Return the filter's lean in degrees. speeds: {index of a sample: measured speed}."""
     estimator = lean_filter.LeanFilter()
     shown = []
     for k, (f, w) in enumerate(zip(force, rate, strict=True)):
@@ -66,7 +73,7 @@ def slope(shown, true):
 
 
 def test_vibration_of_the_gyro_does_not_make_held_turns_read_low():
-    """Noise of the yaw rate must not be treated as the rate that the speed is multiplied by."""
+    """The filter multiplies the yaw rate by the speed. Noise of the yaw rate must not bias this product."""
     lean, speed = held_turns(240.0)
     force, rate = shaken(*balanced(240.0, lean, speed))
     shown = leans(force.tolist(), rate.tolist())
@@ -76,7 +83,8 @@ def test_vibration_of_the_gyro_does_not_make_held_turns_read_low():
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_gyros_scale_and_cross_axis_errors_are_found(seed):
-    """3 % of scale and 2 % of cross-axis, as the sheet allows: after five minutes the lean is right to a degree."""
+    """The data sheet allows scale errors of 3 % and cross-axis errors of 2 %. After five minutes with these errors, the
+    lean is right within a degree."""
     chance = np.random.default_rng(seed)
     lean, speed = weaving(420.0)
     force, rate = shaken(*balanced(420.0, lean, speed))
@@ -88,7 +96,8 @@ def test_the_gyros_scale_and_cross_axis_errors_are_found(seed):
 
 
 def held_from_side_to_side(seconds):
-    """Lean and speed: ten seconds of standing, then turns of 40 s at 38 degrees, directly one after the other."""
+    """Return lean and speed of a ride. After ten seconds at rest and a short straight come turns of 40 s at 38 degrees,
+    directly one after the other."""
     t = np.arange(int(seconds * HZ)) / HZ
     lean = np.radians(38.0) * (t > 23.0) * np.where((t - 23.0) % 80.0 < 40.0, 1.0, -1.0)
     lean = np.convolve(lean, np.full(HZ, 1.0 / HZ), mode="same")
@@ -97,8 +106,8 @@ def held_from_side_to_side(seconds):
 
 @pytest.mark.parametrize("gain", [0.99, 1.01])
 def test_held_turns_show_the_gyros_scale_by_the_force_up(gain):
-    """3 % between the rates about left and up are 0.8 degrees of lean at 38; the accelerometer's own error, which would
-    be as much, is seen at rest."""
+    """A scale error of 3 % between the rates about left and up causes a lean error of 0.8 degrees at 38 degrees. The
+    accelerometer's own error would cause as much, but the filter finds it at rest."""
     lean, speed = held_from_side_to_side(190.0)
     still = 10 * HZ
     force, rate = balanced(190.0, lean, speed)
@@ -111,7 +120,8 @@ def test_held_turns_show_the_gyros_scale_by_the_force_up(gain):
 
 
 def test_a_wheelie_with_a_yaw_error_shows_no_lean():
-    """30 degrees of pitch would be 2.5 of lean with the forward axis 5 degrees to the side."""
+    """The sensor's forward axis points 5 degrees to the side. A pitch of 30 degrees could then appear as a lean of 2.5
+    degrees."""
     t = np.arange(35 * HZ) / HZ
     speed = 3.0 * np.clip(t - 10.0, 0.0, 8.0)
     pitch = np.radians(30.0) * np.clip(3.0 - np.abs(t - 28.0), 0.0, 1.0)
@@ -125,7 +135,7 @@ def test_a_wheelie_with_a_yaw_error_shows_no_lean():
 
 
 def test_a_smooth_straight_is_no_standstill():
-    """No vibration for nine seconds at 20 m/s: the speed must not be set to zero."""
+    """The bike rides without vibration for nine seconds at 20 m/s. The filter must not set the speed to zero."""
     lean, speed = held_turns(200.0)
     force, rate = balanced(200.0, lean, speed)
     shown = leans(force.tolist(), rate.tolist())
@@ -134,8 +144,8 @@ def test_a_smooth_straight_is_no_standstill():
 
 @pytest.mark.parametrize("seed", range(3))
 def test_power_on_in_the_hand_and_laid_down(seed):
-    """Moved about for 20 s from the first sample on, then still: whatever the filter has estimated of the gyro, it
-    finds the rest and the lean, and took no hand for a straight road."""
+    """A hand moves the sensor for 20 s from the first sample on, then lays it down. The filter must find the rest and
+    the lean, although the movement may have given it a wrong estimate of the gyro's errors."""
     rng = np.random.default_rng(seed)
     hand = lean_filter.LeanFilter()
     rate, push, up, lean = np.zeros(3), np.zeros(3), np.array([0.0, 1.0, 0.0]), 0.0
@@ -147,14 +157,15 @@ def test_power_on_in_the_hand_and_laid_down(seed):
         up /= np.linalg.norm(up)
         force = up + push + rng.normal(0, 0.003, 3)
         lean = hand.update(force.tolist(), (rate + rng.normal(0, 5e-4, 3)).tolist(), DT_US if k else 0)
-    if abs(up[2]) < 0.7:  # on its nose it has no lean
+    if abs(up[2]) < 0.7:  # with the nose up or down the sensor has no lean
         assert hand.at_rest
         assert lean == pytest.approx(math.degrees(math.atan2(up[0], up[1])), abs=2.0)
 
 
 @pytest.mark.parametrize("braking_mps2", [2.5, 6.0])
 def test_an_even_braking_on_a_smooth_road_is_no_rest(braking_mps2):
-    """Its end is as calm as a bike on a slope: rest is seen where it stands, and the lean is sure all the way."""
+    """The end of such braking is as calm as a bike at rest on a slope. Rest must be found only when the bike has
+    stopped, and the lean must stay certain."""
     seconds = 20.0 / braking_mps2
     speed = np.concatenate((np.zeros(5 * HZ), np.linspace(0.0, 20.0, 8 * HZ), np.full(6 * HZ, 20.0)))
     speed = np.concatenate((speed, np.linspace(20.0, 0.0, round(seconds * HZ)), np.zeros(8 * HZ)))
@@ -171,7 +182,7 @@ def test_an_even_braking_on_a_smooth_road_is_no_rest(braking_mps2):
 
 
 def test_the_work_on_a_window_has_WORK_STEPS_pieces():
-    """One in each sample; at rest there are fewer."""
+    """One piece is done per sample. At rest the work has fewer pieces."""
     lean, speed = held_turns(60.0)
     estimator, taken, pieces = lean_filter.LeanFilter(), 0, {True: set(), False: set()}
     for f, w in zip(*(values.tolist() for values in balanced(60.0, lean, speed)), strict=True):
@@ -194,7 +205,8 @@ def test_turns_alone_find_a_pose_that_was_not_upright():
 
 
 def test_a_measured_speed_makes_no_long_bend_worse():
-    """The scale of the gyro's up axis and that of a wheel are not known: 3 and 5 % here, ten times a second."""
+    """The gyro's axis up has a scale error of 3 %. The wheel's speed has a scale error of 5 %. It is measured ten times
+    per second."""
     lean, speed = held_from_side_to_side(190.0)
     force, rate = shaken(*balanced(190.0, lean, speed))
     rate[:, 1] *= 1.03
@@ -205,7 +217,7 @@ def test_a_measured_speed_makes_no_long_bend_worse():
 
 
 def test_the_stated_sigma_fits_the_error_of_the_lean():
-    """It is within one standard deviation for two thirds of the time, on a ride of the other simulator."""
+    """In a ride of the second simulator, about two thirds of the errors are within one standard deviation."""
     ride = drawn_ride(2, 100.0, ["firm"], "street")
     shown = replay(ride.logs[0], ride.calibrations[0])
     error = (shown.lean_deg - ride.true_lean(0)) / shown.lean_sigma_deg
@@ -216,7 +228,7 @@ def test_the_stated_sigma_fits_the_error_of_the_lean():
 
 @pytest.mark.parametrize("doubts", [1, 2])
 def test_a_doubt_keeps_what_the_six_positions_measured(doubts):
-    """The gyro's scale and cross-axis errors, whether the other errors are remembered or forgotten."""
+    """The six positions have measured the gyro's scale and cross-axis errors. These errors stay known after a doubt."""
     tested = lean_filter.LeanFilter(gyro_variances=[1e-5] * 5)
     for _ in range(HZ):
         tested.update((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), DT_US)

@@ -1,6 +1,6 @@
-"""Each measurement of the lean filter, and the causes of more noise. Also runs on MicroPython.
+"""Tests each measurement of the lean filter, and what raises its noise. Also runs on MicroPython.
 
-The figures that the variances come to are those of test_known_ride.py.
+test_known_ride.py tests the values of the variances.
 """
 
 from math import cos, degrees, radians, sin
@@ -14,7 +14,7 @@ STILL = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]  # the means of a window, 
 
 
 def model(forward=0.0, rates=(0.0, 0.0, 0.0), lean_deg=0.0, pitch_deg=0.0, speed_mps=0.0, yaw_error_deg=0.0):
-    """The state and the model at it."""
+    """Return a state, and the model that is linearised at this state."""
     x = [0.0] * STATES
     x[LEAN], x[PITCH], x[SPEED] = radians(lean_deg), radians(pitch_deg), speed_mps
     x[YAW_ERROR] = radians(yaw_error_deg)
@@ -22,7 +22,11 @@ def model(forward=0.0, rates=(0.0, 0.0, 0.0), lean_deg=0.0, pitch_deg=0.0, speed
 
 
 def forces(at=None, roll_acceleration=0.0, scale_error=0.0, **changed):
-    """Both measurements of force, of a window whose means are STILL but for those that are changed, by their index."""
+    """Return both measurements of force in a window.
+
+    at: arguments of model().
+    changed: changes of the means STILL. For example, mean8=0.04 changes the mean with index 8.
+    """
     means = [changed.get("mean%d" % i, STILL[i]) for i in range(9)]  # noqa: UP031 MicroPython
     return measurements.forces(model(**(at or {}))[1], means, roll_acceleration, scale_error)
 
@@ -46,14 +50,15 @@ def test_vibration_roll_and_pitch_rates_raise_the_forces_noise():
         (_, _, left), (_, _, up) = forces(at, **changed)
         (_, _, still_left), (_, _, still_up) = forces()
         assert left > still_left + 1e-4 or up > still_up + 1e-4, (at, changed)
-    assert forces(mean8=-1e-6)[0][2] > 0.0  # rounding may make less than nothing of the vibration
+    assert forces(mean8=-1e-6)[0][2] > 0.0  # rounding may make the variance of the vibration negative
 
 
 def test_roll_is_subtracted_above_the_roll_axis():
     for sign in (1.0, -1.0):
         left, _ = forces(roll_acceleration=sign * radians(100.0))
         assert 0.05 < sign * left[1] < 0.1
-        assert 0.1 < forces(mean4=sign * radians(100.0))[1][1] < 0.15  # centripetal, to whichever side it rolls
+        # the centripetal force is the same for both directions of roll
+        assert 0.1 < forces(mean4=sign * radians(100.0))[1][1] < 0.15
 
 
 def test_the_error_at_rest_is_subtracted_from_the_force_up():
@@ -61,7 +66,7 @@ def test_the_error_at_rest_is_subtracted_from_the_force_up():
 
 
 def test_a_wheelie_is_pulled_to_level_less_than_a_hill():
-    """The pull on the pitch is innovation over variance: of 30 degrees it is smaller than of 6."""
+    """The pull on the pitch is the innovation divided by the variance. It is smaller for 30 degrees than for 6."""
     x, here = model(lean_deg=30.0, pitch_deg=2.0, speed_mps=15.0, yaw_error_deg=4.0)
     row, innovation, _ = measurements.level_road(here, x, WINDOW_S)
     assert row == here.level_row
@@ -101,10 +106,10 @@ def test_a_measured_speed_is_less_certain_while_it_changes():
 
 
 def test_ten_measured_speeds_per_second_count_as_one():
-    """They share their errors: delay, the tyre's radius, the scale of the gyro's up axis."""
+    """All ten have the same errors, from the delay, the tyre's radius and the scale of the gyro's axis up."""
     once, often = (measurements.measured_speed(20.0, 20.0, 0.0, seconds)[2] for seconds in (1.0, 0.4))
     near(often, once / 0.4, 1e-3 * often)
-    assert measurements.measured_speed(40.0, 40.0, 0.0, 1.0)[2] > 2.0 * once  # errors of scale
+    assert measurements.measured_speed(40.0, 40.0, 0.0, 1.0)[2] > 2.0 * once  # errors of scale grow with the speed
 
 
 def test_rest_measures_speed_bias_and_the_vertical():
@@ -115,7 +120,8 @@ def test_rest_measures_speed_bias_and_the_vertical():
         assert speed[:2] == (((SPEED, 1.0),), -0.05)
         assert bias[:2] == (((BIAS_LEFT + axis, 1.0),), means[2 + axis])
         assert sorted(side[0]) == sorted([term for term in here.left_row if term[0] in (LEAN, PITCH)])
-        near(side[1], 0.01 + 0.05099 * -0.004, 1e-6)  # the force of the speed that it has not got is put back
+        # the force of the estimated speed is added back, because the true speed is 0
+        near(side[1], 0.01 + 0.05099 * -0.004, 1e-6)
         ((state, factor),) = forward[0]
         assert state == PITCH
         near(factor, 0.99863, 1e-5)

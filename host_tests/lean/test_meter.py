@@ -1,4 +1,4 @@
-"""The meter: the lean it shows as certain, its maxima, and the effect of gaps. Also runs on MicroPython."""
+"""Tests when the meter shows a lean, its maxima, and the effect of gaps. Also runs on MicroPython."""
 
 from array import array
 from math import degrees, pi, radians
@@ -19,7 +19,8 @@ def test_the_first_g_is_shown_at_once_also_after_a_gap():
 
 
 def test_a_lean_is_shown_only_while_it_is_certain():
-    """Power-on on a straight at 20 m/s after a bump: uncertain at first, more certain with each second."""
+    """The power is switched on while riding straight at 20 m/s, just after a bump. The lean is uncertain at first, and
+    becomes more certain with each second."""
     shown, trusted, sigmas = meter(), [], []
     shown.update(reading([0.0, 1.0, 0.5], [0.0, 0.0, 0.0]), 0)
     for _ in range(2000):
@@ -40,7 +41,7 @@ def test_with_the_nose_far_up_or_down_there_is_no_lean():
 
 
 def test_after_the_poses_the_first_bend_shows_its_lean():
-    """The poses have measured the gyro's bias, and the bike was at rest. After a power-on neither is known."""
+    """The poses have measured the gyro's bias, and show that the bike was at rest. After power-on neither is known."""
     for posed in (True, False):
         shown = meter()
         shown.use(shown.calibration, posed)
@@ -72,7 +73,7 @@ def test_a_bike_that_lies_on_its_side_for_a_second_has_fallen():
         assert ride(shown, 0.7, lean_deg=lying).fallen
         assert not roll(shown, lying, sign * 60.0).fallen
         roll(shown, sign * 60.0, lying)
-        assert not ride(shown, 0.5, lean_deg=lying).fallen  # the second counts from its latest fall
+        assert not ride(shown, 0.5, lean_deg=lying).fallen  # the second is counted from the latest fall
         assert ride(shown, 0.7, lean_deg=lying).fallen
         shown.restart()
         assert not shown.fallen
@@ -81,7 +82,7 @@ def test_a_bike_that_lies_on_its_side_for_a_second_has_fallen():
 
 def test_the_lean_of_a_fall_is_no_maximum():
     shown = ride(roll(ride(meter(), 3.0), 0.0, 63.0), 0.2, lean_deg=63.0)
-    near(shown.max_right_deg, 63.0, 0.5)  # the low-pass is made up for
+    near(shown.max_right_deg, 63.0, 0.5)  # the delay of the low-pass is compensated
     roll(shown, 63.0, 85.0)
     assert shown.lean_deg > 80.0
     assert shown.max_right_deg < 65.0
@@ -131,7 +132,7 @@ def test_a_reason_for_distrust_belongs_to_one_calibration():
 
 
 def test_a_lean_shorter_than_150_ms_is_not_a_maximum():
-    """A pothole that jerks the sensor by 18 degrees, to either side."""
+    """Potholes jerk the sensor by 18 degrees to either side."""
     shown = ride(roll(ride(meter(), 3.0), 0.0, 20.0), 0.3, lean_deg=20.0)
     for sign in 1.0, -1.0:
         for _ in range(3):
@@ -147,13 +148,13 @@ def test_a_lean_shorter_than_150_ms_is_not_a_maximum():
 
 
 def test_only_a_long_gap_restarts_the_filter():
-    """The movement during a bridged gap is taken from the rate at its end."""
+    """The filter bridges a short gap. It computes the movement during the gap from the rate at its end."""
     shown = ride(meter(), 3.0)
     shown.update(reading(*force_and_rate(4.0, roll_dps=10.0)), 400_000)
     near(shown.lean_deg, 4.0, 0.3)
     shown.update(reading(*force_and_rate(-20.0, roll_dps=50.0)), 600_000)
-    near(shown.lean_deg, -20.0, 0.01)  # by the force alone: no rate is multiplied by the gap
-    assert shown.filter.variance == pi * pi  # one reading says nothing yet
+    near(shown.lean_deg, -20.0, 0.01)  # the force alone gives this lean, without the rate
+    assert shown.filter.variance == pi * pi  # a single reading leaves the lean unknown
     assert not shown.trusted
     assert not shown.at_rest
 
@@ -166,7 +167,11 @@ def test_lost_readings_make_the_lean_uncertain():
 
 
 def trimmed(angle_deg, sigma_deg, kept_deg=0.0):
-    """A bike that stands, whose ride has found this trim so surely."""
+    """Return the meter of a bike at rest whose filter has found a trim.
+
+    angle_deg, sigma_deg: the trim and its standard deviation.
+    kept_deg: the trim in the calibration.
+    """
     calibration = Calibration()
     calibration.trim_deg = kept_deg
     shown = ride(meter(calibration), 3.0)
@@ -185,7 +190,7 @@ def test_a_trim_is_kept_if_it_is_certain_and_has_changed():
         assert shown.keep_trim() is keeps, (angle_deg, sigma_deg, kept_deg)
         assert shown.calibration
         near(shown.calibration.trim_deg, angle_deg if keeps else kept_deg, 1e-5)
-        assert not shown.keep_trim()  # once is enough
+        assert not shown.keep_trim()  # the same trim is not kept again
 
 
 def test_no_trim_is_kept_while_it_rides():
@@ -198,7 +203,7 @@ def test_no_trim_is_kept_while_it_rides():
 
 
 def test_the_delay_of_the_low_pass_is_compensated():
-    """Rolling to the right at 60 deg/s, what is measured is some milliseconds old: the lean is larger by now."""
+    """The bike rolls to the right at 60 deg/s. The readings are 20 ms old, so the lean is now larger by 1.2 degrees."""
     now, late = ride(meter(delay_s=0.0), 3.0), ride(meter(delay_s=0.02), 3.0)
     for k in range(10):
         for shown in (now, late):
@@ -231,7 +236,7 @@ def test_a_meter_takes_sums_of_counts():
 
 
 def test_the_formulas_lean_takes_the_yaw_rate():
-    """A turn of 30 degrees that a bike leans into: the rate about left has its other sign at the nose down."""
+    """The bike leans into a turn by 30 degrees. The sign of the rate about left is reversed, which must not matter."""
     force, rate = force_and_rate(30.0, 15.0)
     shown = meter()
     shown.update(reading(force, [-rate[0], rate[1], rate[2]]), 0)
@@ -254,7 +259,7 @@ def test_the_g_shown_follows_smoothly_whether_aligned_or_not():
 
 
 def test_a_smoothed_force_that_is_not_updated_is_nan():
-    """Left and up of an aligned motorcycle. With an unaligned calibration they are updated again."""
+    """These are the forces left and up of an aligned motorcycle. With an unaligned calibration they are updated."""
     aligned, other = Calibration(), Calibration()
     aligned.aligned = True
     shown = meter(aligned)
@@ -275,7 +280,7 @@ def test_a_negative_speed_is_ignored():
     for shown in (given, alone):
         ride(shown, 1.0, speed_mps=20.0)
     assert given.speed_mps == alone.speed_mps
-    given.measure_speed(0.0)  # a zero is one
+    given.measure_speed(0.0)  # a speed of 0 is valid
     ride(given, 1.0, speed_mps=20.0)
     assert given.speed_mps < alone.speed_mps - 0.5
 

@@ -1,4 +1,4 @@
-"""The standstill detector for zero-velocity updates. Runs on MicroPython too."""
+"""Tests the detector of standstills. Runs on MicroPython too."""
 
 from kickstand.lean.rest import RestDetector
 
@@ -7,7 +7,7 @@ NONE = (0.0, 0.0, 0.0)
 
 
 def rested_after(detector, seconds, rates=NONE, force=(0.0, 1.0, 0.0), bias=NONE, **rolling):
-    """Windows of the same means. Return the seconds until rest, or None if there was none."""
+    """Pass equal windows to the detector for some seconds. Return the time until rest, or None without a rest."""
     found = None
     for k in range(int(seconds / WINDOW_S + 0.5)):
         left_over = [rate - error for rate, error in zip(rates, bias)]
@@ -21,8 +21,8 @@ def test_rest_takes_ten_seconds_if_the_bike_seems_to_roll():
     assert rested_after(RestDetector(), 12.0, rolling=True) == 10.0
     detector = RestDetector()
     rested_after(detector, 5.0, rolling=True)
-    assert rested_after(detector, 3.0) == 1.5  # from the end of every sign of rolling
-    assert rested_after(detector, 3.0, rolling=True) == 2.0  # ten seconds are enough either way
+    assert rested_after(detector, 3.0) == 1.5  # counted from the time when nothing indicates rolling any more
+    assert rested_after(detector, 3.0, rolling=True) == 2.0  # ten seconds in all, of both kinds
 
 
 def test_a_movement_about_or_along_any_axis_ends_the_rest():
@@ -37,7 +37,8 @@ def test_a_movement_about_or_along_any_axis_ends_the_rest():
 
 
 def test_after_a_movement_the_count_begins_again():
-    """The recent average follows with a time constant of half a second: two windows of four are over the limit."""
+    """The detector's moving average has a time constant of half a second. So two windows exceed the limit after the
+    movement."""
     detector = RestDetector()
     rested_after(detector, 1.25)
     assert rested_after(detector, 4.0, force=(0.0, 1.0, 0.03)) == 0.5 + 1.5
@@ -54,7 +55,7 @@ def test_a_steady_rate_is_bias_only_before_the_first_rest():
         detector = RestDetector()
         rested_after(detector, 3.0)
         assert rested_after(detector, 60.0, rates) is None
-        assert rested_after(RestDetector(), 12.0, [3.0 * rate for rate in rates]) is None  # no gyro is off by so much
+        assert rested_after(RestDetector(), 12.0, [3.0 * rate for rate in rates]) is None  # too large for a bias
 
 
 def test_the_known_bias_is_not_a_turn():
@@ -63,7 +64,7 @@ def test_the_known_bias_is_not_a_turn():
 
 
 def test_a_wrong_estimate_of_the_bias_does_not_hide_rest():
-    """The rate is small without it: so the calibration's bias was right."""
+    """The rate is small without the estimate, so the calibration's bias is right."""
     assert rested_after(RestDetector(False), 3.0, bias=(0.05, 0.0, 0.0)) == 1.5
     assert rested_after(RestDetector(False), 12.0, rates=(0.03, 0.0, 0.0), bias=(0.06, 0.0, 0.0)) is None
 

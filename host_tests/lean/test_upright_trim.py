@@ -1,4 +1,5 @@
-"""The trim: which motion counts as balanced, the time to find it, its uncertainty. Also runs on MicroPython."""
+"""Tests the trim, with the motion that counts as balanced, the time to find it, and its uncertainty. Also runs on
+MicroPython."""
 
 from math import degrees, radians, sin, sqrt
 
@@ -13,7 +14,11 @@ def sigma_deg(trim):
 
 
 def after_turns(sides, lean_share):
-    """The trim after turns of a minute at 35 degrees, of a force to the side of lean_share sin(lean); pose off by 2."""
+    """Return the trim after turns of a minute each at 35 degrees. The upright pose has an error of 2 degrees.
+
+    sides: 1 for a turn to the right, -1 for a turn to the left.
+    lean_share: in turns, a force of lean_share * sin(lean) acts to the side.
+    """
     trim = UprightTrim(0.0)
     for side in sides:
         lean = radians(35.0 * side)
@@ -23,7 +28,7 @@ def after_turns(sides, lean_share):
 
 
 def test_turns_to_both_sides_find_a_pose_error_of_2_degrees():
-    """Without a straight between them: the effect of tyres and rider is the same on both sides and cancels."""
+    """No straight is between the turns. Tyres and rider have the same effect on both sides, so the effect cancels."""
     for lean_share in (0.0, 0.1, -0.1):
         near(degrees(after_turns((1, -1, 1, -1), lean_share).angle), 2.0, 0.4)
 
@@ -38,7 +43,8 @@ def test_straights_find_a_pose_error_of_2_degrees():
     trim = UprightTrim(0.0)
     for _ in range(150):
         trim.update(sin(radians(2.0)), radians(2.0), 0.0, WINDOW_S)
-    # 30 s of disturbances that last 2 s each: 7.5 independent measurements of 1.5 degrees, and the pose of 2.5
+    # The expected trim is a weighted mean of two estimates. Disturbances of 1.5 degrees last 2 s each, so 30 s contain
+    # 7.5 independent measurements. The pose has a standard deviation of 2.5 degrees.
     share = 1.0 / (1.0 + 1.5**2 / 7.5 / 2.5**2)
     near(degrees(trim.angle), 2.0 * share, 0.02)
     near(sigma_deg(trim), 2.5 * sqrt(1.0 - share), 0.02)

@@ -1,4 +1,4 @@
-"""The parts that read and write logs, with small inputs and results computed by hand."""
+"""Tests the parts that read and write logs with small inputs. The expected results were computed by hand."""
 
 import csv
 import io
@@ -44,7 +44,7 @@ def test_plain_numbers_are_read_with_empty_cells():
 
 
 def test_columns_have_their_types():
-    """A short row is filled up, a row that is too long is left out, and an odd quotation mark is ignored."""
+    """A row with too few cells is filled up, and a row with too many is left out. A lone quotation mark is ignored."""
     columns, left_out = csv_reader.columns_of_text('1,2.5,x\n2,,\n\n3\n4,"1,y\n1,2,3,4\n', ",", 3)
     assert left_out == 1
     assert columns[0].tolist() == [1, 2, 3, 4] and columns[0].dtype == np.int64
@@ -205,7 +205,7 @@ def test_names_of_logs_lose_their_suffixes():
 
 
 def marked(equal: int, step_s: float):
-    """50 changing readings, then equal ones, then 50 changing ones."""
+    """Look for frozen readings in a log of 50 changing readings, then equal readings, then 50 changing readings."""
     readings = np.random.default_rng(1).normal(0.0, 0.3, (100 + equal, 7))
     readings[50 : 50 + equal] = readings[50]
     finder = frozen.FrozenFinder()
@@ -213,7 +213,7 @@ def marked(equal: int, step_s: float):
 
 
 def test_readings_are_frozen_after_half_a_second_and_ten_samples():
-    assert not marked(50, 0.01)[0].any()  # 0.49 s
+    assert not marked(50, 0.01)[0].any()  # the readings are equal for 0.49 s
     found, finder = marked(51, 0.01)
     assert np.flatnonzero(found).tolist() == list(range(51, 101))
     assert [notice.line() for notice in finder.notices()] == [
@@ -223,7 +223,7 @@ def test_readings_are_frozen_after_half_a_second_and_ten_samples():
 
 
 def test_a_stopped_clock_is_refused():
-    """Over 50 samples have one time, and over ten times as many as usual."""
+    """The clock has stopped if over 50 samples have the same time, and if these are over ten times as many as usual."""
     for count, stopped in ((50, False), (51, True)):
         t_s = np.concatenate((np.arange(100) * 0.01, np.full(count, 1.0), 1.01 + np.arange(100) * 0.01))
         if stopped:
@@ -256,7 +256,8 @@ def test_steps_that_are_98_percent_equal_are_a_grid():
 
 
 def test_rounded_times_stay_within_the_tick():
-    """Times of 7 ms in whole hundredths: the result is even, and within 6 ms of the recorded time."""
+    """Samples are 7 ms apart, and their times are rounded to hundredths. The repaired times have even steps, and differ
+    from the recorded times by at most 6 ms."""
     recorded = np.floor(np.arange(1000) * 0.7 + 1e-9) / 100.0
     found = even_times.even_times(recorded)
     assert np.abs(found - recorded).max() <= 0.006 + 1e-9

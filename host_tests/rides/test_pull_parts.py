@@ -1,4 +1,4 @@
-"""Rides from the board to a log: rows, gaps, names and attempts, by hand."""
+"""Tests how rides from a board become logs: rows, gaps, names and attempts. Expected results were computed by hand."""
 
 import binascii
 import gzip
@@ -13,7 +13,7 @@ from kickstand_tools.rides.block_reader import Place, StoredBlock, StoredTurn
 
 
 def block(turns, sequence=0, time_us=1_000_000, sample_hz=200) -> StoredBlock:
-    """A block of 16384 counts per g and 131 per deg/s at 21.05 C."""
+    """Return a block with 16384 counts per g and 131 counts per deg/s, at 21.05 C."""
     return StoredBlock(1, sequence, time_us, 2105, 16384, 1310, sample_hz, "1.0.0", 49, b"\x68", 7, turns)
 
 
@@ -40,7 +40,8 @@ def test_a_row_has_the_speed_and_the_place_of_its_turn():
 
 
 def test_a_turn_that_is_late_by_over_two_samples_is_a_gap():
-    """Samples of 5 ms. Two samples after 20 ms are late by 10 ms, after 20.001 ms by a microsecond more."""
+    """The samples are 5 ms apart. If two samples arrive after 20 ms, they are late by 10 ms, which is exactly two
+    samples. After 20.001 ms they are late by a microsecond more."""
     assert block([turn(1_020_000)]).missing_s() == []
     assert block([turn(1_020_001)]).missing_s() == [0.010001]
     assert block([turn(1_010_000), turn(1_520_000)]).missing_s() == [0.5]
@@ -53,7 +54,7 @@ def test_gaps_are_counted_in_words():
 
 
 def test_positions_are_in_hundred_thousandths_of_a_minute():
-    """The date has 7 bits of the year since 2000, 4 of the month and 5 of the day."""
+    """The date has 7 bits for the years since 2000, 4 bits for the month and 5 bits for the day."""
     degree = 60 * 100_000
 
     def places(*rows):

@@ -1,5 +1,5 @@
-"""A slow flash: an erase takes longer than the sensor's FIFO keeps samples. The firmware counts and reports the lost
-samples. If the lean is wrong after a loss, the display does not show it."""
+"""The flash is so slow that an erase takes longer than the sensor's FIFO keeps samples. The firmware counts and reports
+the lost samples. If the lean is wrong after a loss, the display does not show it."""
 
 import gc
 import re

@@ -15,8 +15,11 @@ OTHERS = ("slope_percent", "hang_m", "lift_deg", "engine", "crosswind_mps2", "ba
 
 
 def figures(name: str) -> list[float]:
-    """The number of legs of all seeds; sums of duration, speed, lean, roll time and the other values of the legs, each
-    times the number of the leg; the sum of the conditions."""
+    """Return seven figures of a profile's plans, each summed over all seeds.
+
+    The first is the number of legs. The next five are sums over the legs: duration, speed, lean, roll time, and all
+    other values. In these sums each value is multiplied by the number of its leg. The last is a sum of the conditions.
+    """
     found = np.zeros(7)
     for seed in SEEDS:
         plan = Plan(np.random.default_rng([seed, *name.encode()]), 400.0)
@@ -102,14 +105,15 @@ def test_a_seed_gives_the_plan_of_earlier_versions(name):
 
 
 def test_a_seed_gives_the_bike_of_earlier_versions():
-    """The sums over eight bikes."""
+    """The compared numbers are sums over eight bikes."""
     bikes = [Bike.random(np.random.default_rng(seed)) for seed in SEEDS]
     found = [sum(getattr(one, field) for one in bikes) for field in vars(bikes[0])]
     assert found == pytest.approx(BIKES, rel=1e-5)
 
 
 def test_a_seed_gives_the_ride_of_earlier_versions():
-    """The mean size of force and rate on each axis, of a rough road and a poor mount, and the poses."""
+    """The compared numbers are the mean absolute readings and true values of a ride on a rough road with a poor mount,
+    and its poses."""
     made = ride("fall", 1, 35.0, road="D", mount="holder")
     found = [*np.abs(made.readings).mean(axis=0), *np.abs(np.array(list(made.truth.values()))).mean(axis=1)]
     found += [*made.kickstand.mean(axis=0)[:3], *made.upright.mean(axis=0)[:3], made.stand_deg, made.home_c]
@@ -117,6 +121,6 @@ def test_a_seed_gives_the_ride_of_earlier_versions():
 
 
 def test_a_seed_gives_the_procedure_of_earlier_versions():
-    """The mean size of force and rate while a hand turns the sensor between its six positions."""
+    """The compared numbers are the mean absolute readings while a hand turns the sensor between its six positions."""
     made = ride("parked", 1, 20.0)
     assert np.abs(made.procedure).mean(axis=0).tolist() == pytest.approx(PROCEDURE, rel=1e-4)

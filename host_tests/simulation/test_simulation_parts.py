@@ -1,4 +1,4 @@
-"""The parts of the simulation, with small inputs and results computed by hand."""
+"""Tests the parts of the simulation with small inputs. The expected results were computed by hand."""
 
 from types import SimpleNamespace
 
@@ -15,7 +15,7 @@ G = 9.80665
 
 
 def test_a_smooth_step_is_half_way_in_the_middle():
-    """u^3 (10 - 15 u + 6 u^2): at a quarter 0.015625 * 6.625."""
+    """The step is u^3 (10 - 15 u + 6 u^2). At u = 1 / 4 this is 0.015625 * 6.625."""
     found = signals.smoothstep(np.array([-1.0, 0.0, 0.25, 0.5, 1.0, 2.0]))
     assert found == pytest.approx([0.0, 0.0, 0.103515625, 0.5, 1.0, 1.0])
     assert script._glide(2.0, 6.0, 0.25, 2.0) == pytest.approx((2.4140625, 4.0 * 30.0 * 0.0625 * 0.5625 / 2.0))
@@ -38,13 +38,14 @@ def test_smoothing_and_noise_have_their_size():
     hz = np.linspace(0.0, 100.0, len(power))
     assert np.std(noise) == pytest.approx(1.0, rel=0.1)
     assert np.mean(power[(hz > 1.5) & (hz < 3.0)]) > 8.0 * np.mean(power[hz < 0.5])
-    # at 20 Hz (1 + 16)^-2 of the amplitude's square, at 2 Hz (4 / 5)^2 / (1 + 0.16)^2
+    # The power at 20 Hz is multiplied by (1 + 16)^-2, and the power at 2 Hz by (4 / 5)^2 / (1 + 0.16)^2.
     ratio = np.mean(power[(hz > 19) & (hz < 21)]) / np.mean(power[(hz > 1.9) & (hz < 2.1)])
     assert ratio == pytest.approx((1.0 / 17.0) ** 2 / (0.64 / 1.3456), rel=0.3)
 
 
 def test_legs_become_signals():
-    """Standing 2 s, 10 m/s within 4 s, then 4 s at 10 m/s with 30 degrees reached within 2 s."""
+    """In the first leg the bike stands for 2 s. In the second it reaches 10 m/s within 4 s. In the third it rides at
+    10 m/s for 4 s, and reaches a lean of 30 degrees within 2 s."""
     made = commands([Leg("a", 2.0, 0.0), Leg("b", 4.0, 10.0), Leg("a", 4.0, lean_deg=30.0, roll_s=2.0)], 100.0)
     assert len(made.time) == 1000 and made.time[100] == 1.0
     assert made.speed[[100, 400, 800]] == pytest.approx([0.0, 5.0, 10.0], abs=0.01)
@@ -55,7 +56,7 @@ def test_legs_become_signals():
 
 
 def test_values_of_a_leg_settle_within_their_times():
-    """Hang, lift, engine and wind settle within 1 s, the bank within 3 s; a short leg shortens it."""
+    """Hang, lift, engine and wind settle within 1 s, and the bank within 3 s. In a short leg they settle by its end."""
     more = {"hang_m": 0.1, "lift_deg": 10.0, "engine": 1.0, "crosswind_mps2": 2.0, "bank_deg": 6.0}
     made = commands([Leg("a", 1.0, 5.0), Leg("b", 5.0, **more)], 100.0)  # type: ignore[arg-type]
     half = [made.hang[150], np.degrees(made.lift[150]), made.engine[150], made.crosswind[150]]
@@ -66,7 +67,7 @@ def test_values_of_a_leg_settle_within_their_times():
 
 
 def test_the_slope_changes_with_the_distance():
-    """10 m/s: level for 50 m, then up to 10 % over 50 m."""
+    """At 10 m/s the road is level for 50 m. Over the next 50 m its slope rises to 10 %."""
     made = commands([Leg("a", 5.0, 10.0, slope_percent=0.0), Leg("b", 5.0, slope_percent=10.0)], 100.0)
     assert np.tan(made.slope[[250, 750, 999]]) * 100.0 == pytest.approx([0.0, 5.0, 10.0], abs=0.03)
     still = commands([Leg("a", 1.0, 0.0, slope_percent=10.0), Leg("b", 1.0, slope_percent=5.0)], 100.0)
@@ -78,7 +79,7 @@ def a_plan(seconds=100.0) -> Plan:
 
 
 def test_a_lean_balances_its_radius():
-    """10 m/s on a radius of 10.197 m are 1 g."""
+    """At 10 m/s on a radius of 10.197 m, the acceleration is 1 g and the lean 45 degrees."""
     assert lean_for(10.0, 100.0 / G) == pytest.approx(45.0)
 
 
@@ -88,7 +89,7 @@ def test_a_plan_goes_on_until_45_s_before_its_end():
     assert plan.going_on
     plan.add("a", 0.2)
     assert not plan.going_on and plan.seconds == pytest.approx(55.1)
-    short = a_plan(30.0)  # at least 20 s
+    short = a_plan(30.0)  # a plan continues for at least 20 s
     short.add("a", 19.9)
     assert short.going_on
     short.add("a", 0.1)
@@ -96,18 +97,19 @@ def test_a_plan_goes_on_until_45_s_before_its_end():
 
 
 def test_a_turn_lasts_until_its_heading_has_changed():
-    """45 degrees at 9.80665 m/s: 1 rad/s. 90 degrees take 1.571 s, including half of the roll of 1 s."""
+    """A lean of 45 degrees at 9.80665 m/s gives a yaw rate of 1 rad/s. A turn by 90 degrees takes 1.571 s. Half of the
+    roll of 1 s counts as a part of this time."""
     plan = a_plan()
     plan.turn(45.0, G, heading_deg=90.0, roll_s=1.0)
     assert plan.legs[-1].seconds == pytest.approx(1.0 + np.pi / 2.0 - 0.5)
     assert (plan.legs[-1].phase, plan.legs[-1].lean_deg, plan.speed) == ("turn", 45.0, G)
-    plan.turn(-45.0, G, seconds=3.0, roll_s=1.0)  # 90 degrees of roll at 60 deg/s
+    plan.turn(-45.0, G, seconds=3.0, roll_s=1.0)  # the lean changes by 90 degrees at 60 deg/s
     assert plan.legs[-1].roll_s == pytest.approx(1.5) and plan.legs[-1].seconds == pytest.approx(4.5)
     plan.turn(-45.0, G, heading_deg=1.0)
     assert plan.legs[-1].seconds == pytest.approx(1.5 + 0.5)
     plan.turn(-2.0, 30.0, heading_deg=90.0)
     assert plan.legs[-1].seconds == pytest.approx(1.5 + 12.0)
-    plan.turn(45.0, 0.5, roll_s=1.0)  # as at 1 m/s; 45 degrees
+    plan.turn(45.0, 0.5, roll_s=1.0)  # computed as for 1 m/s, with a change of heading of 45 degrees
     assert plan.legs[-1].seconds == pytest.approx(1.0 + 0.5)
 
 
@@ -127,7 +129,8 @@ def test_speed_changes_take_their_time():
 
 
 def test_braking_into_a_turn_has_two_parts():
-    """From 20 to 10 m/s at 5 m/s2: 1.3 s to 13.5 m/s, then 0.9 s instead of 0.7 with half of the lean."""
+    """The bike brakes from 20 to 10 m/s at 5 m/s2. The first part takes 1.3 s to 13.5 m/s. The second part takes 0.9 s
+    instead of 0.7 s, and has half of the lean."""
     plan = a_plan()
     plan.to_speed(20.0, 5.0)
     plan.into_turn(30.0, 10.0, 5.0)
@@ -170,7 +173,7 @@ def read(part: chip.Chip, force, rates, temp_c=25.0, n=5000):
 
 
 def test_a_chip_adds_its_errors():
-    """Acceleration gives 0.1 deg/s per g. Drifts count from 25 C."""
+    """Acceleration adds 0.1 deg/s per g to the rates. Drifts are proportional to the temperature above 25 C."""
     seen = read(exact_chip(), [0.0, 1.0, -2.0], [10.0, 0.0, 0.0])
     assert seen.shape == (1000, 7)
     assert seen.mean(axis=0) == pytest.approx([0.0, 1.0, -2.0, 25.0, 10.0, 0.1, -0.2], abs=0.003)
@@ -185,7 +188,7 @@ def test_a_chip_adds_its_errors():
 
 
 def test_a_chips_noise_and_steps():
-    """400 ug/sqrt(Hz) and 0.005 deg/s/sqrt(Hz) behind a low-pass of about 50 Hz of noise."""
+    """The noise is 400 ug/sqrt(Hz) and 0.005 deg/s/sqrt(Hz). The low-pass has a noise bandwidth of about 50 Hz."""
     seen = read(exact_chip(), [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], n=50_000)
     assert seen[:, :3].std() == pytest.approx(sensor_errors.ACCEL_NOISE_G, rel=0.2)
     assert seen[:, 4:].std() == pytest.approx(sensor_errors.GYRO_NOISE_DPS, rel=0.2)
@@ -206,7 +209,8 @@ def test_the_low_pass_delays_by_5_ms():
     force = np.zeros((2000, 3))
     force[1000:, 0] = 1.0
     seen = exact_chip().read(np.random.default_rng(1), force, np.zeros((2000, 3)), np.full(2000, 25.0))[:, 0]
-    assert np.sum(1.0 - seen[200:260]) * 5.0 == pytest.approx(4.9 + 2.5, abs=1.0)  # half a sample more on average
+    # on average a step appears half a sample late
+    assert np.sum(1.0 - seen[200:260]) * 5.0 == pytest.approx(4.9 + 2.5, abs=1.0)
     assert chip._DLPF.sum() == pytest.approx(1.0)
     assert chip._DLPF @ np.arange(40) == pytest.approx(4.9, abs=0.2)
 
@@ -230,14 +234,16 @@ def test_a_random_chip_is_within_the_data_sheet():
 
 
 def test_gears_keep_the_engine_under_its_shift():
-    """370, 260, 205, 170, 150 and 135 revolutions per minute and m/s; at least 1250."""
+    """The six gears give 370, 260, 205, 170, 150 and 135 revolutions per minute for each m/s. The engine runs at 1250
+    per minute or faster."""
     speeds = {0.0: 1250.0, 10.0: 3700.0, 15.0: 3900.0, 22.0: 4510.0, 27.0: 4590.0, 31.0: 4650.0, 40.0: 5400.0}
     for speed, rpm in speeds.items():
         assert engine.crank_rpm(np.full(4000, speed), 5000.0, 1000.0)[2000] == pytest.approx(rpm)
 
 
 def test_vibration_grows_with_the_engine():
-    """At 6000/min the given rms, at idle a quarter plus 0.75 * (1250 / 6000)^2, at most 0.5 g; 15 deg/s per g."""
+    """At 6000 revolutions per minute the vibration has the rms rms_g. At idle this is multiplied by
+    0.25 + 0.75 (1250 / 6000)^2. The rms is at most 0.5 g. The rates have 15 deg/s per g."""
     running = np.ones(20_000)
 
     def rms(speed, rms_g, share=1.0):
@@ -254,25 +260,27 @@ def test_vibration_grows_with_the_engine():
 
 
 def test_bumps_are_added_to_the_road():
-    """A bump of 15 mm and 1 m at 2 m: its height in the middle is 15 mm, after it 0."""
+    """The bump is 15 mm high and 1 m long, and begins at 2 m. The road's height is 15 mm in its middle, then 0."""
     slope = np.zeros(200)
     road.add_bumps(slope, [2.0, 3.5], 0.015, 1.0)
     height = np.cumsum(slope) * 0.02
     assert height[99] == pytest.approx(0.0) and height[124] == pytest.approx(0.015, rel=0.02)
-    assert height[149] == pytest.approx(0.0, abs=1e-9) and np.all(slope[150:] == 0.0)  # the second does not fit
+    assert height[149] == pytest.approx(0.0, abs=1e-9) and np.all(slope[150:] == 0.0)  # the second bump does not fit
 
 
 def test_the_road_has_the_roughness_of_its_class():
-    """The slope's variance over 2 m: the density (2 pi 0.1)^2 * G over two lengths."""
+    """For slopes averaged over a length, the variance is (2 pi 0.1)^2 G / (2 length). G is the road's roughness. The
+    lengths here are 2 m and 0.1 m."""
     slope = road.profile_slope(np.random.default_rng(1), 20_000.0, road.CLASS_B)
     means = slope[: len(slope) // 100 * 100].reshape(-1, 100).mean(axis=1)
     assert np.var(means) == pytest.approx((2 * np.pi * 0.1) ** 2 * 64e-6 / (2.0 * 2.0), rel=0.05)
-    assert np.var(slope) == pytest.approx((2 * np.pi * 0.1) ** 2 * 64e-6 / (2.0 * 0.1), rel=0.05)  # over 0.1 m
+    assert np.var(slope) == pytest.approx((2 * np.pi * 0.1) ** 2 * 64e-6 / (2.0 * 0.1), rel=0.05)
     assert len(road.profile_slope(np.random.default_rng(1), 10.0, 1.0)) == 700
 
 
 def test_the_chassis_moves_as_two_masses_on_two_springs():
-    """120 kg on 17 kN/m and 1100 Ns/m, on 15 kg on 150 kN/m: the equations of motion of both, at four frequencies."""
+    """A mass of 120 kg is on a spring of 17 kN/m with a damper of 1100 Ns/m. Below it a mass of 15 kg is on a tyre of
+    150 kN/m. The equations of motion of both masses are solved at four frequencies."""
     for hz in (0.0, 0.1, 1.8, 15.0):
         w = 2.0 * np.pi * hz
         strut = 17e3 + 1j * w * 1100.0
@@ -308,7 +316,8 @@ def test_a_pose_takes_four_seconds(monkeypatch):
         assert np.all(seen[:, 3] == 30.0)
     monkeypatch.setattr(poses, "still", lambda chance, part, up, temp_c: up)
     swaying = poses.standing(chance, exact_chip(), np.eye(3), 5.0, 0.0, 30.0, held=True)
-    assert np.degrees(np.arcsin(swaying[:, 0])).std() == pytest.approx(0.05, rel=0.6)  # slower than 4 s in part
+    # the tolerance is wide, because some of the sway is slower than the 4 s
+    assert np.degrees(np.arcsin(swaying[:, 0])).std() == pytest.approx(0.05, rel=0.6)
     assert np.ptp(poses.standing(chance, exact_chip(), np.eye(3), 5.0, 0.0, 30.0, held=False)[:, 0]) == 0.0
 
 
@@ -330,7 +339,8 @@ def test_rotation_vectors_and_matrices_belong_together():
 
 
 def test_a_hand_holds_still_and_turns():
-    """Three poses: 3 times 4.5 to 6 s, and turns by 90 and 180 degrees in 0.9 to 2 s and 1.6 times this."""
+    """Each of three poses takes 4.5 to 6 s. The turn by 90 degrees takes 0.9 to 2 s, and the turn by 180 degrees about
+    1.6 times as long."""
     ups = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
     hand = hands.Hand(still_s=(5.0, 5.0), turn_s=(1.0, 1.0), heading_deg=0.0, detour_deg=0.0, push_g=0.0)
     seen = hands.procedure(np.random.default_rng(1), exact_chip(), ups, 21.0, hand)
@@ -348,14 +358,15 @@ def test_a_hand_holds_still_and_turns():
 
 
 def test_positions_are_integrated_from_speed_and_yaw():
-    """100 s east at 10 m/s: 1000 m are 0.0089932 degrees, over cos 47.6 degrees of longitude."""
+    """The vehicle goes 1000 m east in 100 s. 1000 m are 0.0089932 degrees of latitude. For the longitude this number is
+    divided by cos(47.6 degrees)."""
     n = 20_000
     truth = {"speed_mps": np.full(n, 10.0), "yaw_rate_dps": np.zeros(n)}
     lat, lon, utc_s = files.positions(SimpleNamespace(truth=truth, rate_hz=200.0, time=np.arange(n) / 200.0))  # type: ignore[arg-type]
     assert lat[-1] == pytest.approx(47.6)
     assert lon[-1] == pytest.approx(8.0 + 0.0089932 / np.cos(np.radians(47.6)), abs=1e-6)
     assert utc_s[[0, 200]].tolist() == [1_779_008_400.0, 1_779_008_401.0]
-    truth["yaw_rate_dps"][0] = 90.0 * 200.0  # at once to the left: north
+    truth["yaw_rate_dps"][0] = 90.0 * 200.0  # a turn to the left in one sample, to the north
     lat, lon, _ = files.positions(SimpleNamespace(truth=truth, rate_hz=200.0, time=np.zeros(n)))  # type: ignore[arg-type]
     assert lat[-1] == pytest.approx(47.6089932, abs=1e-6) and lon[-1] == pytest.approx(8.0)
 
@@ -432,9 +443,9 @@ def test_a_hash_gives_numbers_of_mean_0_and_rms_1():
 
 
 def test_a_scripted_ride_knows_its_distance():
-    """From 0 to 10 m/s in 4 s: 20 m; then 10 m/s."""
+    """The ride covers 20 m while it accelerates from 0 to 10 m/s in 4 s. Then it continues at 10 m/s."""
     made = script.Ride([script.upright(1), script.accelerate(10, 4), script.straight(2)], 0.0)
-    assert made.seconds == 7.0  # upright from the beginning: no move
+    assert made.seconds == 7.0  # the bike is upright from the beginning, so no time is needed to raise it
     assert made.state(5.0)[8] == pytest.approx(20.0) and made.state(7.0)[8] == pytest.approx(40.0)
     assert made.state(9.0)[8] == pytest.approx(60.0) and made.state(0.5)[8] == 0.0
     assert made.state(3.0)[3:5] == pytest.approx((5.0, 10.0 * 1.875 / 4.0))
@@ -450,7 +461,8 @@ def test_feet_help_below_4_mps():
 
 
 def test_the_motion_of_a_body_by_hand():
-    """10 m/s at 0.5 rad/s to the left on a road rising by 0.1 rad: left 5 cos 0.1 m/s2; lean 30 degrees."""
+    """The vehicle turns left with 0.5 rad/s at 10 m/s, which is 5 m/s2. First it is upright on a road that rises by
+    0.1 rad. Then it leans by 30 degrees on a level road."""
     left, up, forward, w_left, w_up, w_forward = script.body_motion(0.0, 0.2, 10.0, 2.0, 0.5, 0.1, 0.03)
     assert left * G == pytest.approx(5.0 * np.cos(0.1)) and up * G == pytest.approx(G * np.cos(0.1) + 0.3)
     assert forward * G == pytest.approx(2.0 + G * np.sin(0.1))

@@ -15,8 +15,8 @@ FULL = "#"
 def bar(lean_deg):
     """Return the lean's bar as text.
 
-    "#" is a full cell and a space is an empty cell. In a cell "1" to "4", so many columns are filled from the left. In
-    a cell "a" to "d", 1 to 4 columns are filled from the right.
+    "#" is a full cell and a space is an empty cell. "1" to "4" is a cell whose first 1 to 4 columns from the left are
+    filled. "a" to "d" is a cell whose first 1 to 4 columns from the right are filled.
     """
     names = {0x20: " ", 0xFF: FULL, **{i: str(i + 1) for i in range(4)}, **{4 + i: "abcd"[i] for i in range(4)}}
     return "".join(names[code] for code in pages.lean_bar(lean_deg))
@@ -34,7 +34,7 @@ def meter(**values):
 
 
 def measured(counts, calibrate=None):
-    """Return a meter after one reading. counts: 4096 per g and 65.5 per deg/s."""
+    """Return a meter after one reading. counts: the reading, with 4096 counts per g and 65.5 counts per deg/s."""
     from array import array
 
     calibration = Calibration()

@@ -1,5 +1,5 @@
-"""The guide's next step for each state of the real firmware. The page's device runs at full speed, with orders as a
-rider gives them. The page's own guide then gets each state that the rider could see."""
+"""Tests the guide's next step for each state of the real firmware. The page's device runs at full speed, and gets the
+orders of a rider. The page's own guide then gets each state that the rider could see."""
 
 import json
 from pathlib import Path
@@ -112,8 +112,8 @@ def test_a_press_while_riding_is_taken_for_the_stand(stages):
     stages(
         ([RIDE, ("wait", 8)], "not aligned", 1, "Put the motorcycle on its stand first", "kickstand"),
         ([SHORT, ("wait", 3)], "aligning", 1, "that the motorcycle is on its stand", "kickstand"),
-        ([("wait", 9)], "refused", 1, "why it has not taken this pose", "kickstand"),
-        ([STAND, ("wait", 9)], "refused", 1, "Press the button: once more", ""),
+        ([("wait", 9)], "refused", 1, "why this pose was refused", "kickstand"),
+        ([STAND, ("wait", 9)], "refused", 1, "Press the button to try again", ""),
         ([SHORT, ("wait", 4.5)], "aligning", 2, "Now hold the motorcycle upright", "upright"),
         ([UPRIGHT, ("wait", 4)], "aligning", 2, "Press the button once more", ""),
     )
@@ -134,9 +134,9 @@ def test_the_wire_is_pulled_while_the_menu_is_open(stages):
     stages(
         (RIDING, "not sure", 5, "That is all", ""),
         ([LONG], "the menu", 0, "The menu", ""),
-        ([PULL, ("wait", 2)], "the menu", 0, "The menu lies over the message", "wire"),
+        ([PULL, ("wait", 2)], "the menu", 0, "The menu hides the message", "wire"),
         ([SHORT, ("wait", 21)], "a fault", 0, "shows no lean", "wire"),
-        ([PLUG, ("wait", 0.1)], "a fault", 0, "sets it up anew", ""),
+        ([PLUG, ("wait", 0.1)], "a fault", 0, "The firmware sets it up", ""),
         ([("wait", 6)], "not sure", 5, "That is all", ""),
         ([STAND, ("wait", 9), LONG, LONG, SHORT, PULL, ("wait", 1)], "a fault", 0, "stops the alignment", "wire"),
         ([("wait", 3)], "a fault", 0, "shows no lean", "wire"),
@@ -154,7 +154,7 @@ def test_each_page_is_named(stages):
         ([LONG, *[SHORT] * 3], "the menu", 0, "The menu", ""),
         ([LONG], "sensor info", 0, "the sensor, and what is calibrated", ""),
         ([SHORT], "not sure", 5, "That is all", ""),
-        ([LONG, SHORT, LONG], "positions", 0, "turned by hand", ""),
+        ([LONG, SHORT, LONG], "positions", 0, "turn the sensor by hand", ""),
     )
 
 
@@ -166,7 +166,7 @@ def test_the_power_goes_in_a_save_or_by_its_switch(stages):
         ([arm, STAND, ("wait", 9)], "not sure", 0, "Hold the button for a second", ""),
         ([LONG, SHORT], "the menu", 0, "Press until the menu says", ""),
         ([*[SHORT] * 5], "the menu", 0, "Hold the button once more", ""),
-        ([LONG, *ALIGN], "nothing", 0, "when 40 bytes", "power"),
+        ([LONG, *ALIGN], "nothing", 0, "after 40 bytes", "power"),
         ([on, ("wait", 0.1)], "starting", 0, "The board starts", ""),
         ([("wait", 4)], "not sure", 5, "The old alignment is still there", "ride"),
         ([RIDE, ("wait", 6)], "not sure", 5, "", ""),
@@ -180,7 +180,7 @@ def test_it_rides_straight_until_the_meter_is_sure(stages):
     showing the lean in a bend."""
     stages(
         ([*ALIGN, RIDE, ("wait", 5)], "not sure", 4, "It rides straight for ten seconds", ""),
-        ([("lean", 30), ("wait", 2)], "not sure", 4, "needs ten seconds straight on", "straight"),
+        ([("lean", 30), ("wait", 2)], "not sure", 4, "needs ten seconds on a straight", "straight"),
         ([("lean", 0), ("wait", 18)], "not sure", 4, "Lean it", ""),
         ([("lean", 40), ("wait", 4)], "not sure", 5, "That is all", ""),
     )
@@ -194,7 +194,7 @@ def test_after_power_on_in_a_bend_it_says_what_ends_the_doubt(stages):
         ([*RIDING, ("lean", -8), ("wait", 4)], "not sure", 5, "That is all", ""),
         ([*power, ("wait", 25)], "not sure", 4, "ride straight, or lean the other way", "straight"),
         ([("lean", 0), ("wait", 12)], "not sure", 5, "That is all", ""),
-        ([("lean", -8), ("wait", 4), *power, ("wait", 20)], "not sure", 4, "not in a steady bend", "straight"),
+        ([("lean", -8), ("wait", 4), *power, ("wait", 20)], "not sure", 4, "In a steady bend", "straight"),
         ([("lean", 20), ("wait", 12)], "not sure", 5, "That is all", ""),
     )
 
@@ -209,7 +209,7 @@ def test_it_rides_straight_is_not_said_of_a_bike_that_leans(guide):
         ]
         for shown in (None, 30)
     ]
-    assert all("needs ten seconds straight on" in one for one in said)
+    assert all("needs ten seconds on a straight" in one for one in said)
 
 
 def test_a_disarmed_save_is_whole(drive):
@@ -234,9 +234,9 @@ def view_of(code):
 def test_each_refusal_and_fault_has_its_step(guide):
     """The test includes codes that the simulated board never reaches."""
     tick = {"powered": True, "plugged": True, "pose": "kickstand", "phase": "kickstand", "t_s": 1.0, "stage": 0}
-    spoilt = ("refused", "The meter says why it has not taken this pose. Press the button: once more.")
-    unlike = ("refused", "The meter says why it takes neither pose. Press the button, and begin with the stand.")
-    again = ("a fault", "The sensor is there again: the firmware sets it up anew.")
+    spoilt = ("refused", "The display says why this pose was refused. Press the button to try again.")
+    unlike = ("refused", "The display says why both poses were refused. Press the button to begin again.")
+    again = ("a fault", "The sensor answers again. The firmware sets it up.")
     wanted: dict[str, tuple[str, str]] = dict.fromkeys(FAULTS, again)
     wanted["starting"] = ("starting", "The board starts.")
     wanted |= dict.fromkeys(SPOILT, spoilt) | dict.fromkeys([*UNLIKE, *FLASH], unlike)
@@ -250,7 +250,7 @@ def test_each_refusal_and_fault_has_its_step(guide):
     ("view", "words", "text"),
     [
         ({"view": "starting"}, "starting", "board starts"),
-        ({"view": "notice", "code": "sensor-lost", "fault": "sensor-lost"}, "a fault", "there again"),
+        ({"view": "notice", "code": "sensor-lost", "fault": "sensor-lost"}, "a fault", "answers again"),
         ({"view": "notice", "code": "stopped"}, "a fault", "stopped the alignment"),
     ],
 )

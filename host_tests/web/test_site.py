@@ -1,4 +1,4 @@
-"""kickstand web: the files of the site, its address, the server, and refusals."""
+"""Tests `kickstand web`: the files of the site, its address, the server, and refusals."""
 
 import contextlib
 import gzip

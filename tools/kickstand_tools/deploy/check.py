@@ -62,8 +62,9 @@ def verdict(findings: list[Finding]) -> str:
 def check(port: Port, say: Callable[[str], None] = lambda text: None) -> Checked:
     """Check a board, then restart it. This takes up to two minutes.
 
-    say: function that is called with each finding as a line, and with instructions for the user. Raises InputError if
-    the board cannot be checked.
+    say: Function that is called with each finding as a line, and with instructions for the user.
+
+    Raises InputError if the board cannot be checked.
     """
     with connected(port) as (transport, name):
         describe(transport, name)

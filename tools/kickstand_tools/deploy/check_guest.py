@@ -62,7 +62,7 @@ def board(parts):
     from kickstand.rides.block import encode, encode_python
 
     pairs = (decode, decode_python), (add_up, add_up_python), (products, products_python), (encode, encode_python)
-    has_it = sys.platform in ("rp2", "esp32")  # only on these boards the firmware uses machine code
+    has_it = sys.platform in ("rp2", "esp32")  # the firmware uses machine code only on these boards
     slow = ", ".join([plain.__name__ for used, plain in pairs if has_it and used is plain])
     chosen = parts.settings
     words = f"{chosen.SAMPLE_HZ} Hz, {chosen.ACCEL_RANGE_G} g, {chosen.GYRO_RANGE_DPS} deg/s, low-pass {chosen.DLPF}"

@@ -52,8 +52,9 @@ def values(text: str) -> dict[str, str]:
 def with_values(text: str, wanted: dict[str, str | None]) -> str:
     """Write values into the text of a config.py, and return the new text. The rest of the text is kept.
 
-    wanted: new value of each setting, as written. None restores the default. Raises InputError if a form cannot show
-    the file (see values()), and if a value is invalid.
+    wanted: New value of each setting, as written. None restores the default.
+
+    Raises InputError if a form cannot show the file (see values()), and if a value is invalid.
 
     >>> before = '# SIDE = "left"   # or "right"\\nRECORD = True\\n'
     >>> print(with_values(before, {"SIDE": '"right"', "RECORD": None}), end="")

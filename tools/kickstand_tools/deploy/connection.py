@@ -254,7 +254,7 @@ def literal(text: bytes, *shapes: Any) -> Any:
     try:
         value = ast.literal_eval(text.decode().strip())
     except (SyntaxError, ValueError, TypeError, MemoryError, RecursionError):
-        value = literal  # has none of the shapes
+        value = literal  # this function matches none of the shapes
     if any(_fits(value, shape) for shape in shapes):
         return value
     shown = ascii(text[:40].decode(errors="replace").strip())
@@ -304,8 +304,9 @@ def printed(transport: SerialTransport, name: str, code: str, what: str) -> byte
 def status(port: Port, wirings: bool = False) -> str:
     """Run kickstand.status() on the board, restart the board, and return the output.
 
-    wirings: True to try each wiring of an LCD backpack on the display too. Raises InputError if the board gives no
-    status.
+    wirings: True to also try each wiring of an LCD backpack on the display.
+
+    Raises InputError if the board returns no status.
     """
     with connected(port) as (transport, name):
         describe(transport, name)

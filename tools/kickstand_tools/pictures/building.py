@@ -13,8 +13,12 @@ _WHITE, _PAD = "#ffffff", "#f2c94c"
 
 
 def drawings(display: str, shifted: str) -> dict[str, str]:
-    """{file name: SVG}: the wiring of both boards, and the other drawings. display: SVG of the display at a board.
-    shifted: SVG of the display behind the level shifter."""
+    """Draw the wiring of both boards, and the other drawings.
+
+    display: SVG of the display that is wired to a board.
+    shifted: SVG of the display that is wired to the level shifter.
+    Returns {file name: SVG}.
+    """
     return {
         "wiring_pico.svg": wiring.draw(wiring.PICO, display),
         "wiring_esp32.svg": wiring.draw(wiring.ESP32, display),
@@ -26,7 +30,7 @@ def drawings(display: str, shifted: str) -> dict[str, str]:
 
 
 def shifter(board: wiring.DrawnBoard, display: str) -> str:
-    """A 5 V display at a board, with the level shifter in SDA and SCL, and VCC at 5 V. display: an SVG of a display."""
+    """Draw a 5 V display at a board. A level shifter is in SDA and SCL, and VCC is at 5 V. display: its SVG."""
     pins = wiring.pin_names(board)
     five = pins["5V"]
     page = Drawing(900, 330)
@@ -58,7 +62,7 @@ def shifter(board: wiring.DrawnBoard, display: str) -> str:
 
 
 def supply() -> str:
-    """The supply from switched 12 V to the board."""
+    """Draw the supply of the board from switched 12 V."""
     page = Drawing(900, 210)
     y, ground = 84, 146
     page.wire(RED, (150, y), (520, y))
@@ -83,7 +87,7 @@ def supply() -> str:
     return page.svg()
 
 
-# The sensor's axes x, y and z, seen from the viewer: to the right, up, towards the viewer
+# The directions of the sensor's axes x, y and z in each position. A direction is (right, up, towards the viewer).
 _POSITIONS: dict[str, tuple[Vector, Vector, Vector]] = {
     "+z": ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
     "-z": ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
@@ -99,12 +103,14 @@ _SLANTED: tuple[Vector, Vector, Vector] = (
     (sin(_SLANT), cos(_SLANT), 0),
 )
 _SAYS = {"+z": "face up", "-z": "face down", "+x": "X up", "-x": "X down", "+y": "Y up", "-y": "Y down"}
-_HALF = (44.0, 34.0, 6.0)  # of the board along its axes, pixels
+_HALF = (44.0, 34.0, 6.0)  # half of the sensor board's size along its axes, in pixels
 
 
 def six_positions(columns: int = 7) -> str:
-    """The six positions of the sensor, with their names on the display, and the slanted pose that checks them. columns:
-    number of poses side by side."""
+    """Draw the six positions of the sensor with their names on the display, and the slanted pose that checks them.
+
+    columns: number of poses side by side.
+    """
     poses = [*_POSITIONS.items(), ("", _SLANTED)]
     page = Drawing(140 * columns, 215 * -(-len(poses) // columns))
     for k, (name, axes) in enumerate(poses):
@@ -127,7 +133,7 @@ def _lay(page: Drawing, x: float, y: float, axes: tuple[Vector, Vector, Vector])
         return _seen(x, y, (place[0], place[1] - 50 + lowest, place[2]))
 
     for which in range(3):
-        side = 1.0 if sum(axes[which]) > 0 else -1.0  # the visible side, from the right, above and in front
+        side = 1.0 if sum(axes[which]) > 0 else -1.0  # the viewer sees it from the right, from above and from the front
         along, across = [k for k in range(3) if k != which]
         corners = []
         for one, other in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
@@ -155,13 +161,16 @@ def _lay(page: Drawing, x: float, y: float, axes: tuple[Vector, Vector, Vector])
 
 
 def _seen(x: float, y: float, place: Vector) -> tuple[float, float]:
-    """Project a point (right, up, towards the viewer) to the drawing, seen from the right, above and in front."""
+    """Project a point to the drawing. The viewer looks from the right, from above and from the front.
+
+    x, y: the origin in the drawing. place: the point (right, up, towards the viewer).
+    """
     right, up, near = place
     return x + 0.71 * (right - near), y - 0.78 * up + 0.36 * (right + near)
 
 
 def on_the_bike() -> str:
-    """A motorcycle from its left side, with the place of each part."""
+    """Draw a motorcycle from its left side, with the place of each part."""
     page = Drawing(900, 470)
     dark, frame, paint = "#22252b", "#6b717c", "#c63c06"
     page.box(0, 404, 900, 66, "#dcd6c6", 0)

@@ -10,7 +10,10 @@ _MIRRORED = {"start": "end", "end": "start", "middle": "middle"}
 
 
 class Drawing:
-    """A drawing. Sizes are in pixels, x to the right, y down. mirrored: x counts from the right; text stays legible."""
+    """A drawing. Sizes are in pixels. x points right, and y points down.
+
+    mirrored: True to count x from the right edge. Text is not mirrored.
+    """
 
     def __init__(self, width: int, height: int, mirrored: bool = False) -> None:
         self._width, self._height, self._mirrored = width, height, mirrored
@@ -20,20 +23,20 @@ class Drawing:
         return self._width - x - width if self._mirrored else x
 
     def box(self, x: float, y: float, width: float, height: float, fill: str, round_by: int = 8) -> None:
-        """A filled rectangle."""
+        """Draw a filled rectangle."""
         place = {"x": self._x(x, width), "y": y, "width": width, "height": height}
         self._elements.append(element("rect", **place, rx=round_by, fill=fill))
 
     def disc(self, x: float, y: float, radius: float, fill: str) -> None:
-        """A filled circle, for a pin, a joint of wires, or the cap of a button."""
+        """Draw a filled circle for a pin, a joint of wires, or the cap of a button."""
         self._elements.append(element("circle", cx=self._x(x), cy=y, r=radius, fill=fill))
 
     def shape(self, fill: str, *corners: tuple[float, float]) -> None:
-        """A filled polygon."""
+        """Draw a filled polygon."""
         self._elements.append(element("path", d=path([(self._x(x), y) for x, y in corners]) + "Z", fill=fill))
 
     def wire(self, colour: str, *points: tuple[float, float], width: float = 4) -> None:
-        """A line from point to point."""
+        """Draw a line through the points."""
         line = path([(self._x(x), y) for x, y in points])
         style = {"stroke_width": width, "stroke_linejoin": "round", "stroke_linecap": "round"}
         self._elements.append(element("path", d=line, fill="none", stroke=colour, **style))
@@ -48,16 +51,16 @@ class Drawing:
         colour: str = "#1d1f24",
         bold: bool = False,
     ) -> None:
-        """Words, vertically centred at y. anchor: the part of the text at x: "start", "middle" or "end"."""
+        """Write text, vertically centred at y. anchor: the part of the text at x, "start", "middle" or "end"."""
         style = {"font_size": size, "font_weight": "bold" if bold else None}
         style["text_anchor"] = _MIRRORED[anchor] if self._mirrored else anchor
         self._elements.append(element("text", words, x=self._x(x), y=y + 0.35 * size, **style, fill=colour))
 
     def picture(self, x: float, y: float, width: float, height: float, svg: str) -> None:
-        """Another SVG, scaled to fit into a rectangle."""
+        """Add another SVG, scaled to fit into a rectangle."""
         place = f'<svg x="{self._x(x, width)}" y="{y}" width="{width}" height="{height}"'
         self._elements.append(Markup(str(svg).strip().replace("<svg", place, 1)))
 
     def svg(self) -> str:
-        """The whole drawing."""
+        """Return the drawing as SVG."""
         return drawing((self._width, self._height), *self._elements, font_family=_FONT)

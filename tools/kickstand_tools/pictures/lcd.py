@@ -3,20 +3,23 @@
 from ..common.svg import drawing, element
 from .lcd_font import ROM
 
-# In units of 0.1 mm, as on the usual module of 80 x 36 mm
+# Sizes in units of 0.1 mm, as on the usual module of 80 x 36 mm
 _DOT = (5, 6)  # width, height
 _PITCH = (6, 7)  # distance between dots
 _CELL = (36, 62)  # distance between characters
 _COLUMNS, _LINES = 16, 2
-_MARGIN = 34  # glass around the characters
-_FRAME = 22  # black metal around the glass
+_MARGIN = 34  # width of the glass around the characters
+_FRAME = 22  # width of the black metal around the glass
 _GLASS = (_COLUMNS * _CELL[0] + 2 * _MARGIN, _LINES * _CELL[1] + 2 * _MARGIN)
 _SIZE = (_GLASS[0] + 2 * _FRAME, _GLASS[1] + 2 * _FRAME)
 
 
 def draw(codes: list[list[int]], cgram: bytes) -> str:
-    """The display as SVG. codes: two lists of 16 character codes; cgram: the 64 bytes of the eight custom
-    characters."""
+    """Return the display as SVG.
+
+    codes: two lists of 16 character codes.
+    cgram: the 64 bytes of the eight custom characters.
+    """
     lit = [
         _dot(column * _CELL[0] + x * _PITCH[0], line * _CELL[1] + y * _PITCH[1])
         for line in range(_LINES)

@@ -55,7 +55,7 @@ _FULL_BLOCK = 0xFF, ("#####",) * 8
 
 
 def _rows(dots):
-    """Up to 8 rows of "#" and "." as 8 numbers, bits 4 (left) to 0 (right)."""
+    """Convert up to 8 rows of "#" and "." to 8 numbers. In each number bit 4 is the left dot, and bit 0 the right."""
     rows = [int(row.replace("#", "1").replace(".", "0"), 2) for row in dots]
     return bytes(rows + [0] * (8 - len(rows)))
 
@@ -69,4 +69,4 @@ def _table():
     return table
 
 
-ROM: dict[int, bytes] = _table()  # code -> eight rows, bits 4 (left) to 0 (right)
+ROM: dict[int, bytes] = _table()  # {code: eight rows, with the left dot in bit 4}

@@ -5,13 +5,13 @@ from itertools import groupby
 from ..common.svg import drawing, element
 from ..simulated_board.oled import HEIGHT, WIDTH
 
-# In pixels of the panel. The usual module is 27 mm wide, its panel 22 mm
+# Sizes in pixels of the panel. The usual module is 27 mm wide, and its panel 22 mm.
 _MARGIN, _FRAME = 4, 6
 _SIZE = (WIDTH + 2 * (_MARGIN + _FRAME), HEIGHT + 2 * (_MARGIN + _FRAME))
 
 
 def draw(pixels: bytes) -> str:
-    """The display as SVG. pixels: 64 rows of 128, 8 pixels per byte, the leftmost in bit 7."""
+    """Return the display as SVG. pixels: 64 rows of 128 pixels. A byte has 8 pixels, the leftmost in bit 7."""
     runs = []
     for y in range(HEIGHT):
         x = 0

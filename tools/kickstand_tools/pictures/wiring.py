@@ -9,15 +9,15 @@ from .drawing import AMBER, BLACK, BLUE, RED, Drawing
 
 
 class DrawnBoard(NamedTuple):
-    """A board seen from above. near, far: pins from the top down. The near side faces the modules."""
+    """A board seen from above. near, far: the pins of each side, from the top down. The near side faces the modules."""
 
     title: str
-    machine: str  # in simulated_board.fakes.chips.MACHINES
-    pin_prefix: str  # before the GPIO number in a pin's name
+    machine: str  # a key of simulated_board.fakes.chips.MACHINES
+    pin_prefix: str  # the text before the GPIO number in a pin's name
     near: tuple[str, ...]
     far: tuple[str, ...]
     near_is_left: bool
-    numbered: bool  # pins are counted from the top down the near side, then up the other
+    numbered: bool  # True if pins have numbers, counted down the near side, then up the far side
 
 
 PICO = DrawnBoard(
@@ -50,12 +50,12 @@ _MODULE_MIDDLE = (_MODULE_LEFT + _MODULE_RIGHT) // 2
 _SENSOR_PINS_Y, _SENSOR_SUPPLY_Y = (114, 140, 166), 140
 _DISPLAY_PINS_Y, _DISPLAY_SUPPLY_Y = (290, 320, 350), 320
 _BUTTON_PINS_Y = (460, 500)
-_CHANNELS = (320, 350)  # x of the two vertical wires to a module
+_CHANNELS = (320, 350)  # x of the two vertical parts of the wires to a module
 _GROUND_X, _SUPPLY_X, _OUTSIDE_X, _TOP_Y = 380, 866, 36, 36
 
 
 def connections(board: DrawnBoard) -> list[tuple[str, dict[str, str]]]:
-    """The connections in the drawing: [(module, {pin of the module: pin of the board})]."""
+    """Return the connections in the drawing as [(module, {pin of the module: pin of the board})]."""
     near, far = ({name: row + 1 for row, name in enumerate(side)} for side in (board.near, board.far))
 
     def pin(name: str) -> str:
@@ -73,12 +73,12 @@ def connections(board: DrawnBoard) -> list[tuple[str, dict[str, str]]]:
 
 
 def pin_names(board: DrawnBoard) -> dict[str, str]:
-    """The names of the board's pins for SDA and SCL of a display, and of the pin with 5 V from USB."""
+    """Return the names of the board's pins for SDA and SCL of a display, and of the pin with 5 V from USB."""
     return _default_pins(board)["display"] | {"5V": board.far[0] if board.far[0] == "VBUS" else board.far[-1]}
 
 
 def draw(board: DrawnBoard, display: str) -> str:
-    """Draw a board with its modules. display: an SVG of a display, shown in its module."""
+    """Draw a board with its modules. display: SVG of the display, which is drawn in its module."""
     page = Drawing(_WIDTH, _HEIGHT, mirrored=board.near_is_left)
     pins = _default_pins(board)
     row = {module: [board.near.index(name) for name in names.values()] for module, names in pins.items()}
@@ -118,10 +118,11 @@ def draw(board: DrawnBoard, display: str) -> str:
 def _draw_signals(
     page: Drawing, board: DrawnBoard, pins: dict[str, str], places: tuple[int, ...], channels: tuple[int, ...]
 ) -> list[str]:
-    """Draw a module's wires in the order of the board's pins, to avoid crossings. Returns the module's pins in this
-    order.
+    """Draw a module's wires in the order of the board's pins, to avoid crossings.
 
-    places: heights of the module's pins; channels: x of the wires' vertical parts.
+    places: heights of the module's pins.
+    channels: x of the vertical parts of the wires.
+    Returns the module's pins in the order of the board's pins.
     """
     order = sorted(pins, key=lambda pin: board.near.index(pins[pin]))
     for pin, y, x in zip(order, places, channels):
@@ -131,8 +132,11 @@ def _draw_signals(
 
 
 def _default_pins(board: DrawnBoard) -> dict[str, dict[str, str]]:
-    """{module: {pin of the module: name of the board's pin}}, from port.py for this board. This installs a simulated
-    board, so do not call it while another one is installed."""
+    """Read the default pins of this board from the firmware's port.py.
+
+    The function installs a simulated board, so do not call it while another one is installed.
+    Returns {module: {pin of the module: name of the board's pin}}.
+    """
     with simulator.Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=board.machine):
         port = runpy.run_path(str(firmware_path.PACKAGE / "board" / "port.py"))
 
@@ -188,8 +192,12 @@ def _draw_board(page: Drawing, board: DrawnBoard, used_near: set[int], used_far:
 def _draw_module(
     page: Drawing, top: int, height: int, title: str, pins: list[str], places: tuple[int, ...], supply_y: int = 0
 ) -> None:
-    """Draw a module. pins: names of the pins on the edge that faces the board. places: heights of these pins. supply_y:
-    height of VCC on the other edge."""
+    """Draw a module.
+
+    pins: names of the pins on the edge that faces the board.
+    places: heights of these pins.
+    supply_y: height of the pin VCC on the other edge.
+    """
     colour = "#2a4f9e" if supply_y else "#5b6270"
     page.box(_MODULE_LEFT, top, _MODULE_RIGHT - _MODULE_LEFT, height, colour)
     page.text(_MODULE_MIDDLE, top + 18, title, 14, "middle", "#ffffff", True)

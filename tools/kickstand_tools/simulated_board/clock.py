@@ -15,24 +15,25 @@ def _host_us():
 
 
 class PowerOff(BaseException):
-    """The power is off: end the program on the board. A BaseException, because firmware may catch Exception."""
+    """Ends the program on the board after a power cut. It is a BaseException, because firmware may catch Exception."""
 
 
 class Reset(BaseException):
-    """The microcontroller restarts: machine.reset(), or a watchdog that was not fed."""
+    """Ends the program because the microcontroller restarts, after machine.reset() or because of the watchdog."""
 
 
 def to_us(seconds):
-    """Seconds to integer microseconds."""
+    """Convert seconds to integer microseconds."""
     return round(seconds * 1e6)
 
 
 class Clock:
     """The board's clock. Models read now_us and schedule calls with at(). Operations that take time call advance().
 
-    now_us: the time since the clock was created. next_us: time of the next deadline, event or comparison with the
-    host's clock; until then advance() only adds to now_us.
-    pace: simulated seconds per second of the host: 1.0 for real time, 0 for as fast as possible.
+    now_us: the time since the clock was created.
+    next_us: time of the next deadline, event or comparison with the host's clock. Until then advance() only adds to
+        now_us.
+    pace: simulated seconds per second of the host. 1.0 is real time, 0 is as fast as possible.
     """
 
     def __init__(self, pace=0.0):
@@ -89,7 +90,7 @@ class Clock:
         raise PowerOff
 
     def set_pace(self, pace):
-        """Change the pace, see the class."""
+        """Change the pace. See the class."""
         self._pace = pace
         self._pace_us = self.now_us if pace else NEVER_US
         self._host_lead_us = _host_us() - self._host_due_us() if pace else 0
@@ -132,7 +133,7 @@ class Clock:
 
 
 class Watchdog:
-    """A watchdog: if it is not fed in time, the call that advances the time raises Reset. clock: a Clock."""
+    """A watchdog. If it is not fed in time, the call that advances the time raises Reset. clock: a Clock."""
 
     def __init__(self, clock):
         self._clock = clock

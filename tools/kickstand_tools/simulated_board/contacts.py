@@ -4,16 +4,19 @@ from .clock import NEVER_US
 
 BOUNCE_US = 4000  # time for which the button bounces
 RELEASED_US = 150_000  # least time between two presses
-_BOUNCES = 3  # short openings (or closings) after each edge of the button
+_BOUNCES = 3  # number of short openings (or closings) after each edge of the button
 
-_CLOSED_SHARE = 0.1  # the magnet is near for this share of the way between two pulses
+_CLOSED_SHARE = 0.1  # the contact is closed for this share of the way between two pulses
 _LOOK_US = 20_000  # longest time between two readings of the speed by the wheel's model
 _CREEP_MPS = 0.02  # a lower speed counts as standing
 
 
 class Contact:
-    """A contact between a pin and ground. closed: True while the contact is closed. broken_us: time at which its wire
-    breaks."""
+    """A contact between a pin and ground.
+
+    closed: True while the contact is closed.
+    broken_us: time at which its wire breaks.
+    """
 
     def __init__(self, clock, broken_us=NEVER_US):
         self.closed = False
@@ -53,8 +56,11 @@ class Button(Contact):
         return self.closed or self._clock.now_us < pulled_us + self.charge_us
 
     def press(self, at_us, for_us):
-        """Press the button at at_us for for_us. at_us: None for now or, if a press is still scheduled, for its end,
-        because a finger cannot press a pressed button."""
+        """Press the button at at_us for for_us.
+
+        at_us: None to press now. If a press is still scheduled, the new one begins after it, because a finger cannot
+            press a pressed button.
+        """
         if at_us is None:
             at_us = max(self._clock.now_us, self._free_us)
             self._free_us = at_us + for_us + RELEASED_US
@@ -76,10 +82,10 @@ class Button(Contact):
 class Wheel(Contact):
     """A wheel contact that closes when a magnet passes.
 
-    speed(t_s): speed of the vehicle, m/s.  bounce_us: time for which the contact bounces at each edge, 0 for none.
+    speed: function speed(t_s) that returns the speed of the vehicle in m/s.
+    bounce_us: time for which the contact bounces at each edge. 0 for no bouncing.
     until_s: time at which its wire breaks.
-
-    noise_hz: pulses per second that a neighbouring cable induces instead of the wheel's; 0 for none.
+    noise_hz: pulses per second that a neighbouring cable induces. They replace the wheel's pulses. 0 for none.
     """
 
     def __init__(self, clock, speed, pulses_per_metre=0.5, bounce_us=0, until_s=1e9):
@@ -93,7 +99,7 @@ class Wheel(Contact):
         clock.at(clock.now_us, self._add_distance)
 
     def _add_distance(self):
-        """Add the distance since the last call. At a pulse, schedule closing and opening. Schedule the next call."""
+        """Add the distance since the last call. At a pulse, schedule the contact's edges. Schedule the next call."""
         now_us = self._clock.now_us
         speed = self._speed(now_us / 1e6)
         rate = speed * self._pulses_per_metre / 1e6 if speed > _CREEP_MPS else 0.0  # pulses per us

@@ -12,7 +12,7 @@ from .i2c import TransferFault
 
 _FOREVER = 1 << 60  # a number of transfers
 _BLOCK = 4096  # bytes of flash that are erased at once
-_STALL_S = 0.5  # time-out of a print if the host reads nothing (shared/tinyusb/mp_usbd_cdc.h of MicroPython)
+_STALL_S = 0.5  # time-out of print() if the host reads nothing (shared/tinyusb/mp_usbd_cdc.h of MicroPython)
 
 
 class Faults:
@@ -26,15 +26,15 @@ class Faults:
     # On the wires
 
     def nack(self, address, nth=1, count=1):
-        """The nth transfer to address from now, and count - 1 more, are not acknowledged."""
+        """Do not acknowledge `count` transfers to address, beginning with the nth from now."""
         self._transfers("nack", address, nth, count)
 
     def nack_for(self, address, at_s, for_s):
-        """From at_s on, no transfer to address is acknowledged for for_s."""
+        """From at_s on, acknowledge no transfer to address. This lasts for for_s."""
         self._during("nack", address, at_s, for_s)
 
     def timeout(self, address, nth=1, count=1):
-        """The nth transfer to address from now, and count - 1 more, hang until the controller gives up."""
+        """Let `count` transfers to address hang until the controller gives up, beginning with the nth from now."""
         self._transfers("timeout", address, nth, count)
 
     def timeout_for(self, address, at_s, for_s):
@@ -42,16 +42,17 @@ class Faults:
         self._during("timeout", address, at_s, for_s)
 
     def corrupt(self, address, nth=1, byte=0, mask=0x01):
-        """Invert the bits of mask in byte number `byte` that the nth transfer from now reads."""
+        """Invert bits in a byte that the nth transfer from now reads. byte: number of the byte. mask: the bits."""
         self._transfers("corrupt", address, nth, 1, byte, mask)
 
     def cut(self, address, at_s, byte):
-        """Interrupt a transfer to address at byte number `byte`: the first long enough transfer after at_s."""
+        """Interrupt the first transfer to address after at_s that reaches byte number `byte`, at this byte."""
 
         self._board.at(at_s, lambda: self._transfers("cut", address, 1, _FOREVER, byte))
 
     def stuck_sda(self, at_s, bits=8, lcd=False):
-        """A device on the sensor's bus (lcd: on the display's bus) holds SDA low for `bits` clocks of SCL."""
+        """Let a device hold SDA low for `bits` clocks of SCL. lcd: True for the display's bus, False for the
+        sensor's."""
         bus = self._board.lcd_bus if lcd else self._board.sensor_bus
         self._board.at(at_s, lambda: bus.hang(bits))
 
@@ -60,37 +61,40 @@ class Faults:
     def supply_dip(self, at_s, leaves="asleep"):
         """The sensor's supply drops for a moment, and the sensor loses its configuration.
 
-        leaves: the state after the dip: "asleep" (data 0), "frozen" (asleep, the last data), "default_ranges" (awake,
-        other scales) or "torn" (asleep, and the frame that is being read ends in garbage).
+        leaves: the state after the dip, one of:
+            "asleep": asleep, all data is 0.
+            "frozen": asleep, the last data stays.
+            "default_ranges": awake with other scales.
+            "torn": asleep, and the frame that is being read ends in garbage.
         """
         self._board.at(at_s, lambda: self._board.sensor.supply_dip(leaves))
 
     def freeze(self, at_s, for_s):
-        """The sensor answers and keeps its configuration, but its data no longer change."""
+        """Freeze the sensor's data. The sensor still answers and keeps its configuration."""
         self._override(at_s, for_s, "freeze")
 
     def all_zero(self, at_s, for_s):
-        """Every data register reads 0."""
+        """Make every data register read 0."""
         self._override(at_s, for_s, 0x00)
 
     def all_ones(self, at_s, for_s):
-        """Every data register reads 0xFF."""
+        """Make every data register read 0xFF."""
         self._override(at_s, for_s, 0xFF)
 
     def unplug_sensor(self, at_s, for_s=None):
-        """Disconnect the sensor for for_s, or for ever. When reconnected, it starts as after power-on."""
+        """Disconnect the sensor for for_s. None: until the end. When reconnected, it starts as after power-on."""
         self._between(at_s, for_s, self._board.remove_sensor, self._board.fit_sensor)
 
     def unplug_lcd(self, at_s, for_s=None):
-        """Disconnect the display for for_s, or for ever. When reconnected, it starts as after power-on."""
+        """Disconnect the display for for_s. None: until the end. When reconnected, it starts as after power-on."""
         self._between(at_s, for_s, self._board.remove_lcd, self._board.fit_lcd)
 
     def lcd_slip(self, at_s):
-        """A spike on E shifts the display's pairing of nibbles by one."""
+        """Shift the display's pairing of nibbles to bytes by one nibble, as a spike on its pin E does."""
         self._board.at(at_s, self._board.lcd.slip)
 
     def wheel_storm(self, at_s, for_s, pulses_per_s):
-        """An ignition cable induces pulses in the cable of the wheel contact."""
+        """Add false pulses to the wheel contact, as an ignition cable beside its cable induces them."""
 
         def set_to(pulses_per_s):
             self._board.wheel.noise_hz = pulses_per_s
@@ -98,7 +102,7 @@ class Faults:
         self._between(at_s, for_s, lambda: set_to(pulses_per_s), lambda: set_to(0))
 
     def busy(self, at_s, for_s, times=1):
-        """Other work occupies the processor for for_s. This happens `times` times, 30 ms apart."""
+        """Occupy the processor with other work for for_s. This happens `times` times, 30 ms apart."""
 
         def begin(left):
             self._board.clock.advance(to_us(for_s))
@@ -110,7 +114,7 @@ class Faults:
     # In the file system
 
     def disk_full(self, at_s, for_s):
-        """Writing to any file fails."""
+        """Let every write to a file fail."""
 
         full = self._writing(lambda file, path: _FailingFile(file, 0, OSError(errno.ENOSPC)))
         self._replaced("open", full, at_s, for_s)
@@ -144,13 +148,13 @@ class Faults:
         self._replaced("open", slow, at_s, for_s)
 
     def restore(self, *names):
-        """End the faults that replace these builtin functions: `open` for the file system, `print` for USB."""
+        """End the faults that replace builtin functions. names: "open" for the file system, "print" for USB."""
         for name in names:
             if name in self._real:
                 setattr(builtins, name, self._real.pop(name))
 
     def _replace(self, name, function):
-        """From now on call function(the real one, its arguments) instead of the builtin `name`."""
+        """Replace the builtin function `name`. function is called with the real function, then with its arguments."""
         self.restore(name)
         self._real[name] = real = getattr(builtins, name)
         setattr(builtins, name, lambda *arguments, **named: function(real, *arguments, **named))
@@ -160,7 +164,7 @@ class Faults:
         self._between(at_s, for_s, lambda: self._replace(name, function), lambda: self.restore(name))
 
     def _writing(self, wrap):
-        """The function for _replace("open") that wraps files opened for writing: wrap(file, path)."""
+        """Return a function for _replace("open"). It passes files opened for writing through wrap(file, path)."""
 
         def opened(real, path, mode="r", *more, **named):
             file = real(path, mode, *more, **named)
@@ -171,7 +175,7 @@ class Faults:
     # On USB
 
     def usb_asleep(self, at_s, for_s):
-        """The host reads nothing: each print waits, then its text is lost."""
+        """Let the host read nothing. Each print() waits, then its text is lost."""
         self._replaced("print", lambda *_, **__: self._board.clock.advance(to_us(_STALL_S)), at_s, for_s)
 
     def _transfers(self, kind, address, nth, count, byte=0, mask=0):
@@ -189,7 +193,7 @@ class Faults:
         )
 
     def _between(self, at_s, for_s, begin, end):
-        """Call begin() at at_s, and end() for_s later (None: never)."""
+        """Call begin() at at_s, and end() for_s later. for_s: None to never call end()."""
         self._board.at(at_s, begin)
         if for_s is not None:
             self._board.at(at_s + for_s, end)
@@ -206,7 +210,7 @@ class Faults:
 
 
 class _Wrapped:
-    """The base of the two classes below. Attributes that they do not define are those of the file."""
+    """The base of the two classes below. Attributes that they do not define come from the wrapped file."""
 
     def __init__(self, file):
         self._file = file

@@ -18,14 +18,15 @@ _ROM_A00 = {
     0xFF: "\u2588",  # full block
 }
 
-# The nearest Unicode block by number of filled columns or rows. Blocks are in eighths; a character has five columns
+# The nearest Unicode block by number of filled columns or rows. Unicode has blocks in eighths, but a character has five
+# columns.
 _FROM_LEFT = " \u258e\u258d\u258b\u258a\u2588"
 _FROM_RIGHT = " \u2595\u2590\u2590\u2590\u2588"  # at the right edge Unicode has only an eighth and a half block
 _FROM_BELOW = " \u2581\u2582\u2583\u2584\u2585\u2586\u2587\u2588"
 
 
 def rom(code):
-    """The ROM's character for a code >= 0x10; '?' if Unicode has no similar one."""
+    """Return the ROM's character for a code from 0x10 on, or '?' if Unicode has no similar character."""
     if code in _ROM_A00:
         return _ROM_A00[code]
     if 0x20 <= code < 0x7E:
@@ -34,7 +35,10 @@ def rom(code):
 
 
 def drawn(rows):
-    """The character that looks most like a 5x8 pattern, or '?'. rows: eight values, bits 4 (left) to 0 (right)."""
+    """Return the character that looks most like a 5x8 pattern, or '?'.
+
+    rows: eight values. Bit 4 is the left dot, and bit 0 the right dot.
+    """
     rows = [row & 0x1F for row in rows]
     inked = [row for row in rows if row]
     if not inked:

@@ -1,21 +1,21 @@
 """Models a GPS receiver that sends NMEA sentences on a serial line, some time after each fix."""
 
 _KNOTS = 3600.0 / 1852.0
-_PIECE = 8  # bytes delivered at once
+_PIECE = 8  # number of bytes that are delivered at once
 _START_S = 12 * 3600 - 20  # UTC time of day, s, when the board's clock is 0, on 21 November 2026
 _HOME = 48.1173, 11.5166667  # degrees north and east
 
 
 def _angle(degrees, digits, sides):
-    """An angle in the form of NMEA: degrees with `digits` digits, minutes, and the letter of its side."""
-    parts = int(abs(degrees) * 6e6 + 0.5)  # 0.00001 minutes
+    """Return an angle as NMEA writes it: degrees with `digits` digits, minutes, and the letter of its side."""
+    parts = int(abs(degrees) * 6e6 + 0.5)  # the angle in units of 0.00001 minutes
     whole, rest = parts // 6_000_000, parts % 6_000_000
     side = sides[1] if degrees < 0.0 else sides[0]
     return "%0*d%02d.%05d,%s" % (digits, whole, rest // 100_000, rest % 100_000, side)
 
 
 def sentence(body):
-    """A whole NMEA line: $, body, checksum, line end."""
+    """Return a whole NMEA line with $, body, checksum and line end."""
     total = 0
     for byte in body.encode():
         total ^= byte
@@ -25,12 +25,14 @@ def sentence(body):
 class Gps:
     """A GPS receiver, which transmits on clock events.
 
-    speed(t_s): of the vehicle, m/s. hz: fixes per second. latency_s: time from a fix to its first byte. place(t_s):
-    latitude and longitude, degrees north and east; None: a fixed position.
-
-    kinds: the sentences to send, each of which contains a speed. talker: their first letters, the satellite system.
-    faults: [[kind, from_s, until_s], ...] where kind is "unplugged", "garbled" (occasional wrong bits), "void" (no fix)
-    or "stuck" (it repeats the last sentence).
+    speed: function speed(t_s) that returns the speed of the vehicle in m/s.
+    hz: fixes per second.
+    latency_s: time from a fix to its first byte.
+    place: function place(t_s) that returns latitude and longitude in degrees north and east. None: a fixed position.
+    kinds: the sentences to send. Each contains a speed.
+    talker: first letters of the sentences, which name the satellite system.
+    faults: [[kind, from_s, until_s], ...]. The kinds are "unplugged", "garbled" (occasional wrong bits), "void" (no
+        fix) and "stuck" (the receiver repeats the last sentence).
     """
 
     def __init__(

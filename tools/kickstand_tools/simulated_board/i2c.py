@@ -10,8 +10,11 @@ from .clock import NEVER_US
 class TransferFault:
     """A fault in the transfers number `first` to `last` to one address, if they begin between from_us and until_us.
 
-    kind: "nack"; "timeout"; "cut": in one transfer no byte from number `byte` on is acknowledged; "corrupt": the bits
-    of mask are inverted in read byte number `byte`.
+    kind: one of:
+        "nack": the transfers are not acknowledged.
+        "timeout": the wires are held.
+        "cut": in one transfer no byte from number `byte` on is acknowledged.
+        "corrupt": the bits of mask are inverted in the read byte number `byte`.
     """
 
     def __init__(self, kind, address, first, last, from_us=0, until_us=NEVER_US, byte=0, mask=0):
@@ -24,19 +27,21 @@ class TransferFault:
         self._count = 0
 
     def applies(self, address, number, now_us):
-        """True if the transfer that begins now has this fault."""
+        """Return True if the transfer that begins now has this fault."""
         first, last = self._numbers
         start, end = self._times
         return address == self._address and first <= number <= last and start <= now_us < end
 
     def begin(self, read):
-        """Called at each START: True (the device may answer), False (NACK) or None (the wires are held)."""
+        """Called at each START. Returns True if the device may answer, False for NACK, None if the wires are held."""
         self._count = 0
         return {"nack": False, "timeout": None}.get(self.kind, True)
 
     def on_write(self, value):
-        """The byte that the device receives when the controller sends value; None if the device does not acknowledge.
-        Byte 0 is the first one, usually the register address."""
+        """Return the byte that the device receives when the controller sends value.
+
+        Returns None if the device does not acknowledge. Byte 0 is the first byte, usually the register address.
+        """
         self._count += 1
         if self.kind != "cut" or self._count <= self._byte:
             return value
@@ -44,7 +49,7 @@ class TransferFault:
         return None
 
     def on_read(self, value):
-        """The byte that the controller receives when a device sends value."""
+        """Return the byte that the controller receives when a device sends value."""
         number = self._count
         self._count += 1
         return value ^ self.mask if self.kind == "corrupt" and number == self._byte else value
@@ -54,16 +59,20 @@ GOOD, OPEN, LOW = "good", "open", "low"  # states of a wire: good; without pull-
 
 
 class Bus:
-    """A bus. sda, scl: numbers of the microcontroller's pins. open: True during a transfer. sda_wire, scl_wire: GOOD,
-    OPEN or LOW."""
+    """A bus.
+
+    sda, scl: numbers of the microcontroller's pins.
+    open: True during a transfer.
+    sda_wire, scl_wire: GOOD, OPEN or LOW.
+    """
 
     def __init__(self, clock, sda, scl):
         self.clock = clock
         self.sda = sda
         self.scl = scl
         self.sda_wire = self.scl_wire = GOOD
-        self.devices = {}  # by address
-        self.transfers = {}  # by address: number of transfers so far
+        self.devices = {}  # {address: device}
+        self.transfers = {}  # {address: number of transfers so far}
         self.faults = []  # a list of TransferFault
         self._fault = None  # the fault of the current transfer
         self._device = None
@@ -83,7 +92,7 @@ class Bus:
             self._device = None
 
     def max_hz(self):
-        """The highest clock frequency that all devices allow."""
+        """Return the highest clock frequency that all devices allow."""
         return min([400_000] + [getattr(d, "max_hz", 400_000) for d in self.devices.values()])
 
     # For a controller
@@ -93,8 +102,10 @@ class Bus:
         return self._stuck_bits > 0
 
     def start(self, address, read):
-        """Send START or repeated START, and the address. Returns True if a device acknowledges, False if none does,
-        None if a device holds SDA low."""
+        """Send START or repeated START, and the address.
+
+        Returns True if a device acknowledges, False if no device does, None if a device holds SDA low.
+        """
         if self._stuck_bits > 0 or not self.sda_wire == self.scl_wire == GOOD:
             return None
         self._stuck_bits = -1  # START frees a device that waits for ACK
@@ -142,7 +153,7 @@ class Bus:
         self.open = False
 
     def hang(self, bits=8):
-        """Interrupt a read: the controller stops, and the device holds SDA low for `bits` more clocks."""
+        """Interrupt a read. The controller stops, and the device holds SDA low for `bits` more clocks."""
         self.stop()
         self._stuck_bits = bits
 
@@ -160,12 +171,17 @@ class Bus:
     # For pins
 
     def scl_level(self, pulled_up=False):
-        """The level of SCL, 0 or 1. pulled_up: True if the pin's own pull-up is on, which a wire without other pull-ups
-        needs."""
+        """Return the level of SCL, 0 or 1.
+
+        pulled_up: True if the pin's own pull-up is on. A wire without other pull-ups needs it.
+        """
         return self._level(self._driven_scl, self.scl_wire, pulled_up)
 
     def sda_level(self, pulled_up=False):
-        """The level of SDA: 0 if the controller or a device pulls it low, otherwise 1. pulled_up: see scl_level()."""
+        """Return the level of SDA. It is 0 if the controller or a device pulls it low, otherwise 1.
+
+        pulled_up: see scl_level().
+        """
         return self._level(0 if self._stuck_bits > 0 else self._driven_sda, self.sda_wire, pulled_up)
 
     @staticmethod

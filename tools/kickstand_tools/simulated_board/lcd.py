@@ -1,7 +1,7 @@
 """Models a 16x2 HD44780 character display on a PCF8574 backpack (HD44780U data sheet ADE-207-272).
 
-Wiring of the usual backpack: P0 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7; for others see WIRINGS. D0..D3 are not
-connected, so the controller reads them as ones. Data sent while the controller is busy is lost, as on the chip.
+The usual backpack has this wiring: P0 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7. WIRINGS has other wirings. D0..D3
+are not connected, so the controller reads them as ones. Data sent while the controller is busy is lost, as on the chip.
 """
 
 import re
@@ -10,17 +10,17 @@ from .glyphs import drawn, rom
 
 _RS, _RW, _E, _LIGHT = 0x01, 0x02, 0x04, 0x08
 
-POWER_UP_US = 40_000  # at 3.3 V; 15 ms at 5 V
+POWER_UP_US = 40_000  # busy time after power-up at 3.3 V; at 5 V it is 15 ms
 WAKE_US = (4100, 100)  # busy time after the first and second "function set, 8 bit" since power-up (figures 23, 24)
-CLEAR_US = 1520  # "clear display" and "return home"
+CLEAR_US = 1520  # busy time of "clear display" and "return home"
 COMMAND_US = 37
-DATA_US = 41  # 37 us, plus 4 us for the address counter
+DATA_US = 41  # busy time of a character: 37 us, plus 4 us for the address counter
 
-# Other backpacks: the pins of RS, R/W, E and backlight, the level that switches the backlight on, the pin of D4
+# Wirings of other backpacks: (pins of RS, R/W, E and backlight, level that switches the backlight on, pin of D4)
 WIRINGS = {2: (6, 5, 4, 7, 0, 0), 3: (4, 5, 6, 7, 1, 0), 4: (0, 1, 2, 3, 0, 4)}
 
 COLUMNS = 16
-_LINE = 40  # characters of a line in display memory, of which 16 are visible
+_LINE = 40  # number of characters of a line in display memory. Only 16 of them are visible
 # (address past the end of a line, address where the counter continues)
 _TWO_LINE_WRAPS = ((0x28, 0x40), (0x68, 0x00), (0x3F, 0x27), (-1, 0x67))
 _ONE_LINE_WRAPS = ((0x50, 0x00), (-1, 0x4F))
@@ -29,17 +29,21 @@ _LEAN_PAGE = re.compile("Lean +([0-9]+)° (left|right)?[ *]*$")
 
 
 def shown_lean(lines):
-    """The lean that the firmware's lean page shows, degrees, > 0 to the right. None if the two lines are another
-    page."""
+    """Return the lean that the firmware's lean page shows, in degrees, positive to the right.
+
+    Returns None if the two lines are another page.
+    """
     found = _LEAN_PAGE.match(lines[0])
     return found and float(found.group(1)) * (-1.0 if found.group(2) == "left" else 1.0)
 
 
 class Lcd:
-    """One display. address: 0x20..0x27 (PCF8574) or 0x38..0x3F (PCF8574A).
+    """A display.
 
-    wiring: of the backpack, 1 for the usual one, otherwise a key of WIRINGS.
-    changes: counts visible changes. lost: counts nibbles (bytes in 8-bit mode) that were sent while it was busy.
+    address: 0x20..0x27 (PCF8574) or 0x38..0x3F (PCF8574A).
+    wiring: wiring of the backpack, 1 for the usual one, otherwise a key of WIRINGS.
+    changes: number of visible changes.
+    lost: number of nibbles (bytes in 8-bit mode) that were sent while the display was busy.
     """
 
     max_hz = 100_000  # the PCF8574 is a standard-mode part
@@ -53,8 +57,9 @@ class Lcd:
         self.power_on()
 
     def power_on(self):
-        """Set the state after the internal reset: 8-bit mode, one line, off, busy for POWER_UP_US."""
-        self.ddram = bytearray(b" " * 128)  # by address: lines at 0x00..0x27 and 0x40..0x67
+        """Set the state after the internal reset. The display is off, has one line and 8-bit mode, and is busy for
+        POWER_UP_US."""
+        self.ddram = bytearray(b" " * 128)  # display memory, with the lines at 0x00..0x27 and 0x40..0x67
         self.cgram = bytearray(64)
         self.glyphs = [" "] * 8  # the patterns in cgram as text
         self.lost = 0
@@ -86,16 +91,16 @@ class Lcd:
 
     @property
     def backlight(self):
-        """True while the backlight is on."""
+        """Return True while the backlight is on."""
         return bool(self._port & _LIGHT)
 
     def codes(self):
-        """Two lists of the 16 visible character codes."""
+        """Return two lists of the 16 visible character codes."""
         places = [(self._shift + i) % _LINE for i in range(COLUMNS)]
         return [[self.ddram[start + place] for place in places] for start in (0x00, 0x40)]
 
     def text(self):
-        """Two strings of the 16 visible characters; blank while the display is off."""
+        """Return two strings of the 16 visible characters. They are blank while the display is off."""
         lines = ["".join([self._character(code) for code in line]) for line in self.codes()]
         if not self.on:
             lines = [" " * COLUMNS, " " * COLUMNS]
@@ -109,11 +114,11 @@ class Lcd:
     # The I2C side
 
     def start(self, address, read):
-        """START and address. True: acknowledged."""
+        """Receive START and address. Returns True to acknowledge."""
         return True
 
     def write_byte(self, value):
-        """Set the levels of the eight pins. When E falls, the earlier levels are used. True: ACK."""
+        """Set the levels of the eight pins. When E falls, the earlier levels are used. Returns True to acknowledge."""
         if self.wiring != 1:
             self._raw, value = value, self._as_usual(value)
         before = self._port
@@ -125,8 +130,8 @@ class Lcd:
         return True
 
     def read_byte(self):
-        """Read the eight pins. While R/W and E are high, D7..D4 carry the busy flag and the address counter, high
-        nibble first."""
+        """Read the eight pins. While R/W and E are high, D7..D4 carry the busy flag and the address counter. The high
+        nibble comes first."""
         port = self._port
         if self.wiring != 1:
             return self._raw

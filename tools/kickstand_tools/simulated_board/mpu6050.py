@@ -22,14 +22,14 @@ RESET, SLEEP = 0x80, 0x40  # PWR_MGMT_1
 FIFO_ENABLED, FIFO_RESET, SIG_COND_RESET = 0x40, 0x04, 0x01  # USER_CTRL
 DATA_RDY, FIFO_OFLOW = 0x01, 0x10  # INT_STATUS
 
-START_UP_US = 90_000  # after power-on and reset; the data sheet's worst case is 100 ms
-WAKE_US = 30_000  # from sleep to the first sample: gyro start-up time, PS 6.1
+START_UP_US = 90_000  # start-up time after power-on and reset; the data sheet's worst case is 100 ms
+WAKE_US = 30_000  # time from sleep to the first sample, the gyro's start-up time (PS 6.1)
 GYRO_LSB_PER_DPS = (131.0, 65.5, 32.8, 16.4)  # by range, GYRO_CONFIG bits 4 and 3
 DLPF_DELAY_US = (980, 1900, 2800, 4800, 8300, 13400, 18600, 980)  # delay of the gyro's low-pass, by DLPF_CFG
 
 ACCEL_TRIMS, GYRO_TRIMS = (13, 17, 22), (9, 14, 11)  # factory trim codes of x, y, z (RM pp. 9 to 11)
 
-# temperature in degrees C = counts / counts_per_c + zero_c.
+# The temperature in degrees C is counts / counts_per_c + zero_c.
 # temperature_in_fifo: True if the FIFO stores the temperature with accelerometer and gyro for any FIFO_EN.
 Variant = namedtuple(
     "Variant",
@@ -49,7 +49,7 @@ VARIANTS = {  # by WHO_AM_I, for the same chips as CHIPS in firmware/kickstand/i
 
 
 class Fifo:
-    """The chip's FIFO, which does not separate frames. size: its capacity in bytes."""
+    """The chip's FIFO. It contains bytes without marks between frames. size: its capacity in bytes."""
 
     def __init__(self, size):
         self.size = size
@@ -58,7 +58,7 @@ class Fifo:
 
     @property
     def count(self):
-        """Number of bytes waiting to be read."""
+        """Return the number of bytes that wait to be read."""
         return len(self._waiting)
 
     def clear(self):
@@ -66,14 +66,16 @@ class Fifo:
         self._waiting = b""
 
     def push(self, data, keep_old=False):
-        """Add bytes. Returns True if the FIFO was full: then the oldest bytes are lost, or with keep_old the new
-        bytes."""
+        """Add bytes. Returns True if the FIFO was full and bytes are lost.
+
+        keep_old: True to lose the new bytes, False to lose the oldest bytes.
+        """
         waiting = self._waiting + data
         self._waiting = waiting[: self.size] if keep_old else waiting[-self.size :]
         return len(waiting) > self.size
 
     def pop(self, count=1):
-        """Remove and return the oldest bytes. An empty FIFO repeats the byte read last (register map 4.31)."""
+        """Remove and return the oldest bytes. An empty FIFO repeats the byte that was read last (RM 4.31)."""
         data, self._waiting = self._waiting[:count], self._waiting[count:]
         if data:
             self._last = data[-1:]
@@ -81,14 +83,14 @@ class Fifo:
 
 
 class Mpu6050:
-    """One chip.
+    """A chip.
 
-    clock: a Clock; the model reads its now_us.
-    world(t_s): (fx, fy, fz in g, wx, wy, wz in deg/s[, temp_c]) along the chip's axes, including its offset and scale
-    errors.
-    self_test: result of each axis's self-test as a share of its factory trim: three of the accelerometer, then three of
-    the gyro. 1.0 is correct; at 0.0 the axis does not respond.
-    clock_error: relative error of the chip's sample rate, > 0 if it is too fast (0.01 = 1 %).
+    clock: a Clock. The model reads its now_us.
+    world: function world(t_s) that returns (fx, fy, fz in g, wx, wy, wz in deg/s[, temp_c]) along the chip's axes. The
+        values include the chip's offset and scale errors.
+    self_test: result of each axis's self-test, as a share of its factory trim. The first three are the accelerometer's,
+        then come the gyro's. 1.0 is correct. At 0.0 the axis does not respond.
+    clock_error: relative error of the chip's sample rate, positive if it is too fast (0.01 is 1 %).
     """
 
     def __init__(self, clock, world, who_am_i=0x68, address=0x68):
@@ -127,8 +129,14 @@ class Mpu6050:
             self._start_sampling(self._busy_us + WAKE_US)
 
     def supply_dip(self, leaves="asleep"):
-        """A short power loss. leaves: the state after it: "asleep" (data 0), "frozen" (asleep, the last data),
-        "default_ranges" (awake) or "torn" (asleep, and the rates of the frame being read are garbage)."""
+        """Lose the power for a short time.
+
+        leaves: the state after the loss, one of:
+            "asleep": asleep, all data is 0.
+            "frozen": asleep, the last data stays.
+            "default_ranges": awake.
+            "torn": asleep, and the rates of the frame that is being read are garbage.
+        """
         self._update()
         data = bytes(self._regs[ACCEL_XOUT_H : GYRO_ZOUT_L + 1])
         self.power_on()
@@ -142,25 +150,28 @@ class Mpu6050:
             self._start_sampling(self._busy_us)
 
     def override(self, value):
-        """Begin a fault. value: "freeze" for no new data, or the value of every data byte. None ends the fault."""
+        """Begin or end a fault. value: "freeze" for no new data, the value of every data byte, or None to end it."""
         self._update()
         self._override = value
 
     def peek(self, register):
-        """The content of a register, without the side effects of a read."""
+        """Return the content of a register, without the side effects of a read."""
         self._update()
         return self._regs[register]
 
     # The I2C side
 
     def start(self, address, read):
-        """START and address. Data read until the next START comes from one sample. True: ACK."""
+        """Receive START and address. Data that is read until the next START comes from one sample.
+
+        Returns True to acknowledge.
+        """
         self._update()
         self._expect_pointer = not read
         return True
 
     def write_byte(self, value):
-        """Receive the register address, then data. True: ACK, which the chip sends even if the write has no effect."""
+        """Receive the register address, then data. Returns True, because the chip acknowledges every write."""
         if self._expect_pointer:
             self._pointer = value & 0x7F
             self._expect_pointer = False
@@ -171,7 +182,7 @@ class Mpu6050:
         return True
 
     def read_byte(self):
-        """The content of the register at the pointer. The pointer then advances, except at FIFO_R_W."""
+        """Return the content of the register at the pointer. The pointer then advances, except at FIFO_R_W."""
         register = self._pointer
         if register == FIFO_R_W:
             return self.fifo.pop()[0]
@@ -187,7 +198,7 @@ class Mpu6050:
         return value
 
     def read_into(self, buf):
-        """Fill buf like repeated read_byte(), but from the FIFO in one step."""
+        """Fill buf as repeated read_byte() would. Bytes from the FIFO are read in one step."""
         if self._pointer == FIFO_R_W:
             buf[:] = self.fifo.pop(len(buf))
             return
@@ -236,7 +247,7 @@ class Mpu6050:
         self._regs[ACCEL_XOUT_H : GYRO_ZOUT_L + 1] = bytes([value] * 14)
 
     def _chosen(self, enabled):
-        """The data registers that FIFO_EN sends to the FIFO, in order."""
+        """Return the data registers that FIFO_EN sends to the FIFO, in order."""
         if self._variant.temperature_in_fifo:  # bit 4: gyro and temperature, bit 3: accelerometer and temperature
             enabled = (0xF0 if enabled & 0x10 else 0) | (0x88 if enabled & 0x08 else 0)
         chosen = list(range(0x3B, 0x41)) if enabled & 0x08 else []
@@ -270,7 +281,7 @@ class Mpu6050:
             return
         last = (now - self._first_us) * 1000 // self._period_ns
         if self._fifo_registers and self._regs[USER_CTRL] & FIFO_ENABLED:
-            # Skip samples that later samples would push out of the FIFO: its final content is the same
+            # Skip samples that later samples would push out of the FIFO, because its final content is the same
             kept = self.fifo.size // len(self._fifo_registers) + 2
             for number in range(max(self._next, last + 1 - kept), last + 1):
                 self._sample(number)
@@ -306,7 +317,7 @@ class Mpu6050:
         self._put(0x47, values[5] * self._gyro_lsb)
 
     def _with_self_test(self, values, force):
-        """The readings plus the factory trims of the axes in self-test (RM p. 11)."""
+        """Return the readings, with the factory trims added for the axes in self-test (RM p. 11)."""
         force, values = list(force[:3]), list(values)
         for k in range(3):
             if self._regs[ACCEL_CONFIG] & 0x80 >> k:

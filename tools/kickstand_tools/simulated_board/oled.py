@@ -10,27 +10,32 @@ from . import oled_text
 
 WIDTH, HEIGHT = 128, 64
 PAGES = HEIGHT // 8
-# By kind: columns of RAM, first visible column, low half of the status (measured on chips, in no data sheet)
+# {kind: (columns of RAM, first visible column, low half of the status)}. The status was measured on chips, because no
+# data sheet has it.
 _KINDS = {"ssd1306": (128, 0, 0x03), "sh1106": (132, 2, 0x08)}
-# The other controller's supply commands, which this one ignores. Commands with another meaning here are not listed
+# Supply commands of the other controller that this one ignores. Commands with another meaning here are not listed.
 _IGNORED = {"ssd1306": (0xAD, 0x8B), "sh1106": (0x8D, 0x20, 0x2E)}
-# Number of arguments by command
+# {command: number of its arguments}
 _ARGUMENTS = {0x81: 1, 0xA8: 1, 0xD3: 1, 0xD5: 1, 0xD9: 1, 0xDA: 1, 0xDB: 1}
 _OWN_ARGUMENTS = {
     "ssd1306": {0x20: 1, 0x21: 2, 0x22: 2, 0x8D: 1, 0x26: 6, 0x27: 6, 0x29: 5, 0x2A: 5, 0xA3: 2},
     "sh1106": {0xAD: 1},
 }
 _SWITCHES = {0xA0: "_flipped_columns", 0xA4: "_all_on", 0xA6: "inverted", 0xAE: "on"}  # bit 0 switches them on
-_OFF = 0x40  # bit of the status
+_OFF = 0x40  # bit of the status while the display is off
 
 
 class Oled:
-    """One display. kind: "ssd1306" or "sh1106".
+    """A display.
 
-    identity: low half of the status. alternate: True if rows alternate, as on a panel of 64 rows; on a panel of 32 rows
-    they are in sequence.
-    on: True if switched on. pumped: True if the pixels have their voltage. inverted, contrast, start_line: settings.
-    changes: counts visible changes.  unknown: counts commands that the controller does not have.
+    kind: "ssd1306" or "sh1106".
+    identity: low half of the status.
+    alternate: True if rows alternate, as on a panel of 64 rows. On a panel of 32 rows they are in sequence.
+    on: True if switched on.
+    pumped: True if the pixels have their voltage.
+    inverted, contrast, start_line: settings.
+    changes: number of visible changes.
+    unknown: number of received commands that the controller does not have.
     """
 
     max_hz = 400_000
@@ -48,7 +53,7 @@ class Oled:
         self.power_on()
 
     def power_on(self):
-        """Set the state after a reset: off, with arbitrary content in RAM."""
+        """Set the state after a reset. The display is off, and its RAM has arbitrary content."""
         self._power += 1
         self.ram = bytearray([(37 * i + 91 * self._power) & 0xFF for i in range(self._columns * PAGES)])
         self.on = self.pumped = self.inverted = self._all_on = False
@@ -72,12 +77,14 @@ class Oled:
 
     @property
     def backlight(self):
-        """True while pixels can be lit."""
+        """Return True while pixels can be lit."""
         return self.on and self.pumped
 
     def pixels(self):
-        """The visible pixels, row by row from the top: 8 pixels per byte, the leftmost in bit 7. Columns and rows are
-        both reversed, because modules are mounted with the cable's edge at the top."""
+        """Return the visible pixels, row by row from the top. A byte has 8 pixels, the leftmost in bit 7.
+
+        Columns and rows are both reversed, because modules are mounted with the cable's edge at the top.
+        """
         seen = bytearray(WIDTH // 8 * HEIGHT)
         if not self.backlight:
             return seen
@@ -93,16 +100,16 @@ class Oled:
 
     @property
     def rows(self):
-        """The number of driven rows: 64 or fewer."""
+        """Return the number of driven rows, at most 64."""
         return self._mux + 1
 
     def pages(self):
-        """The visible part of the RAM: 128 bytes per page."""
+        """Return the visible part of the RAM, 128 bytes per page."""
         starts = [page * self._columns + self._first for page in range(PAGES)]
         return [self.ram[start : start + WIDTH] for start in starts]
 
     def text(self):
-        """The two lines that a character display would show, see oled_text.py."""
+        """Return the two lines that a character display would show. See oled_text.py."""
         if self._read != self.changes:
             self._read = self.changes
             self._lines = oled_text.lines(self)
@@ -111,12 +118,12 @@ class Oled:
     # The I2C side
 
     def start(self, address, read):
-        """START and address. True: acknowledged."""
+        """Receive START and address. Returns True to acknowledge."""
         self._control = True
         return True
 
     def write_byte(self, value):
-        """A control byte, a command or one of its arguments, or eight pixels. True: ACK."""
+        """Receive a control byte, a command or its argument, or eight pixels. Returns True to acknowledge."""
         if self._control:
             self._one, self._data = bool(value & 0x80), bool(value & 0x40)
             self._control = False
@@ -129,7 +136,7 @@ class Oled:
         return True
 
     def read_byte(self):
-        """The status."""
+        """Return the status."""
         return self.identity | (0 if self.on else _OFF)
 
     # The controller
@@ -140,7 +147,7 @@ class Oled:
             self.ram[at] = value
             self.changes += 1
         first, last, top, bottom = self._window
-        if self._mode == 2:  # stay within the page; an SH1106 stops at its last column
+        if self._mode == 2:  # the address stays within the page; an SH1106 stops at its last column
             if self._column < self._columns - 1:
                 self._column += 1
             elif self.kind == "ssd1306":

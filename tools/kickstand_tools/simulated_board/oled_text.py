@@ -1,25 +1,25 @@
 """Reads an OLED's pixels as the two lines that a character display would show.
 
-So the same code can read every kind of display. Letters are recognised by their shapes, pictures
-(firmware/kickstand/ui/glance.py) by their digits and words.
+So the same code can read every kind of display. Letters are recognised by their shapes. Pictures
+(firmware/kickstand/ui/glance.py) are recognised by their digits and words.
 """
 
 from .fakes.framebuf_font import FONT
 
 _WIDTH = 128
 _BLANK = " " * 16
-_DIGIT_ROWS = 5  # pages of a large digit
+_DIGIT_ROWS = 5  # height of a large digit, in pages
 _DIGIT_COLUMNS = 24
 _SPREAD = [sum([3 << 2 * bit for bit in range(4) if nibble >> bit & 1]) for nibble in range(16)]
 _LETTERS = {bytes(FONT[8 * i : 8 * i + 8]): chr(32 + i) for i in range(95)}
-# The driver's pictures for other codes of an HD44780's ROM
+# The driver's pictures for codes of an HD44780's ROM that are not ASCII
 _LETTERS[bytes((0, 15, 9, 9, 15, 0, 0, 0))] = "\u00b0"
 _LETTERS[bytes((0, 0, 127, 62, 28, 8, 0, 0))] = "\u2192"
 _LETTERS[b"\xff" * 8] = "\u2588"
 for _columns in range(1, 5):
     _LETTERS[b"\xff" * (2 * _columns) + bytes(8 - 2 * _columns)] = "\u258e\u258d\u258b\u258a"[_columns - 1]
     _LETTERS[bytes(8 - 2 * _columns) + b"\xff" * (2 * _columns)] = "\u2595\u2590\u2590\u2590"[_columns - 1]
-# The same letters at twice the height: upper and lower half of each column in turn
+# The same letters at twice the height. The upper and the lower half of each column follow each other.
 _TALL = {
     bytes([half for column in shape for half in (_SPREAD[column & 15], _SPREAD[column >> 4])]): letter
     for shape, letter in _LETTERS.items()
@@ -27,8 +27,10 @@ _TALL = {
 
 
 def lines(oled):
-    """Two strings of 16 characters. They are blank if the display is dark, and contain "?" if it does not show one of
-    the firmware's pages. oled: an Oled."""
+    """Return two strings of 16 characters.
+
+    They are blank if the display is dark. They contain "?" if it does not show a page of the firmware. oled: an Oled.
+    """
     if not oled.backlight:
         return [_BLANK, _BLANK]
     pages = oled.pages()
@@ -51,13 +53,13 @@ def _cells(line):
 
 
 def _small(pages, page):
-    """The letters of 8x8 pixels in a page, or None."""
+    """Return the letters of 8x8 pixels in a page, or None."""
     letters = [_LETTERS.get(cell, "") for cell in _cells(pages[page])]
     return "".join(letters) if all(letters) else None
 
 
 def _tall(pages, page, inverted=0):
-    """The letters of 8x16 pixels in this page and the next, or None."""
+    """Return the letters of 8x16 pixels in this page and the next, or None."""
     letters = []
     for i in range(16):
         halves = [pages[page + k][8 * i + x] ^ inverted for x in range(8) for k in (0, 1)]
@@ -66,7 +68,7 @@ def _tall(pages, page, inverted=0):
 
 
 def _digit(pages, page, x):
-    """The large digit at column x whose top is in this page, or None."""
+    """Return the large digit at column x whose top is in this page, or None."""
     from kickstand.ui.glance import DIGITS
 
     seen = b"".join([bytes(pages[page + row][x : x + _DIGIT_COLUMNS]) for row in range(_DIGIT_ROWS)])
@@ -77,7 +79,7 @@ def _digit(pages, page, x):
 
 
 def _number(pages, page, *columns):
-    """The number whose digits are at these columns; leading digits may be missing."""
+    """Return the number whose digits are at these columns. Leading digits may be missing."""
     digits = [_digit(pages, page, x) for x in columns]
     while len(digits) > 1 and digits[0] is None:
         digits.pop(0)
@@ -85,7 +87,7 @@ def _number(pages, page, *columns):
 
 
 def _picture(pages, below):
-    """The two lines for a picture, or None. below: the line of text below the picture."""
+    """Return the two lines for a picture, or None. below: the line of text below the picture."""
     reason = _tall(pages, 5, 0xFF)
     if reason is not None:
         return "Lean  --", reason.strip()

@@ -4,7 +4,8 @@
 class Registers:
     """A device with registers and an advancing pointer.
 
-    contents: {register: value}, others read 0.  writable: the registers that store written values.
+    contents: {register: value}. Other registers read 0.
+    writable: the registers that store written values.
     """
 
     SIZE = 128  # number of registers, after which the pointer restarts
@@ -19,12 +20,12 @@ class Registers:
         self._pointer, self._first = 0, False
 
     def start(self, address, read):
-        """START and address. True: acknowledged."""
+        """Receive START and address. Returns True to acknowledge."""
         self._first = not read
         return True
 
     def write_byte(self, value):
-        """Receive the register's number, then data. True: ACK."""
+        """Receive the register's number, then data. Returns True to acknowledge."""
         if self._first:
             self._pointer, self._first = value % self.SIZE, False
             return True
@@ -35,7 +36,7 @@ class Registers:
         return True
 
     def read_byte(self):
-        """The content of the register at the pointer."""
+        """Return the content of the register at the pointer."""
         value = self.registers[self._pointer]
         self._pointer = (self._pointer + 1) % self.SIZE
         return value

@@ -1,13 +1,13 @@
 """Models the board's Bluetooth LE radio and its connection to one phone, in plain Python, on the board's clock.
 
-A phone is any object with heard(handle, data) and dropped(). It calls connect() and disconnect(), write(), read() and
-give_pin().
+A phone is any object with the methods heard(handle, data) and dropped(). It calls connect(), disconnect(), write(),
+read() and give_pin() of the radio.
 """
 
 from .clock import to_us
 
 EVENT_S = 0.03  # time between two connection events, at which waiting notifications are sent
-ROOM = 12  # notifications that NimBLE keeps on an ESP32; btstack on a Pico W has no limit
+ROOM = 12  # number of notifications that NimBLE keeps on an ESP32; btstack on a Pico W has no limit
 
 CONNECTED, DISCONNECTED, WRITTEN, GET_SECRET, SET_SECRET, PASSKEY = 1, 2, 3, 29, 30, 31
 READ, WRITE, NOTIFY = 0x02, 0x08, 0x10
@@ -19,11 +19,14 @@ _BOND = 2  # the type of the secret that pairing stores
 class Radio:
     """The radio of a board.
 
-    pairs: True if its MicroPython can ask for a PIN, as on an ESP32; then there is also little room for notifications.
-    found, named: the advertised data, or None. services: [(uuid, [(uuid, flags, handle), ...]), ...]. values: {handle:
-    bytes}.
-    phone: the connected phone, or None. away: True while the phone is out of reach. fails: True if active(True) raises
-    OSError."""
+    pairs: True if its MicroPython can ask for a PIN, as on an ESP32. Then it keeps at most ROOM notifications.
+    found, named: the advertised data, or None.
+    services: [(uuid, [(uuid, flags, handle), ...]), ...].
+    values: {handle: bytes}.
+    phone: the connected phone, or None.
+    away: True while the phone is out of reach.
+    fails: True if active(True) raises OSError.
+    """
 
     def __init__(self, clock, pairs=False, address=b"\x28\xcd\xc1\x0a\x1a\x2b"):
         self._clock = clock
@@ -100,8 +103,10 @@ class Radio:
     # Called by a phone
 
     def connect(self, phone, address=b"\x01\x02\x03\x04\x05\x06"):
-        """Connect a phone. Returns False if the board does not advertise. The address identifies a phone that has
-        already paired."""
+        """Connect a phone. Returns False if the board does not advertise.
+
+        address: the phone's address, by which the board knows a phone that has already paired.
+        """
         if self.found is None or self.phone is not None:
             return False
         self.found = self.named = None
@@ -121,7 +126,7 @@ class Radio:
         self._tell(DISCONNECTED, 0, 0, self.peer)
 
     def give_pin(self, pin):
-        """Pair with the PIN that the rider typed into the phone. True: it was right."""
+        """Pair with the PIN that the rider typed into the phone. Returns True if it was right."""
         if not self.config.get("mitm"):
             return False
         self._tell(PASSKEY, 0, _DISPLAY, 0)
@@ -130,12 +135,12 @@ class Radio:
         return self.paired
 
     def pair(self):
-        """Pair: the PIN was right."""
+        """Complete the pairing after the right PIN."""
         self.paired = True
         self._tell(SET_SECRET, _BOND, self.peer, b"\x00key")
 
     def write(self, handle, data):
-        """Write a value. Returns False if this is not allowed, or only after pairing."""
+        """Write a value. Returns False if writing is not allowed, or allowed only after pairing."""
         flags = self.flags[handle]
         if not flags & WRITE or (flags & WRITE_PAIRED and not self.paired):
             return False
@@ -144,6 +149,6 @@ class Radio:
         return True
 
     def read(self, handle):
-        """The value. None if reading is not allowed, or only after pairing."""
+        """Return a value, or None if reading is not allowed, or allowed only after pairing."""
         flags = self.flags[handle]
         return self.values[handle] if flags & READ and (self.paired or not flags & READ_PAIRED) else None

@@ -10,15 +10,21 @@ _DATA, _MULTIPLE, _STOP = 0xFE, 0xFC, 0xFD  # tokens
 class SdCard:
     """An SD card.
 
-    sectors: number of sectors.  cs: the pin that selects the card.  init_s: time to get ready after CMD0; None: never.
-    read_s: time from the command to the data.  busy_s: time for which the card is busy after each written sector.
-
+    sectors: number of sectors.
+    cs: the pin that selects the card.
+    init_s: time until the card is ready after CMD0. None: it is never ready.
+    read_s: time from the command to the data.
+    busy_s: time for which the card is busy after each written sector.
     driver: False if the board lacks the driver.
 
-    Faults that can be set at any time: rejects: number of the next writes to reject. busy_next_s: time for which the
-    card is busy after the next sector only. stuck: if True, a busy card stays busy. removed: if True, nothing answers.
+    These faults can be set at any time:
+        rejects: how many of the next writes to reject.
+        busy_next_s: time for which the card is busy after the next sector only.
+        stuck: True to keep a busy card busy.
+        removed: True if no card answers.
 
-    data: the written sectors by number, except sectors of zeros. most_hz: the highest clock rate so far.
+    data: {number: content} of the written sectors, except sectors of zeros.
+    most_hz: the highest clock rate so far.
     """
 
     def __init__(self, clock, sectors=1 << 20, cs=17, init_s=0.1, read_s=0.0005, busy_s=0.002, driver=True):
@@ -35,13 +41,13 @@ class SdCard:
         self._clock = clock
         self._init_s = init_s
         self._read_s = read_s
-        self._ready_us = None  # the time at which it becomes ready, after CMD0
-        self._busy_us = 0  # the time until which it is busy
+        self._ready_us = None  # the time at which the card becomes ready after CMD0
+        self._busy_us = 0  # the card is busy until this time
         self._command = b""
         self._answer = b""
         self._at = 0
         self._writing = 0  # the start token of the expected sector, 0 if no sector is expected
-        self._taking = 0  # bytes of a sector still to receive, including the check sum
+        self._taking = 0  # number of bytes of a sector that are still expected, including the checksum
         self._sector = 0
         self._selected = False
 

@@ -30,17 +30,23 @@ WIRING = {"rp2": ((4, 5), (6, 7), 15, 9, 14), "esp32": ((21, 22), (18, 19), 4, 1
 class Board:
     """A board. It is off until run() switches it on.
 
-    world(t_s): (fx, fy, fz, wx, wy, wz[, temp_c]) in g and deg/s along the chip's axes, including the chip's errors.
-    who_am_i: the fitted chip. display: "lcd", "ssd1306" or "sh1106". sensor_address, lcd_address: None if not fitted; 0
-    for the display's usual address.
-    one_bus: True if the display is on the sensor's wires. port: "rp2" or "esp32". clock: None for a new Clock, which
-    runs as fast as possible.
-    machine: a name in chips.MACHINES, which determines the port. Firmware first imported after install() sees this
-    board. Without `machine`, it sees the board that it was imported for, usually a Pico.
-    i2c_driver: of MicroPython on an ESP32, "new" or (up to 1.28) "legacy". sensor_pins, lcd_pins: (SDA, SCL); None for
-    those of WIRING. touched: the pins that the firmware has used so far. volts: voltages at the pins of an ADC, by pin
-    number. sent: the bytes written to UARTs.
     Times in seconds refer to the board's clock, which continues through resets and power cycles.
+
+    world: function world(t_s) that returns (fx, fy, fz, wx, wy, wz[, temp_c]) in g and deg/s along the chip's axes. The
+        values include the chip's errors.
+    who_am_i: the fitted chip.
+    display: "lcd", "ssd1306" or "sh1106".
+    sensor_address, lcd_address: the addresses. None: not fitted. 0 for the display: its usual address.
+    one_bus: True if the display is on the sensor's wires.
+    port: "rp2" or "esp32".
+    clock: None for a new Clock, which runs as fast as possible.
+    machine: a name in chips.MACHINES, which determines the port. Firmware that is first imported after install() sees
+        this board. Without `machine`, it sees the board that it was imported for, usually a Pico.
+    i2c_driver: driver of MicroPython on an ESP32, "new" or (up to version 1.28) "legacy".
+    sensor_pins, lcd_pins: (SDA, SCL). None for the pins in WIRING.
+    touched: the pins that the firmware has used so far.
+    volts: {pin number: voltage at this pin of an ADC}.
+    sent: the bytes that were written to UARTs.
     """
 
     def __init__(
@@ -165,22 +171,25 @@ class Board:
         self.clock.every(to_us(period_s), function)
 
     def press(self, at_s=None, for_s=0.15):
-        """Press the button at at_s for for_s. at_s: None for now or, if a press is still scheduled, for its end."""
+        """Press the button at at_s for for_s.
+
+        at_s: None to press now. If a press is still scheduled, the new one begins after it.
+        """
         self.button.press(None if at_s is None else to_us(at_s), to_us(for_s))
 
     # Parts that are connected and disconnected
 
     def fit_sensor(self):
-        """Connect it and switch its supply on."""
+        """Connect the sensor and switch its supply on."""
         self.sensor.power_on()
         self.sensor_bus.attach(self.sensor)
 
     def remove_sensor(self):
-        """Disconnect it."""
+        """Disconnect the sensor."""
         self.sensor_bus.detach(self.sensor)
 
     def fit_lcd(self):
-        """Connect it and switch its supply on."""
+        """Connect the display and switch its supply on."""
         self.lcd.power_on()
         self.lcd_bus.attach(self.lcd)
 
@@ -201,15 +210,15 @@ class Board:
         self.lcd.power_off()
 
     def fit_gps(self, speed, **kind):
-        """Connect a GPS receiver. speed(t_s): of the vehicle, m/s. kind: arguments of Gps."""
+        """Connect a GPS receiver. speed(t_s): speed of the vehicle in m/s. kind: further arguments of Gps."""
         self.gps = Gps(self.clock, speed, **kind)
 
     def fit_wheel(self, speed, **kind):
-        """Connect a wheel contact. speed(t_s): of the vehicle, m/s. kind: arguments of Wheel."""
+        """Connect a wheel contact. speed(t_s): speed of the vehicle in m/s. kind: further arguments of Wheel."""
         self.wheel = Wheel(self.clock, speed, **kind)
 
     def fit_card(self, **kind):
-        """Connect an SD card. Call it before install() to have the driver on the board. kind: arguments of SdCard."""
+        """Connect an SD card. Call this before install() to have the driver on the board. kind: arguments of SdCard."""
         self.card = SdCard(self.clock, **kind)
 
     # Called by the fake `machine`
@@ -229,7 +238,7 @@ class Board:
             self.wheel.connect(edge)
 
     def bus_on(self, sda, scl, hz):
-        """The bus on these pins, clocked at hz from now on. A bus on pins without wires has no devices."""
+        """Return the bus on these pins, clocked at hz from now on. A bus on pins without wires has no devices."""
         self.touched.update((sda, scl))
         for bus in self.buses:
             if (bus.sda, bus.scl) == (sda, scl):
@@ -241,7 +250,7 @@ class Board:
         return Bus(self.clock, sda, scl)
 
     def set_up_pin(self, number, mode, pull, level):
-        """Pin.init()."""
+        """Execute Pin.init()."""
         self.touched.add(number)
         self._pins.setdefault(number, [0, 0, 0, self.clock.now_us])[:3] = mode, pull, level or 0
         self._drive_wire(number, 1 if mode == fake_machine.Pin.IN else level or 0)
@@ -255,7 +264,7 @@ class Board:
             self._drive_wire(number, level)
 
     def pin_level(self, number):
-        """Pin.value()."""
+        """Return the result of Pin.value()."""
         mode, pull, level, since_us = self._pins.get(number, (fake_machine.Pin.IN, -1, 0, 0))
         for bus in self.buses:
             if number == bus.sda:

@@ -23,7 +23,8 @@ from ..deploy import bytecode
 from ..deploy.firmware_files import firmware_files
 
 _DATE = (1980, 1, 1, 0, 0, 0)
-# In this order: Pico; Pico 2 (Arm); ESP32-C3, C6, H2 and Pico 2 (RISC-V); all other ESP32
+# The boards of these architectures, in this order: Pico; Pico 2 (Arm); ESP32-C3, C6, H2 and Pico 2 (RISC-V); all other
+# ESP32
 ARCHITECTURES = ("armv6m", "armv7emsp", "rv32imc", "xtensawin")
 # Replaces pyserial and mpremote's module for terminals. Contains only the names that mpremote needs at its import.
 _STANDS_IN = {
@@ -34,13 +35,13 @@ _STANDS_IN = {
 }
 _MPREMOTE = ("__init__.py", "mp_errno.py", "transport.py", "transport_serial.py")
 _NUMPY = "lib/python3.12/site-packages/"  # the folder of numpy in the conda package
-# These folders are a third of numpy: parts for its developers, for compilers and for random numbers
+# These folders are a third of numpy. They contain parts for its developers, for compilers and for random numbers.
 _LEFT_OUT = ("/tests/", "/f2py/", "/random/", "/distutils/", "/testing/", "/include/", "/_pyinstaller/")
 _LICENCES = "info/licenses/"
 
 
 class _ToolsFinder(ModuleFinder):
-    """Finds only modules of kickstand_tools. An installed kickstand_tools has other packages beside it."""
+    """Finds only modules of kickstand_tools. An installed kickstand_tools is in a folder with other packages."""
 
     def find_module(self, name: str, path: Any, parent: Any = None) -> Any:
         if path is None and name != "kickstand_tools":
@@ -97,7 +98,7 @@ def _compiled() -> dict[str, bytes]:
     """Compile the firmware for every architecture in ARCHITECTURES.
 
     Returns {compiled/ARCHITECTURE/... .mpy: content}. The first architecture has all files. The other architectures
-    have only the files with machine code. The result is empty without a compiler. Then the board gets the sources.
+    have only the files with machine code. Without a compiler the result is empty, and the board gets the sources.
     """
     sources = sorted(firmware_path.PACKAGE.rglob("*.py"))
     first, *others = ARCHITECTURES

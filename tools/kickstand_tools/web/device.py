@@ -18,10 +18,10 @@ from ..simulated_board.simulator import Board
 from ..simulation.scripted.sensor_errors import Sensor
 
 PART_SEED = 1
-PART_SHARE = 0.5  # the errors of an ordinary sensor are up to half of the data sheet's limits
+PART_SHARE = 0.5  # the simulated sensor's errors, as a share of the data sheet's limits
 TICK_S = 0.02  # time between two records
 REST_US = 10_000  # length of a time step while no firmware runs
-CUT_AFTER_BYTES = 40  # number of bytes of a calibration's record that are written before the supply is cut
+CUT_AFTER_BYTES = 40  # bytes of a calibration that are written before the supply is cut
 FOREVER_S = 1e9
 SHORTEST_PRESS_US = 100_000  # shortest press of the button, in the board's time
 STATE = "view", "code", "step", "pose", "entry", "trusted", "fault"
@@ -66,8 +66,8 @@ class Device:
             now_us = board.clock.now_us
             if value:
                 self._pressed_us = now_us
-            # board.mjs times a press by the page's clock. After a stall both orders arrive at the same board time, and
-            # the firmware would not notice the press
+            # board.mjs times a press by the page's clock. After a stall, press and release can arrive at the same board
+            # time. Then the firmware would not notice the press.
             board.button.turn(value, now_us if value else max(now_us, self._pressed_us + SHORTEST_PRESS_US))
         elif name == "pose":
             if value in ("kickstand", "upright"):
@@ -103,7 +103,7 @@ class Device:
         self.board.clock.advance(REST_US)
 
     def resume(self, function):
-        """Like Board.run(), but without a start: for a function that continues a running firmware."""
+        """Call a function that continues a running firmware. Like Board.run(), but without starting the firmware."""
         try:
             function()
             return "returned"
@@ -136,7 +136,7 @@ class Device:
         self._ticks.append(tick)
 
     def _whole(self):
-        """Return False while the firmware writes to the display, because the text would be incomplete.
+        """Return True if the display's text is complete, False while the firmware writes to the display.
 
         The firmware writes some characters in each pass of its loop. A pass is shorter than a tick. So the text is
         complete if the display did not change during a tick.

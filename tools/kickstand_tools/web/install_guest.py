@@ -1,6 +1,7 @@
 """Runs `kickstand flash`, `status` and `check` in the browser, on CPython for WebAssembly.
 
-page/install/install.mjs calls this module. Results are JSON. They are {"refused": reason} if the board cannot be used.
+page/install/install.mjs calls this module. Results are JSON. If the board cannot be used, the result is
+{"refused": reason}.
 """
 
 import json

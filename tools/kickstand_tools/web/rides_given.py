@@ -50,8 +50,8 @@ class Given:
 def sorted_out(names: list[str]) -> Given:
     """Identify files in the working directory.
 
-    A calibration belongs to a ride if its name matches the ride's name. A ride without its own calibration gets the
-    last calibration that belongs to no ride. Every ride gets the last track.
+    A calibration belongs to a ride if its name matches the ride's name. Other rides get the last calibration that
+    belongs to no ride. Every ride gets the last track.
 
     names: names of the files, in the order in which the user chose them.
     """

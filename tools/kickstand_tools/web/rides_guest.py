@@ -181,7 +181,7 @@ def look(log, calibration, progress):
 
 @in_json
 def smooth(log, calibration, progress):
-    """Write LEAN.csv as `smooth` does. The lean from look() is reused if look() showed the same ride.
+    """Write LEAN.csv as `smooth` does. If look() has already computed the lean of this ride, it is reused.
 
     Returns {"path": path of LEAN.csv}.
     """
@@ -229,7 +229,7 @@ def _result_path(log, name):
 
 
 def _one_line(text):
-    """Return a message on one line, without the internal path of the folder of results."""
+    """Return a message on one line, without the path of the internal folder of results."""
     return re.sub(rf"{re.escape(str(MADE))}/[^/]*/", "", " ".join(text.split()))
 
 

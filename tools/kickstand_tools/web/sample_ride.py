@@ -16,7 +16,7 @@ from ..simulation.ride import SimulatedRide
 
 LOG, CALIBRATION = "simulated-ride.csv.gz", "simulated-ride.cal.json"
 PROFILE, SEED, SECONDS = "street", 2, 180.0
-_EACH = 2  # number of the sensor's readings per row of the log, as in a recording of a board
+_EACH = 2  # sensor readings per row of the log, as in a recording of a board
 
 
 _WIDE, _CHART, _MAP = 640.0, 190.0, 150.0  # width of the drawing, and heights of its chart and map
@@ -33,7 +33,7 @@ def _ride() -> SimulatedRide:
 def sample_ride() -> dict[str, bytes]:
     """Return {name: content} of the log and its calibration.
 
-    The log contains values of a GPS receiver. The calibration comes from six poses and then from two poses.
+    The log contains values of a GPS receiver. The calibration comes from six positions and then from two poses.
     """
     made = _ride()
     with tempfile.TemporaryDirectory() as directory:
@@ -52,9 +52,9 @@ def sample_ride() -> dict[str, bytes]:
 
 
 def preview() -> str:
-    """Draw the lean during the sample ride, and its road in the colours of the lean, as an SVG element.
+    """Draw the lean during the sample ride, and a map of its road coloured by lean.
 
-    The style sheet sets the colours of the classes left, right and road.
+    Returns an SVG element. The style sheet sets the colours of its classes left, right and road.
     """
     made = _ride()
     each = round(_EACH_S * made.rate_hz)

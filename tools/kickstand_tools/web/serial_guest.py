@@ -5,7 +5,7 @@ The page keeps running while this module waits for the board.
 
 import time
 
-from pyodide.ffi import run_sync  # waits for a promise of JavaScript
+from pyodide.ffi import run_sync  # waits for a JavaScript promise
 
 from ..deploy.connection import ANSWER_S, ConnectedBoard
 

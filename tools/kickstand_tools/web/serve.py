@@ -12,10 +12,12 @@ from typing import Any
 from urllib.parse import unquote, urlsplit
 
 HOST = "127.0.0.1"
-MOST, PATIENCE_S = 64, 10.0  # most connections at a time; longest wait for a browser's data
-FULL_S = 1.0  # wait of a new connection for a free place; then the oldest is ended, a silent one at once
+MOST, PATIENCE_S = 64, 10.0  # maximum number of connections; longest wait for a browser's data
+# Time that a new connection waits for a free place before the oldest connection is ended. If a connection has sent no
+# request, the oldest of these is ended immediately.
+FULL_S = 1.0
 PORT = 8377  # always the same, because the browser keeps files by address
-# Defined here, because the registry of Windows may have others, and then a browser does not run modules
+# Defined here, because the Windows registry may have other types. With a wrong type a browser does not run modules.
 TYPES = {
     ".css": "text/css; charset=utf-8",
     ".gz": "application/gzip",
@@ -34,8 +36,11 @@ TYPES = {
 
 
 class Server(ThreadingHTTPServer):
-    """Ignores a browser that disconnects. If there are more than MOST connections, it ends an old one: the oldest that
-    has sent no request, or otherwise the oldest of all."""
+    """Serves the site, and ignores a browser that disconnects.
+
+    With more than MOST connections the server ends an old one. It ends the oldest that has sent no request, or
+    otherwise the oldest of all.
+    """
 
     request_queue_size = 128
     daemon_threads = True
@@ -59,7 +64,7 @@ class Server(ThreadingHTTPServer):
         super().process_request(request, client_address)
 
     def _end_silent_connection(self) -> bool:
-        """End the oldest connection that has sent no request, and use its place; False if there is none."""
+        """End the oldest connection that has sent no request, and take its place. Return False without one."""
         with contextlib.suppress(OSError, StopIteration, RuntimeError):
             next(one for one in list(self._open) if one not in self.has_asked).shutdown(socket.SHUT_RDWR)
             return self._free.acquire(timeout=FULL_S)
@@ -79,7 +84,11 @@ class Server(ThreadingHTTPServer):
 
 
 def server(files: dict[str, bytes], port: int = PORT) -> Server:
-    """A server of {path: content}, on `port` or, if that is taken, on a free one. Its port is server_address[1]."""
+    """Return a server for the files of the site. Its port is server_address[1].
+
+    files: {path: content}.
+    port: the wanted port. If it is in use, the server uses a free port.
+    """
 
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"

@@ -23,8 +23,9 @@ _BOARDS = {"pico": wiring.PICO, "esp32": wiring.ESP32}
 _NARROW = 4  # number of poses side by side in the drawing for phones
 _STYLE = "style.css"  # the style sheet is a template too
 _SHOWN = ("Kickstand", "starting")  # the text on the drawn display
-_NOT_KEPT = ("service_worker.js", "index.html")  # stored anyway, the first as a worker, the second as "./"
-_WHEN_READ = (*LATER, documents.FOLDER)  # the browser stores these when they are opened
+# The service worker does not store these files. The browser stores the worker itself, and index.html is stored as "./".
+_NOT_KEPT = ("service_worker.js", "index.html")
+_WHEN_READ = (*LATER, documents.FOLDER)  # the service worker stores these when they are first opened
 
 
 def python_files() -> dict[str, str]:

@@ -4,7 +4,7 @@ Sources: data sheets of the chips; mpconfigboard.h of each board in ports/rp2/bo
 MicroPython.
 """
 
-# short name -> sys.implementation._machine of the board
+# {short name: sys.implementation._machine of the board}
 MACHINES = {
     "pico": "Raspberry Pi Pico with RP2040",
     "pico w": "Raspberry Pi Pico W with RP2040",
@@ -36,29 +36,29 @@ _ESP32_PINS = {
 
 
 def pins_of(machine):
-    """The GPIO numbers that machine.Pin accepts on this board. On a classic ESP32 these include the flash's pins."""
+    """Return the GPIO numbers that machine.Pin accepts. On a classic ESP32 they include the flash's pins."""
     ranges = ((0, 29),) if _chip(machine).startswith("RP2") else _ESP32_PINS[_kind(machine)]
     pins = frozenset(pin for first, last in ranges for pin in range(first, last + 1))
     return pins - {16, 17} if "SPIRAM" in machine else pins
 
 
 def flash_pins(machine):
-    """The pins, among those of pins_of(), that are connected to the flash with the program."""
+    """Return the pins in pins_of() that are connected to the flash with the program."""
     return frozenset(range(6, 12)) if _is_classic(machine) else frozenset()
 
 
 def inputs_only(machine):
-    """The pins that have neither an output nor a pull-up."""
+    """Return the pins that have neither an output nor a pull-up."""
     return frozenset(range(34, 40)) if _is_classic(machine) else frozenset()
 
 
 def i2c_controllers(machine):
-    """Number of I2C controllers that machine.I2C can use."""
+    """Return the number of I2C controllers that machine.I2C can use."""
     return 1 if _chip(machine)[:7] in ("ESP32C3", "ESP32C6") else 2  # machine.I2C lacks the C6's low-power controller
 
 
 def has_bluetooth(machine):
-    """True if MicroPython for this board has the module bluetooth."""
+    """Return True if MicroPython for this board has the module bluetooth."""
     chip = _chip(machine)
     return " W with " in machine if chip.startswith("RP2") else not chip.startswith("ESP32S2")
 
@@ -68,7 +68,7 @@ def _is_classic(machine):
 
 
 def _kind(machine):
-    """The key in _ESP32_PINS."""
+    """Return the board's key in _ESP32_PINS."""
     kind = _chip(machine)[5:7]
     return kind if kind in _ESP32_PINS else ""
 

@@ -33,6 +33,6 @@ def _module():
 
 
 def _no_viper(function):
-    """Raise NameError, as the annotations of viper functions do up to Python 3.13. Later Pythons do not evaluate
-    them."""
+    """Raise NameError, as the annotations of viper functions do up to Python 3.13. Later versions of Python do not
+    evaluate annotations."""
     raise NameError("CPython has no machine code")

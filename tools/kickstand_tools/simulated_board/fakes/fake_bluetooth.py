@@ -1,5 +1,5 @@
-"""MicroPython's `bluetooth` on the simulated board: the functions of a peripheral, on the radio of the board installed
-last. Errors are the same as in the ports with NimBLE (ESP32) and btstack (Pico W).
+"""MicroPython's `bluetooth` on the simulated board, with the functions of a peripheral. They use the radio of the board
+that was installed last. Errors are the same as in the ports with NimBLE (ESP32) and btstack (Pico W).
 """
 
 import errno

@@ -1,5 +1,5 @@
-"""MicroPython's `machine` on the simulated board: the parts that the firmware may use, with the errors of the rp2 and
-esp32 ports. All calls act on the board installed last.
+"""MicroPython's `machine` on the simulated board. It has the parts that the firmware may use, with the errors of the
+rp2 and esp32 ports. All calls act on the board that was installed last.
 """
 
 import errno
@@ -8,16 +8,16 @@ from ..clock import Reset
 from . import chips
 
 CALL_US = 2  # duration of a call into `machine`, without which a loop that waits for a pin would never end
-IRQ_US = 26  # duration of an interrupt without its calls into `machine` and `time`; with them 33, as on a Pico
+IRQ_US = 26  # duration of an interrupt without its calls into `machine` and `time`. With them it is 33, as on a Pico
 
 PWRON_RESET = 1
 WDT_RESET = 3  # the rp2 port reports this cause also after machine.reset()
 
 _TICK_MS = 10  # tick of FreeRTOS on an ESP32
-_LEGACY_MS = 100  # time-out of an ESP32's legacy driver for each byte, and once more at the end
+_LEGACY_MS = 100  # time-out of an ESP32's legacy driver per byte. It is added once more at the end of a transfer
 _SPI_CALL_US = 20  # duration of a call into machine.SPI, including the driver's Python code
 _RP2_MAX_WATCHDOG_MS = 8388
-_ESP32_TICKS = 4  # ticks of its watchdog's second stage per millisecond, counted in 32 bits (ESP-IDF)
+_ESP32_TICKS = 4  # ticks per millisecond of the second stage of an ESP32's watchdog, counted in 32 bits (ESP-IDF)
 _WATCHDOG_CTRL_CLEAR = 0x40058000 + 0x3000  # RP2040: writing bit 30 here stops the watchdog
 _WATCHDOG_ENABLE = 1 << 30
 
@@ -30,8 +30,8 @@ def use(installed):
 
 
 class Pin:
-    """machine.Pin: levels, and interrupts from the part wired to the pin. Handlers run while the simulated time
-    advances."""
+    """machine.Pin, with levels, and with interrupts from the part wired to the pin. Handlers run while the simulated
+    time advances."""
 
     IN, OUT, OPEN_DRAIN = 0, 1, 2
     PULL_UP, PULL_DOWN = 1, 2
@@ -49,7 +49,7 @@ class Pin:
     def init(self, mode=-1, pull=-1, value=None):
         machine = board.machine
         if self.id in chips.flash_pins(machine):
-            board.clock.reset()  # a crash: the next instruction cannot be read
+            board.clock.reset()  # the program crashes, because its next instruction cannot be read
         if self.id in chips.inputs_only(machine):
             if mode in (Pin.OUT, Pin.OPEN_DRAIN):
                 raise ValueError("pin can only be input")
@@ -96,9 +96,10 @@ class Irqs:
     """Interrupts that wait while a handler runs. If the queue is full, further interrupts are lost.
 
     An RP2040 keeps one more edge of a pin. On an ESP32, MicroPython calls the handlers of all pins between two steps of
-    the program. A transfer of SoftI2C is one step; meanwhile interrupts wait in the scheduler's queue.
+    the program. A transfer of SoftI2C is one step. During the transfer interrupts wait in the scheduler's queue.
 
-    clock: a Clock.  held: True during such a transfer.
+    clock: a Clock.
+    held: True during a transfer of SoftI2C.
     """
 
     SCHEDULED = 8  # the depth of MicroPython's queue
@@ -140,7 +141,7 @@ class _Controller:
         self._bus = board.bus_on(Pin(sda).id, Pin(scl).id, freq)
         self._clock = board.clock
         self._bit_ns = 1_000_000_000 // freq
-        self._ns = 0  # elapsed time below one microsecond, not yet added to the clock
+        self._ns = 0  # elapsed time of less than one microsecond that is not yet added to the clock
         self._timeout_us = timeout
         self._bytes = 0  # number of bytes in the current transfer, without the address byte
 
@@ -211,7 +212,7 @@ class _Controller:
             raise OSError(self._NO_DEVICE)
 
     def _stall(self):
-        """The wires are held: wait for the controller's time-out, then raise OSError."""
+        """Wait for the controller's time-out, because the wires are held, then raise OSError."""
         self._clock.advance(self._timeout_us)
         raise OSError(errno.ETIMEDOUT)
 
@@ -244,8 +245,8 @@ def _in_one_go(method):
 
 
 class SoftI2C(_Controller):
-    """machine.SoftI2C, in software on any two pins. It does not check whether a device holds SDA. The clocks of a
-    transfer let that device finish its byte, and the zeros that the device sends look like answers."""
+    """machine.SoftI2C, in software on any two pins. It does not check whether a device holds SDA. A device that holds
+    SDA finishes its byte during the clocks of the next transfer. The zeros that it sends look like answers."""
 
     def __init__(self, scl, sda, freq=400000, timeout=50000):
         super().__init__(scl, sda, freq, timeout)
@@ -325,7 +326,7 @@ class I2C(_Controller):
 
 
 class ADC:
-    """machine.ADC: measures the voltage in the board's `volts` for the pin."""
+    """machine.ADC. It measures the voltage of the pin in the board's `volts`."""
 
     def __init__(self, pin):
         self._number = pin.id if isinstance(pin, Pin) else pin
@@ -411,7 +412,7 @@ class WDT:
 
 
 class Timer:
-    """machine.Timer: its callback runs in the call that advances the time. period in ms."""
+    """machine.Timer. Its callback runs in the call that advances the time. period in ms."""
 
     ONE_SHOT, PERIODIC = 0, 1
 
@@ -440,7 +441,7 @@ class Timer:
 
 
 class _Mem32:
-    """machine.mem32: stores words. One register has a function: it stops the watchdog."""
+    """machine.mem32, which stores words. Only one register has a function. It stops the watchdog."""
 
     def __init__(self):
         self._words = {}

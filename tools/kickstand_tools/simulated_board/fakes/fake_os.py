@@ -32,8 +32,8 @@ def ilistdir(path="."):
 
 
 def statvfs(path):
-    """os.statvfs(). For a folder in the current directory, return the values of a Pico's flash that contains the
-    firmware and this folder, because the real file system may be very large."""
+    """Replaces os.statvfs(), because the host's file system may be very large. For a folder in the current directory,
+    return the values of a Pico's flash that contains the firmware and this folder."""
     if path.startswith("/"):
         return os.statvfs(path)
     free = FLASH_BLOCKS - FIRMWARE_BLOCKS - _taken(path)
@@ -41,7 +41,7 @@ def statvfs(path):
 
 
 def _taken(folder):
-    """Number of flash blocks of all files in a folder and its subfolders."""
+    """Return the number of flash blocks of all files in a folder and its subfolders."""
     blocks = 0
     for name, kind, *rest in ilistdir(folder):
         if kind & 0x4000:

@@ -7,8 +7,11 @@ MONO_HLSB = 3
 
 
 class FrameBuffer:
-    """A picture of width x height pixels in a buffer. In MONO_VLSB a byte holds eight rows of a column, the topmost row
-    in bit 0. In MONO_HLSB it holds eight columns of a row, the leftmost column in bit 7."""
+    """A picture of width x height pixels in a buffer.
+
+    In MONO_VLSB a byte holds eight rows of a column, with the topmost row in bit 0. In MONO_HLSB a byte holds eight
+    columns of a row, with the leftmost column in bit 7.
+    """
 
     def __init__(self, buffer, width, height, format):
         self._buffer = buffer

@@ -75,12 +75,12 @@ class _Esp32:
 
     @staticmethod
     def idf_heap_info(capabilities):
-        """One region of ESP-IDF's heap: its size, free bytes, largest free block, and least free bytes so far."""
+        """Return one region of ESP-IDF's heap as (size, free bytes, largest free block, fewest free bytes)."""
         return [(160_000, 0, 0, 0)]
 
 
 def _posing(port, machine):
-    """A module `sys` with platform `port`. machine: its implementation._machine, as in chips.MACHINES."""
+    """Return a module `sys` of another board. port: its platform. machine: its implementation._machine."""
     real = {name: getattr(sys, name) for name in dir(sys) if not name.startswith("__")}
     of = sys.implementation
     implementation = _filled(_Namespace(), {"name": of.name, "version": of.version, "_machine": machine})

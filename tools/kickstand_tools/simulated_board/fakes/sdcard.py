@@ -13,7 +13,12 @@ _TRIES = 100
 
 
 class SDCard:
-    """A block device. spi: a machine.SPI.  cs: a machine.Pin.  baudrate: Hz, once the card is ready."""
+    """A block device.
+
+    spi: a machine.SPI.
+    cs: a machine.Pin.
+    baudrate: clock rate in Hz after the card is ready.
+    """
 
     def __init__(self, spi, cs, baudrate=1320000):
         self.spi = spi

@@ -1,4 +1,4 @@
-"""Lists the documents, and makes the pages of them."""
+"""Lists the documents and converts them to pages of the site."""
 
 import posixpath
 import re
@@ -13,7 +13,7 @@ FOLDER = "docs/"  # in the site
 ALL = "all.html"
 _BETWEEN = "--"  # between a document's name and an anchor in it, on the page with all documents
 _TEMPLATE = Path(__file__).with_name("document.html")
-# In the order in which one reads them: (title of the group, paths in the project)
+# The documents in reading order: (title of the group, paths in the project)
 GROUPS = (
     ("Start", ("README.md",)),
     (
@@ -66,7 +66,7 @@ class Entry:
 
 
 def page_of(path: str) -> str:
-    """The name of a document's page in FOLDER.
+    """Return the name of a document's page in FOLDER.
 
     >>> page_of("firmware/README.md"), page_of("firmware/docs/live.md"), page_of("firmware/FAQ.md")
     ('device.html', 'live.html', 'faq.html')
@@ -75,8 +75,12 @@ def page_of(path: str) -> str:
 
 
 def document_files(home: str) -> dict[str, bytes]:
-    """{path in the site: content} of all documents, of one page with all of them, and of their pictures. home: the
-    address of the project, "" if it is unknown: then links to its other files and to its issues are left out."""
+    """Build the pages of all documents, one page with all of them together, and their pictures.
+
+    home: the project's address, or "" if it is unknown. Without it, links to the project's other files and to its
+        issues are left out.
+    Returns {path in the site: content}.
+    """
     root = firmware_path.documents()
     made = {path: _converted(root, path, home) for path in PATHS}
     groups = [(title, [Entry(made[path].title, page_of(path), path) for path in paths]) for title, paths in GROUPS]
@@ -92,8 +96,10 @@ def document_files(home: str) -> dict[str, bytes]:
 
 
 def _on_one_page(root: Path, home: str) -> Document:
-    """Return all documents as one, so the browser can search them together. Each anchor begins with its document's
-    name."""
+    """Join all documents to one, so the browser can search them together.
+
+    Each anchor begins with its document's name.
+    """
     made = [(_name_of(path), _converted(root, path, home, together=True)) for path in PATHS]
     headings = [Heading(2, name, document.title) for name, document in made]
     html = "\n".join(f'<section id="{name}">\n{document.html}</section>' for name, document in made)
@@ -110,7 +116,7 @@ def _converted(root: Path, path: str, home: str, together: bool = False) -> Docu
     here = posixpath.dirname(path)
 
     def link(target: str) -> str | None:
-        """Return the address in the site, or else at the project's home."""
+        """Return the target's address in the site. A file that is not in the site gets its address in the project."""
         outside = _OUTSIDE.match(target)
         if outside:
             if not outside[1].startswith("issues"):

@@ -1,5 +1,4 @@
-"""Converts a Markdown document to HTML. Headings get the anchors that GitHub gives them; the caller chooses the
-links."""
+"""Converts a Markdown document to HTML. Headings get the same anchors as on GitHub. The caller chooses the links."""
 
 import re
 from collections.abc import Callable
@@ -18,7 +17,12 @@ Link = Callable[[str], str | None]
 
 @dataclass
 class Heading:
-    """level: 1 is the title. name: the anchor. text: without markup."""
+    """A heading of a document.
+
+    level: 1 for the title.
+    name: its anchor.
+    text: its text without markup.
+    """
 
     level: int
     name: str
@@ -27,8 +31,13 @@ class Heading:
 
 @dataclass
 class Document:
-    """title: the text of the first heading. about: that of the first paragraph. headings: all but the title. html: the
-    whole document."""
+    """A converted document.
+
+    title: text of the first heading.
+    about: text of the first paragraph.
+    headings: all headings except the title.
+    html: the whole document.
+    """
 
     title: str
     about: str
@@ -37,7 +46,7 @@ class Document:
 
 
 def anchor(text: str) -> str:
-    """The name that GitHub gives a heading.
+    """Return the anchor that GitHub gives a heading.
 
     >>> anchor("MicroPython on an ESP32: `esptool`")
     'micropython-on-an-esp32-esptool'
@@ -46,9 +55,14 @@ def anchor(text: str) -> str:
 
 
 def converted(text: str, link: Link, picture: Callable[[str], str], deeper: int = 1, name: str = "") -> Document:
-    """Convert a document. link(target): the address of a link, None to leave out the link and keep its words.
-    picture(source): the address of a picture. deeper: a heading of level n becomes <h(n + deeper)>, because the site
-    has its own first heading. name: prefix of all anchors if several documents share a page."""
+    """Convert a document.
+
+    text: the document in Markdown.
+    link: function link(target) that returns the address of a link, or None to keep only the link's words.
+    picture: function picture(source) that returns the address of a picture.
+    deeper: number that is added to the levels of headings, because the site has its own first heading.
+    name: prefix of all anchors if several documents share a page.
+    """
     markdown = MarkdownIt("commonmark", {"html": True}).enable("table")
     tokens = markdown.parse(text)
     headings, about, table = [], "", 0
@@ -62,7 +76,7 @@ def converted(text: str, link: Link, picture: Callable[[str], str], deeper: int 
         elif token.type == "paragraph_open" and not about:
             about = _words(inside)
         elif token.type == "th_open" and not inside.content:
-            token.tag = tokens[at + 2].tag = "td"  # an empty cell is no header
+            token.tag = tokens[at + 2].tag = "td"  # an empty cell is not a header
         elif token.type == "html_block":
             token.content = _with_pictures(token.content, picture)
         elif token.type == "inline":
@@ -84,7 +98,7 @@ def converted(text: str, link: Link, picture: Callable[[str], str], deeper: int 
 
 
 def _words(inline: Token) -> str:
-    """The text of an inline token, without markup."""
+    """Return the text of an inline token, without markup."""
     return "".join(
         " " if token.type == "softbreak" else token.content
         for token in inline.children or []
@@ -93,7 +107,7 @@ def _words(inline: Token) -> str:
 
 
 def _linked(children: list[Token], link: Link, picture: Callable[[str], str]) -> list[Token]:
-    """Return the tokens with new addresses, without links that have no target."""
+    """Return the tokens with new addresses. Links for which link() returns None are removed."""
     kept: list[Token] = []
     open_links: list[bool] = []
     for token in children:

@@ -1,7 +1,8 @@
-// The motorcycle from behind, and the scale of its lean. Units: centimetres, the rear tyre's contact at 0, 0, y down.
+// Draws the motorcycle from behind, and the scale of its lean. Units: centimetres. The rear tyre touches the road at
+// 0, 0, and y points down.
 
-const RADIUS = 196; // of the scale
-const LIMIT = 60; // degrees at the scale's ends
+const RADIUS = 196; // radius of the scale
+const LIMIT = 60; // lean at the scale's ends, in degrees
 
 const BIKE = `
 <g id="body">
@@ -54,8 +55,8 @@ export class Bike {
     this.#shown = svg.querySelector(".shown");
   }
 
-  /** lean, shown: degrees, > 0 to the right. shown is null if the display shows no lean. pose: "kickstand", "upright"
-   * or "ride". */
+  /** lean: the true lean in degrees, positive to the right. shown: the display's lean, or null if it shows none. pose:
+   * "kickstand", "upright" or "ride". */
   draw(lean, shown, pose, speed, braking) {
     this.#body.setAttribute("transform", `rotate(${lean.toFixed(2)})`);
     this.#truth.setAttribute("transform", `rotate(${lean.toFixed(2)})`);

@@ -1,6 +1,6 @@
 // The page's side of worker.mjs: sends orders to the worker, and receives what the board shows.
 
-// as long as a finger's press; the click of a program is shorter than the bouncing of a contact
+// Shortest press: as long as a finger's press. A program's click is shorter than the bouncing of a contact.
 const SHORTEST_PRESS_MS = 120;
 
 export class Board {
@@ -8,7 +8,7 @@ export class Board {
   #pressedMs = 0;
   #down = false;
 
-  /** handlers: an object with the functions ready(), tick(tick), pressed(down), rate(rate), failed(text). */
+  /** handlers: an object with the functions ready(), tick(tick), pressed(down), rate(rate) and failed(text). */
   constructor(handlers) {
     this.#worker.onmessage = ({ data }) => {
       if (data.ready) handlers.ready();
@@ -28,18 +28,18 @@ export class Board {
     this.#worker.postMessage({ order: [name, value] });
   }
 
-  /** Send orders for times of the board, [[s, name, value], ...]. The board advances to these times as fast as it can.
-   * */
+  /** Send orders that the board carries out at certain times, as fast as it can. orders: [[s, name, value], ...] with
+   * the board's time in seconds. */
   ahead(orders) {
     this.#worker.postMessage({ ahead: orders });
   }
 
-  /** Stop the board: its worker has failed. */
+  /** Stop the board after its worker has failed. */
   end() {
     this.#worker.terminate();
   }
 
-  /** Press the button (true) or let it go. */
+  /** Press the button (true) or release it (false). */
   button(down) {
     if (down === this.#down) return;
     this.#down = down;

@@ -3,9 +3,9 @@
 const STEP_DEG = 5;
 const SLOWEST_KMH = 20; // lowest speed of a ride
 const CRUISE_KMH = 54; // speed at the start of a ride
-const DRAG_DEG = 75; // change of lean for a drag across half of the scene
+const DRAG_DEG = 75; // change of lean in degrees for a drag across half of the scene
 const TAP_MS = 150;
-const MOTION_MS = 1500; // a device with an orientation sensor reports within this time
+const MOTION_MS = 1500; // time within which a device with an orientation sensor reports
 
 const byId = (id) => document.getElementById(id);
 // If the chosen pose has the focus, the space bar presses the push button
@@ -24,10 +24,10 @@ export function connectButton(press) {
   }
   button.addEventListener("contextmenu", (event) => event.preventDefault());
   button.addEventListener("keydown", (event) => {
-    if (event.repeat && event.key === "Enter") event.preventDefault(); // a held key would press again and again
+    if (event.repeat && event.key === "Enter") event.preventDefault(); // a held key would press repeatedly
   });
   button.addEventListener("click", (event) => {
-    if (event.detail) return; // a pointer's click, which is already handled
+    if (event.detail) return; // the click of a mouse or finger, which is already handled
     press(true);
     setTimeout(() => press(false), TAP_MS);
   });
@@ -45,8 +45,8 @@ export function connectButton(press) {
 }
 
 /**
- * Pose, lean and speed. act(name, value) as for Board.order(). The poses are not radio buttons, because there the arrow
- * keys would change the pose. Here they always lean the bike.
+ * The controls of pose, lean and speed. They call act(name, value) with the arguments of Board.order(). The poses are
+ * not radio buttons, because then the arrow keys would change the pose. On this page they always lean the bike.
  */
 export class Steering {
   #act;
@@ -82,7 +82,7 @@ export class Steering {
     this.#act("lean", 0);
   }
 
-  /** Show the motorcycle's state on the sliders while it stands or comes to a stop. lean: degrees; speed: m/s. */
+  /** Show the motorcycle's state on the sliders while it stands or stops. lean: in degrees. speed: in m/s. */
   follow(lean, speed) {
     if (this.pose === "ride") return;
     this.#show(Math.round(lean));
@@ -111,7 +111,7 @@ export class Steering {
     this.#speed.setAttribute("aria-valuetext", text);
   }
 
-  /** Set the speed. kmh: as on the slider, or beyond its ends. */
+  /** Set the speed, in km/h. A speed beyond the slider's ends is limited to them. */
   #ride(kmh) {
     this.#speed.value = kmh;
     this.#wanted = this.#speed.valueAsNumber;
@@ -141,7 +141,7 @@ export class Steering {
     for (const name of ["pointerup", "pointercancel"]) scene.addEventListener(name, () => (from = null));
   }
 
-  /** Lean by the phone's tilt, counted from how it is held when the button is pressed. */
+  /** Lean the bike by tilting the phone. The phone's position when the button is pressed is upright. */
   #tilt(button) {
     if (!("DeviceOrientationEvent" in window) || !isSecureContext || !matchMedia("(pointer: coarse)").matches) return;
     button.hidden = false;
@@ -161,7 +161,7 @@ export class Steering {
     };
     button.addEventListener("click", async () => {
       const on = button.getAttribute("aria-pressed") !== "true";
-      // iOS asks the user, and only after a click
+      // iOS must ask the user for permission, and allows this only after a click
       const may = on && DeviceOrientationEvent.requestPermission ? await DeviceOrientationEvent.requestPermission() : "granted";
       clearTimeout(late);
       if (may !== "granted") return end("The browser does not tell this page how the device is held.");
@@ -176,12 +176,12 @@ export class Steering {
   }
 }
 
-/** m/s in words: "54 km/h". */
+/** Return a speed in m/s as text, such as "54 km/h". */
 export function speedText(speed) {
   return `${Math.round(speed * 3.6)} km/h`;
 }
 
-/** A lean in words: "12.3° left". */
+/** Return a lean as text, such as "12.3° left". */
 export function leanText(degrees, digits = 1) {
   const size = Math.abs(degrees).toFixed(digits);
   return Number(size) === 0 ? `${size}°` : `${size}° ${degrees < 0 ? "left" : "right"}`;

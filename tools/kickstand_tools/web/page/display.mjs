@@ -1,6 +1,6 @@
 // Draws the display dot by dot from the memory of its controller: 16x2 characters, or an OLED's 128x64 pixels.
 
-// In units of 0.1 mm, as on the usual module
+// Sizes of the usual LCD module, in units of 0.1 mm
 const DOT = [5, 6];
 const PITCH = [6, 7];
 const CELL = [36, 62];
@@ -11,7 +11,7 @@ const LINES = 2;
 const WIDTH = COLUMNS * CELL[0] + 2 * MARGIN;
 const HEIGHT = LINES * CELL[1] + 2 * MARGIN;
 const OLED = [128, 64];
-const OLED_MARGIN = 5; // glass around the OLED's picture, in its pixels
+const OLED_MARGIN = 5; // glass around the OLED's picture, in pixels of the OLED
 
 export class Display {
   #canvas;
@@ -20,8 +20,8 @@ export class Display {
   #waiting;
   #last = { codes: [[], []], cgram: [], lit: false };
 
-  /** canvas: the canvas to draw on. said: the element whose text a screen reader speaks. font: {code: eight rows of
-   * dots}. */
+  /** canvas: the canvas to draw on. said: the element whose text a screen reader speaks. font: {character code: its
+   * eight rows of dots}. */
   constructor(canvas, said, font) {
     this.#canvas = canvas;
     this.#said = said;
@@ -72,7 +72,7 @@ export class Display {
   }
 
   #drawLcd(context, { codes, cgram, lit }) {
-    // The canvas has exactly the pixels of the screen: a scaled canvas would show dots of different widths
+    // The canvas has exactly the pixels of the screen. If it were scaled, the dots would have different widths.
     const scale = (this.#canvas.clientWidth * devicePixelRatio) / WIDTH;
     this.#canvas.width = Math.round(WIDTH * scale);
     this.#canvas.height = Math.round(HEIGHT * scale);

@@ -1,6 +1,6 @@
 // Fetches files of the site for the pages.
 
-/** The Response. Throws an Error with one sentence if the site does not deliver the file. */
+/** Fetch a file and return the Response. Throws an Error with one sentence if the site does not deliver the file. */
 export async function fetched(url) {
   const answer = await fetch(url).catch(() => null);
   if (!answer) throw new Error(`${url} cannot be loaded: the server does not answer`);
@@ -8,8 +8,8 @@ export async function fetched(url) {
   return answer;
 }
 
-/** The bytes of files of the site, in their order. tell(done, of): in bytes by sizes.json, because a server may
- * compress files. */
+/** Fetch files of the site and return their bytes in the same order. tell(done, of) is called with the progress in
+ * bytes. The total is from sizes.json, because a server may compress files. */
 export async function fetchedAll(names, base, tell = () => {}) {
   const sizes = await (await fetched(new URL("sizes.json", base))).json();
   const of = names.reduce((sum, name) => sum + sizes[name], 0);

@@ -11,11 +11,11 @@ import { Road } from "./road.mjs";
 import { shows } from "./shows.mjs";
 
 const byId = (id) => document.getElementById(id);
-const SLOW = 0.9; // a lower pace than this share of real time is reported
-const MOST_S = 0.1; // the most that the road advances between two pictures
+const SLOW = 0.9; // a pace below this share of real time is reported
+const MOST_S = 0.1; // longest time by which the road advances between two pictures
 const settled = { kickstand: "kickstand", upright: "upright" };
 const FAULTS = {
-  // the text below the button's name: normally, and while the button is pressed
+  // the texts below the name of each button: while it is not pressed, and while it is pressed
   wire: ["plugged in", "out"],
   cut: ["not armed", "armed"],
   power: ["on", "off"],
@@ -84,7 +84,7 @@ const actions = {
     board.order("sensor", state.plugged);
   },
   power() {
-    state.armed = false; // the rider cuts the power, so this is no cut during a save
+    state.armed = false; // the visitor switches the power off, so no save will be cut
     board.order("power", !state.powered);
   },
   cut() {
@@ -99,7 +99,7 @@ byId("do").addEventListener("click", () => {
 });
 for (const id in FAULTS) {
   byId(id).addEventListener("click", (event) => {
-    // The guide explains and undoes this fault: on a phone the button may be out of sight
+    // Show the guide, which explains and undoes the fault. On a phone it may be out of sight.
     if (event.currentTarget.ariaPressed === "false") byId("todo").parentElement.scrollIntoView({ block: "nearest" });
     actions[id]();
   });
@@ -114,8 +114,8 @@ addEventListener("click", (event) => {
   if (event.detail && event.target.closest("button:not(#press, #do)")) document.activeElement.blur();
 });
 
-/** Move the focus to the control of the next step, or to where the arrow keys lean: the guide's button disappears with
- * its step. */
+/** Move the focus to the control of the next step, or to a place where the arrow keys lean the bike. This is needed
+ * because the guide's button disappears together with its step. */
 function focusPress() {
   byId("press").focus({ preventScroll: true });
 }

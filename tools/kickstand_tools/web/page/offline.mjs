@@ -1,9 +1,9 @@
 let registered = null;
 
 /**
- * Make the browser keep the site: then each page opens without a network. Files that a page loads on demand (see LATER
- * in web/site.py) are kept from their first use on. Resolves to true when the site is kept, to false if that is
- * impossible: without https, except on this computer's own address.
+ * Make the browser keep the site, so each page opens without a network. Files that a page loads on demand (see LATER in
+ * web/site.py) are kept after their first use. Resolves to true when the site is kept. Resolves to false if the browser
+ * cannot keep it, because the page came without https from another computer.
  */
 export async function keepOffline() {
   if (!navigator.serviceWorker || !isSecureContext) return false;
@@ -15,7 +15,7 @@ export async function keepOffline() {
 
 const LONGEST_MS = 5000;
 
-/** Wait until files fetched by the page will be kept. If that is impossible, wait only a short time. */
+/** Wait until the browser keeps the files that the page fetches. If it cannot keep them, wait only a short time. */
 export async function keptOffline() {
   if (!(await registered) || navigator.serviceWorker.controller) return;
   await new Promise((done) => {

@@ -7,13 +7,13 @@ const EDGES_M = [-5.4, 1.8]; // edges of the road, from the middle of the bike's
 const CENTRE_M = -1.8;
 const DASH_M = [4, 12]; // length of a dash, and distance between the beginnings of two
 const POST_M = 25; // distance between two posts at the roadside
-const HORIZON = 0.4; // share of the picture's height
+const HORIZON = 0.4; // distance of the horizon from the top, as a share of the picture's height
 
 export class Road {
   #canvas;
   #colours;
   #metres = 0;
-  #heading = 0; // rad, > 0 to the right
+  #heading = 0; // in rad, positive to the right
   #still = matchMedia("(prefers-reduced-motion: reduce)");
 
   constructor(canvas) {
@@ -29,14 +29,14 @@ export class Road {
     this.draw(0, 0, 0);
   }
 
-  /** Let `seconds` pass at this speed (m/s) and yaw rate (deg/s, > 0 in a left turn), and draw. */
+  /** Advance by `seconds` at this speed (m/s) and yaw rate (deg/s, positive in a left turn), and draw. */
   draw(speed, yawRate, seconds) {
     const right = (-yawRate * Math.PI) / 180;
     if (!this.#still.matches) {
       this.#metres += speed * seconds;
       this.#heading += right * seconds;
     }
-    const bend = speed > 1 && !this.#still.matches ? right / speed : 0; // 1/m
+    const bend = speed > 1 && !this.#still.matches ? right / speed : 0; // curvature in 1/m
     const { width, height } = this.#canvas;
     if (!width || !height) return;
     this.#colours ??= colours(this.#canvas);

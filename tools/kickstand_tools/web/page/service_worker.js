@@ -36,14 +36,13 @@ async function answer(request) {
   if (kept) return kept;
   const fetched = await fetch(request);
   if (fetched.ok) {
-    // A file that a page loads on demand is kept from then on if the browser has space; else it is fetched again each
-    // time
+    // Keep a file that a page loads on demand. If the browser has no space, the file is fetched again each time.
     await cache.put(request, fetched.clone()).catch(() => {});
   }
   return fetched;
 }
 
-/** The address under which a page is kept: the first page without its name, because some servers redirect that name. */
+/** Return the address under which a page is kept. It omits the first page's name, because some servers redirect it. */
 function named(request) {
   const { pathname } = new URL(request.url);
   return pathname === new URL("./index.html", location).pathname ? "./" : request;

@@ -1,6 +1,6 @@
 // Describes what the display shows, from the firmware's state (firmware/kickstand/state.py).
 
-// By the name of the view: its kind for the guide, and a few words to show beside the true lean
+// {name of a view: [its kind for the guide, a few words to show beside the true lean]}
 const VIEWS = {
   off: ["dark", "nothing"],
   starting: ["starting", "starting"],
@@ -17,7 +17,7 @@ const VIEWS = {
   raw: ["readings", "readings"],
   recording: ["recording", "recording"],
 };
-// pages that show a doubt while the lean is not trusted
+// Pages that say so while the firmware does not trust the lean
 const DOUBTED = ["lean", "maxima", "acceleration", "formula", "raw"];
 const ALIGNING = {
   ask: { kickstand: "ask-stand", upright: "ask-upright" },
@@ -25,8 +25,8 @@ const ALIGNING = {
 };
 
 /**
- * Return {kind, words}, or null for an unknown view. state: the result of Device.state() in web/device.py. If the lean
- * itself is shown, the kind is "lean".
+ * Return {kind, words}, or null for an unknown view. state: the result of Device.state() in web/device.py. The kind is
+ * "lean" if the display shows the lean.
  */
 export function shows(state) {
   if (state.view === "notice" && state.code === "stopped") return { kind: "stopped", words: "a fault" };

@@ -1,4 +1,4 @@
-// Reports a module that cannot be loaded, because the browser shows nothing
+// Shows a message if a module cannot be loaded. The browser itself shows nothing.
 addEventListener("error", (event) => {
   if (event.target.tagName !== "SCRIPT") return;
   document.getElementById("todo").textContent =

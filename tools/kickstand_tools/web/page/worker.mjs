@@ -1,22 +1,29 @@
-// Runs the board (firmware and models on MicroPython) in real time, outside the page's own thread.
-// Receives {order: [name, value]}, see Device.act() in web/device.py, {ahead: [[s, name, value], ...]}: orders that are
-// carried out at these times of the board, as fast as it can, and {awake: boolean}.
-// Sends {ready}, {ticks} from Device.take(), {rate}: the board's seconds per second, below 1 if the browser is too
-// slow, {orders} with the board's time of each order, so they can be repeated, and {failed: text}.
+// Runs the board (firmware and models on MicroPython) in real time, in a separate thread.
+//
+// Receives these messages:
+//     {order: [name, value]}: an order, see Device.act() in web/device.py.
+//     {ahead: [[s, name, value], ...]}: orders that are carried out at these board times, as fast as possible.
+//     {awake: boolean}: whether the board's time advances.
+// Sends these messages:
+//     {ready}: the board has started.
+//     {ticks}: the result of Device.take().
+//     {rate}: the board's pace, in seconds per second. It is below 1 if the browser is too slow.
+//     {orders}: the orders with the board time of each, so they can be repeated.
+//     {failed: text}: the reason for a failure.
 
 import { fetched } from "./fetched.mjs";
 import { loadMicroPython } from "./micropython/micropython.mjs";
 
 const PAUSE_MS = 8; // pause between two steps
-const SLICE_S = 0.1; // the board's time in one slice: garbage is collected only between two slices
+const SLICE_S = 0.1; // the board's time in one slice; garbage is collected only between two slices
 const LATE_S = 0.2; // after a longer delay the board does not catch up
 const RATE_MS = 2000; // the pace is measured over this time
 
-let device; // the device's functions, kept because each look-up would make a new function
+let device; // the device's functions, looked up once because each look-up creates a new function
 let boardS = 0; // the board's time
-let beganMs; // performance.now() at the board's time 0 (computed)
+let beganMs; // the value of performance.now() at the board's time 0, computed
 let awake = true;
-let waiting = []; // ticks of a start: a start is computed at once, but shown in its own time
+let waiting = []; // ticks of a start; they are computed at once, but shown in real time
 let lostS = 0;
 let ratedMs;
 
@@ -42,13 +49,13 @@ async function load() {
   device = { order: made.order, run_to: made.run_to, take: made.take };
 }
 
-/** Say plainly that the site does not deliver the .wasm file: MicroPython's own message is unclear. */
+/** Report that the site does not deliver the .wasm file, because MicroPython's own message is unclear. */
 async function missing(error) {
   await fetched("./micropython/micropython.wasm");
   throw error;
 }
 
-/** Advance the board's time to ours, and send what the board shows. */
+/** Advance the board's time to real time, and send what the board shows. */
 function go() {
   try {
     if (awake) follow();
@@ -81,7 +88,7 @@ function follow() {
   if (message.ticks.length || message.rate !== undefined) postMessage(message);
 }
 
-/** Advance the board's time ahead of ours, up to the last of these orders. */
+/** Advance the board's time beyond real time, up to the last of these orders. */
 function runAhead(orders) {
   for (const [atS, name, value] of orders) {
     while (boardS < atS) {

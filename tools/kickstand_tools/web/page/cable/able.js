@@ -1,4 +1,4 @@
-// Records before the page is drawn whether this browser can connect to a board. The browser must offer serial ports
-// (only over https or from this computer) and must let Python wait for them.
-document.documentElement.dataset.bluetooth = "bluetooth" in navigator ? "yes" : "no"; // of the page Live alone
+// Runs before the page is drawn, and records whether this browser can connect to a board. The browser must offer serial
+// ports. It offers them only over https or from this computer. It must also let Python wait for them.
+document.documentElement.dataset.bluetooth = "bluetooth" in navigator ? "yes" : "no"; // used only by the page Live
 document.documentElement.dataset.serial = "serial" in navigator && "Suspending" in WebAssembly ? "yes" : "no";

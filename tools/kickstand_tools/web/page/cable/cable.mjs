@@ -4,8 +4,8 @@
 import { keptOffline } from "../offline.mjs";
 
 const BAUD = 115200;
-const BUFFER = 65_536; // bytes that may arrive while the page is busy
-const BACK_MS = 10_000; // longest time until a restarted board is back
+const BUFFER = 65_536; // number of bytes that may arrive while the page is busy
+const BACK_MS = 10_000; // longest wait for a restarting board
 const AGAIN_MS = 300;
 export const ASKING = "Asking the board, which takes up to 15 seconds …"; // time limit for a silent board
 
@@ -16,7 +16,7 @@ export function showShare(bar, share) {
   else bar.removeAttribute("value");
 }
 
-/** The bytes of a serial port, for web/serial_guest.py. lost: nothing more can arrive. */
+/** Passes the bytes of a serial port to web/serial_guest.py. lost: true if nothing more can arrive. */
 export class SerialLine {
   lost = false;
   #port;
@@ -39,11 +39,11 @@ export class SerialLine {
         await this.sleep(AGAIN_MS);
       }
     }
-    // Like a terminal program: a Pico sends nothing to a host without it
+    // Terminal programs set these signals too. A Pico sends nothing to a host that does not set them.
     try {
       await this.#port.setSignals?.({ dataTerminalReady: true, requestToSend: true });
     } catch (error) {
-      await this.close(); // an open port could not be opened again
+      await this.close(); // if it stayed open, it could not be opened again
       throw error;
     }
     this.#read();
@@ -51,7 +51,7 @@ export class SerialLine {
 
   async #read() {
     let ended;
-    // After a disturbed byte or a break the port continues with another stream
+    // After a disturbed byte or a break, the port continues with a new stream
     while (!this.lost && this.#port.readable && this.#port.readable !== ended) {
       ended = this.#port.readable;
       try {
@@ -59,7 +59,7 @@ export class SerialLine {
         for (;;) {
           const { value, done } = await this.#reader.read();
           if (done) {
-            this.lost = true; // closed from here
+            this.lost = true; // this page closed the port
             break;
           }
           this.#received.push(value);
@@ -71,7 +71,7 @@ export class SerialLine {
     this.lost = true;
   }
 
-  /** All bytes received since the last call, a Uint8Array. */
+  /** Return all bytes received since the last call as a Uint8Array. */
   take() {
     const all = new Uint8Array(this.#received.reduce((length, chunk) => length + chunk.length, 0));
     let at = 0;
@@ -82,7 +82,7 @@ export class SerialLine {
     return all;
   }
 
-  /** data: bytes of Python. False: they could not be sent. */
+  /** Send bytes. data: a bytes object of Python. Returns false if they could not be sent. */
   async send(data) {
     const bytes = data.toJs();
     const writer = this.#port.writable?.getWriter();
@@ -103,24 +103,24 @@ export class SerialLine {
 
   async close() {
     this.lost = true; // otherwise #read would continue with the port's next stream
-    // Each of these fails if the cable is out. A port that is not closed could not be opened again.
+    // Each of these calls fails if the cable is unplugged. If the port stayed open, it could not be opened again.
     await this.#reader?.cancel().catch(() => {});
     this.#reader?.releaseLock();
     await this.#port.close().catch(() => {});
   }
 }
 
-/** A new Python with the tools. withNumpy: needed to write rides. */
+/** Start a new Python with the tools. withNumpy: true to load numpy, which is needed to write rides. */
 export async function python(withNumpy = false) {
-  await keptOffline(); // because the files fetched now must be kept, too
+  await keptOffline(); // the files that are fetched now must be kept too
   const { PACKAGES, loadPython } = await import("../python.mjs");
   const made = await loadPython(["install.zip", ...(withNumpy ? ["numpy/numpy.zip"] : [])]);
   made.runPython(`import sys; sys.path[:0] = ["${PACKAGES}/tools", "${PACKAGES}/firmware"]`);
   return made;
 }
 
-/** A function that calls load() once and returns its result. If load() fails, it calls tell(text) with the reason and
- * returns null, and the next call tries again. */
+/** Return a function that calls load() once and returns its result. If load() fails, the function calls tell(text) with
+ * the reason and returns null. Its next call tries again. */
 export function loadOnce(load) {
   let loaded;
   return async (tell) => {
@@ -134,7 +134,7 @@ export function loadOnce(load) {
   };
 }
 
-/** The port that the rider chooses, or null; tell(text) is called with the reason for none. */
+/** Ask the rider to choose a port. Returns the port. Without one, calls tell(text) with the reason and returns null. */
 export async function choosePort(tell) {
   try {
     return await navigator.serial.requestPort();
@@ -145,8 +145,8 @@ export async function choosePort(tell) {
 }
 
 /**
- * Open a SerialLine and return the result of use(line, name), with the port's name for messages. After an error call
- * tell(text) with it and return null.
+ * Open a SerialLine and return the result of use(line, name). The name of the port is for messages. After an error,
+ * call tell(text) with it and return null.
  */
 export async function overCable(port, tell, use, restarted = false) {
   const line = new SerialLine(port);

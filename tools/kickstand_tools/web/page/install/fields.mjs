@@ -4,7 +4,7 @@ const SIDES = [['"left"', "left"], ['"right"', "right"]];
 const SWITCH = [["True", "yes"], ["False", "no"]];
 const numbers = (...values) => values.map((value) => [String(value), String(value)]);
 
-// [title, open at first, [name, label, choices if only these are allowed]]
+// Groups of fields: [title, open at first, fields]. A field is [name, label, choices if no other value is allowed].
 export const GROUPS = [
   ["The motorcycle", true, [
     ["SIDE", "Its kickstand leans it to the", SIDES],
@@ -66,18 +66,18 @@ export class Fields {
     place.addEventListener("change", changed);
   }
 
-  /** settings: {name: value in config.py}; usual: {name: default value}; all as Python literals. */
+  /** Fill the form. settings: {name: value in config.py}. usual: {name: default value}. Values are Python literals. */
   fill(settings, usual) {
     this.#place.replaceChildren(...GROUPS.map(([title, open, fields]) => group(title, open, fields, settings, usual)));
     this.#marked = null;
   }
 
-  /** {name: value as a Python literal, or null for the default}. */
+  /** Return {name: value as a Python literal, or null for the default}. */
   values() {
     return Object.fromEntries([...this.#place.querySelectorAll("[name]")].map(({ name, value }) => [name, value.trim() || null]));
   }
 
-  /** Show a fault beside a field, instead of an earlier one. name: null for none. */
+  /** Show a fault beside a field, and remove the earlier fault. name: the setting, or null to show no fault. */
   mark(name, text) {
     if (this.#marked) {
       this.#marked.removeAttribute("aria-invalid");
@@ -111,7 +111,7 @@ function field(name, label, choices, value, usual) {
     const word = choices.find(([literal]) => same(literal, usual))?.[1] ?? usual;
     input.append(new Option(`${word} (usual)`, ""), ...choices.map(([literal, text]) => new Option(text, literal)));
     const chosen = [...input.options].find((option) => same(option.value, value));
-    if (chosen) chosen.value = value; // as the rider wrote it
+    if (chosen) chosen.value = value; // keeps the literal as the rider wrote it
     else if (value) input.append(new Option(value, value));
     input.value = value;
   } else {
@@ -123,8 +123,8 @@ function field(name, label, choices, value, usual) {
   return made;
 }
 
-/** True if these two values, both not empty, are equal in Python, as far as choices need it: 'left' is "left", and 0x68
- * is 104. */
+/** Return true if two literals have the same value in Python, for the literals that occur as choices. Examples: 'left'
+ * and "left", 0x68 and 104. Neither literal is empty. */
 function same(one, other) {
   const plain = (text) => (Number.isNaN(Number(text)) ? text.replaceAll("'", '"') : Number(text));
   return one !== "" && other !== "" && plain(one) === plain(other);

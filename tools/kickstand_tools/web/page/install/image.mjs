@@ -1,15 +1,15 @@
-// Writes MicroPython to an ESP32: the image is the rider's own file, and Espressif's esptool-js writes it.
+// Writes MicroPython to an ESP32 with Espressif's esptool-js. The rider chooses the image file.
 
 import { choosePort } from "../cable/cable.mjs";
 
-const BAUD = 460_800; // for the image; the chip is asked at its own rate
+const BAUD = 460_800; // baud rate for the image; the chip is identified at its own rate
 const IMAGE = 0xe9; // first byte of an image for an ESP32
-const CHIP_AT = 12; // place of its chip's number, 2 bytes
+const CHIP_AT = 12; // offset of the chip's number in the image, 2 bytes
 const CHIPS = { 0: "ESP32", 2: "ESP32-S2", 5: "ESP32-C3", 9: "ESP32-S3", 12: "ESP32-C2", 13: "ESP32-C6", 16: "ESP32-H2" };
-const MOST_BYTES = 16 << 20; // of the largest flash
+const MOST_BYTES = 16 << 20; // size of the largest flash
 const byId = (id) => document.getElementById(id);
 
-/** The number of the chip for this image, or an Error with the reason why it is not an image. */
+/** Return the number of the chip that an image is for. Throws an Error with the reason if the data is not an image. */
 export function chipOf(data) {
   if (data.length > MOST_BYTES || data[0] !== IMAGE) {
     throw new Error("This is no image for an ESP32: take the .bin file of your chip from micropython.org");
@@ -17,7 +17,7 @@ export function chipOf(data) {
   return data[CHIP_AT] | (data[CHIP_AT + 1] << 8);
 }
 
-/** atWork(on): called when work on a board begins and ends. */
+/** Connect the controls for an image. atWork(on) is called when work on a board begins and ends. */
 export function connectImage(atWork) {
   byId("image").addEventListener("click", async () => {
     const [file] = byId("image-file").files;
@@ -76,7 +76,7 @@ async function write(port, data, wanted) {
     });
     await loader.after("hard_reset");
   } finally {
-    await transport.disconnect().catch(() => {}); // it may already be gone
+    await transport.disconnect().catch(() => {}); // the port may already be gone
   }
 }
 

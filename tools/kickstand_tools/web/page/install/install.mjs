@@ -1,5 +1,6 @@
-// Installs the firmware and its config.py on a board at the browser's serial port with `kickstand flash`, and shows the
-// output of `kickstand status` and `check`, on CPython for WebAssembly (web/install_guest.py).
+// Installs the firmware and its config.py on a board at the browser's serial port, as `kickstand flash` does. Also
+// shows the output of `kickstand status` and `check`. The commands run on CPython for WebAssembly
+// (web/install_guest.py).
 
 import { ASKING, choosePort, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
@@ -87,8 +88,8 @@ function showResult({ refused, board: name, copied, kept, config_kept }) {
   tell(`Done: ${name}. ${files}.${config} The board starts now. ${next}`);
 }
 
-/** Ask the board for a text, to read and to copy into an issue. asks(tools, line, name, say): returns a promise of
- * JSON. */
+/** Show a text about the board that the rider can copy into an issue. asks(tools, line, name, say) returns a promise of
+ * the text as JSON. */
 async function report(asks) {
   const say = (text) => (byId("status-said").textContent = text);
   const port = await choosePort(say);
@@ -112,10 +113,10 @@ async function report(asks) {
   byId("status-shown").hidden = !text;
 }
 
-/** The output of `kickstand status`. */
+/** Show the output of `kickstand status`. */
 const status = () => report((tools, line, name) => tools.status.callPromising(line, name));
 
-/** `kickstand check`: its lines as they arrive, and instructions for the rider. */
+/** Run `kickstand check`, and show its lines as they arrive, with instructions for the rider. */
 const checkBoard = () =>
   report((tools, line, name, say) => {
     byId("status-shown").hidden = false;

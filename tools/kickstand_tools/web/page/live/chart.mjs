@@ -1,10 +1,11 @@
 // Draws lean (for a car the sideways force) and acceleration over the last minute on one canvas.
 
 const SPAN_S = 60;
-const LEFT = 46; // px for the numbers beside the plots
+const LEFT = 46; // width of the numbers beside the plots, in pixels
 const GAP = 26;
-const EVERY_S = 10; // distance of the grid's lines
-// value: of a moment; limit: at the upper end, minus it at the lower end; step: between two lines
+const EVERY_S = 10; // time between two vertical lines of the grid
+// value: function that returns the value of a moment. The plot reaches from -limit to limit. step: distance between two
+// of its lines.
 const ACCELERATION = {
   ...{ title: "acceleration: braking is down", value: ([, , forward]) => forward, limit: 1, step: 0.5, unit: " g" },
   ...{ share: 0.38, color: "--truth" },
@@ -17,7 +18,8 @@ export class Chart {
     this.#canvas = canvas;
   }
 
-  /** moments: those of LiveReading (rides/stream.py); until: s, at the right edge; measure: one of measures.mjs. */
+  /** Draw the chart. moments: as in LiveReading (rides/stream.py). until: time at the right edge, in s. The third
+   * argument is a measure of measures.mjs. */
   draw(moments, until, { value, limit, chart }) {
     const { clientWidth: width, clientHeight: height } = this.#canvas;
     const scale = devicePixelRatio;

@@ -1,4 +1,4 @@
-// Offers logs that came over the cable: to save them, or to open them in the page Rides.
+// Offers logs that came from a board. The rider saves them, or opens them in the page Rides.
 
 import { leavePulled } from "../rides/pulled.mjs";
 
@@ -9,13 +9,13 @@ addEventListener("beforeunload", (event) => {
   if (unsaved.size) event.preventDefault(); // the browser asks, because unsaved data is lost
 });
 
-/** on: work is in progress that leaving the page would end. */
+/** Note whether work is in progress that would end if the rider left the page. on: true or false. */
 export function busy(on) {
   if (on) unsaved.add(RUNNING);
   else unsaved.delete(RUNNING);
 }
 
-/** Add a ride to the list. title: text; files: [{name, data: Uint8Array}], the log and its calibration. */
+/** Add a ride to the list. title: a text. files: [{name, data: Uint8Array}] of the log and its calibration. */
 export function offer(list, title, files) {
   const item = document.createElement("li");
   item.append(Object.assign(document.createElement("strong"), { textContent: title }));

@@ -1,4 +1,4 @@
-// The big gauge: an arc from left to right that fills up to a value, with the maximum of each side marked.
+// Draws the big gauge, an arc from left to right that is filled up to a value. It also marks the maximum of each side.
 
 import { sideOf } from "./measures.mjs";
 
@@ -12,7 +12,7 @@ export class Gauge {
     this.#svg = svg;
   }
 
-  /** measure: one of measures.mjs. The scale is a half circle. */
+  /** Draw the scale, a half circle. measure: a measure of measures.mjs. */
   scale(measure) {
     this.#measure = measure;
     const { limit } = measure;
@@ -21,7 +21,7 @@ export class Gauge {
       <g class="marks">${this.#marks()}</g><path class="furthest left"/><path class="furthest right"/><path class="needle"/>`;
   }
 
-  /** value: > 0 to the right, or null if unknown. left, right: the maxima so far, both > 0, 0 for none. */
+  /** Show a value, positive to the right, or null if unknown. left, right: the maxima so far, both positive, or 0. */
   show(value, left, right) {
     const set = (name, path) => this.#svg.querySelector(name).setAttribute("d", path);
     set(".fill", value === null ? "" : this.#arc(0, value));
@@ -37,7 +37,7 @@ export class Gauge {
     return `${Math.abs(value).toFixed(digits)} ${spoken} ${sideOf(this.#measure, value)}`.trim();
   }
 
-  /** The point at this value on a circle, x y. */
+  /** Return the point at this value on a circle, as "x y". */
   #point(value, radius = RADIUS) {
     const { limit } = this.#measure;
     const angle = (Math.max(-limit, Math.min(limit, value)) / limit) * (Math.PI / 2);

@@ -1,4 +1,4 @@
-// Shows a board's stream, keeps it as a log, and fetches recorded rides from the board: `kickstand record` and
+// Shows a board's stream, keeps it as a log, and fetches recorded rides from the board. It runs `kickstand record` and
 // `kickstand pull` on CPython for WebAssembly (web/cable_guest.py).
 
 import { ASKING, choosePort, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
@@ -15,7 +15,7 @@ const byId = (id) => document.getElementById(id);
 const gauge = new Gauge(byId("gauge"));
 const chart = new Chart(byId("chart"));
 const player = new Player();
-const guests = loadOnce(async () => (await python(true)).pyimport("kickstand_tools.web.cable_guest")); // no board is posed here
+const guests = loadOnce(async () => (await python(true)).pyimport("kickstand_tools.web.cable_guest"));
 let live; // the LiveStream of cable_guest.py, or null
 let stopped = false;
 let awake = null; // a WakeLockSentinel
@@ -53,12 +53,12 @@ async function start() {
   if (said) tell(sentences(said.refused ? [said.refused] : ["Stopped", ...said.notes]));
 }
 
-/** Keep the screen on if the browser can. It stops doing so when the page is covered. */
+/** Keep the screen on if the browser can. The browser ends this when the page is no longer visible. */
 async function stayAwake() {
   awake = await navigator.wakeLock?.request("screen").catch(() => null);
 }
 
-/** Make room for values: before the first there are neither figures nor a chart. */
+/** Show the figures and the chart, which are hidden until the first value arrives. */
 const watch = () => (document.documentElement.dataset.watching = "yes");
 
 function received(text) {
@@ -87,7 +87,7 @@ const shown = {
 };
 
 async function ride() {
-  await stayAwake(); // while the button press still counts
+  await stayAwake(); // called first, because a browser may allow it only directly after a button press
   riding = new Riding(shown);
   await riding.run();
   riding = null;
@@ -157,12 +157,12 @@ async function pull() {
   say(sentences([sum, ...problems].filter(Boolean)));
 }
 
-/** Lines of the commands, one after the other. */
+/** Join the lines of a command to one text. */
 function sentences(lines) {
   return lines.map((line) => line.replace(/^./, (first) => first.toUpperCase())).join(". ") + ".";
 }
 
-/** From Python's [(name, bytes)]. */
+/** Convert Python's [(name, bytes)] to [{name, data}]. */
 function byName(list) {
   return list.toJs().map(([name, data]) => ({ name, data }));
 }
@@ -178,7 +178,7 @@ function clock(seconds) {
   return `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
 }
 
-/** From now on show this measure of measures.mjs. */
+/** Show this measure of measures.mjs from now on. */
 function show(wanted) {
   if (wanted === measure) return;
   measure = wanted;

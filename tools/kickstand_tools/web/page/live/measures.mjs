@@ -1,7 +1,10 @@
-// The value that the page shows: a motorcycle's lean; for a car, which does not lean, the specific force sideways.
+// The measures that the page Live can show. A motorcycle's measure is its lean. A car's measure is the specific force
+// sideways, because a car does not lean.
 //
-// value: of a moment of LiveReading (rides/stream.py), > 0 to the right, null if unknown. limit: at the ends of gauge
-// and chart; mark: between two marks of the gauge, every second one with a number.
+// value: function that returns the value of a moment of LiveReading (rides/stream.py). It is positive to the right, and
+//     null if unknown.
+// limit: value at the ends of gauge and chart.
+// mark: distance between two marks of the gauge. Every second mark has a number.
 
 export const LEAN = {
   title: "Lean now",
@@ -13,7 +16,7 @@ export const LEAN = {
   digits: 0,
   unit: "°",
   spoken: "degrees",
-  // The label beside the current acceleration
+  // The labels of the two maxima
   furthest: ["Most left", "Most right"],
   most: ({ max_left_deg, max_right_deg }) => [max_left_deg, max_right_deg],
 };
@@ -32,18 +35,18 @@ export const SIDEWAYS = {
   most: ({ max_brake_g, max_accel_g }) => [max_brake_g, max_accel_g],
 };
 
-/** A size with its unit. */
+/** Return the size of a value with its unit, without a sign. */
 export function written({ digits, unit }, value) {
   return `${Math.abs(value).toFixed(digits)}${unit}`;
 }
 
-/** The value with its sign; 0 has no sign. */
+/** Return the value with its sign. 0 has no sign. */
 export function signed(value) {
   const size = Math.abs(value).toFixed(2);
   return Number(size) === 0 ? size : `${value < 0 ? "−" : "+"}${size}`;
 }
 
-/** "left" or "right", "" if the size is shown as 0. */
+/** Return "left" or "right", or "" if the value is shown as 0. */
 export function sideOf({ digits }, value) {
   if (Number(value.toFixed(digits)) === 0) return "";
   return value < 0 ? "left" : "right";

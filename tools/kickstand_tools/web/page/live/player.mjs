@@ -1,14 +1,15 @@
-// Readings arrive in blocks of half a second. They are played at the pace of the recording, half a second late.
+// Plays readings that arrive in blocks of half a second. They are shown at the pace of the recording, half a second
+// late.
 
 const KEPT_S = 62;
-const STALE_MS = 1200; // after this time without a block (two are missing) the shown value is no longer valid
+const STALE_MS = 1200; // if no block arrives for this time (two are missing), the shown value is no longer valid
 const JUMP_S = 0.7;
 const EASE = 0.1; // share of a block's earliness or delay that is corrected
 
 export class Player {
   /** The moments of the last minute, as in LiveReading (rides/stream.py). */
   moments = [];
-  #late = null; // s of our time minus s of the recording
+  #late = null; // the browser's time minus the recording's time, in s
   #heardMs = -Infinity;
 
   /** Forget earlier moments before another recording is played. */
@@ -28,8 +29,8 @@ export class Player {
     this.moments.splice(0, this.moments.findIndex(([s]) => s >= since));
   }
 
-  /** {moment, until}: the moment to show now, null if nothing has arrived for too long; and the current time of the
-   * recording, s. */
+  /** Return {moment, until}. moment: the moment to show now, or null if nothing has arrived for STALE_MS. until: the
+   * current time of the recording, in s. */
   now(nowMs) {
     const last = this.moments.at(-1);
     if (!last) return { moment: null, until: 0 };

@@ -1,10 +1,10 @@
-// A board to watch without a real one: the firmware on the simulated board of the page Try, on a repeating ride.
+// A simulated board for visitors without a real one. It runs the firmware, as on the page Try, during a repeated ride.
 
 import { Board } from "../board.mjs";
 
 const CRUISE_MPS = 17;
 const TOWN_MPS = 9;
-// s of the board's time: the two presses, and straight ahead until the firmware is sure of its lean
+// [board time in s, action, value]: the two presses, then riding straight until the firmware is sure of its lean
 const BEFORE = [
   [1.5, "button", true],
   [1.7, "button", false],
@@ -14,7 +14,7 @@ const BEFORE = [
   [15, "pose", CRUISE_MPS],
   [27, "lean", 0],
 ];
-// The rider's actions with their durations in seconds, repeated
+// The repeated actions of the rider: [duration in s, action, value]
 const RIDE = [
   [4, "lean", 28],
   [3.5, "lean", -36],
@@ -37,7 +37,8 @@ export class SimulatedRide {
   #leg = 0;
   #furthest = { max_left_deg: 0, max_right_deg: 0 };
 
-  /** shown: moment([s, lean, forward g, null]) and furthest({max_left_deg, max_right_deg}) are called; tell(text). */
+  /** shown: object whose functions moment([s, lean, forward g, null]) and furthest({max_left_deg, max_right_deg}) are
+   * called. tell(text) is called with messages. */
   constructor(shown, tell) {
     this.#shown = shown;
     this.#tell = tell;

@@ -1,14 +1,14 @@
-// The files given to the page, with their kinds, and a button to remove each.
+// Lists the files that were given to the page, with their kinds. Each has a button that removes it.
 
 const UNREADABLE = "it is a folder, or was changed or moved after it was given. Give it again, or what is in the folder";
 
 export class Held {
-  #files = new Map(); // by name, in the order given
+  #files = new Map(); // {name: file}, in the order in which they were given
   #found = { kinds: {}, why: {} };
   #place;
   #removed;
 
-  /** place: the <details> in which to show them. removed(): called when one was removed. */
+  /** place: the <details> element for the list. removed() is called when a file was removed. */
   constructor(place, removed) {
     this.#place = place;
     this.#removed = removed;
@@ -25,7 +25,7 @@ export class Held {
     return [...this.#files.values()];
   }
 
-  /** The files that the browser can read. For the others the reason is stored in why[name]. */
+  /** Return the files that the browser can read. For each other file, why[name] gets the reason. */
   async readable(why) {
     const tried = await Promise.allSettled(this.files.map((file) => file.slice(0, 1).arrayBuffer()));
     return this.files.filter(({ name }, k) => {
@@ -38,12 +38,13 @@ export class Held {
     return this.#files.get(name);
   }
 
-  /** found: {kinds: {name: kind}, why: {name: reason why it cannot be used}}, as far as known. */
+  /** Show the list. found: {kinds: {name: kind}, why: {name: reason why it cannot be used}}, for files that were
+   * identified. */
   show(found = this.#found) {
     this.#found = found;
     const { kinds, why } = found;
     const rows = this.files.map((file) => this.#row(file, kinds[file.name], why[file.name]));
-    this.#place.querySelector("ul").replaceChildren(...rows.toReversed()); // the last one first
+    this.#place.querySelector("ul").replaceChildren(...rows.toReversed()); // the newest file first
     const wrong = this.files.filter(({ name }) => why[name]).length;
     const count = rows.length === 1 ? "1 file" : `${rows.length} files`;
     this.#place.querySelector("summary").textContent = wrong ? `${count}, ${wrong} cannot be used` : count;
@@ -71,7 +72,7 @@ export class Held {
   }
 }
 
-/** Remove the name, which is shown beside the text. */
+/** Remove the file's name from the reason, because the list shows it beside the reason. */
 function without(name, why) {
   const words = why.startsWith(name) ? why.slice(name.length).replace(/^:? /, "") : why;
   return /[.?!]$/.test(words) ? words : `${words}.`;

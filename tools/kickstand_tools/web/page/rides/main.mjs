@@ -16,11 +16,11 @@ const tools = new Tools((done, of, loading) => {
   if (loading) showReady(done, of);
 });
 const held = new Held(byId("held"), () => sortOut([]));
-let rides = []; // from rides() of web/rides_guest.py, each with its result: see kept()
+let rides = []; // the rides from rides() of web/rides_guest.py, each with its results (see kept())
 let looked = null;
-let current = ""; // the ride chosen last
-let loaded = false; // Python, and everything that the tools need
-let turn = 0; // number of the current request: results of earlier ones are not shown
+let current = ""; // the ride that was chosen last
+let loaded = false; // true when Python and everything that the tools need are loaded
+let turn = 0; // number of the current request; results of earlier requests are not shown
 
 /** Show a ride. files: File objects, added to earlier ones. */
 export async function openRide(files) {
@@ -37,7 +37,7 @@ async function sortOut(added) {
     const unreadable = {};
     const files = await held.readable(unreadable);
     if (mine !== turn) return; // a later request has passed its files to the worker
-    if (tools.give(files)) [rides, looked] = [[], null]; // the results for them are gone
+    if (tools.give(files)) [rides, looked] = [[], null]; // the worker has lost its earlier results
     const found = await tools.call("rides", JSON.stringify(files.map(({ name }) => name)));
     return { ...found, why: { ...found.why, ...unreadable } };
   }, async (found) => {
@@ -63,7 +63,7 @@ async function sortOut(added) {
   }, true);
 }
 
-/** Return the ride, with its earlier results if its files are the same. given: its name among the given files. */
+/** Return the ride. It includes its earlier results if its files are the same. */
 function kept(ride) {
   const sources = [...ride.files, ...(ride.track ? [ride.track] : [])].map((name) => held.file(name));
   const bytes = sources.reduce((sum, file) => sum + file.size, 0);
@@ -123,7 +123,7 @@ async function look(ride) {
   });
 }
 
-/** The remarks about the shown ride. */
+/** Return the remarks about the shown ride. */
 function sayOf(ride) {
   const sample = ride.given === SAMPLE[0] ? "This ride is simulated: nobody has ridden it." : "";
   const aligned = ride.calibration ? "" : ride.fitted?.words;
@@ -155,7 +155,8 @@ async function saveLean() {
   }, () => say(""), true);
 }
 
-/** The page of the charts including the library. A frame without this page's rights cannot use the offline files. */
+/** Return the page of the charts with the library in it. Its frame lacks this page's rights, so it cannot load files
+ * that are kept offline. */
 function whole(page, plotly, library) {
   const [allowed] = document.querySelector("meta[http-equiv]").content.match(/'sha256-[^']+'/); // see web/site.py
   return page
@@ -201,8 +202,8 @@ async function sample() {
 
 const chosen = () => rides[Math.max(0, byId("ride").selectedIndex)];
 
-/** Announce and do a piece of work, then show its result; or show why it failed, and return false. stays: keep the
- * current content meanwhile. */
+/** Announce text, call begin(), and show its result with show(). If it fails, show the reason and return false. stays:
+ * true to keep the current content meanwhile. */
 async function work(text, begin, show, stays = false) {
   const mine = ++turn;
   say(text);
@@ -244,7 +245,7 @@ function stop() {
   say("Stopped.");
 }
 
-/** Clear the page: results for the files are lost with the worker, and the shown ride could no longer be saved. */
+/** Clear the page. The worker has lost its results, so the shown ride could no longer be saved. */
 function forget() {
   rides = [];
   looked = null;

@@ -3,13 +3,13 @@
 
 const NAME = "pulled";
 
-/** files: [{name, data: Uint8Array}]. Throws an Error if the browser does not store them. */
+/** Store files: [{name, data: Uint8Array}]. Throws an Error if the browser does not store them. */
 export async function leavePulled(files) {
   const given = files.map(({ name, data }) => ({ name, data: data.slice().buffer }));
   await inStore((store) => store.put(given, NAME));
 }
 
-/** Take the files out of the store. Empty if there are none. */
+/** Return the files and remove them from the store. The list is empty without files. */
 export async function takePulled() {
   const found = await inStore((store) => {
     const reading = store.get(NAME);
@@ -19,7 +19,7 @@ export async function takePulled() {
   return (found ?? []).map(({ name, data }) => new File([data], name));
 }
 
-/** The result of the request made by begin(store), after the transaction is complete. */
+/** Return the result of the request that begin(store) makes, when the transaction is complete. */
 async function inStore(begin) {
   const opening = indexedDB.open("kickstand", 1);
   opening.onupgradeneeded = () => opening.result.createObjectStore("files");

@@ -8,7 +8,7 @@ function element(name, ...inside) {
   return made;
 }
 
-/** words, warnings: of look() in web/rides_guest.py; name: of the ride as given. */
+/** Show a report. words, warnings: from look() in web/rides_guest.py. name: the ride's name. */
 export function showReport({ words, warnings, name, calibration }) {
   byId("report-title").textContent = name;
   byId("calibration").textContent = calibration;
@@ -38,8 +38,8 @@ export function showReport({ words, warnings, name, calibration }) {
   for (const id of ["report", "more"]) byId(id).hidden = false;
 }
 
-/** page: the HTML of the charts, whose height depends on the width. Its frame is new, and visible before it loads: a
- * previously hidden frame may behave as if still hidden, and draw nothing. */
+/** Show the charts. page: their HTML. Its height depends on its width. The frame is new and visible before it loads. A
+ * frame that was hidden earlier may draw nothing. */
 export function showCharts(page) {
   byId("charts").hidden = byId("drawing").hidden = false;
   byId("drawing").textContent = "Drawing the charts …";
@@ -49,8 +49,7 @@ export function showCharts(page) {
   byId("plot").replaceWith(frame);
 }
 
-// The frame may run scripts, but has no access to this page. It sends messages: its height, and whether it has drawn or
-// cannot
+// The frame may run scripts, but has no access to this page. It sends its height, and whether it could draw the charts.
 addEventListener("message", ({ source, data }) => {
   if (source !== byId("plot").contentWindow) return;
   if (Number.isFinite(data?.height)) byId("plot").style.height = `${data.height}px`;

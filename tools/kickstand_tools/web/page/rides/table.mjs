@@ -1,9 +1,10 @@
-// Asks for the meaning and unit of a table's columns: the values of the options --columns and --units of `kickstand
-// import`.
+// Asks the visitor for the meanings and units of a table's columns. The answers are the values of the options --columns
+// and --units of `kickstand import`.
 
 const form = document.getElementById("table");
 
-/** table: from asked_for() of web/rides_guest.py. use(columns, units): called with the answers, {key: name}. */
+/** Ask about a table. table: from asked_for() of web/rides_guest.py. use(columns, units) is called with the answers.
+ * Each is {key: name}. */
 export function askColumns(name, table, use) {
   form.querySelector("legend").textContent = `Which column of ${name} is what?`;
   const columns = table.keys.map(([key, words, needed, found]) => {
@@ -31,7 +32,7 @@ export function askNothing() {
   form.hidden = true;
 }
 
-/** The first seconds of both sensors, in a small chart each, to check the choice of columns. */
+/** Draw the first seconds of each sensor in a small chart, so the visitor can check the choice of columns. */
 function drawn({ t = [], ...sensors }) {
   const words = { a: "acceleration", g: "rates" };
   return Object.entries(sensors).map(([key, axes]) => {

@@ -6,24 +6,24 @@ export class Tools {
   #before = Promise.resolve(); // calls run one after the other
   #tell;
 
-  /** tell(done, of, loading): the progress of a call, or with loading of the files fetched for it; (1, 1, true) when
-   * all are fetched. */
+  /** tell(done, of, loading) is called with the progress. loading: true for the progress of fetching the tools. After
+   * the last tool, tell(1, 1, true) is called. */
   constructor(tell) {
     this.#tell = tell;
   }
 
-  /** False if the worker has no files: none was opened, or the work was stopped or has failed. */
+  /** False if the worker has no files, because none was opened, or because the work was stopped or has failed. */
   get open() {
     return this.#worker !== null;
   }
 
-  /** Fetch and start Python, unless done. */
+  /** Fetch and start Python, if this is not yet done. */
   begin() {
     this.#worker ??= this.#start();
   }
 
-  /** Use these File objects instead of all earlier ones. Work in progress is abandoned. True if all results of earlier
-   * files are gone. */
+  /** Replace the files by these File objects, and abandon work in progress. Returns true if the results of all earlier
+   * files are lost. */
   give(files) {
     if (this.#answer) this.stop();
     const begins = !this.open;
@@ -32,7 +32,7 @@ export class Tools {
     return begins;
   }
 
-  /** The result of a function of web/rides_guest.py, with `made`: the bytes of the file that it made.
+  /** Call a function of web/rides_guest.py. Returns its result. If it made a file, `made` in the result has the bytes.
    *
    * Throws an Error with the line of a refusal. */
   call(...call) {
@@ -47,7 +47,7 @@ export class Tools {
     return said;
   }
 
-  /** Abandon work in progress, and the files. A caller that waits for a result waits for ever. */
+  /** Abandon work in progress, and the files. A caller that waits for a result never gets one. */
   stop() {
     this.#worker?.terminate();
     this.#worker = null;
@@ -60,7 +60,7 @@ export class Tools {
     worker.onmessage = ({ data }) => {
       if (data.of !== undefined) return this.#tell(data.done, data.of, data.loading);
       if (data.ready) return this.#tell(1, 1, true);
-      if (!this.#answer) return this.stop(); // fetching in advance failed: the next call tries again, and reports it
+      if (!this.#answer) return this.stop(); // fetching in advance has failed; the next call tries again
       const { resolve, reject } = this.#answer;
       this.#answer = null;
       if (data.failed || data.said.refused) reject(new Error(data.failed ?? data.said.refused));

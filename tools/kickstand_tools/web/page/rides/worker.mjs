@@ -1,14 +1,19 @@
-// The command-line tools, outside the page's own thread.
+// Runs the command-line tools in a separate thread.
 //
-// Receives {files}: the files given to the page, and {call: [name, ...arguments]}: a function of web/rides_guest.py.
-// Sends {done, of}: the progress of a call, or with {loading} of fetching the tools, {ready} after that, {said}: a
-// call's result, {failed: text}, and {made}: the file that a call made.
+// Receives these messages:
+//     {files}: the files that were given to the page.
+//     {call: [name, ...arguments]}: call a function of web/rides_guest.py.
+// Sends these messages:
+//     {done, of}: the progress of a call. With {loading}, the progress of fetching the tools.
+//     {ready}: the tools are fetched.
+//     {said}: the result of a call. With {made}, the file that the call made.
+//     {failed: text}: the reason for a failure.
 
 import { loadPython } from "../python.mjs";
 
 const GIVEN = "/given";
 const HERE = "/ride"; // Python's working directory
-const OFTEN_MS = 100; // between two messages of progress
+const OFTEN_MS = 100; // time between two messages about the progress
 
 let guest;
 let python;
@@ -31,7 +36,7 @@ async function load() {
   postMessage({ ready: true });
 }
 
-/** Mount the files: Python reads them in parts, and none is copied into its memory as a whole. */
+/** Mount the files, so Python reads them in parts instead of copying a whole file into memory. */
 function give(files) {
   if (mounted) python.FS.unmount(GIVEN);
   mounted = true;

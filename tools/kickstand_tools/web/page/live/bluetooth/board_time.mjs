@@ -1,15 +1,16 @@
-// Computes the time of a board from packets that contain 16 bits of it, in ms, and arrive late.
+// Computes a board's time from its packets. A packet contains only the lowest 16 bits of the time in ms, and arrives
+// late.
 
 const PERIOD = 65536;
-const DRIFT = 1e-4; // of a board's clock: apparent delay of a packet per second
+const DRIFT = 1e-4; // largest error of a board's clock, in seconds per second
 
 export class BoardTime {
-  #board = null; // ms of the previous packet, without overflow
+  #board = null; // time of the previous packet in ms, counted beyond 16 bits
   #arrived = 0;
-  #least = Infinity; // arrival minus board time of the fastest packet
+  #least = Infinity; // arrival time minus board time of the fastest packet, in ms
 
-  /** ms: of a packet that arrived at arrivedMs. Returns {s, lateMs}: its time since the first packet, in seconds, and
-   * its delay relative to the fastest packet. */
+  /** Take the time of a packet. ms: the 16 bits in the packet. arrivedMs: when it arrived. Returns {s, lateMs}. s: time
+   * since the first packet, in seconds. lateMs: the packet's delay relative to the fastest packet. */
   take(ms, arrivedMs) {
     const passed = arrivedMs - this.#arrived;
     if (this.#board === null) this.#board = this.#first = ms;
@@ -23,7 +24,7 @@ export class BoardTime {
     return { s: (this.#board - this.#first) / 1000, lateMs: offset - this.#least };
   }
 
-  /** Reset after a new connection, perhaps to a board that was switched off and on: earlier delays mean nothing. */
+  /** Forget earlier delays after a new connection, because the board may have restarted its clock. */
   reconnected() {
     this.#least = Infinity;
   }

@@ -3,9 +3,9 @@
 import { BOARD, NOW, PERIOD_MS, RATE, RIDE, SERVICE, VERSION } from "./packets.mjs";
 
 const AGAIN_MS = 1000;
-const QUIET_MS = 5000; // a connection that is silent for this time is treated as lost
+const QUIET_MS = 5000; // a connection without data for this time is treated as lost
 
-/** The board that the rider chooses, or null; tell(text) is called with the reason for none. */
+/** Ask the rider to choose a board. Returns it. Without one, calls tell(text) with the reason and returns null. */
 export async function chooseBoard(tell) {
   try {
     return await navigator.bluetooth.requestDevice({ filters: [{ services: [SERVICE] }] });
@@ -15,7 +15,8 @@ export async function chooseBoard(tell) {
   }
 }
 
-/** device: from chooseBoard(). on: callbacks {now(view), ride(view), state(text), back()} for packets and states. */
+/** A connection that receives packets. device: from chooseBoard(). on: object of the callbacks now(view) and ride(view)
+ * for packets, state(text), and back() after a restored connection. */
 export class Link {
   #device;
   #on;

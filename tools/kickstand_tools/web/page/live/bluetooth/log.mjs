@@ -17,8 +17,8 @@ export class BluetoothLog {
     return this.#lines.length ? this.#last : 0;
   }
 
-  /** now: from decodeNow(), at s seconds. Readings before the alignment have no axes and are left out, as are repeated
-   * ones. */
+  /** Add a reading. now: from decodeNow(). s: its time in seconds. Repeated readings are left out, and also readings
+   * before the alignment, because their axes are unknown. */
   take(now, s) {
     if (now.force.includes(null) || s <= this.#last) return;
     const fresh = now.speed !== this.#speed && now.speed !== null;
@@ -34,7 +34,7 @@ export class BluetoothLog {
     this.#trim = ride.trim_deg;
   }
 
-  /** [{name, data}], empty without readings. began: a Date. */
+  /** Return the files as [{name, data}]. The list is empty without readings. began: a Date, the start of the log. */
   files(began) {
     if (this.#lines.length < 2) return [];
     const stem = `bluetooth-${began.toISOString().slice(0, 19).replaceAll(/[-:]/g, "").replace("T", "-")}`;

@@ -12,7 +12,7 @@ export const NO_READINGS = 64;
 
 const UNKNOWN = -0x8000;
 
-/** view: DataView of a packet of the kind `now`. Unknown numbers are null; units are g and degrees per second. */
+/** Decode a packet of the kind `now`. view: its DataView. Unknown numbers are null. Units: g and degrees per second. */
 export function decodeNow(view) {
   const signed = (at, scale) => (view.getInt16(at, true) === UNKNOWN ? null : view.getInt16(at, true) / scale);
   const three = (at, scale) => [0, 2, 4].map((more) => signed(at + more, scale));
@@ -27,7 +27,7 @@ export function decodeNow(view) {
   };
 }
 
-/** view: of a packet of the kind `ride`. Returns its values with the names of LiveReading (rides/stream.py). */
+/** Decode a packet of the kind `ride`. view: its DataView. The result has the names in LiveReading (rides/stream.py). */
 export function decodeRide(view) {
   return {
     max_left_deg: view.getUint16(2, true) / 10,

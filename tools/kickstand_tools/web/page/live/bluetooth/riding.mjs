@@ -1,4 +1,4 @@
-// The page while a board on the motorcycle sends over Bluetooth: the lean fills the screen, and the readings are kept.
+// Runs the page while a board on the motorcycle sends over Bluetooth. The lean fills the screen. Readings are kept.
 
 import { busy, offer } from "../files.mjs";
 import { LEAN, SIDEWAYS } from "../measures.mjs";
@@ -11,7 +11,7 @@ import { Stops } from "./stops.mjs";
 const LATE_MS = 500; // an older packet, queued during a poor connection, is kept but not shown
 const byId = (id) => document.getElementById(id);
 
-/** shown: the object of this name in live.mjs. Ends when the rider stops it. */
+/** A ride over Bluetooth until the rider stops it. shown: the object of this name in live.mjs. */
 export class Riding {
   #shown;
   #link = null;
@@ -80,7 +80,7 @@ export class Riding {
   }
 }
 
-/** The text beside the lean, "" for none. */
+/** Return the text beside the lean, or "" for no text. */
 function said({ state, lean }) {
   if (state & NO_READINGS) return "The sensor gives no readings";
   if (!(state & ALIGNED)) return "The board is not aligned yet";

@@ -1,4 +1,4 @@
-// Finds the last stop: braking to a standstill.
+// Finds the last stop. A stop is braking to a standstill.
 
 const BRAKING_G = -0.1;
 const PAUSE_S = 1; // after a longer pause the braking has ended
@@ -10,7 +10,7 @@ export class Stops {
   #end = 0;
   #peak = 0;
 
-  /** forward: g, or null if unknown; atRest: the board has detected a standstill. */
+  /** Take a reading. forward: forward acceleration in g, or null if unknown. atRest: true at a detected standstill. */
   take(s, forward, atRest) {
     if (this.#begun !== null && s - this.#end > STOOD_S) this.#begun = null;
     if (atRest) {
