@@ -1,6 +1,7 @@
 """Whole simulated rides. A seed always gives the same ride, the values are in their stated ranges, and the logs are
 valid."""
 
+import functools
 import tracemalloc
 
 import numpy as np
@@ -15,9 +16,9 @@ from support.command import refused, works
 SHORT_S = 150.0
 
 
-@pytest.fixture(scope="module")
-def rides():
-    return {name: ride(name, 5, SHORT_S) for name in PROFILES}
+@functools.cache
+def ride_of(name):
+    return ride(name, 5, SHORT_S)
 
 
 def vehicle_readings(made):
@@ -41,8 +42,8 @@ def test_seed_determines_the_ride():
 
 
 @pytest.mark.parametrize("name", list(PROFILES))
-def test_simulated_values_are_possible_for_a_motorcycle(rides, name):
-    made = rides[name]
+def test_simulated_values_are_possible_for_a_motorcycle(name):
+    made = ride_of(name)
     truth = made.truth
     assert all(np.all(np.isfinite(values)) for values in [made.readings, *truth.values()])
     assert made.rate_hz == 200.0
@@ -69,39 +70,39 @@ def test_simulated_values_are_possible_for_a_motorcycle(rides, name):
         ("corners", (38, 60), (20, 45), (15, 60)),
     ],
 )
-def test_profiles_reach_their_stated_ranges(rides, name, lean, speed, yaw):
-    truth = rides[name].truth
+def test_profiles_reach_their_stated_ranges(name, lean, speed, yaw):
+    truth = ride_of(name).truth
     assert lean[0] < np.abs(truth["lean_deg"]).max() < lean[1]
     assert speed[0] < truth["speed_mps"].max() < speed[1]
     assert yaw[0] < np.abs(truth["yaw_rate_dps"]).max() < yaw[1]
 
 
-def test_each_profile_has_its_special_condition(rides):
-    turn = rides["sweeper"].phase == "turn"
+def test_each_profile_has_its_special_condition():
+    turn = ride_of("sweeper").phase == "turn"
     assert turn.sum() > 60 * 200
-    assert np.abs(rides["sweeper"].truth["lean_deg"][turn]).min() < 60.0
-    lean = rides["held"].truth["lean_deg"][rides["held"].phase == "turn"]
+    assert np.abs(ride_of("sweeper").truth["lean_deg"][turn]).min() < 60.0
+    lean = ride_of("held").truth["lean_deg"][ride_of("held").phase == "turn"]
     assert (lean > 25.0).sum() > 40 * 200 and (lean < -25.0).sum() > 40 * 200
-    city = rides["city"]
+    city = ride_of("city")
     assert ((city.truth["speed_mps"] == 0.0) & (city.phase == "stopped")).any() or "walking pace" in city.phase
-    assert np.abs(rides["hills"].truth["slope_deg"]).max() > 4.0
-    assert rides["wheelie"].truth["pitch_deg"].max() > 9.0
-    hard = np.gradient(rides["bumps"].truth["speed_mps"], 0.005)
+    assert np.abs(ride_of("hills").truth["slope_deg"]).max() > 4.0
+    assert ride_of("wheelie").truth["pitch_deg"].max() > 9.0
+    hard = np.gradient(ride_of("bumps").truth["speed_mps"], 0.005)
     assert hard.min() < -5.5
-    fallen = rides["fall"]
+    fallen = ride_of("fall")
     assert np.abs(fallen.truth["lean_deg"][-200:]) == pytest.approx(80.0, abs=2.0)
     assert (fallen.phase == "lying").sum() > 20 * 200
-    assert np.ptp(rides["parked"].truth["lean_deg"]) == 0.0
-    assert np.ptp(rides["temperature"].readings[:, 3]) > 5.0
-    windy = rides["crosswind"]
+    assert np.ptp(ride_of("parked").truth["lean_deg"]) == 0.0
+    assert np.ptp(ride_of("temperature").readings[:, 3]) > 5.0
+    windy = ride_of("crosswind")
     straight = (windy.phase == "straight") & (windy.truth["speed_mps"] > 10.0)
     straight[: len(straight) // 2] = False  # the wind turns in the middle of the ride
     assert np.abs(np.mean(windy.truth["lean_deg"][straight])) > 1.8
 
 
 @pytest.mark.parametrize("name", ["held", "corners", "weight"])
-def test_moving_rider_does_not_tilt_a_bike_on_its_stand(rides, name):
-    made = rides[name]
+def test_moving_rider_does_not_tilt_a_bike_on_its_stand(name):
+    made = ride_of(name)
     lean = made.truth["lean_deg"]
     assert np.ptp(lean[made.phase == "kickstand"]) < 0.02
     assert np.ptp(lean[(made.phase == "standing") & (made.truth["speed_mps"] == 0.0)]) < 1.5
