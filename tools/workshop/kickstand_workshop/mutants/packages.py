@@ -55,7 +55,9 @@ PACKAGES = {
     "logs": _package("tools/kickstand_tools/logs/*.py", "logs/test_log_parts logs/test_[!cm]* logs/test_c*"),
     "imports": _package("tools/kickstand_tools/imports/**/*.py", "imports/test_apps imports/test_[!a]*"),
     "joining": _package(
-        "tools/kickstand_tools/joining/*.py", "joining/test_joining_parts joining/test_[!m]* imports/test_joining"
+        "tools/kickstand_tools/joining/*.py",
+        "joining/test_joining_limits joining/test_joining_parts joining/test_track_steps"
+        " joining/test_matching joining/test_c* imports/test_joining",
     ),
     "estimation": _package(
         "tools/kickstand_tools/estimation/*.py", "estimation/test_estimation_parts estimation/test_[esa]*"
