@@ -35,7 +35,8 @@ PACKAGES = {
         "lean/test_known_ride lean/test_filter_states lean/test_[bkmru]* lean/test_formula",  # the others take longer
     ),
     "drive_alignment": _package(
-        "firmware/kickstand/drive_alignment/*.py", "drive_alignment/test_parts drive_alignment/test_drive*"
+        "firmware/kickstand/drive_alignment/*.py",
+        "drive_alignment/test_limits drive_alignment/test_parts drive_alignment/test_drive*",
     ),
     "speed": _package(
         "firmware/kickstand/speed/*.py", "simulated_board/test_board_speed simulated_board/test_board_place"
