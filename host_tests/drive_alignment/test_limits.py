@@ -385,7 +385,7 @@ def test_bias_and_vertical_are_means_over_the_stop():
     stand(standing, pitched(0.0), 3.0, rate=(1.0, 0.0, 0.0))
     stand(standing, pitched(1.0), 2.0, rate=(2.0, 0.0, 0.0))
     assert standing.bias == pytest.approx([1.0 + 20 / 41, 0.0, 0.0], rel=0.03)
-    assert np.degrees(np.arcsin(standing.up[2])) == pytest.approx(20 / 41, rel=0.03)
+    assert standing.up and np.degrees(np.arcsin(standing.up[2])) == pytest.approx(20 / 41, rel=0.03)
 
 
 def test_a_same_stop_differs_by_less_than_15_degrees():
@@ -411,7 +411,7 @@ def test_riding_straight_and_standing_differ_by_8_degrees(is_car, deg, problem):
 # alignment.py
 
 
-def drive(vehicle=CAR, **given) -> Any:
+def drive(vehicle: Any = CAR, **given: Any) -> Any:
     made: Any = DriveAlignment(vehicle)
     for name, value in given.items():
         target, _, attribute = name.rpartition("__")
@@ -522,7 +522,7 @@ def test_only_a_fresh_speed_proves_a_standstill():
 # background.py
 
 
-def background(**given) -> Any:
+def background(real=False, **given: Any) -> Any:
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):
         from kickstand.drive_alignment.background import BackgroundAlignment
     made: Any = object.__new__(BackgroundAlignment)
@@ -543,8 +543,9 @@ def background(**given) -> Any:
     for name, value in given.items():
         setattr(made, name, value)
     made.calls = calls
-    made._adopt = lambda anew: calls.append(("adopt", anew))
-    made._restart = lambda: calls.append("restart")
+    if not real:
+        made._adopt = lambda anew: calls.append(("adopt", anew))
+        made._restart = lambda: calls.append("restart")
     return made
 
 
@@ -648,6 +649,55 @@ def test_a_saved_alignment_has_the_whole_bias():
     made._active = SimpleNamespace(refine=seen.append)
     assert made._save("matrix", 0.5) is True
     assert seen == [("matrix", pytest.approx([1.1, 2.2, 3.3]), 0.5, True)]
+
+
+@pytest.mark.parametrize(
+    ("given", "up", "bias", "shown"),
+    [({}, True, True, False), ({"_leans": False}, False, True, False), ({"aligned": False}, False, False, False)]
+    + [({"_asked": True}, False, True, False), ({"_leans": False, "aligned": False}, False, False, True)]
+    + [({"shown": True}, True, True, True)],
+)
+def test_a_new_drive_knows_what_the_alignment_knows(given, up, bias, shown):
+    """A motorcycle's upright pose is the vertical, unless the drive must replace the alignment. The bias of an aligned
+    sensor is subtracted already."""
+    made = background(real=True, _total=[9] * 7, **{"shown": False} | given)
+    made.result = "old"
+    made._restart()
+    assert (made.drive.vertical._from_pose is not None) is up
+    assert made.drive._bias_given is bias and made.drive.standing.bias == [0.0] * 3
+    assert made.drive.vertical.is_car is not made._leans and made.shown is shown
+    assert made.result is None and made._total == [0] * 7
+
+
+def test_a_request_begins_a_drive_that_replaces_the_alignment():
+    made = background(shown=False, _answered=["other-side"], message="m")
+    made.ask()
+    assert made.shown and made._asked and made._answered == [] and made.message is None
+    made.begin()
+    assert made._asked is False and made.calls == ["restart", "restart"]
+
+
+def test_an_adopted_alignment_is_saved_with_its_trim():
+    for anew, trim in ((True, 0.0), (False, 1.5)):
+        made = background(real=True, _asked=True)
+        saved = []
+        made._save = lambda matrix, trim_deg, saved=saved: saved.append(trim_deg) or True
+        made._adopt(anew)
+        assert saved == [trim] and said(made.result) == ("aligned", 0.7)
+        assert (made.message is made.result, made._asked, "maxima" in made.calls) == (anew, not anew, anew)
+        made._save, made.result = (lambda *_: False), None
+        made._adopt(anew)
+        assert made.result is None
+
+
+def test_an_old_speed_is_forgotten_even_if_nobody_asks():
+    made = background(_total=[0] * 7)
+    made._look = lambda now: None
+    made.speed = SimpleNamespace(poll=lambda now: None)
+    made.poll(2999)
+    assert made._speed_ms == 0
+    made.poll(3999)
+    assert made._speed_ms is None
 
 
 def test_lags_and_blocks_have_their_sizes():

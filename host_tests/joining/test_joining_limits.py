@@ -1,12 +1,13 @@
 """The limits and formulas of joining and comparing, each with values computed by hand or by plain numpy."""
 
+import datetime as dt
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.joining import agreement, clocks, compare, fit, match
+from kickstand_tools.joining import agreement, clocks, compare, fit, match, track_files
 from kickstand_tools.joining.clocks import Clocks
 from kickstand_tools.joining.motion import CellMotion
 from kickstand_tools.joining.track import Course, Segments, Track
@@ -431,3 +432,26 @@ def test_a_picture_shows_both_leans_and_their_difference(monkeypatch, tmp_path):
     ]  # fmt: skip
     assert above.get_xlim() == (0.0, 120.0) and below.xaxis.get_major_formatter()(60.0, 0) == "1:00"
     assert not any(text.get_parse_math() for axis in figure.axes for text in axis.get_legend().get_texts())
+
+
+# track_files.py
+
+
+def test_a_time_without_a_zone_is_universal():
+    """Both formats write Universal Time. One day has 86,400 s."""
+    day = dt.datetime(1970, 1, 2)
+    assert track_files._utc_s(day) == track_files._utc_s(day.replace(tzinfo=dt.UTC)) == 86_400.0
+    assert track_files._utc_s(day.replace(tzinfo=dt.timezone(dt.timedelta(hours=2)))) == 79_200.0
+
+
+def test_a_gpx_speed_is_its_own_or_an_extensions():
+    def extension(tag, text):
+        return SimpleNamespace(iter=lambda: [SimpleNamespace(tag=tag, text=text)])
+
+    def speed(own, *extensions):
+        return track_files._gpx_speed(SimpleNamespace(speed=own, extensions=extensions))
+
+    assert speed(3, extension("speed", "4")) == 3.0
+    assert speed(None, extension("{x}hr", "90"), extension("{x}Speed", "4")) == 4.0
+    for nothing in ((), (extension("speed", "x"),), (extension("speed", ""),), (extension(None, "4"),)):
+        assert np.isnan(speed(None, *nothing))

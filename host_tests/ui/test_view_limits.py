@@ -520,3 +520,15 @@ def test_the_band_of_a_reason_is_centred():
         )
         glance._unsure(canvas, reason)
         assert seen == [(" " * spaces + reason, 5, True)]
+
+
+def test_each_digit_has_its_own_120_bytes():
+    """The glyphs are drawn from bands of 8 rows; the 1 has a column of 40 rows or less, and the 8 is symmetric."""
+    from kickstand.ui import glance
+
+    assert len(glance._GLYPHS) == 10 and len(glance.DIGITS) == 1200
+    for digit, glyph in enumerate(glance._GLYPHS):
+        bands = glance.DIGITS[120 * digit : 120 * (digit + 1)]
+        for x, y in ((0, 0), (12, 3), (5, 20), (20, 30), (12, 39), (23, 17)):
+            assert glyph.pixel(x, y) == bands[24 * (y // 8) + x] >> y % 8 & 1
+    assert (glance.DIGIT_WIDTH, glance.DIGIT_HEIGHT) == (24, 40)

@@ -54,7 +54,9 @@ PACKAGES = {
         " drive_alignment/test_drive_bins drive_alignment/test_cli_drive",
     ),
     "logs": _package("tools/kickstand_tools/logs/*.py", "logs/test_log_parts logs/test_[!cm]* logs/test_c*"),
-    "imports": _package("tools/kickstand_tools/imports/**/*.py", "imports/test_apps imports/test_[!a]*"),
+    "imports": _package(
+        "tools/kickstand_tools/imports/**/*.py", "imports/test_import_parts imports/test_apps imports/test_[!ai]*"
+    ),
     "joining": _package(
         "tools/kickstand_tools/joining/*.py",
         "joining/test_joining_limits joining/test_joining_parts joining/test_track_steps"
