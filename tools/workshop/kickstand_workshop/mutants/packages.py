@@ -70,7 +70,7 @@ PACKAGES = {
         "analysis/test_analysis_parts analysis/test_riding analysis/test_analysis_channels"
         " analysis/test_al* analysis/test_c* analysis/test_map",
     ),
-    "overlay": _package("tools/kickstand_tools/overlay/*.py", "overlay/test_[!h]*"),
+    "overlay": _package("tools/kickstand_tools/overlay/*.py", "overlay/test_overlay_parts overlay/test_[!ho]*"),
     "deploy": _package(
         "tools/kickstand_tools/deploy/*.py",
         "deploy/test_check* deploy/test_config* deploy/test_[unmo]* deploy/test_cli_flash",
