@@ -53,7 +53,9 @@ PACKAGES = {
         "calibration/test_sensor_fit calibration/test_cli_calibration_file calibration/test_cli_calibrate"
         " drive_alignment/test_drive_bins drive_alignment/test_cli_drive",
     ),
-    "logs": _package("tools/kickstand_tools/logs/*.py", "logs/test_log_parts logs/test_[!cm]* logs/test_c*"),
+    "logs": _package(
+        "tools/kickstand_tools/logs/*.py", "logs/test_log_limits logs/test_log_parts logs/test_[!cm]* logs/test_c*"
+    ),
     "imports": _package(
         "tools/kickstand_tools/imports/**/*.py", "imports/test_import_parts imports/test_apps imports/test_[!ai]*"
     ),
