@@ -535,6 +535,84 @@ def test_a_time_column_increases_and_is_named():
     assert found(time=np.arange(100) * 50_000_000, x=steps).unit == "ns"
 
 
+@pytest.mark.parametrize(
+    ("name", "step", "hz"), [("s", 0.01, 100.0), ("ms", 20.0, 50.0), ("us", 5000.0, 200.0), ("ns", 2e7, 50.0)]
+)
+def test_a_time_without_a_name_has_a_usual_rate(name, step, hz):
+    found = findings._time(Sheet("f", ["x"], [step * np.arange(1000.0) * (1.0 + 1e-6 * np.arange(1000))]))
+    assert found is not None and found.unit == name
+    assert found.why == f"in {name} there are {hz:.3g} samples per second"
+    assert findings._mean_step(np.arange(101.0) * step) == pytest.approx(80 * step / (0.8 * 101))
+
+
+@pytest.mark.parametrize(
+    ("unit", "step", "fits"), [("s", 0.99, True), ("s", 1.03, False), ("us", 51.0, True), ("us", 49.0, False)]
+)
+def test_a_stated_unit_of_times_must_be_usual(unit, step, fits):
+    assert findings._step_fits(step * np.arange(1000.0), unit) is fits
+
+
+def test_groups_of_three_columns_do_not_share_one():
+    """Columns without any number belong to no group. Without names, groups are side by side."""
+
+    def places(names, **cells):
+        columns = [cells.get(name, np.arange(50.0) % 7) for name in names]
+        return [(three.stem, three.places) for three in findings._find_triples(Sheet("f", names, columns))]
+
+    assert places(["t", "ax", "ay", "az", "gx", "gy", "gz"]) == [("a", [1, 2, 3]), ("g", [4, 5, 6])]
+    nothing = np.full(50, np.nan)
+    assert places(["ax", "ay", "az", "gx", "gy", "gz"], gz=nothing) == [("a", [0, 1, 2])]
+    few = np.where(np.arange(50) < 1, 1.0, np.nan)
+    assert places(["ax", "ay", "az", "gx", "gy", "gz"], gz=few) == [("a", [0, 1, 2])]
+    two = np.where(np.arange(50) < 2, 1.0, np.nan)
+    assert len(places(["ax", "ay", "az", "gx", "gy", "gz"], gz=two)) == 2
+    assert places(["time", "p", "q", "r", "u", "v", "w"], time=np.arange(50.0)) == [("", [1, 2, 3]), ("", [4, 5, 6])]
+    assert places(["data1", "data2", "data3", "x1"]) == [("data", [0, 1, 2])]
+    assert [place for _, place in places(["xgyrox", "xgyroy", "xgyroz"])] == [[0, 1, 2]]
+
+
+def test_single_axes_of_a_sensor_are_proposed():
+    sheet = Sheet("f", ["accX", "accY", "gyroZ", "t"], [np.arange(9.0)] * 4)
+    assert findings._single(sheet, "a", "accel") == {"ax": "accX", "ay": "accY"}
+    assert findings._single(sheet, "g", "gyro") == {"gz": "gyroZ"}
+
+
+def test_wanted_names_may_be_in_any_line():
+    lines = ["# a recording", "", "#t,ax,ay,az", "1,2,3,4", "2,3,4,5"]
+    assert layout._grid_below(lines, ["t", "az"]) == layout.Grid(2, 3, ",", False, 4)
+    assert layout._grid_below(lines, ["t", "b"]) is None is layout._grid_below(lines, [])
+    assert layout._grid_below(["t;b", "x", "y"], ["t", "b"]) == layout.Grid(0, 1, ";", False, 2)
+    assert layout._grid_below(["x", "t,b"], ["t"]) is None  # below the last line there are no rows
+    wide = layout._grid_below(["t,a,b,c,d", "1,2,3,4", "1,2,3,4"], ["t", "d"])
+    assert wide is not None and wide.width == 5
+
+
+def test_speeds_and_places_are_found_by_name():
+    def sheet(*names):
+        return Sheet("f", list(names), [np.arange(9.0)] * len(names))
+
+    for name, unit in (("Speed (km/h)", "km/h"), ("speed_kph", "km/h"), ("GPS_velocity_mph", "mph"), ("speed", "")):
+        found = findings._speed(sheet("t", name))
+        assert found is not None and (found.columns, found.unit, found.certain) == ([name], unit, bool(unit))
+    for name in ("speedaccuracy", "angularvelocity", "velocityx", "fast"):
+        assert findings._speed(sheet(name)) is None
+    assert findings._find_by_name(sheet("latitude_acc"), "^lat") is None
+    assert findings._find_by_name(sheet("Latitude"), "^lat") is not None
+    made = findings.find(Sheet("f", ["lat"], [np.arange(9.0)]))
+    assert "lat" not in made.found and made.lacking == ["time", "acceleration", "gyro"]
+
+
+def test_gravity_has_a_constant_length():
+    def has(values, near=True):
+        return findings._has_gravity(findings._Triple("", [0, 1, 2], "", values), None, near)
+
+    assert has(calm(1.0)) and not has(calm(1.0)[:2]) and not has(calm(0.0)) and not has(calm(3.0))
+    assert has(calm(3.0), near=False) and has(calm(1.29)) and not has(calm(1.31)) and not has(calm(1 / 1.31))
+    swinging = calm(1.0) * np.where(np.arange(200) < 100, 1.03, 0.97)[:, None]
+    assert has(swinging) and not has(swinging, near=False)
+    assert not has(calm(1.0) * np.sign(np.random.default_rng(1).normal(size=(200, 1))))  # without gravity
+
+
 # rate_fit.py
 
 

@@ -554,3 +554,22 @@ def test_slow_and_quick_changes_of_the_rate_are_removed():
     high = found > 1.0
     assert 4 <= high.sum() <= 5 and found[high] == pytest.approx(40.0 / high.sum() - 40.0 / 100.0, abs=0.05)
     assert found[100:145].min() == pytest.approx(-0.4, abs=0.02) and found[90] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_camera_is_averaged_over_cells_less_its_median(monkeypatch):
+    """Cells of 50 ms without a reading do not count. The median of the rates is subtracted."""
+    given: list = []
+    monkeypatch.setattr(camera_match, "correlations", lambda *of: given.append(of) or (np.zeros(9), np.zeros(9)))
+    monkeypatch.setattr(camera_match, "_turning", lambda rates: rates)
+    monkeypatch.setattr(camera_match, "log_likelihood_ratio", lambda *_: np.zeros(9))
+    monkeypatch.setattr(camera_match, "peaks", lambda *_: [])
+    t_s = np.array([2.0, 2.01, 2.06, 2.21, 2.22])
+    rates = np.outer([1.0, 3.0, 5.0, 8.0, 10.0], [1.0, 10.0, -1.0])
+    ride = CellMotion(np.zeros((5, 3)), np.ones((5, 3)), np.ones(5, dtype=bool), False, False)
+    with pytest.raises(InputError):
+        camera_match.camera_offset_s(ride, gpmf.Telemetry(t_s, rates))
+    ((ridden, there, filmed, known),) = given
+    assert ridden.tolist() == ride.rate_dps.tolist() and there.all()
+    assert known.tolist() == [True, True, False, False, True]
+    # the cells have 2, 5 and 9, and their median is 5
+    assert filmed[known] == pytest.approx(np.outer([-3.0, 0.0, 4.0], [1.0, 10.0, -1.0]))
