@@ -75,7 +75,7 @@ PACKAGES = {
     "overlay": _package("tools/kickstand_tools/overlay/*.py", "overlay/test_overlay_parts overlay/test_[!ho]*"),
     "deploy": _package(
         "tools/kickstand_tools/deploy/*.py",
-        "deploy/test_check* deploy/test_config* deploy/test_[unmo]* deploy/test_cli_flash",
+        "deploy/test_deploy_parts deploy/test_check* deploy/test_config* deploy/test_[unmo]* deploy/test_cli_flash",
     ),
     "simulation": _package(
         "tools/kickstand_tools/simulation/**/*.py",
