@@ -46,7 +46,7 @@ class Talker:
 
     def __init__(self, clock, *pieces):
         self.clock, self.written = clock, b""
-        self.pieces: list[Any] = list(pieces)
+        self.pieces: Any = list(pieces)
         self.serial = self
 
     def exec_raw_no_follow(self, code):

@@ -404,6 +404,46 @@ def test_labels_before_the_values():
     assert layout._labelled("n", "a: 1 b: 2 c: 3\n" * 3) is None
 
 
+def test_labels_of_under_half_of_the_rows_are_left_out():
+    """Of five rows, two or three have the label u. Of a label of half of the rows, only a minority is there."""
+    full, short = "t: {0} x: 2 y: 3 z: 4 u: 5", "t: {0} x: 2 y: 3 z: 4"
+    for count, there in ((2, False), (3, True)):
+        text = "\n".join((full if k < count else short).format(k) for k in range(5)) + "\n"
+        found = layout._labelled("n", text)
+        assert found is not None and ("u" in found.columns) is there
+    four = "\n".join((full if k < 2 else short).format(k) for k in range(4)) + "\n"
+    found = layout._labelled("n", four)
+    assert found is not None and "u" not in found.columns
+
+
+def test_lines_with_labels_are_the_majority():
+    """Seven of ten lines are labelled. There are at least 1.5 labels per line."""
+    row = "t: 1 x: 2 y: 3 z: 4"
+    assert layout._labelled("n", "\n".join([row] * 7 + ["text"] * 3)) is not None
+    assert layout._labelled("n", "\n".join([row] * 6 + ["text"] * 4)) is None
+    assert layout._labelled("n", "t: 1\nx: 2\ny: 3\nz: 4\n") is None
+
+
+def test_a_joined_table_has_the_names_of_its_files():
+    """The first columns are the times. Each row comes from one file."""
+    one = file("t,x,y,z\n" + "".join(f"{k},1,2,3\n" for k in range(5)), "acc.csv")
+    other = file("t,x,y,z\n" + "".join(f"{k + 0.5},4,5,6\n" for k in range(4)), "gyro.csv")
+    found = layout.joined_sheet([one, other])
+    assert found is not None and found.columns == ["t", *[f"{of}:{axis}" for of in ("acc", "gyro") for axis in "xyz"]]
+    assert found.cells[0].tolist() == [0, 1, 2, 3, 4, 0.5, 1.5, 2.5, 3.5]
+    assert np.isfinite(found.cells[1]).tolist() == [True] * 5 + [False] * 4
+    assert found.cells[6].tolist()[5:] == [6.0] * 4 and np.isnan(found.cells[6][:5]).all()
+    assert layout.joined_sheet([one]) is None and layout.joined_sheet([one, one]) is None
+    assert layout.joined_sheet([one, file("text", "b.csv")]) is None
+
+
+def test_units_below_the_names_are_added():
+    text = "a,b,c,d,e\ns,g,,g\n1,2,3,4,5\n2,2,3,4,5\n"
+    found = layout.sheet_in(file(text))
+    assert found is not None and found.columns == ["a (s)", "b (g)", "c", "d (g)", "e"]
+    assert found.left_out == 0 and len(found.cells) == 5
+
+
 def test_rows_per_sensor_become_columns():
     lines = ["t,sensor,x,y"]
     for k in range(20):

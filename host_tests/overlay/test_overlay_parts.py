@@ -573,3 +573,105 @@ def test_a_camera_is_averaged_over_cells_less_its_median(monkeypatch):
     assert known.tolist() == [True, True, False, False, True]
     # the cells have 2, 5 and 9, and their median is 5
     assert filmed[known] == pytest.approx(np.outer([-3.0, 0.0, 4.0], [1.0, 10.0, -1.0]))
+
+
+# the shapes, as they are passed to the pen
+
+
+class Pen:
+    """Records the shapes that are drawn, with one pixel per pixel of the mask."""
+
+    def __init__(self):
+        self.shapes: list[tuple] = []
+
+    def __getattr__(self, name):
+        def draw(box, *more, **how):
+            points = [value for point in box for value in (point if isinstance(point, tuple) else (point,))]
+            self.shapes.append((name, [round(float(value), 6) for value in points], *more, how))
+
+        return draw
+
+
+@pytest.fixture
+def pen(monkeypatch):
+    """Let smooth_mask() pass its shapes to a Pen, and return the Pen."""
+    made, real = Pen(), parts.smooth_mask
+
+    def smooth_mask(size, draw, finer=4):
+        draw(made, 1)
+        return real(size, draw, finer)
+
+    monkeypatch.setattr(parts, "smooth_mask", smooth_mask)
+    return made
+
+
+def test_the_shapes_of_the_gauge(pen):
+    """A Gauge of 300 pixels has units of 3 pixels: the dial has a radius of 150, and the band is 24 pixels wide."""
+    gauge = Gauge(1000)
+    band, hole, panel, *rest = pen.shapes
+    assert band == ("pieslice", [0.0, 0.0, 299.0, 299.0], 180, 360, {"fill": 255})
+    assert hole == ("ellipse", [24.0, 24.0, 275.0, 275.0], {"fill": 0})
+    assert panel == ("rounded_rectangle", [0.0, 0.0, 515.0, 299.0], {"radius": 27.0, "fill": 120})
+    ticks, rings = rest[:13], rest[13:]
+    assert all(tick[2] == {"fill": 255, "width": 3} for tick in ticks)
+    assert ticks[6][1] == [180.0, 60.0, 180.0, 36.0]  # upright: from 42 to 50 units above 62
+    assert ticks[0][1] == [180.0 - 126.0, 186.0, 30.0, 186.0]  # 60 degrees to the left
+    sine, cosine = math.sin(math.radians(75)), math.cos(math.radians(75))
+    long = [180 - 138 * sine, 186 - 138 * cosine, 180 - 150 * sine, 186 - 150 * cosine]
+    assert ticks[1][1] == pytest.approx(long)
+    assert [ring[2] for ring in rings[:3]] == [{"outline": 255, "width": width} for width in (2, 2, 3)]
+    assert rings[0][1] == [438 - 26.25, 189 - 26.25, 438 + 26.25, 189 + 26.25]
+    assert rings[2][1] == [438.0 - 63.0, 189.0 - 63.0, 438.0 + 63.0, 189.0 + 63.0]
+    assert rings[3] == ("line", [438.0, 126.0, 438.0, 252.0], {"fill": 120, "width": 1})
+    assert rings[4] == ("line", [375.0, 189.0, 501.0, 189.0], {"fill": 120, "width": 1})
+    for lean, begin, end in ((20.0, 270.0, 300.0), (-20.0, 240.0, 270.0), (70.0, 270.0, 360.0)):
+        pen.shapes.clear()
+        gauge._fill(Image.new("RGBA", (516, 300)), lean)
+        assert pen.shapes == [("pieslice", [0.0, 0.0, 299.0, 299.0], begin, end, {"fill": 255})]
+
+
+def test_the_shapes_of_an_arrow_a_spot_and_the_motorcycle(pen):
+    parts.arrow.cache_clear()
+    parts.spot.cache_clear()
+    parts.bike.cache_clear()
+    parts.arrow(50.0, True, ACCENT)
+    parts.arrow(50.0, False, ACCENT)
+    parts.spot(50, ACCENT)
+    assert pen.shapes == [
+        ("polygon", [56.0, 30.0, 4.0, 4.0, 4.0, 56.0], {"fill": 255}),
+        ("polygon", [4.0, 30.0, 56.0, 4.0, 56.0, 56.0], {"fill": 255}),
+        ("ellipse", [7.0, 7.0, 56.0, 56.0], {"fill": 255}),
+    ]  # fmt: skip
+    pen.shapes.clear()
+    parts.bike(360.0)  # a unit has 10 pixels, and the middle is at 403
+    tyre, seat, back, *limbs, head = pen.shapes
+
+    def at(*points):
+        return [value for x, y in points for value in (403.0 + 10 * x, 403.0 - 10 * y)]
+
+    assert tyre == ("rounded_rectangle", at((-2.7, 15), (2.7, 0)), {"radius": 25.0, "fill": 255})
+    assert seat[1] == at((-5.5, 19), (5.5, 19), (3.4, 12.5), (-3.4, 12.5))
+    assert back[1] == at((-4.8, 17), (4.8, 17), (7.8, 26.5), (4.5, 29), (-4.5, 29), (-7.8, 26.5))
+    assert head == ("ellipse", at((-4.4, 36.2), (4.4, 27.4)), {"fill": 255})
+    arm, hand_1, hand_2, leg = limbs[0], limbs[1], limbs[2], limbs[3]
+    assert arm == ("line", at((-6.6, 26.3), (-11.0, 22.0), (-13.0, 19.0)), {"fill": 255, "width": 30, "joint": "curve"})
+    assert hand_1[1] == at((-8.1, 27.8), (-5.1, 24.8)) and hand_2[1] == at((-14.5, 20.5), (-11.5, 17.5))
+    assert leg == ("line", at((-4.5, 18.0), (-9.0, 13.0), (-6.2, 6.5)), {"fill": 255, "width": 32, "joint": "curve"})
+    mirrored = [shape[1] for shape in limbs[6:] if shape[0] == "line"]
+    assert mirrored == [at((6.6, 26.3), (11.0, 22.0), (13.0, 19.0)), at((4.5, 18.0), (9.0, 13.0), (6.2, 6.5))]
+
+
+def test_the_colours_and_sizes_of_texts():
+    assert (WHITE, DIM, ACCENT) == ((255, 255, 255, 255), (150, 156, 166, 255), (255, 176, 0, 255))
+    assert (parts.DARK, parts.PANEL, parts.CLEAR) == ((12, 14, 18, 255), (12, 14, 18, 120), (0, 0, 0, 0))
+    from PIL import ImageFont
+
+    for words, height, stroke in (("60", 50.0, 4), ("g", 30.0, 3), ("-", 5.0, 1)):
+        font = ImageFont.load_default(height)
+        left, top, right, bottom = font.getbbox(words, stroke_width=stroke)
+        _, zero_top, _, zero_bottom = font.getbbox("0", stroke_width=stroke)
+        size = int(right - left) + 2, int(max(bottom, zero_bottom) - min(top, zero_top)) + 2
+        found = parts.text(words, height, ACCENT)
+        assert found.size == size
+        inside = pixels(found)[1:-1, 1:-1, 3]
+        assert inside.sum() == pixels(found)[..., 3].sum() > 0
