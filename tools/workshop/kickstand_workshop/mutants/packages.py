@@ -24,7 +24,9 @@ def _package(sources: str, tests: str) -> Package:
 
 _STOPS = "stops_closed_form speed_fit quiet analysis_standstill analysis_brake_test"
 PACKAGES = {
-    "imu": _package("firmware/kickstand/imu/*.py", "imu/test_batches imu/test_sensor imu/test_[!d]*"),
+    "imu": _package(
+        "firmware/kickstand/imu/*.py", "imu/test_batches imu/test_axis_judge imu/test_sensor imu/test_[!d]*"
+    ),
     "calibration": _package(
         "firmware/kickstand/calibration/*.py firmware/kickstand/rotation.py",
         "calibration/test_rotation calibration/test_calibration calibration/test_still_pose calibration/test_pose_taker"
@@ -50,7 +52,8 @@ PACKAGES = {
     "published": _package("tools/kickstand_tools/calibration/published.py", "drive_alignment/test_published"),
     "aligning": _package(
         "tools/kickstand_tools/calibration/[!p]*.py tools/kickstand_tools/calibration/p[or]*.py",
-        "calibration/test_sensor_fit calibration/test_cli_calibration_file calibration/test_cli_calibrate"
+        "calibration/test_aligning_parts calibration/test_sensor_fit calibration/test_cli_calibration_file"
+        " calibration/test_cli_calibrate"
         " drive_alignment/test_drive_bins drive_alignment/test_cli_drive",
     ),
     "logs": _package(
