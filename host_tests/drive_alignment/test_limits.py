@@ -111,7 +111,7 @@ def test_a_straight_interval_is_in_the_regression():
 
 @pytest.mark.parametrize(
     ("given", "used"),
-    [({"yaw_dps": 1.99}, True), ({"yaw_dps": -2.01}, False), ({"speeds": (1.0, 0.9, 0.9)}, False)]
+    [({"yaw_dps": 1.99}, True), ({"yaw_dps": -2.01}, False), ({"speeds": (1.0, 1.0, 1.0)}, False)]
     + [({"speeds": (1.3, 0.9, 0.8)}, True), ({"force": (0.0, 2.9, 0.0)}, True), ({"force": (0.0, 3.1, 0.0)}, False)]
     + [({"every_us": 2_200_000}, True), ({"every_us": 2_300_000}, False)],
 )
@@ -508,6 +508,7 @@ def test_bins_of_a_silent_source_are_not_checked():
 def test_only_a_fresh_speed_proves_a_standstill():
     for given, updates in (
         ({}, 1),
+        ({"_silent_us": 5_000_000}, 1),
         ({"_speed_mps": 0.0}, 1),
         ({"_speed_mps": -1.0}, 0),
         ({"_silent_us": 5_000_001}, 0),

@@ -60,6 +60,11 @@ def test_rows_are_converted_in_blocks(monkeypatch):
     assert sizes == [2] * 40 + [2] * 40 + [1] * 40  # 20 * 4 // 40
 
 
+def test_the_first_row_may_be_wider_than_the_names():
+    columns, left_out = csv_reader.columns_of_text("1,2,3\n4,5\n6,7,8,9\n\n1,2,3\n", ",", 2)
+    assert left_out == 1 and [column.tolist() for column in columns] == [[1, 4, 1], [2, 5, 2]]
+
+
 def test_texts_of_a_table_are_limited(monkeypatch):
     monkeypatch.setattr(csv_reader, "ROWS", 2)
     monkeypatch.setattr(csv_reader, "MOST_TEXTS", 4)
