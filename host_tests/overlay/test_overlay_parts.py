@@ -33,7 +33,7 @@ class Drawing:
         self.texts: dict[str, tuple] = {}
         self.spots, self.arrows, self.bikes, self.pieces = [], [], [], []
         marks: dict[int, tuple] = {}
-        real_put, real_text = parts.put, parts.text
+        real_put, real_text, real_mask = parts.put, parts.text, parts.smooth_mask
         real_spot, real_arrow, real_bike = parts.spot, parts.arrow, parts.bike
 
         def text(words, height, colour):
@@ -52,6 +52,7 @@ class Drawing:
             real_put(picture, part, centre)
 
         self.kept: list[Image.Image] = []
+        monkeypatch.setattr(parts, "smooth_mask", lambda size, draw, finer=1: real_mask(size, draw, 1))  # faster
         monkeypatch.setattr(parts, "text", text)
         monkeypatch.setattr(parts, "put", put)
         monkeypatch.setattr(parts, "spot", lambda *of: self.spots.append(of) or real_spot(*of))
@@ -65,8 +66,12 @@ class Drawing:
         return self.gauge.picture(*values)
 
 
-def test_the_gauge_is_300_pixels_high_and_172_as_wide():
-    gauge = Gauge(1000)
+@pytest.fixture(scope="module")
+def gauge() -> Gauge:
+    return Gauge(1000)
+
+
+def test_the_gauge_is_300_pixels_high_and_172_as_wide(gauge):
     assert (gauge.height, gauge.width) == (300, 516)
 
 
@@ -128,9 +133,9 @@ def pixels(picture: Image.Image) -> np.ndarray:
     return np.asarray(picture, dtype=int)
 
 
-def test_ticks_are_every_ten_degrees_and_longer_every_thirty():
+def test_ticks_are_every_ten_degrees_and_longer_every_thirty(gauge):
     """At 45 of 50 units from the middle only the long ticks are white; at 48 units every tick is drawn."""
-    gauge, still = Gauge(1000), pixels(Gauge(1000)._still_picture())
+    still = pixels(gauge._still)
     for lean in range(-60, 61, 5):
         x, y = (round(3.0 * value) for value in gauge._on_dial(lean, 48.0))
         bright = still[max(y - 1, 0) : y + 2, x - 1 : x + 2, :3].max()
@@ -140,9 +145,9 @@ def test_ticks_are_every_ten_degrees_and_longer_every_thirty():
         assert long == (lean % 30 == 0)
 
 
-def test_the_rings_of_forces_are_at_half_one_and_12_g():
+def test_the_rings_of_forces_are_at_half_one_and_12_g(gauge):
     """With a radius of 63 pixels for 1.2 g, the rings are 26.25, 52.5 and 63 pixels from the middle."""
-    still = pixels(Gauge(1000)._still_picture())
+    still = pixels(gauge._still)
     row = still[189 + 8, 438:].sum(axis=1)  # beside the line through the middle
     along = np.sqrt(np.maximum(np.array([26.25, 52.5, 63.0]) ** 2 - 64.0, 0.0))
     for ring in along:
@@ -151,9 +156,8 @@ def test_the_rings_of_forces_are_at_half_one_and_12_g():
         assert row[between] < 450
 
 
-def test_the_band_of_the_dial_is_eight_units_wide():
+def test_the_band_of_the_dial_is_eight_units_wide(gauge):
     """Around 75 degrees from upright (50 degrees of lean) the band is filled from 42 to 50 units."""
-    gauge = Gauge(1000)
     picture = pixels(gauge.picture(60.0, NAN, NAN, NAN, 0.0, 0.0))
 
     def amber(lean, radius):
@@ -164,8 +168,7 @@ def test_the_band_of_the_dial_is_eight_units_wide():
     assert not amber(-5, 46.0) and amber(5, 46.0) and amber(59, 48.0)
 
 
-def test_the_largest_lean_has_a_line_from_40_to_52():
-    gauge = Gauge(1000)
+def test_the_largest_lean_has_a_line_from_40_to_52(gauge):
     plain, marked = (pixels(gauge.picture(NAN, NAN, NAN, NAN, left, 0.0)) for left in (0.0, 45.0))
     for radius, drawn in ((38.0, False), (41.0, True), (46.0, True), (51.0, True), (54.0, False)):
         x, y = (round(3.0 * value) for value in gauge._on_dial(-45.0, radius))
