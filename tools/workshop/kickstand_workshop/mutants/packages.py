@@ -38,7 +38,7 @@ PACKAGES = {
     ),
     "drive_alignment": _package(
         "firmware/kickstand/drive_alignment/*.py",
-        "drive_alignment/test_limits drive_alignment/test_parts drive_alignment/test_drive*",
+        "drive_alignment/test_[ebq]* drive_alignment/test_drive_limits drive_alignment/test_parts drive_alignment/test_drive*",
     ),
     "speed": _package(
         "firmware/kickstand/speed/*.py", "simulated_board/test_board_speed simulated_board/test_board_place"
@@ -53,18 +53,19 @@ PACKAGES = {
     "aligning": _package(
         "tools/kickstand_tools/calibration/[!p]*.py tools/kickstand_tools/calibration/p[or]*.py",
         "calibration/test_aligning_parts calibration/test_sensor_fit calibration/test_cli_calibration_file"
-        " calibration/test_cli_calibrate"
-        " drive_alignment/test_drive_bins drive_alignment/test_cli_drive",
+        " calibration/test_cli_calibrate drive_alignment/test_drive_bins drive_alignment/test_cli_drive",
     ),
     "logs": _package(
-        "tools/kickstand_tools/logs/*.py", "logs/test_log_limits logs/test_log_parts logs/test_[!cm]* logs/test_c*"
+        "tools/kickstand_tools/logs/*.py",
+        "logs/test_csv_limits logs/test_reader_limits logs/test_log_parts logs/test_[!cm]* logs/test_c*",
     ),
     "imports": _package(
-        "tools/kickstand_tools/imports/**/*.py", "imports/test_import_parts imports/test_apps imports/test_[!ai]*"
+        "tools/kickstand_tools/imports/**/*.py",
+        "imports/test_import* imports/test_[lf]*_limits imports/test_app_signs imports/test_[!a]* imports/test_apps",
     ),
     "joining": _package(
         "tools/kickstand_tools/joining/*.py",
-        "joining/test_joining_limits joining/test_joining_parts joining/test_track_steps"
+        "joining/test_fit_limits joining/test_match_limits joining/test_joining_parts joining/test_track_steps"
         " joining/test_matching joining/test_c* imports/test_joining",
     ),
     "estimation": _package(
@@ -75,10 +76,12 @@ PACKAGES = {
         "analysis/test_analysis_parts analysis/test_riding analysis/test_analysis_channels"
         " analysis/test_al* analysis/test_c* analysis/test_map",
     ),
-    "overlay": _package("tools/kickstand_tools/overlay/*.py", "overlay/test_overlay_parts overlay/test_[!ho]*"),
+    "overlay": _package("tools/kickstand_tools/overlay/*.py", "overlay/test_[gosv]* overlay/test_c*"),
     "deploy": _package(
         "tools/kickstand_tools/deploy/*.py",
-        "deploy/test_deploy_parts deploy/test_check* deploy/test_config* deploy/test_[unmo]* deploy/test_cli_flash",
+        "deploy/test_console_limits deploy/test_check_order deploy/test_check_limits"
+        " deploy/test_config_limits deploy/test_update_limits deploy/test_check* deploy/test_config* deploy/test_[unmo]*"
+        " deploy/test_cli_flash",
     ),
     "simulation": _package(
         "tools/kickstand_tools/simulation/**/*.py",
