@@ -326,5 +326,47 @@ def test_stops_are_found_in_each_log_of_its_own():
     found = drive_feed.standing([log(), log()], CalibrationFile(), steps)
     assert found.stops == 2 and found.bias == pytest.approx([0.5, 0.0, 0.0]) and seen[-1] == (800, 800)
     assert drive_feed.standing([log(speed_at=())], CalibrationFile(), drive_feed.Steps(None, 1)).stops == 0
+    for seconds, stops in ((6.1, 1), (4.0, 1), (2.9, 0)):
+        assert drive_feed.standing([log(seconds)], CalibrationFile(), drive_feed.Steps(None, 1)).stops == stops
     late = drive_feed.standing([log(4.0, (250,))], CalibrationFile(), drive_feed.Steps(None, 1))
     assert late.stops == 0  # only 1.5 s are left
+
+
+def test_a_speed_counts_as_known_for_5_s(monkeypatch):
+    """Each bin lasts 100 ms. After the speed in the first bin, 50 more bins are known."""
+    seen: list = []
+    monkeypatch.setattr(drive_feed.StandingVertical, "update", lambda _, force, rate, mps, s: seen.append((mps, s)))
+    speed = np.full(801, np.nan)
+    speed[10] = -0.2
+    log = Log(np.arange(801) / 100.0, np.tile([0.0, 1.0, 0.0], (801, 1)), np.zeros((801, 3)), speed)
+    drive_feed.standing([log], CalibrationFile(), drive_feed.Steps(None, 1))
+    assert seen[0] == (2.0 * 2.0, 0.0)  # the pretended motion between two logs
+    assert seen[1:] == [(0.0, pytest.approx(0.1))] * 51
+
+
+def test_a_first_event_is_reported_without_an_earlier_look():
+    made: Any = Alignment()
+    made.counted = 1
+    watch = DriveWatch(made, None)
+    watch.look(1.0)
+    assert [event.what for event in watch.events] == ["used"]
+    made = Alignment()
+    made.turned = 1
+    watch = DriveWatch(made, None)
+    watch.look(1.0)
+    assert [event.what for event in watch.events] == ["turning"]
+
+
+def test_forces_of_nothing_are_refused_with_their_time():
+    def fails(*_):
+        raise ValueError
+
+    made: Any = SimpleNamespace(update=fails, measure_speed=lambda *_: None, standing=None)
+    watch: Any = SimpleNamespace(begin=lambda name: None, look=lambda t_s: None, end=lambda t_s: None)
+    log = Log(np.arange(800) / 100.0, np.zeros((800, 3)), np.zeros((800, 3)), name="n")
+    with pytest.raises(InputError, match=r"n, at 0\.0 s: accelerations of nearly 0: at rest 1 g is needed"):
+        drive_feed.feed(made, [log], CalibrationFile(), drive_feed.Steps(None, 1), watch)
+    made.update = lambda force, rate, us: fails() if len(seen) > 499 else seen.append(us)
+    seen: list = []
+    with pytest.raises(InputError, match=r"n, at 5\.0 s: accelerations"):
+        drive_feed.feed(made, [log], CalibrationFile(), drive_feed.Steps(None, 1), watch)

@@ -1,5 +1,6 @@
 """What the values of unknown columns show, with a value on either side of each limit."""
 
+import functools
 import itertools
 from typing import Any
 
@@ -202,7 +203,8 @@ def test_gravity_has_a_constant_length():
 # rate_fit.py
 
 
-def turning(dps=40.0, seconds=20.0, hz=100.0):
+@functools.cache
+def turning(dps=40.0, seconds=12.0, hz=100.0):
     """Gravity turns about x and z, as the rates say: du/dt = u x w."""
     t_s = np.arange(0.0, seconds, 1.0 / hz)
     w = np.radians(dps) * np.column_stack((np.sin(t_s), 0.2 * np.cos(0.7 * t_s), np.sin(1.3 * t_s + 1.0)))

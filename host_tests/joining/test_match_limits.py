@@ -221,6 +221,7 @@ def test_a_lean_is_unknown_between_samples_200_ms_apart():
 
 
 def test_a_picture_shows_both_leans_and_their_difference(monkeypatch, tmp_path):
+    """matplotlib would show text between two dollar signs as a formula, so names are not parsed."""
     from matplotlib.figure import Figure
 
     drawn = []
@@ -232,13 +233,13 @@ def test_a_picture_shows_both_leans_and_their_difference(monkeypatch, tmp_path):
         Clocks(0.0, 0.0, 0.9, 9.0), None, same, np.array([0.0, 60.0, 120.0]), leans, {}, ("x/A.csv", "B.csv")
     )
     agreement.draw(tmp_path / "c.png", found)
-    figure, path, dpi = drawn[0]
-    assert (tuple(figure.get_size_inches()), path, dpi) == ((14.0, 7.0), tmp_path / "c.png", 100)
+    figure, path, _ = drawn[0]
+    assert path == tmp_path / "c.png"
     above, below = figure.axes
-    lines = [(line.get_label(), line.get_ydata()[0], line.get_linewidth()) for line in (*above.lines, *below.lines)]
+    lines = [(line.get_label(), line.get_ydata()[0]) for line in (*above.lines, *below.lines)]
     assert lines == [
-        ("smoothed A: A.csv", 10.0, 1.6), ("smoothed B: B.csv", 17.0, 0.9), ("live, B less A", 2.0, 0.6),
-        ("smoothed, B less A", 7.0, 1.2),
+        ("smoothed A: A.csv", 10.0), ("smoothed B: B.csv", 17.0), ("live, B less A", 2.0),
+        ("smoothed, B less A", 7.0),
     ]  # fmt: skip
     assert above.get_xlim() == (0.0, 120.0) and below.xaxis.get_major_formatter()(60.0, 0) == "1:00"
     assert not any(text.get_parse_math() for axis in figure.axes for text in axis.get_legend().get_texts())

@@ -38,7 +38,8 @@ PACKAGES = {
     ),
     "drive_alignment": _package(
         "firmware/kickstand/drive_alignment/*.py",
-        "drive_alignment/test_[ebq]* drive_alignment/test_drive_limits drive_alignment/test_parts drive_alignment/test_drive*",
+        "drive_alignment/test_[ebq]* drive_alignment/test_drive_limits drive_alignment/test_parts"
+        " drive_alignment/test_drive*",
     ),
     "speed": _package(
         "firmware/kickstand/speed/*.py", "simulated_board/test_board_speed simulated_board/test_board_place"
@@ -80,8 +81,8 @@ PACKAGES = {
     "deploy": _package(
         "tools/kickstand_tools/deploy/*.py",
         "deploy/test_console_limits deploy/test_check_order deploy/test_check_limits"
-        " deploy/test_config_limits deploy/test_update_limits deploy/test_check* deploy/test_config* deploy/test_[unmo]*"
-        " deploy/test_cli_flash",
+        " deploy/test_config_limits deploy/test_update_limits deploy/test_check* deploy/test_config*"
+        " deploy/test_[unmo]* deploy/test_cli_flash",
     ),
     "simulation": _package(
         "tools/kickstand_tools/simulation/**/*.py",
