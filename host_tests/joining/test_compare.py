@@ -1,7 +1,6 @@
 """Tests `kickstand compare`. It puts the logs of two devices on one clock and compares their leans."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -95,12 +94,6 @@ def test_words_json_and_a_picture(files, found, monkeypatch):
     data = json.loads(command.works("compare", files / "A.csv", files / "B.csv", "--json").out)
     assert set(data) == {"clocks", "live", "smoothed", "remarks"}
     assert 0.0 < data["smoothed"]["moving_deg"] < 2.0
-
-
-def test_dollar_signs_in_a_name_are_no_formula(found, tmp_path):
-    """matplotlib would otherwise show text between two dollar signs as a formula."""
-    agreement.draw(tmp_path / "C.png", replace(found, names=("A$_$.csv", "B$x$.csv")))
-    assert (tmp_path / "C.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_remark_appears_once(ride):

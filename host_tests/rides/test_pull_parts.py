@@ -2,14 +2,20 @@
 
 import binascii
 import gzip
+import io
 import struct
+import threading
 from binascii import b2a_base64
+from types import SimpleNamespace
 
 import pytest
+from kickstand.calibration import store
+from kickstand.calibration.parameters import Calibration
 from kickstand.rides import block as block_format
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.rides import block_reader, pull, record, ride_log
+from kickstand_tools.rides import block_reader, pull, record, ride_log, stream
 from kickstand_tools.rides.block_reader import Place, StoredBlock, StoredTurn
+from kickstand_tools.rides.stream import StreamLog
 
 
 def block(turns, sequence=0, time_us=1_000_000, sample_hz=200) -> StoredBlock:
@@ -170,3 +176,125 @@ def test_a_recording_needs_a_new_name_with_a_logs_suffix(tmp_path):
         with pytest.raises(InputError, match="exists already"):
             record.record(None, tmp_path / "a.csv")
         (tmp_path / name).unlink()
+
+
+def streamed(given, live=None, fails=0):
+    """Write blocks as a stream. Returns the StreamLog, the text, the notes, and whether the stream was stopped."""
+    stopped, notes = threading.Event(), []
+    log, file = StreamLog(stopped, live), io.StringIO()
+    real = file.write
+
+    def write(text):
+        nonlocal fails
+        fails -= 1
+        if fails == 0:
+            raise OSError(28, "No space left on device")
+        return real(text)
+
+    file.write = write  # type: ignore[method-assign]
+    log.write(file, iter(given), notes)
+    return log, file.getvalue(), notes, stopped.is_set()
+
+
+def whole_block(sequence=0, time_us=1_000_000, turns=2, car=False, changed=0) -> StoredBlock:
+    """A block with the calibration of a sensor that is not aligned, and turns of two samples in each 10 ms."""
+    calibration = Calibration()
+    calibration.set_scale(16384, 131.0)
+    calibration.gyro_bias[0] = float(changed)
+    body = store.pack(0x68, 16, calibration)
+    made = [turn(time_us + 10_000 * (k + 1), sums=(0, 32768, 0, 0, 0, 0), speed=3.0) for k in range(turns)]
+    return StoredBlock(
+        1, sequence, time_us, 2105, 16384, 1310, 200, "1.0.0", 49, body, 7, made, "car" if car else "motorcycle"
+    )
+
+
+def test_a_stream_is_a_log_from_its_first_block():
+    log, text, notes, stopped = streamed([whole_block(), whole_block(1, 1_020_000, 3)])
+    head, *rows = text.splitlines()
+    assert head.startswith("t_s,ax_g") and head.endswith("utc_s,temp_c") and len(rows) == 5
+    assert [row.partition(",")[0] for row in rows] == ["0.010000", "0.020000", "0.030000", "0.040000", "0.050000"]
+    assert (log.count, log.seconds, log.written, notes, stopped) == (5, 0.05, True, [], False)
+
+
+def test_lost_blocks_and_gaps_of_a_stream_are_noted():
+    notes = streamed([whole_block(2), whole_block(5, 2_000_000)])[2]
+    assert notes == ["4 blocks of half a second did not arrive: the log has gaps"]  # 0, 1, 3 and 4
+    late = whole_block()
+    late.turns[1] = turn(2_000_000, sums=(0, 32768, 0, 0, 0, 0))
+    assert streamed([late])[2] == [block_reader.missing_note([0.98])]
+    with pytest.raises(InputError, match="nothing was recorded: does the display show readings"):
+        streamed([])
+
+
+def test_a_stream_ends_with_a_full_disk_or_a_new_calibration():
+    log, text, notes, stopped = streamed([whole_block(), whole_block(1, 1_020_000), whole_block(2)], fails=2)
+    assert log.count == 2 and len(text.splitlines()) == 3 and stopped
+    assert len(notes) == 1 and notes[0].startswith("writing the log failed (")
+    log, _, notes, stopped = streamed([whole_block(), whole_block(1, changed=1), whole_block(2)])
+    assert log.count == 2 and notes == ["the board's calibration has changed: the log ends here"] and stopped
+
+
+@pytest.mark.parametrize("car", [False, True])
+def test_the_live_readings_of_a_block(car):
+    """The sensor is not aligned, so neither lean nor force is shown. There are 2 turns in 20 ms."""
+    seen: list = []
+    streamed([whole_block(car=car), whole_block(1, 1_020_000, 0)], seen.append)
+    first, second = seen
+    assert (first.aligned, first.rate_hz, first.seconds, second.seconds) == (False, 100.0, 0.02, 0.02)
+    assert first.moments == [(0.01, None, None, None), (0.02, None, None, None)]
+    assert (first.max_left_deg, first.max_brake_g) == (0.0, 0.0) and (second.moments, second.rate_hz) == ([], 0.0)
+
+
+def test_blocks_of_a_stream_end_with_a_point(monkeypatch):
+    given = [b"vehicle car", b"YWJj", b"ZGVm", b".", b"!", b".", b"YWJj", b"."]
+    monkeypatch.setattr(stream, "lines", lambda *_: iter(given))
+    parsed: list = []
+    monkeypatch.setattr(stream, "parse", lambda data: parsed.append(data) or SimpleNamespace(data=data))
+    notes: list = []
+    found = list(stream.blocks(None, "P", notes, threading.Event()))  # type: ignore[arg-type]
+    assert parsed[0] == b"abcdef" and parsed[-1] == b"abc"
+    assert {one.vehicle for one in found} == {"car"}
+    assert notes == ["P: the board stopped on its own: the log up to there is kept"]
+
+
+def pulled(monkeypatch, tmp_path, *contents, whole=True, problems=()):
+    """Pull a ride of parts with these blocks. problems: those of the last part."""
+    parts = [pull._Part(3, k, 6, f"/rides/{k}") for k in range(len(contents))]
+    monkeypatch.setattr(pull, "_read", lambda _, part, *more: (b"abc", whole))
+    given = iter(contents)
+    monkeypatch.setattr(pull, "read", lambda _: (made := next(given), list(problems) if made is contents[-1] else []))
+    monkeypatch.setattr(pull.ride_log, "write", lambda path, blocks: path.touch())
+    return pull._pull_ride(None, 3, parts, "car", tmp_path, lambda *_: None)  # type: ignore[arg-type]
+
+
+def test_a_pulled_ride_has_its_name_and_its_length(monkeypatch, tmp_path):
+    found = pulled(monkeypatch, tmp_path, [whole_block(), whole_block(1, 1_020_000)], [whole_block(2, 1_040_000)])
+    assert found.log == tmp_path / "ride-00003-0007.csv.gz" and (found.seconds, found.readings) == (0.06, 6)
+    assert found.whole and not found.problems
+
+
+def test_problems_of_a_pulled_ride_are_named(monkeypatch, tmp_path):
+    def lines(*contents, **more):
+        found = pulled(monkeypatch, tmp_path, *contents, **more)
+        return found.problems, found.whole
+
+    assert lines([whole_block()], problems=["cut short"]) == (
+        ["ride 3, part 0: the last block is cut short, as by a power cut: left out"], True,
+    )  # fmt: skip
+    assert lines([whole_block()], problems=["damaged at byte 9"]) == (
+        ["ride 3, part 0: damaged at byte 9: left out"], False,
+    )  # fmt: skip
+    assert lines([whole_block()], whole=False)[0][0].startswith("ride 3, part 0: only 3 of its 6 bytes arrived: try")
+    assert lines([]) == (["ride 3: nothing in it can be read"], False)
+    gap = lines([whole_block(), whole_block(4, 1_020_000)])
+    assert gap == (["ride 3: 3 blocks are missing: the log has a gap there"], True)
+    begun = lines([whole_block(5)])
+    assert begun == (["ride 3: its beginning had to make room for later blocks"], True)
+
+
+def test_a_longer_log_of_the_same_ride_stays(monkeypatch, tmp_path):
+    for readings, kept in ((2, False), (3, True)):
+        monkeypatch.setattr(pull, "_readings", lambda path, readings=readings: readings)
+        (tmp_path / "ride-00003-0007.csv.gz").touch()
+        found = pulled(monkeypatch, tmp_path, [whole_block()])
+        assert (found.log == tmp_path / "ride-00003-0007-2.csv.gz") is kept and found.whole is not kept

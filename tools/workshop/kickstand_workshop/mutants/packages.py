@@ -24,7 +24,9 @@ def _package(sources: str, tests: str) -> Package:
 
 _STOPS = "stops_closed_form speed_fit quiet analysis_standstill analysis_brake_test"
 PACKAGES = {
-    "imu": _package("firmware/kickstand/imu/*.py", "imu/test_batches imu/test_sensor imu/test_[!d]*"),
+    "imu": _package(
+        "firmware/kickstand/imu/*.py", "imu/test_batches imu/test_axis_judge imu/test_sensor imu/test_[!d]*"
+    ),
     "calibration": _package(
         "firmware/kickstand/calibration/*.py firmware/kickstand/rotation.py",
         "calibration/test_rotation calibration/test_calibration calibration/test_still_pose calibration/test_pose_taker"
@@ -35,7 +37,9 @@ PACKAGES = {
         "lean/test_known_ride lean/test_filter_states lean/test_[bkmru]* lean/test_formula",  # the others take longer
     ),
     "drive_alignment": _package(
-        "firmware/kickstand/drive_alignment/*.py", "drive_alignment/test_parts drive_alignment/test_drive*"
+        "firmware/kickstand/drive_alignment/*.py",
+        "drive_alignment/test_[ebq]* drive_alignment/test_drive_limits drive_alignment/test_parts"
+        " drive_alignment/test_drive*",
     ),
     "speed": _package(
         "firmware/kickstand/speed/*.py", "simulated_board/test_board_speed simulated_board/test_board_place"
@@ -49,13 +53,21 @@ PACKAGES = {
     "published": _package("tools/kickstand_tools/calibration/published.py", "drive_alignment/test_published"),
     "aligning": _package(
         "tools/kickstand_tools/calibration/[!p]*.py tools/kickstand_tools/calibration/p[or]*.py",
-        "calibration/test_sensor_fit calibration/test_cli_calibration_file calibration/test_cli_calibrate"
-        " drive_alignment/test_drive_bins drive_alignment/test_cli_drive",
+        "calibration/test_aligning_parts calibration/test_sensor_fit calibration/test_cli_calibration_file"
+        " calibration/test_cli_calibrate drive_alignment/test_drive_bins drive_alignment/test_cli_drive",
     ),
-    "logs": _package("tools/kickstand_tools/logs/*.py", "logs/test_log_parts logs/test_[!cm]* logs/test_c*"),
-    "imports": _package("tools/kickstand_tools/imports/**/*.py", "imports/test_apps imports/test_[!a]*"),
+    "logs": _package(
+        "tools/kickstand_tools/logs/*.py",
+        "logs/test_csv_limits logs/test_reader_limits logs/test_log_parts logs/test_[!cm]* logs/test_c*",
+    ),
+    "imports": _package(
+        "tools/kickstand_tools/imports/**/*.py",
+        "imports/test_import* imports/test_[lf]*_limits imports/test_app_signs imports/test_[!a]* imports/test_apps",
+    ),
     "joining": _package(
-        "tools/kickstand_tools/joining/*.py", "joining/test_joining_parts joining/test_[!m]* imports/test_joining"
+        "tools/kickstand_tools/joining/*.py",
+        "joining/test_fit_limits joining/test_match_limits joining/test_joining_parts joining/test_track_steps"
+        " joining/test_matching joining/test_c* imports/test_joining",
     ),
     "estimation": _package(
         "tools/kickstand_tools/estimation/*.py", "estimation/test_estimation_parts estimation/test_[esa]*"
@@ -65,10 +77,12 @@ PACKAGES = {
         "analysis/test_analysis_parts analysis/test_riding analysis/test_analysis_channels"
         " analysis/test_al* analysis/test_c* analysis/test_map",
     ),
-    "overlay": _package("tools/kickstand_tools/overlay/*.py", "overlay/test_[!h]*"),
+    "overlay": _package("tools/kickstand_tools/overlay/*.py", "overlay/test_[gosv]* overlay/test_c*"),
     "deploy": _package(
         "tools/kickstand_tools/deploy/*.py",
-        "deploy/test_check* deploy/test_config* deploy/test_[unmo]* deploy/test_cli_flash",
+        "deploy/test_console_limits deploy/test_check_order deploy/test_check_limits"
+        " deploy/test_config_limits deploy/test_update_limits deploy/test_check* deploy/test_config*"
+        " deploy/test_[unmo]* deploy/test_cli_flash",
     ),
     "simulation": _package(
         "tools/kickstand_tools/simulation/**/*.py",
