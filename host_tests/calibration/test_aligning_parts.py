@@ -184,10 +184,12 @@ def test_a_still_window_has_limits(what, amount, still):
     assert bool(found and found[0][1] - found[0][0] > 250) is still
 
 
-def test_windows_do_not_extend_over_a_gap():
-    t_s = np.append(np.arange(122) / 100.0, 3.0 + np.arange(148) / 100.0)
-    found = procedure._still_stretches(Log(t_s, np.tile([0.0, 1.0, 0.0], (270, 1)), np.zeros((270, 3))))
-    assert found == [(10, 110), (135, 260)]  # windows begin at every fifth sample
+@pytest.mark.parametrize(("before", "found"), [(122, [(10, 110), (135, 260)]), (130, [(10, 119), (140, 260)])])
+def test_no_stretch_extends_over_a_gap(before, found):
+    """Windows begin at every fifth sample. With 130 samples before the gap, the next window begins right after it."""
+    t_s = np.append(np.arange(before) / 100.0, 3.0 + np.arange(270 - before) / 100.0)
+    log = Log(t_s, np.tile([0.0, 1.0, 0.0], (270, 1)), np.zeros((270, 3)))
+    assert procedure._still_stretches(log) == found
 
 
 def test_the_least_tilted_pose_is_a_sides():

@@ -178,10 +178,16 @@ def test_speeds_and_places_are_found_by_name():
     def sheet(*names):
         return Sheet("f", list(names), [np.arange(9.0)] * len(names))
 
-    for name, unit in (("Speed (km/h)", "km/h"), ("speed_kph", "km/h"), ("GPS_velocity_mph", "mph"), ("speed", "")):
+    for name, unit in (
+        ("Speed (km/h)", "km/h"),
+        ("speed_kph", "km/h"),
+        ("GPS_velocity_mph", "mph"),
+        ("speed", ""),
+        ("Velocity", ""),
+    ):
         found = findings._speed(sheet("t", name))
         assert found is not None and (found.columns, found.unit, found.certain) == ([name], unit, bool(unit))
-    for name in ("speedaccuracy", "angularvelocity", "velocityx", "fast"):
+    for name in ("speedaccuracy", "angularvelocity", "velocityx", "velocity_y", "fast"):
         assert findings._speed(sheet(name)) is None
     assert findings._find_by_name(sheet("latitude_acc"), "^lat") is None
     assert findings._find_by_name(sheet("Latitude"), "^lat") is not None

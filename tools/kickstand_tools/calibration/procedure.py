@@ -111,6 +111,7 @@ def _still_stretches(log: Log) -> list[tuple[int, int]]:
     lies = np.zeros(len(log.t_s) + 2, dtype=int)
     for start in starts[still]:
         lies[start + 1 : start + 1 + n] = 1
+    lies[1:-2][np.diff(log.t_s) > _WINDOW_S] = 0  # the sensor may be moved in a gap, so a stretch ends at it
     edges = np.flatnonzero(np.diff(lies))
     margin = round(_MARGIN_S / step_s)
     found = [(first + margin, last - margin) for first, last in zip(edges[::2].tolist(), edges[1::2].tolist())]

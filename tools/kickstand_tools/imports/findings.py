@@ -486,9 +486,8 @@ def _by_size(rates: Array, force: Array) -> tuple[str, str]:
 def _speed(sheet: Sheet) -> ColumnFinding | None:
     for place, name in enumerate(sheet.columns):
         bare = plain(name)
-        if re.search(r"speed|velocity|kmh|kph", bare) and not re.search(
-            r"acc|ang|[xyz]$", bare.replace("speedkmh", "")
-        ):
+        # velocityx and others are components, but velocity alone also ends in y
+        if re.search(r"speed|velocity|kmh|kph", bare) and not re.search(r"acc|ang|[xz]$|(?<!velocit)y$", bare):
             if not np.any(np.isfinite(sheet.numbers(place))):
                 continue
             stated = stated_unit(name)
