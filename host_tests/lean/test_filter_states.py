@@ -171,8 +171,8 @@ def test_rest_corrects_a_large_bias_at_once():
 
 
 def test_a_sensor_pointing_up_or_down_comes_to_rest():
-    """An unaligned board lies on the table, so its pitch may be a right angle. Then lean has no meaning, but the filter
-    must not fail."""
+    """Before the alignment, the filter's forward axis may point straight up or down, for example with the board on a
+    table. Then lean has no meaning, but the filter must not fail."""
     for forward in (1.0, -1.0):
         for left, up in ((0.0, 0.0), (1e-5, 0.0), (1e-4, -1e-4), (0.01, 0.02), (0.0, -0.3)):
             estimator, rested = LeanFilter(), False

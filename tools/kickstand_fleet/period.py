@@ -39,7 +39,7 @@ _REPORTED = (CutLine, CutGzip, NulEnd, FrozenReadings, AxisDead, GyroSaturated, 
 # Refusals of the firmware whose cause may be a move of the mount
 _SUSPECTS = (MOVED, "parts-differ", "uncertain")
 _PLOTTED = 160  # largest number of intervals in a picture
-_AGAINST = -0.5  # below this value of evidence.handedness(), the gyro or the axes are mirrored
+_AGAINST = -0.5  # limit of evidence.handedness(): if it is lower, the gyro or the axes are mirrored
 
 Row = dict[str, Any]
 

@@ -19,7 +19,7 @@ _FEED_TURNS = const(2)
 _GAP_MS = const(300)  # a longer time between two readings means that readings are missing
 _LOOK_MS = const(1000)  # time between two calls of _look()
 _FRESH_MS = const(3000)  # a speed older than this does not prove a standstill
-_AWAY_MPS = const(2.0)  # above this speed the vehicle has driven off
+_AWAY_MPS = const(2.0)  # a faster vehicle has driven off
 
 # The bias in the corrected rates of an aligned sensor, because the bias of its poses is already subtracted
 _KNOWN_BIAS = (0.0, 0.0, 0.0)

@@ -220,8 +220,8 @@ class Mpu6050:
         self.axes.restart()
 
     def configured(self):
-        """Return True if the chip is awake and has the configuration that setup() wrote. Raises OSError from the
-        bus."""
+        """Return True if the chip is awake and has the configuration that setup() wrote. After start() the FIFO must
+        run too. Raises OSError from the bus."""
         self._read_into(_SMPLRT_DIV, self._readback)  # SMPLRT_DIV to FIFO_EN
         self._read_into(_USER_CTRL, self._three)  # USER_CTRL, PWR_MGMT_1 and PWR_MGMT_2
         # An accepted unknown chip is also sent ACCEL_CONFIG2, but it may not have that register.

@@ -120,7 +120,9 @@ class Consistency:
 
     @property
     def one_sided(self):
-        """True after a recent misfit if the lean has been steadily on one side."""
+        """True if a misfit is not yet forgotten, and the mean lean is steadily over _ONE_SIDE.
+
+        From _SURE_LEAN on, this must have lasted for _LONG_S."""
         lean = abs(self._lean)
         if not self.doubts or lean <= _ONE_SIDE or lean * lean <= _STEADY * self._lean_square:
             return False

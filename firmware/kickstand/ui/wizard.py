@@ -96,8 +96,8 @@ class Wizard:
         return fault is None
 
     def _refuse(self, problem):
-        """Show the reason of a refusal until a press. A fault of the gyro is also printed, because another sensor is
-        needed."""
+        """Show the reason of a refusal until a press. A fault of the gyro is also printed, because its remedy is too
+        long for the display."""
         if isinstance(problem, GyroError):
             report(problem)
         self._turn.running = False

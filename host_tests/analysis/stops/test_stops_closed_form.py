@@ -70,8 +70,8 @@ def test_rebound_of_the_fork_does_not_change_the_end():
 
 
 def test_jerk_is_the_steepest_change_of_the_force():
-    """The deceleration grows by 10 m/s3 to 6 m/s2 and stays constant. At the end it falls by 20 m/s3, which is the
-    larger jerk."""
+    """The deceleration rises to 6 m/s2 at a rate of 10 m/s3, and stays constant. At the end it falls at a rate of
+    20 m/s3, which is the larger jerk."""
     t = np.arange(0.0, 30.0, 1.0 / RATE_HZ)
     braked = np.interp(t, [15.0, 15.6, 17.6, 17.9, 19.0], [0.0, 6.0, 6.0, 0.0, 0.0])
     lost = np.concatenate(([0.0], np.cumsum((braked[1:] + braked[:-1]) / 2.0 / RATE_HZ)))[-1]

@@ -139,10 +139,10 @@ def sensor(parts):
 
 
 def self_test(parts):
-    """Switch the chip's self-test on and off.
+    """Measure the six axes without and with the chip's self-test.
 
     Returns:
-        The registers 0x0D to 0x10.
+        The registers 0x0D to 0x10, with the trims of the self-test by the factory.
         Means of the six axes without self-test, in counts at +-8 g and +-250 deg/s.
         Means of the six axes with self-test.
     """

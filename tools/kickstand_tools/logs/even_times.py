@@ -18,8 +18,10 @@ from ..signals import Array, Ints, window_means
 from .log import Block
 
 COARSE = 0.05  # smallest tick, as a share of the time between samples, for which times are changed
-OFTEN = 0.05  # over this share of repeated times, the recorder writes one time for several samples
-EXACT = 0.98  # from this share of equal steps, the times are already even, and only some samples are missing
+# If more than this share of the times repeats the previous time, the recorder writes one time for several samples
+OFTEN = 0.05
+# If at least this share of the steps is equal, the times are already even, and only some samples are missing
+EXACT = 0.98
 GAP = 1.5  # a step is a gap if it is longer than 1.5 median steps plus a tick
 # The mean around a sample uses at least AROUND samples and at least TICKS ticks.
 AROUND = 64

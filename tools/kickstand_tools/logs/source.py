@@ -83,7 +83,7 @@ def chunks(source: File, size: int, remarks: list[Message] | None = None) -> Ite
         text: the chunk.
         read: bytes of the file read so far.
 
-    Raises InputError with the file's name.
+    Raises InputError with the file's name if the file cannot be read.
     """
     name = name_of(source)
     if isinstance(source, (Path, str)) and Path(source).is_dir():

@@ -1,7 +1,8 @@
 """Reads the gyro of a GoPro from its video file.
 
-The format GPMF is described at github.com/gopro/gpmf-parser. It consists of nested items: a four-letter key, a type, a
-size, the number of values, and the values, big-endian. There is about one packet per second.
+The video file has a track of packets in the format GPMF, about one packet per second. The format is described at
+github.com/gopro/gpmf-parser. A packet consists of nested items. An item has a four-letter key, a type, a size, the
+number of values, and the values, big-endian.
 """
 
 import struct

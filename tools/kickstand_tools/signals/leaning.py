@@ -52,7 +52,8 @@ def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
 
     rate: rates without bias, shape (n, 3), in rad/s.
     force: forces in any unit, shape (n, 3).
-    riding: True for the windows to use, shape (n).
+    riding: True for the windows from which axes, speed and share are computed, shape (n). The lean itself is integrated
+        over all windows.
     """
     up = _unit(force[riding].mean(axis=0))
     yaw = averaged(rate @ up, SMOOTH_S)

@@ -36,7 +36,7 @@ _RATE = [f"motionRotationRate{axis}" for axis in "XYZ"]
 
 
 def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
-    """Each file that has SensorLog's columns is a recording."""
+    """Return each file with a column of SensorLog as a recording of its own."""
     return [[file] for file in files if _is_ours(file)]
 
 

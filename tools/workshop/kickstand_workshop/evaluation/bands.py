@@ -65,7 +65,7 @@ def bands_of_log(log: Log, calibration: CalibrationFile) -> Figures:
 
 
 def of_recording(path: Path) -> Figures:
-    """Return the rms in each band for a recorded ride. The alignment is computed from the same ride.
+    """Return the same as bands_of_log() for a recorded ride. The alignment is computed from this ride.
 
     Raises InputError if the log cannot be used.
     """
