@@ -84,6 +84,8 @@ def test_an_export_replays_as_the_ride_it_was_made_from(tmp_path, name):
     ride = app_exports.riding().every(every)
     found = api.import_recording(write(tmp_path, ride))
     assert name.startswith(found.app)
+    on_bike = name.startswith(ON_THE_BIKE)
+    assert found.vehicle_axes is on_bike, f"{found.app}: vehicle_axes of AppRecording, or ON_THE_BIKE above, is wrong"
     assert [notice.code for notice in found.notices if notice.code != "import-sign"] == []
     api.write_imported(tmp_path / "RIDE.csv", found)
     log = api.read_log(tmp_path / "RIDE.csv")
