@@ -108,11 +108,14 @@ def test_pages_of_the_owner_follow_the_last_page(screen):
     screen.pages.own += [lambda: ("one", ""), lambda: ("two", "")]
     screen._meter.trusted = False  # so that each page has the same lines
     shown = []
-    for k in range(8):
+    from kickstand.ui import page_ring
+
+    ring = [page.__name__ for page in page_ring.MOTORCYCLE]
+    for k in range(len(ring) + 3):
         line = first_line(screen, 100 * k)
         shown.append((screen.pages.name, line))
         screen.press(SHORT, 100 * k + 50)
-    assert [name for name, _ in shown] == ["lean", "maxima", "acceleration", "formula", "raw", "own", "own", "lean"]
+    assert [name for name, _ in shown] == [*ring, "own", "own", ring[0]]
     assert [line for name, line in shown if name == "own"] == ["one", "two"]
 
 
@@ -143,6 +146,8 @@ def test_a_display_that_draws_gets_a_picture_of_the_first_page(screen):
 
 
 def test_the_menu_asks_for_alignment_by_driving(drive, screen):
+    from kickstand.ui import page_ring
+
     asked = []
     drive.ask = lambda: asked.append(True)
     screen.press(LONG, 0)
@@ -152,7 +157,7 @@ def test_the_menu_asks_for_alignment_by_driving(drive, screen):
         screen.press(SHORT, 100 * k + 50)
     screen.press(LONG, 1500)
     assert asked == [True]
-    assert screen.pages._at == 5  # after the five pages
+    assert screen.pages._at == len(page_ring.MOTORCYCLE)  # the page after those of the motorcycle
 
 
 def test_the_problem_of_a_pose_is_known_until_the_next_pose(screen):

@@ -1,5 +1,5 @@
 """The ring of pages. A short press shows the next page. A page is a function in pages.py. To add a page called load,
-write pages.load, add it to MOTORCYCLE or CAR, and add a row to the table of pages in firmware/docs/displays.md."""
+write pages.load, and add it to MOTORCYCLE or CAR. CONTRIBUTING.md has the other steps."""
 
 from ..board.button import SHORT
 from ..errors import attempt
