@@ -5,8 +5,8 @@ The vertical from standing is the mean direction of gravity over many stops. The
 measured too.
 
 At a stop a motorcycle may lean to a side. So its vertical comes from the upright pose or, without this pose, from
-riding straight, because a balanced bike has no lateral force. A car's vertical comes in equal shares from its stops and
-from driving straight, because the road's camber and slope tilt both in the same way.
+riding straight, because a balanced bike has no lateral force. A car's vertical is the mean of the vertical from its
+stops and the vertical from driving straight. The camber and slope of the road disturb both by about the same amount.
 """
 
 from ..errors import AlignmentError

@@ -177,7 +177,9 @@ class Consistency:
         return False
 
     def rest(self, seconds):
-        """Take a window at rest. After a gap the force then shows the lean."""
+        """Take a window at rest.
+
+        A doubt that comes only from a gap ends here at once, because at rest the force shows the lean."""
         if self.doubt and self._in_rest and self.doubts <= MILD:
             self._fit(seconds if self.doubts else _GAP_S)
 

@@ -152,8 +152,9 @@ def _turn(rate: Array) -> Array:
     (w, n, 3, 3).
     """
     half = rotation_matrix(rate * (CELL_S / 2.0))
-    after = half @ half  # each pass of the loop combines twice as many cells
+    after = half @ half  # the rotation over each cell
     reach = 1
+    # Before each pass, after[:, k] is the rotation over the last `reach` cells up to cell k. A pass doubles `reach`
     while reach < rate.shape[1]:
         after[:, reach:] = after[:, :-reach] @ after[:, reach:]
         reach *= 2

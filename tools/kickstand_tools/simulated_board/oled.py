@@ -13,7 +13,7 @@ PAGES = HEIGHT // 8
 # {kind: (columns of RAM, first visible column, low half of the status)}. The status was measured on chips, because no
 # data sheet has it.
 _KINDS = {"ssd1306": (128, 0, 0x03), "sh1106": (132, 2, 0x08)}
-# Supply commands of the other controller that this one ignores. Commands with another meaning here are not listed.
+# {kind: commands that the driver sends for the other kind of chip, and that this kind ignores}
 _IGNORED = {"ssd1306": (0xAD, 0x8B), "sh1106": (0x8D, 0x20, 0x2E)}
 # {command: number of its arguments}
 _ARGUMENTS = {0x81: 1, 0xA8: 1, 0xD3: 1, 0xD5: 1, 0xD9: 1, 0xDA: 1, 0xDB: 1}
