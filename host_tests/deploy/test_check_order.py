@@ -5,11 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.deploy import (
-    board_files,
-    bytecode,
-    check,
-)  # fmt: skip
+from kickstand_tools.deploy import board_files, bytecode, check
 from kickstand_tools.deploy.board_files import BoardFiles, fingerprint
 from kickstand_tools.deploy.check_limits import BAD, GOOD, LOOK, SKIPPED, Finding
 

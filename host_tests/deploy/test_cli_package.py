@@ -24,7 +24,7 @@ def test_mip_installs_every_module_and_nothing_else():
     modules = {path.relative_to(firmware).as_posix() for path in (firmware / "kickstand").rglob("*.py")}
     assert {target for target, _ in listed["urls"]} == modules
     assert all(target == source for target, source in listed["urls"])  # relative targets need no network
-    assert listed == firmware_files.mip_package(), "python -m kickstand_tools.deploy.firmware_files writes it anew"
+    assert listed == firmware_files.mip_package(), "python -m kickstand_tools.deploy.firmware_files writes it again"
 
 
 def test_one_version_everywhere():

@@ -3,10 +3,7 @@
 from types import SimpleNamespace
 
 import pytest
-from kickstand_tools.deploy import (
-    config_check,
-    config_text,
-)  # fmt: skip
+from kickstand_tools.deploy import config_check, config_text
 
 
 def test_faults_of_a_config_have_their_line(tmp_path):

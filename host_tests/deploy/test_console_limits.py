@@ -7,10 +7,7 @@ from typing import Any
 
 import pytest
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.deploy import (
-    board_console,
-    connection,
-)  # fmt: skip
+from kickstand_tools.deploy import board_console, connection
 from kickstand_tools.deploy.connection import literal
 from mpremote.transport import TransportError
 
@@ -61,7 +58,7 @@ class Talker:
 
 
 @pytest.fixture
-def told(monkeypatch):
+def answers(monkeypatch):
     """Return a function that returns the lines, or the reason of an end, and the bytes sent to the board."""
     clock = Clock()
     fake = SimpleNamespace(monotonic=lambda: clock.now, time=lambda: clock.wall)
@@ -80,38 +77,38 @@ def told(monkeypatch):
     return result
 
 
-def test_lines_of_a_program_end_with_its_prompt(told):
-    assert told(b"a\r\nb", b"b\n\x04\x04>") == ([b"a", b"bb"], b"\x01")
-    assert told(b"a\n\x04Traceback\r\nOSError: 5\r\n\x04>") == ([b"a", "the board reports OSError: 5"], b"\x01")
-    assert told(b"\x04\x04>") == ([], b"\x01")
+def test_lines_of_a_program_end_with_its_prompt(answers):
+    assert answers(b"a\r\nb", b"b\n\x04\x04>") == ([b"a", b"bb"], b"\x01")
+    assert answers(b"a\n\x04Traceback\r\nOSError: 5\r\n\x04>") == ([b"a", "the board reports OSError: 5"], b"\x01")
+    assert answers(b"\x04\x04>") == ([], b"\x01")
 
 
-def test_a_silent_board_is_abandoned_after_its_time(told):
-    assert told(b"a\n", 19.9, b"b\n\x04\x04>")[0] == [b"a", b"b"]
-    assert told(b"a\n", 20.1, b"b\n\x04\x04>")[0] == [b"a", "the board says nothing any more"]
+def test_a_silent_board_is_abandoned_after_its_time(answers):
+    assert answers(b"a\n", 19.9, b"b\n\x04\x04>")[0] == [b"a", b"b"]
+    assert answers(b"a\n", 20.1, b"b\n\x04\x04>")[0] == [b"a", "the board says nothing any more"]
 
 
-def test_a_computer_that_slept_hears_5_s_of_silence(told):
+def test_a_computer_that_slept_hears_5_s_of_silence(answers):
     awake = "the board stopped because this computer took nothing for 3 s: keep it awake"
-    assert told(b"a\n", (3.0,), 5.1, b"\x04\x04>")[0] == [b"a", awake]
-    assert told(b"a\n", (3.0,), 4.9, b"\x04\x04>")[0] == [b"a"]
-    assert told(b"a\n", (0.9,), 5.1, b"\x04\x04>")[0] == [b"a"]
-    assert told((3.0,), 2.1, b"\x04\x04>", silent_s=2.0)[0] == ["the board says nothing any more"]
+    assert answers(b"a\n", (3.0,), 5.1, b"\x04\x04>")[0] == [b"a", awake]
+    assert answers(b"a\n", (3.0,), 4.9, b"\x04\x04>")[0] == [b"a"]
+    assert answers(b"a\n", (0.9,), 5.1, b"\x04\x04>")[0] == [b"a"]
+    assert answers((3.0,), 2.1, b"\x04\x04>", silent_s=2.0)[0] == ["the board says nothing any more"]
 
 
-def test_a_stopped_program_may_print_for_10_s_more(told):
+def test_a_stopped_program_may_print_for_10_s_more(answers):
     stopped = threading.Event()
     stopped.set()
-    assert told(9.9, b"a\n\x04KeyboardInterrupt\x04>", stopped=stopped) == ([b"a"], b"\x03\x01")
-    assert told(10.1, b"a\n\x04\x04>", stopped=stopped) == ([], b"\x03")
+    assert answers(9.9, b"a\n\x04KeyboardInterrupt\x04>", stopped=stopped) == ([b"a"], b"\x03\x01")
+    assert answers(10.1, b"a\n\x04\x04>", stopped=stopped) == ([], b"\x03")
 
 
-def test_an_endless_answer_is_abandoned(told):
+def test_an_endless_answer_is_abandoned(answers):
     endless = "the program on the board does not end"
-    assert told(b"a\n" * 5, b"\x04\x04>", most_bytes=13)[0] == [b"a"] * 5
-    assert told(b"a\n" * 5, b"\x04\x04>", most_bytes=12)[0] == [b"a"] * 5 + [endless]
-    assert told(b"x" * 60_000, b"x" * 40_000, b"\n\x04\x04>")[0] == [b"x" * 100_000]
-    assert told(b"x" * 60_000, b"x" * 40_001, b"y", b"\n\x04\x04>")[0] == [endless]
+    assert answers(b"a\n" * 5, b"\x04\x04>", most_bytes=13)[0] == [b"a"] * 5
+    assert answers(b"a\n" * 5, b"\x04\x04>", most_bytes=12)[0] == [b"a"] * 5 + [endless]
+    assert answers(b"x" * 60_000, b"x" * 40_000, b"\n\x04\x04>")[0] == [b"x" * 100_000]
+    assert answers(b"x" * 60_000, b"x" * 40_001, b"y", b"\n\x04\x04>")[0] == [endless]
 
 
 # connection.py

@@ -97,7 +97,7 @@ def test_a_car_by_its_wheel_stores_at_standstill_only(tmp_path):
     assert forward_error_deg(stored(tmp_path), 3) < 1.5
 
 
-def test_a_car_whose_sensor_is_mounted_anew_finds_it_out(tmp_path):
+def test_a_car_finds_out_that_its_sensor_was_remounted(tmp_path):
     before = Calibration().with_alignment(sensor_errors.Sensor(seed=3).vehicle_from_sensor, [0.0] * 3, 0.0, True)
     Store(0x68, 8, str(tmp_path)).save(before)
     record = device_plans.run("cpython", tmp_path, car("wheel", 7, remount=[20.0, 8]))

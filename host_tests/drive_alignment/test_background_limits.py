@@ -33,7 +33,7 @@ def background(real=False, **given: Any) -> Any:
         setattr(made, name, value)
     made.calls = calls
     if not real:
-        made._adopt = lambda anew: calls.append(("adopt", anew))
+        made._adopt = lambda new: calls.append(("adopt", new))
         made._restart = lambda: calls.append("restart")
     return made
 
@@ -167,15 +167,19 @@ def test_a_request_begins_a_drive_that_replaces_the_alignment():
 
 
 def test_an_adopted_alignment_is_saved_with_its_trim():
-    for anew, trim in ((True, 0.0), (False, 1.5)):
+    for new, trim in ((True, 0.0), (False, 1.5)):
         made = background(real=True, _asked=True)
         saved = []
         made._save = lambda matrix, trim_deg, saved=saved: saved.append(trim_deg) or True
-        made._adopt(anew)
+        made._adopt(new)
         assert saved == [trim] and said(made.result) == ("aligned", 0.7)
-        assert (made.message is made.result, made._asked, "maxima" in made.calls) == (anew, not anew, anew)
+        assert (made.message is made.result, made._asked, "maxima" in made.calls) == (
+            new,
+            not new,
+            new,
+        )
         made._save, made.result = (lambda *_: False), None
-        made._adopt(anew)
+        made._adopt(new)
         assert made.result is None
 
 

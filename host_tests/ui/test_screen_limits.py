@@ -8,8 +8,6 @@ from kickstand.errors import Notice
 from kickstand_tools.simulated_board.simulator import Board
 
 SHORT, LONG = 1, 2  # as in board/button.py
-
-
 CHIP = SimpleNamespace(accel_lsb_per_g=4096, gyro_lsb_per_dps=65.5, SATURATED=32700)
 
 
@@ -155,22 +153,27 @@ def names(shown, count) -> list[str]:
     return found
 
 
-PAGES = ["lean", "maxima", "acceleration", "formula", "raw"]
+def ring(leans=True) -> list[str]:
+    """Return the names of the pages that every board has, in their order."""
+    from kickstand.ui import page_ring
+
+    return [page.__name__ for page in (page_ring.MOTORCYCLE if leans else page_ring.CAR)]
 
 
-def test_the_ring_of_pages_has_its_order():
+def test_pages_of_parts_follow_those_of_every_board():
+    every = ring()
     shown = screen()
     shown._meter.trusted = False
-    assert names(shown, 6) == [*PAGES, "lean"]
+    assert names(shown, len(every) + 1) == [*every, every[0]]
     shown.recorder.active = True
     shown.pages.first()
-    assert names(shown, 7) == [*PAGES, "recording", "lean"]
+    assert names(shown, len(every) + 2) == [*every, "recording", every[0]]
     shown.pages.live = SimpleNamespace(lines=lambda: ("live", ""))
     shown.pages.first()
-    assert names(shown, 8) == [*PAGES, "live", "recording", "lean"]
-    car = screen(False)
+    assert names(shown, len(every) + 3) == [*every, "live", "recording", every[0]]
+    car, of_car = screen(False), ring(False)
     car._meter.trusted = False
-    assert names(car, 4) == ["acceleration", "cornering", "raw", "acceleration"]
+    assert names(car, len(of_car) + 1) == [*of_car, of_car[0]]
 
 
 def test_the_page_of_the_drive_follows_or_is_first(monkeypatch):
@@ -180,7 +183,8 @@ def test_the_page_of_the_drive_follows_or_is_first(monkeypatch):
     monkeypatch.setattr(pages, "not_aligned", lambda meter, seconds, line2="": ("not aligned", str(seconds) + line2))
     shown = screen(drive=SimpleNamespace(message=None, shown=True))
     shown._meter.trusted = False
-    assert names(shown, 7) == [*PAGES, "drive", "lean"]
+    every = ring()
+    assert names(shown, len(every) + 2) == [*every, "drive", every[0]]
     shown._calibration.aligned = False
     shown.pages.drive()
     assert shown.lines(2999) == ("drive", "")
@@ -220,9 +224,11 @@ def test_a_reason_for_no_lean_is_shown():
 
 
 def test_a_picture_is_for_the_pages_that_have_one():
+    from kickstand.ui import pages
+
     shown = screen()
     shown.pages.draws = True
-    assert [len(shown.pages._page(page)) for page in shown.pages._pages[:3]] == [3, 3, 3]
+    assert all(len(shown.pages._page(page)) == 3 for page in (pages.lean, pages.maxima, pages.acceleration))
     function, *values, recording = shown.pages._page(shown.pages._pages[0])[2]
     assert function.__name__ == "_lean" and values == [12, "right", 12] and not recording
     shown.recorder.active = True

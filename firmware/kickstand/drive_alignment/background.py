@@ -237,18 +237,18 @@ class BackgroundAlignment:
                 self.message = Notice("side-fixed")
                 self._meter.reset_maxima()
 
-    def _adopt(self, anew):
+    def _adopt(self, new):
         """Save the drive's alignment.
 
         Args:
-            anew: True if the sensor was remounted. Then trim and maxima are reset.
+            new: True for a new alignment, which resets trim and maxima. False for a refinement.
         """
         found = matrix()
         self.drive.matrix(found)
-        if not self._save(found, 0.0 if anew else self._meter.trim_deg):
+        if not self._save(found, 0.0 if new else self._meter.trim_deg):
             return
         self.result = Notice("aligned", self.drive.quality_deg)
-        if anew:
+        if new:
             self.message = self.result
             self._asked = False
             self._meter.reset_maxima()
