@@ -147,7 +147,7 @@ class Cluster:
         """
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._under_way: dict[str, tuple[int, Any]] = {}
-        self._working_s = time.monotonic()  # time at which a task ended or a worker existed, at the latest
+        self._working_s = time.monotonic()  # latest time at which a task ended or a worker existed
         suspects: list[int] = []
         waiting = deque(range(len(items)))
         while waiting or self._under_way:

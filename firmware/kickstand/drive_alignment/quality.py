@@ -23,10 +23,10 @@ READY_DEG, STAY_READY_DEG = 1.5, 2.5
 AGREE_DEG, STAY_AGREE_DEG = 4.0, 6.0  # largest difference of forward between the halves, and between the parts
 # A larger difference between the parts is allowed if it is within this number of standard deviations
 AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0
-# If two parts differ by more than the next three limits, the mount moved
+# The mount moved if two parts differ by more than one of the next three limits
 # Difference of forward. A long banked motorway curve that was treated as straight caused a difference of 15 degrees
 _MOVED_DEG = const(30.0)
-PITCH_DEG = 7.0  # difference of pitch. A road that goes 6 % uphill and then 6 % downhill causes less
+PITCH_DEG = 7.0  # difference of pitch. A road that goes 6 % uphill and then 6 % downhill causes a smaller one
 # Difference of roll. The banked curve caused 6 degrees. This limit is not used on a motorcycle, because it leans
 ROLL_DEG = 7.0
 # The mount moved if forward from one event differs by over _EVENT_OFF_DEG from forward of the whole drive. An event is

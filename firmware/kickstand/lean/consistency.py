@@ -60,8 +60,7 @@ _ONE_SIDE = const(0.13)
 # rad: steady lean above which the lean is hidden only after _LONG_S, because the upward force confirms it. Smaller:
 # fewer leans are hidden.
 _SURE_LEAN = const(0.3)
-# ratio: share of the lean's mean square that its squared mean exceeds if the lean is steady. Larger: fewer leans are
-# hidden.
+# ratio: the lean is steady if its squared mean exceeds this share of its mean square. Larger: fewer leans are hidden.
 _STEADY = const(0.75)
 # ratio: limit to which larger forces to the side are reduced. Larger: a single blow counts for more.
 _MOST_SIDEWAYS = const(0.5)

@@ -71,7 +71,7 @@ class Covariance:
 
     def _divide(self):
         n, every = self.n, memoryview(self._p)
-        # Parts of _p. The type checker takes the elements of a memoryview for integers.
+        # Parts of _p. The type checker treats the elements of a memoryview as integers.
         self.rows = [every[n * i : n * (i + 1)] for i in range(n)]  # type: list
 
     def __getstate__(self):  # copy and pickle on a computer cannot copy a memoryview

@@ -69,7 +69,7 @@ class LeanFilter:
         self._good = self._next_good = [0.0] * (STATES - BIAS_LEFT)
         self._good_s = 0.0
         self._kept_speed = None  # (speed, variance) for the next start
-        self._gap = False  # readings were missing before the next start
+        self._gap = False  # True if readings were missing before the next start
         self.restart()
 
     def restart(self):
@@ -101,7 +101,7 @@ class LeanFilter:
         self._roll_rate = self._last_roll_rate = 0.0
 
     def inflate_covariance(self, seconds):
-        """Add the process noise of this many seconds of lost readings to the variances of lean, pitch and speed."""
+        """Increase the variances of lean, pitch and speed, because readings were lost for this many seconds."""
         p = self._p
         if p is None:
             return

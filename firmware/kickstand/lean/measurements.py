@@ -115,15 +115,16 @@ _MEASURED_SPEED_S = const(4.0)
 # s: time for which the scale error of the speed stays the same. A wheel's radius is smaller during a whole bend.
 # Larger: measured speeds count for less, most of all in long bends.
 SPEED_SCALE_S = 40.0
-# s: possible delay of a measured speed. Larger: it counts for less during acceleration and braking.
+# s: possible delay of a measured speed. Larger: measured speeds count for less during acceleration and braking.
 _MEASURED_SPEED_LATE_S = const(1.0)
 # s: shortest time between two measured speeds that are used. In the windows between, straight_or_prior_speed() is used.
 # Larger: the measured speeds in use are older.
 MEASURED_SPEED_EVERY_S = 0.3
 
-# ratio: real standard deviation of the lean's error, divided by the filter's own standard deviation. The filter's is
-# too large, because the noises above are increased for disturbances that last. In simulated rides, two thirds of the
-# errors are within this share of it. Larger: the claimed sigma is larger, and the lean stays the same.
+# ratio: real standard deviation of the lean's error, divided by the filter's own standard deviation. The filter's
+# standard deviation is too large, because the noises above are increased for disturbances that last. In simulated
+# rides, two thirds of the errors are within this share of it. Larger: the claimed sigma is larger, and the lean stays
+# the same.
 SIGMA_SHARE = 0.46
 
 # Assumptions that take the place of measurements
@@ -158,7 +159,8 @@ SIGMA_REST_SPEED = 0.02  # m/s: error of the speed 0 at rest. Larger: the estima
 # g: largest forward force at rest that the pitch does not explain. A larger force is braking. Larger: steady braking is
 # mistaken for rest.
 MAX_REST_PUSH = 0.08
-# The bike certainly rolls if the estimated speed is above both of these. Larger: a smooth road is mistaken for rest.
+# The bike certainly rolls if the estimated speed is above both of the next limits. Larger: a smooth road is mistaken
+# for rest.
 ROLLING_SPEED = 3.0  # m/s
 ROLLING_SIGMAS = 3.0  # standard deviations of the speed
 # The trim is measured while the standard deviations of speed and lean are below these limits. Larger: the trim is found

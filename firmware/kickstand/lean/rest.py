@@ -30,8 +30,8 @@ class RestDetector:
     def __init__(self, first=True):
         self.resting = False
         self._still_s = 0.0
-        self._not_rolling_s = 0.0  # stillness without a sign of moving
-        self._average = None  # of the rates, before the estimated bias is subtracted, and of the forces
+        self._not_rolling_s = 0.0  # time of stillness without a sign that the bike moves
+        self._average = None  # averages of the rates, with the estimated bias included, and of the forces
         self._max_bias = _MAX_FIRST_BIAS_RADPS if first else MAX_BIAS_RADPS
 
     def update(self, rates, force, bias, seconds, rolling=False, moving=False):
@@ -64,7 +64,8 @@ class RestDetector:
                 still = still and abs(deviation) < _MAX_FORCE_G
         still = still and (near_estimate or near_calibration) and not moving
         self._still_s = self._still_s + seconds if still else 0.0
-        # A second timer, because steady braking looks still. It must not be rest as soon as the estimated speed is low.
+        # A second timer, because steady braking looks still. With one timer, it would count as rest as soon as the
+        # estimated speed is low.
         self._not_rolling_s = self._not_rolling_s + seconds if still and not rolling else 0.0
         self.resting = self._not_rolling_s >= _REST_S or self._still_s >= _REST_ROLLING_S
         if self.resting:

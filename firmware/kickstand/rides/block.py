@@ -140,7 +140,8 @@ except NO_MACHINE_CODE:
     encode = encode_python
 else:
     _ENTRY = array("i", (2, 9999, -30000, 30000, -1, 0, 255, -256, 0))
-    # A state for the comparison. It has a previous entry, means from small to large, and three pending bits.
+    # A state for the comparison of both functions. It has a previous entry, small and large means, and three pending
+    # bits.
     _STATE = array("i", (3, 1, -1, 29000, 70, -7, 254, 77, 0) + tuple(range(16, 160, 16)) + (5, 3, 0, 5000))
     encode = checked(encode, encode_python, _ENTRY, _STATE, bytearray(40))
 

@@ -190,8 +190,8 @@ def of_calibration(found: CalibrationFile, before: CalibrationFile | None = None
     the user is asked. An x axis that points down gives no notice, because a phone can lie on its side.
 
     found: the calibration with the new alignment.
-    before: the calibration on which it should build. If it belongs to another mount, only its offset and slope are
-        used.
+    before: the earlier calibration, whose offset and slope are used. A notice says so if it belongs to another
+        mount.
     """
     notices: list[Message] = []
     up = found.vehicle_from_sensor[1]

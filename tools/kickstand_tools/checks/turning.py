@@ -76,7 +76,8 @@ class Turning:
         Returns the mean square of the force that the rates do not explain, shape (w), in g2.
         """
         sign = np.linalg.det(exchange)
-        force = self._force @ (sign * exchange)  # the force is permuted instead of the rates, which keep only a sign
+        # permute the force instead of the rates. Only the sign of the permutation is applied to the rates
+        force = self._force @ (sign * exchange)
         bias, velocity = self._bias, self._velocities[0]
         if len(self._velocities) > 1:
             turned = self._turned(force, sign, bias)

@@ -74,11 +74,11 @@ def button(parts, wait_ms):
     """Wait for a press of the button. wait_ms: longest time to wait for the press, and then for the release.
 
     Returns:
-        True if the button was pressed at first.
-        True if it was pressed.
-        True if it was released.
+        True if the button was already pressed at the start.
+        True if a press was seen.
+        True if the release was seen.
         Duration of the press.
-        Number of edges of both changes.
+        Number of edges during press and release.
         GPIO of the button.
     """
     from time import sleep_ms, ticks_diff, ticks_ms

@@ -39,7 +39,8 @@ DIVE_MPS, DIVE_RAD, DIVE_S = 0.1, np.radians(2.5), 0.5
 SLOPE_MPS, SLOPE_RAD, SLOPE_S = 0.1, np.radians(2.0), 4.0
 STEEP = np.radians(10.0)  # DIVE_RAD and SLOPE_RAD double at this pitch; roads are less steep, wheelies steeper
 BALANCE_G, BALANCE_S = 0.011, 3.0  # force to the side, due to wind, camber and the rider
-# Two more parts of the force to the side: g times sin(lean), and g s2/rad times the roll acceleration
+# Two more parts of the force to the side: the first (in g) times sin(lean), and the second (in g s2/rad) times the roll
+# acceleration
 BALANCE_LEANED_G, BALANCE_ROLLING = 0.045, 0.05
 BALANCE_MIN_MPS = 4.0  # least speed of a balanced bike; at lower speeds, steering and feet also balance it
 ANY_MPS, ANY_S = 20.0, 60.0  # difference of the speed from USUAL_MPS, for a ride in which nothing else shows the speed
@@ -68,9 +69,9 @@ LASTING_MISFIT_S, MISFIT_MPS, USUAL_MISFIT, MOST_MISFIT = 2.0, 25.0, 0.25, 6.0
 # less, because lasting errors have small residuals.
 MISFIT_ROUGHNESS = 0.14
 # The unbalance of a ride is estimated in the same way. Subtract from BALANCED its mean over LASTS_S, which is
-# unknowns.BESIDE, and divide it by its standard deviation. The unbalance follows from the rms of means over BRIEF_S or
-# LONG_S. Longer means average out errors that change sign, such as a rider's corrections. So BRIEF_S overestimates the
-# noise, for caution, and LONG_S does not.
+# unknowns.BESIDE, and divide it by its standard deviation. Average the result over BRIEF_S or LONG_S. The unbalance
+# follows from the rms of these averages. Longer averages remove errors that change sign, such as a rider's corrections.
+# So BRIEF_S overestimates the noise, for caution, and LONG_S does not.
 BRIEF_S, LONG_S, LASTS_S = 3.0, 10.0, 40.0
 LEAST_UNBALANCE, MOST_UNBALANCE = 0.12, 6.0
 LEAST_WINDOWS = 50  # with fewer windows of balanced riding, the unbalance stays 1

@@ -37,7 +37,7 @@ DOUBTFUL = 0.2  # largest share of doubtful riding without a remark
 POSE_DEG = 1.8
 # A gyro is faulty if an estimated error is over this many standard deviations of its prior. Good gyros stayed under
 # 2.6, on good and bad mounts. If a gyro is faulty, the standard deviation of the lean is multiplied
-# by this ratio of the error to the standard deviation of its prior.
+# by this error, in standard deviations of its prior.
 ODD_SIGMAS = 4.0
 
 

@@ -12,7 +12,7 @@ GAP_S = 0.17  # if the time between two samples is longer, readings are missing
 
 @dataclass
 class Windows:
-    """n successive windows. A time of missing readings is one window with `gap` True.
+    """n successive windows. A stretch without readings is one window whose `gap` is True.
 
     edges: times at which the windows start and end, shape (n + 1), in s.
     rate: mean rates along the vehicle's axes, shape (n, 3), in rad/s.

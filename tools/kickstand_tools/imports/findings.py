@@ -388,7 +388,7 @@ def _has_gravity(three: _Triple, seconds: Array | None, near: bool) -> bool:
 
 
 def _rows_in(span_s: float, seconds: Array | None, count: int) -> int:
-    """The number of rows in span_s. Without a time column, a fiftieth of all rows."""
+    """The number of rows in span_s. Without a time column, 25 rows, but at most a tenth of all rows."""
     if seconds is None or not np.any(np.isfinite(seconds)):
         return max(1, min(25, count // 10))
     span = float(np.nanmax(seconds) - np.nanmin(seconds))

@@ -11,8 +11,8 @@ _MOST_SINE = 0.87  # largest sine of the lean; over 60 degrees, the speed or the
 
 
 class Comparison:
-    """Compares a ride with a track. A shift is the track's time at the ride's first sample, s since the track's first
-    point.
+    """Compares a ride with a track. A shift is the track's time at the ride's first sample, in s since the track's
+    first point.
 
     given: the segments of the track that are within the ride for every shift within margin_s.
     """
@@ -55,9 +55,9 @@ class Comparison:
 def _double_sums(motion: CellMotion, course: Course, shift_s: float) -> Array:
     """Return six integrals over time, shape (n + 1, 6). Their differences give means between two times.
 
-    The first three are of the rotation about up and two axes across it, in degrees. The others are of the integrated
-    force along the sensor's axes, in m/s. The rate about up is the yaw rate times the cosine of the lean. The lean of a
-    balanced bike follows from the track's speed and the yaw rate.
+    Columns 0 to 2 integrate the rotation about up and about two axes across it, in degrees. Columns 3 to 5 integrate
+    the speed that the force along the sensor's axes causes, in m/s. The rate about up is the yaw rate times the cosine
+    of the lean. The lean of a balanced bike follows from the track's speed and the yaw rate.
     """
     up = motion.up
     across = np.asarray(np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))]), dtype=float)
@@ -77,5 +77,8 @@ def _double_sums(motion: CellMotion, course: Course, shift_s: float) -> Array:
 
 
 def _sums(values: Array) -> Array:
-    """Return the integrals of values (n, k) from the first edge to each edge, shape (n + 1, k)."""
+    """Integrate each column from the first edge to each edge.
+
+    values: one row per cell, shape (n, k). Returns one row per edge, shape (n + 1, k).
+    """
     return np.vstack((np.zeros(values.shape[1]), np.cumsum(values * STEP_S, axis=0)))

@@ -22,7 +22,8 @@ _USUAL_TILT = 0.05  # prior of the tilt of up due to an accelerometer's offset, 
 _PRIOR = 1.0 / np.array([np.inf, USUAL_DRIFT, _USUAL_TILT, _USUAL_TILT, np.inf, np.inf, np.inf]) ** 2
 _SAME_TRACK_S = 0.05  # 1 sigma of the shift; receivers smooth more in bends than on straights
 _FREEDOM = 4.0  # degrees of freedom of Student's distribution, which down-weights errors over two sigma
-_LEAST_ERROR = 0.5  # least error divided by its sigma: the gyro's scale factor is inexact, even with a better receiver
+# least error divided by its sigma. With a better receiver the error is no smaller, because of the gyro's scale factor
+_LEAST_ERROR = 0.5
 _LEAST_COST = 0.5 * (_FREEDOM + 1.0) * np.log1p(_LEAST_ERROR**2 / _FREEDOM)  # least cost of a step
 _ROUNDS = 8
 _FEWEST = 2  # least number of segments to compare
@@ -61,7 +62,7 @@ def fitted(motion: CellMotion, course: Course, segments: Segments, rough_s: floa
 
 
 def cost_of_one_shift(motion: CellMotion, course: Course, segments: Segments, fit: TrackFit) -> float:
-    """The reduction of the cost per segment if each segment gets its own shift, in units of an error's cost.
+    """Return by how much the cost per segment falls if each segment gets its own shift, in units of an error's cost.
 
     The result is under 2 if the track belongs to the ride, and over 4 for the same road at another time.
     """
@@ -81,7 +82,8 @@ def _try_shifts(compared: Comparison, rough_s: float) -> tuple[float, float, flo
     since_s = given.middle_s.mean(axis=1) - middle_s
     best = (np.inf, 0.0, 0.0)
     for drift in _DRIFTS:
-        # for every shift in the middle of the ride: the cost of each segment at the segment's own shift
+        # With a drift, the shift differs between segments. For each shift in the middle of the ride, interpolate the
+        # cost of each segment at its own shift.
         at = np.clip((_SHIFTS[:, None] + drift * since_s + AROUND_S) / _TRIED_S, 0.0, len(_SHIFTS) - 1.001)
         low = at.astype(int)
         column = np.arange(len(since_s))
@@ -108,8 +110,10 @@ def _costs(compared: Comparison, shift_s: float, drift: float, along: Array) -> 
 
 
 def _cost(given: Segments, error_deg: Array) -> Array:
-    """Return minus the log-likelihood of each segment's errors, shape (p), by Student's distribution. error_deg: shape
-    (p, STEPS)."""
+    """Return the cost of each segment, shape (p): minus the log-likelihood of its errors by Student's distribution.
+
+    error_deg: the error of each step, shape (p, STEPS).
+    """
     square = error_deg * error_deg * given.course_weight
     return 0.5 * (_FREEDOM + 1.0) * np.log1p(square / _FREEDOM).sum(axis=1)
 
@@ -187,8 +191,10 @@ def _with_sigma(compared: Comparison, evidence: float, now: Array, step: _Step) 
 
 
 def _least(columns: Array, values: Array, weight: Array) -> Array:
-    """Return the coefficients of columns that fit values best, by weighted least squares, shape (k). columns: shape
-    (k, p, STEPS)."""
+    """Fit values by a weighted sum of k columns, by weighted least squares.
+
+    columns: shape (k, p, STEPS). Returns the coefficient of each column, shape (k).
+    """
     root = np.sqrt(weight)
     found = np.linalg.lstsq((columns * root).reshape(len(columns), -1).T, (values * root).ravel(), rcond=None)[0]
     return np.asarray(found, dtype=float)

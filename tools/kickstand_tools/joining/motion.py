@@ -23,8 +23,10 @@ _LONGEST_S = 100 * 3600.0  # longest ride; memory limits it
 class CellMotion:
     """A ride in n cells of STEP_S from its first sample.
 
-    force_g, rate_dps (n, 3): means in the sensor's axes, rates minus the gyro's bias. there (n): False without samples
-    or with frozen readings; force and rate are then 0. speed, positions: True if the log has them.
+    force_g: mean force of each cell along the sensor's axes, shape (n, 3).
+    rate_dps: mean rate of each cell about the sensor's axes, minus the gyro's bias, shape (n, 3).
+    there: False in a cell without samples or with frozen readings, shape (n). Its force and rate are 0.
+    speed, positions: True if the log has them.
     """
 
     force_g: Array

@@ -33,7 +33,7 @@ CROWD = 50
 # Largest change of a time, in ticks. Rounding explains half a tick. The rest is a margin for the ends of the log, where
 # the mean is less exact.
 ALLOWED = 0.6
-SHORTEST_S = 2e-6  # shortest step in s; steps stay over 0 when times are rounded to microseconds
+SHORTEST_S = 2e-6  # shortest step, in s. It stays over 0 if times are rounded to microseconds
 CONTEXT = 2000  # number of samples before and after a block that are used to compute its times
 REPORTED_S = 0.002  # smallest change of a time, in s, that is reported in a notice
 

@@ -65,7 +65,8 @@ class Gps:
         data = bytearray(self._last)
         if self._has("garbled"):
             for i in range(self._sent % 13, len(data), 13):
-                data[i] ^= 1 << (self._sent + i // 13) % 7  # different bits: equal ones would not change the checksum
+                # Invert different bits, because the same bit in two bytes would not change the checksum
+                data[i] ^= 1 << (self._sent + i // 13) % 7
         self._sent += 1
         start_us = self._clock.now_us + self._latency_us
         for i in range(0, len(data), _PIECE):

@@ -14,7 +14,7 @@ class TransferFault:
         "nack": the transfers are not acknowledged.
         "timeout": the wires are held.
         "cut": in one transfer no byte from number `byte` on is acknowledged.
-        "corrupt": the bits of mask are inverted in the read byte number `byte`.
+        "corrupt": in the byte number `byte` that is read, the bits of mask are inverted.
     """
 
     def __init__(self, kind, address, first, last, from_us=0, until_us=NEVER_US, byte=0, mask=0):

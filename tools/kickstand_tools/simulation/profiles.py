@@ -118,7 +118,7 @@ def hills(plan: Plan) -> Conditions:
     while plan.going_on:
         climb = -climb if plan.likely(0.1) else climb
         before, after = climb * plan.uniform(3.0, 12.0), climb * plan.uniform(2.0, 12.0)
-        if plan.likely(0.4):  # a hairpin with another slope in its middle
+        if plan.likely(0.4):  # a hairpin whose slope changes in its middle
             speed, lean = plan.uniform(5.5, 9.0), plan.side() * plan.uniform(22.0, 40.0)
             plan.into_turn(lean, speed, plan.uniform(2.5, 5.0))
             roll_s, inside = plan.uniform(1.0, 1.6), plan.uniform(-2.0, 12.0) * climb

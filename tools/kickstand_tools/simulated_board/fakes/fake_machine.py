@@ -8,7 +8,7 @@ from ..clock import Reset
 from . import chips
 
 CALL_US = 2  # duration of a call into `machine`, without which a loop that waits for a pin would never end
-IRQ_US = 26  # duration of an interrupt without its calls into `machine` and `time`. With them it is 33, as on a Pico
+IRQ_US = 26  # duration of an interrupt without its calls into `machine` and `time`. With these calls it is 33 us
 
 PWRON_RESET = 1
 WDT_RESET = 3  # the rp2 port reports this cause also after machine.reset()

@@ -46,7 +46,7 @@ export function connectButton(press) {
 
 /**
  * The controls of pose, lean and speed. They call act(name, value) with the arguments of Board.order(). The poses are
- * not radio buttons, because then the arrow keys would change the pose. On this page they always lean the bike.
+ * not radio buttons, because then the arrow keys would change the pose. On this page arrow keys always lean the bike.
  */
 export class Steering {
   #act;

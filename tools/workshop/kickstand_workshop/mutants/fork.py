@@ -46,10 +46,10 @@ class Tests:
         for name in WARM:
             with contextlib.suppress(ImportError):
                 importlib.import_module(name)
-        gc.freeze()  # at its end pytest collects garbage. Scanning the imported modules each time would take too long
+        gc.freeze()  # pytest collects garbage at its end. Scanning the imported modules each time would take too long
 
     def pass_unchanged(self) -> bool:
-        """Run the tests of the unchanged code. Returns True if they pass. The copy keeps their bytecode."""
+        """Run the tests of the unchanged code. Returns True if they pass. The copy keeps the bytecode."""
         self._run(self._files)  # the first run writes bytecode, the second is timed
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         passed = self._run(self._files) == SURVIVED
@@ -67,7 +67,8 @@ class Tests:
         file = self.root / path
         original = file.read_text("utf-8")
         for bytecode in file.parent.glob(f"__pycache__/{file.stem}.*"):
-            bytecode.unlink()  # Python would use it again for a text of the same length, written in the same second
+            # Python would use this bytecode for a changed file of the same length that is written in the same second
+            bytecode.unlink()
         try:
             file.write_text(mutant, "utf-8")
             return self._run(sorted(self._files, key=lambda name: file.stem not in name))
