@@ -32,7 +32,7 @@ class TimedFlash(RPSSI):
     """
 
     def __init__(self, rp2040: RP2040, name: str) -> None:
-        rp2040.qspi[1]._listeners.clear()  # disconnect rp2040py's own interface, which this one replaces
+        rp2040.qspi[1]._listeners.clear()  # disconnect rp2040py's own interface, which this class replaces
         super().__init__(rp2040, name)
         self.operations = 0
         self.before_operation: Callable[[], None] | None = None

@@ -5,15 +5,16 @@ The vertical from standing is the mean direction of gravity over many stops. The
 measured too.
 
 At a stop a motorcycle may lean to a side. So its vertical comes from the upright pose or, without this pose, from
-riding straight, because a balanced bike has no lateral force. A car's vertical is the mean of the vertical from its
-stops and the vertical from driving straight. The camber and slope of the road disturb both by about the same amount.
+riding straight, because a balanced bike has no lateral force. A car's vertical is the mean of two verticals,
+from its stops and from driving straight. The camber and slope of the road disturb both verticals by about the same
+amount.
 """
 
 from ..errors import AlignmentError
 from ..rotation import angle_deg, norm, normalize, vector
 from ..units import const
 
-_STANDING_MPS = const(0.5)  # lower speeds count as standing, because a GPS at rest shows speeds up to this one
+_STANDING_MPS = const(0.5)  # lower speeds count as standing, because a GPS at rest shows speeds up to this value
 MOVED_MPS = 2.0  # if the speed was higher than this, the next stop is a new one
 SETTLE_S = 1.0  # time for which a vehicle rocks after braking
 COUNTS_S = 2.0  # time that a stop must last after SETTLE_S to count

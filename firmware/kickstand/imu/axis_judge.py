@@ -11,7 +11,7 @@ from micropython import const
 from ..errors import Notice
 from ..units import AXES
 
-# Indices in the notes. They repeat those of fifo_frames.py, because imported names would take heap.
+# Indices in the notes of add_up(), as in fifo_frames.py. Names imported from there would take heap.
 _ENDS = const(5)
 _CLIPPED = const(6)
 _GYRO_CLIPPED = const(7)

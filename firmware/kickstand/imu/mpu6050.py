@@ -144,7 +144,7 @@ class Mpu6050:
         self.frames_left = self.overflows = 0
         self._most = 0  # largest number of bytes found in the FIFO
         self._odd = False  # the last fetch() found an incomplete frame
-        self._settled = False  # True once a chip was started at this address, so the other is no longer tried
+        self._settled = False  # True once a chip was started at this address, so the other address is not tried
         self._started = False  # True once setup() is complete and the FIFO fills
         self._full = 0  # if the FIFO holds more bytes than this, it may have overflowed
         self.counts, self.sums = array("h", [0] * 7), array("i", [0] * 7)

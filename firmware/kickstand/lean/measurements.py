@@ -123,8 +123,8 @@ MEASURED_SPEED_EVERY_S = 0.3
 
 # ratio: real standard deviation of the lean's error, divided by the filter's own standard deviation. The filter's
 # standard deviation is too large, because the noises above are increased for disturbances that last. In simulated
-# rides, two thirds of the errors are within this share of it. Larger: the claimed sigma is larger, and the lean stays
-# the same.
+# rides, two thirds of the errors are below this share of the filter's standard deviation. Larger: the claimed sigma is
+# larger, and the lean stays the same.
 SIGMA_SHARE = 0.46
 
 # Assumptions that take the place of measurements
@@ -211,8 +211,8 @@ def forces(model, means, roll_acceleration, force_error, dive=0.0):
     left_variance = _SIGMA_LEFT**2 + _SHAKEN_SHARE * shaken + uncertain**2 + sideways * sideways
     left += _ROLL_HEIGHT_M * rolling * model.cos_lean + dive * model.sin_lean
     # In a steady turn the upward force is 1 / cos(lean), so it shows the lean independently of the gyro's scale factor.
-    # One window shows little of it, but a minute shows much. A constant error of this force would add up during this
-    # minute, so force_error is subtracted.
+    # One window gives little information, but a minute gives much. In a minute a constant error of this force would
+    # add up, so force_error is subtracted.
     square = means[4] * means[4] / STANDARD_GRAVITY
     up = means[1] + _ROLL_HEIGHT_M * square - force_error * means[6] + dive * model.cos_lean
     up_variance = (

@@ -57,7 +57,7 @@ LIMIT = 12
 RAW_BITS = 31
 MEAN_SHIFT = 4  # a mean covers about the last 16 sizes, and is stored multiplied by 16
 START_MEAN = 128 << MEAN_SHIFT
-MAX_SIZE = 1 << 20  # the mean counts larger sizes as this one, because it must fit in 32 bits
+MAX_SIZE = 1 << 20  # larger sizes count as this size in the mean, because the mean must fit in 32 bits
 MAX_DT_US = 1 << 29  # the longest time between two turns that an entry can hold
 _HEAD_LENGTH = struct.calcsize(HEAD)
 _TAIL_LENGTH = struct.calcsize(TAIL)
@@ -72,7 +72,8 @@ _MEANS, _PENDING, _BITS, _AT, _PERIOD = 9, 18, 19, 20, 21
 
 
 def block_length(index):
-    """Return the number of bytes in ride block `index` of a file. The littlefs block with the same index holds as many.
+    """Return the number of bytes in ride block `index` of a file. A ride block fills the littlefs block of the same
+    index.
 
     Each block of littlefs except the first begins with 4-byte pointers to earlier blocks. It has one pointer, plus one
     for each time that the block's index can be halved (littlefs, SPEC.md, CTZ skip-lists). A ride block that ends

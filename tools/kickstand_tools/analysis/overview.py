@@ -86,7 +86,7 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     if total.speed_mps.time_s is None:
         course = replace(course, speed_mps=np.broadcast_to(np.nan, len(course.t_s)))
     frozen_s = sum((notice.seconds for notice in notices if isinstance(notice, FrozenReadings)), 0.0)
-    # The notice is about the whole log, even if the ride is a stretch of it.
+    # The notice is about the whole log, even if the ride is a stretch of the log.
     total.frozen_s = min(frozen_s, total.missing_s) if isinstance(ride.log, Stretch) else frozen_s
     still = standing(course)
     found = quality(course, still)

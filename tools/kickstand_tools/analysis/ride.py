@@ -81,7 +81,7 @@ class Ride:
     def blocks(self, progress: Progress | None = None, notices: list[Message] | None = None) -> Iterator[Channels]:
         """Yield the channels of the ride block by block. Frozen readings are left out, so they become gaps.
 
-        progress, notices: see read_blocks(). Both are about the whole log, even if the ride is a stretch of it.
+        progress, notices: see read_blocks(). They are about the whole log, even if the ride is a stretch of the log.
         Raises InputError.
         """
         along, absurd, slow, some = MeterAlong(self.calibration), False, False, False

@@ -143,7 +143,7 @@ class PublishedAlignment:
         self._improved.finish()
 
     def measure_speed(self, speed_mps: float, age_us: int = 0) -> None:
-        """Add a new speed: see DriveAlignment.measure_speed(). Unlike there, the lag is not estimated."""
+        """Add a new speed: see DriveAlignment.measure_speed(). This class does not estimate the lag."""
         self._improved.measure_speed(speed_mps, age_us)
         seconds = self._interval_us * 1e-6
         if self._interval_us < MIN_INTERVAL_US:

@@ -40,7 +40,7 @@ _LEAST = np.repeat([OTHER_G, OTHER_DPS], 3)
 
 @dataclass(frozen=True)
 class AxisDead(Message):
-    """The readings of an axis do not change while those of others do.
+    """An axis repeats its reading while other axes of the same sensor change.
 
     name: sensor and axis, such as "gyro x".
     seconds: how long the axis was dead, in all.

@@ -104,7 +104,8 @@ def whole_file(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise InputError(f"{path} cannot be written: {cause(error)}; choose another place") from error
     finally:
-        with contextlib.suppress(OSError):  # this error must not hide the first, for example on a read-only file system
+        # An error here, for example on a read-only file system, must not hide the first error
+        with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
 
 

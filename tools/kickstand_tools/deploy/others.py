@@ -20,7 +20,8 @@ from .firmware_files import CONFIG, MAIN, PACKAGE
 
 BOOT = "/boot.py"
 _KEPT = "-before-kickstand"
-# A file with this many of Kickstand's settings is Kickstand's. Another project may also have one such as DISPLAY
+# A file with this many of Kickstand's settings belongs to Kickstand. Another project may have a setting of the same
+# name, such as DISPLAY
 _MANY = 3
 _ON_THE_BOARD = "config.py on the board"
 # The first 16 digits of the SHA-256 of every released main.py of Kickstand, with \n as line end

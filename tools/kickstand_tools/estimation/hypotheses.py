@@ -52,7 +52,10 @@ class Hypotheses:
     weight: Array
 
     def select(self, index: Ints, weight: Array) -> "Hypotheses":
-        """Return the hypotheses with these indices (k), with the posterior weights `weight` (k)."""
+        """Return k of the hypotheses, with new posterior weights.
+
+        index: indices of the hypotheses, shape (k). weight: their posterior weights, shape (k).
+        """
         return Hypotheses(
             self.turning[index], self.rolling[index], self.pushed[index], self.minus_two_log_prior[index], weight
         )

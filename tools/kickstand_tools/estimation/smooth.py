@@ -24,11 +24,11 @@ from .windows import Windows, windows_of
 SLOWEST_HZ = 10.0  # least sample rate
 SEGMENT_S = 120.0  # longest part of a log between two cuts
 TOGETHER = 8  # number of segments estimated together, with one more before and one after
-# LEANED_SHARE times the lean is added to the standard deviation of the lean. It covers errors that the model lacks,
+# LEANED_SHARE times the lean is added to the standard deviation of the lean, to cover errors that the model lacks,
 # such as the gyro's sensitivity to acceleration.
 LEANED_SHARE = 0.001
-# TIMING_S times the roll rate is also added to it. It covers the delay of the gyro's low-pass filter, and errors of the
-# samples' times.
+# TIMING_S times the roll rate is also added to this standard deviation, to cover the delay of the gyro's low-pass
+# filter and errors of the samples' times.
 TIMING_S = 0.002
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps", "doubtful")
 DIGITS = 3, 3, 3, 3, 0

@@ -157,13 +157,13 @@ class RandomWalks:
 def _chains(blocks: Reduced, walks: RandomWalks) -> tuple[Reduced, Array, Array]:
     """Build G chains of blocks.
 
-    A state of a chain has n = s + m values: a block's first state and its parameters. The parameters after the last
-    block are equal to those of the last block.
+    A state of a chain has n = s + m values: a block's first state and its parameters. After the last block
+    the parameters stay the same.
 
     Returns:
         reduced: the chains.
         ends: normal equations of both ends of each chain, shape (G, 2 n, 2 n + 1).
-        minus_two_log: minus twice the log-likelihood, shape (G). A constant is missing, the same for all hypotheses.
+        minus_two_log: minus twice the log-likelihood, shape (G). A constant that all hypotheses share is left out.
     """
     (count, width), s = blocks.left.shape[:2], blocks.s
     hypotheses, n = len(walks.prior), width - s
@@ -187,14 +187,14 @@ def _chains(blocks: Reduced, walks: RandomWalks) -> tuple[Reduced, Array, Array]
 
 
 def _squared(information: Array, gradient: Array) -> Array:
-    """Return the squares of the gradients (G, k, 1) in the metric of the covariance, shape (G)."""
+    """Return the square of each gradient in the metric of the covariance, shape (G). gradient: shape (G, k, 1)."""
     return np.sum(gradient * np.linalg.solve(information, gradient), axis=(1, 2))
 
 
 def minus_two_log_likelihood(blocks: Reduced, walks: RandomWalks) -> Array:
     """Return minus twice the log-likelihood of the readings under each hypothesis, shape (G).
 
-    A constant is missing, the same for all hypotheses.
+    A constant that all hypotheses share is left out.
     """
     return _chains(blocks, walks)[2]
 

@@ -22,7 +22,7 @@ from .recording import Sheet, decimal_points
 from .units import ACCELERATIONS, RATES, SPEEDS, TIMES, unit
 
 LOOKED_AT = 400  # lines used to find the layout
-SEPARATORS = "\t;, "  # if two of these split the same lines into equally many cells, the first is used
+SEPARATORS = "\t;, "  # if two of them split the same lines into the same number of cells, the first is used
 FEWEST_CELLS = 4  # least count of numbers in a row of a table of sensors: a time and three axes
 MOST_KINDS = 20  # largest number of names of sensors or events in one column
 EVENT = ":"  # separates a sensor's name from a column's name
@@ -127,7 +127,8 @@ def find_grid(lines: Sequence[str]) -> Grid | None:
     """Find the layout that fits most of these lines; None if hardly any line has numbers."""
     best: tuple[int, int, Grid] | None = None
     for separator in SEPARATORS:
-        for comma in (True, False):  # whole numbers after a time with a decimal comma fit both
+        # Decimal commas are tried first, because whole numbers after a time with a decimal comma fit both layouts
+        for comma in (True, False):
             if comma and separator == ",":
                 continue
             found = _rows(lines, separator, comma)
@@ -137,8 +138,8 @@ def find_grid(lines: Sequence[str]) -> Grid | None:
 
 
 def _rows(lines: Sequence[str], separator: str, comma: bool) -> tuple[int, int, Grid] | None:
-    """Return the number of rows, the number of numbers, and the grid for cells separated in this way. None if the cells
-    are not separated so."""
+    """Return the number of rows, the number of numbers, and the grid for cells separated in this way. None if the lines
+    do not fit."""
     number = _COMMA_NUMBER if comma else _NUMBER
     split = [split_row(line, separator) for line in lines]
     counts = [sum(bool(number.fullmatch(cell) or _WHEN.fullmatch(cell)) for cell in cells) for cells in split]

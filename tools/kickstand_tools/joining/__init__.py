@@ -1,1 +1,2 @@
-"""Joins a phone's or watch's track to a ride. The yaw of both shows the unknown offset between their clocks."""
+"""Joins a phone's or watch's track to a ride. The yaw of ride and track shows the unknown offset between their
+clocks."""

@@ -190,7 +190,7 @@ class Mpu6050:
         value = self._regs[register]
         if register == INT_STATUS:
             self._regs[INT_STATUS] = 0
-        elif register == FIFO_COUNTH:  # reading the high byte latches both
+        elif register == FIFO_COUNTH:  # reading the high byte latches both bytes
             value = self.fifo.count >> 8
             self._regs[FIFO_COUNTL] = self.fifo.count & 0xFF
         elif register == PWR_MGMT_1 and self.clock.now_us < self._reset_us:

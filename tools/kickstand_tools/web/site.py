@@ -45,7 +45,7 @@ def site_files() -> dict[str, bytes]:
     """
     files = npm_packages.find()
     files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in sorted(PAGE.rglob("*.*"))}
-    files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # with this suffix a browser shows it as text
+    files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # with the suffix .txt a browser shows the file
     files |= wiring_files()
     values = {"home": home(), "boards": wiring_tables(), "preview": sample_ride.preview()}
     library = files["plotly/plotly.min.js"].decode()

@@ -68,7 +68,8 @@ class Dots:
 
 @dataclass
 class Bars:
-    """n bars from zero to y, in the colours of both sides. Each bar is centred on its x, and has the width `width`."""
+    """n bars from zero to y, in the colours of left and right lean. Each bar is centred on its x, and has the width
+    `width`."""
 
     x: Array
     y: Array

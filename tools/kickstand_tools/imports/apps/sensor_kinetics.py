@@ -48,6 +48,6 @@ def read(files: list[RecordingFile], name: str) -> AppRecording:
 
 
 def _parts(file: RecordingFile) -> tuple[str, str]:
-    """The common part of the names of a recording's files, and the sensor of this one."""
+    """The common part of the names of a recording's files, and the sensor of this file."""
     match = _SENSOR.match(file.stem)
     return (match[1], match[2]) if match else (file.stem, "")

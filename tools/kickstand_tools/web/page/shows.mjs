@@ -17,7 +17,7 @@ const VIEWS = {
   raw: ["readings", "readings"],
   recording: ["recording", "recording"],
 };
-// Pages that say so while the firmware does not trust the lean
+// Pages that show no value while the firmware does not trust the lean
 const DOUBTED = ["lean", "maxima", "acceleration", "formula", "raw"];
 const ALIGNING = {
   ask: { kickstand: "ask-stand", upright: "ask-upright" },

@@ -90,7 +90,7 @@ def _micropython_s(kind: Kind, files: dict[str, bytes]) -> float:
     """Measure the time until MicroPython runs main.py, in s."""
     begun: list[bytes] = []
     with kind(files={**files, "/main.py": f"{kind.SINK}Sink().write(b'main')\n".encode()}) as device:
-        device.listen(begun.append)  # on a Pico this does not use USB, which starts later than main.py
+        device.listen(begun.append)  # on a Pico, Sink does not use USB, which starts later than main.py
         device.run_until(lambda: begun, _LIMIT_S, 0.001)
         return device.time_s
 

@@ -1,5 +1,5 @@
 // Shared by the pages that connect to a board: the browser's serial port, and the command-line tools on CPython for
-// WebAssembly, which is fetched only for this.
+// WebAssembly. CPython is fetched when it is first needed.
 
 import { keptOffline } from "../offline.mjs";
 
@@ -146,7 +146,7 @@ export async function choosePort(tell) {
 
 /**
  * Open a SerialLine and return the result of use(line, name). The name of the port is for messages. After an error,
- * call tell(text) with it and return null.
+ * call tell(text) with the error and return null.
  */
 export async function overCable(port, tell, use, restarted = false) {
   const line = new SerialLine(port);

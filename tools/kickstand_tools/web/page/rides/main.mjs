@@ -63,7 +63,7 @@ async function sortOut(added) {
   }, true);
 }
 
-/** Return the ride. It includes its earlier results if its files are the same. */
+/** Return the ride, with the results of an earlier ride from the same files if there is one. */
 function kept(ride) {
   const sources = [...ride.files, ...(ride.track ? [ride.track] : [])].map((name) => held.file(name));
   const bytes = sources.reduce((sum, file) => sum + file.size, 0);
