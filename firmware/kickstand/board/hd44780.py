@@ -106,7 +106,7 @@ class Lcd:
                 self._initialise(self._step)
             self._step += 1
             self._init_ms = self._seen_ms = now_ms
-        elif self._changed and self._refresh():  # before the power check, because the shown text may be too old
+        elif self._changed and self._refresh():  # new text is sent first, because the shown text may be too old
             self._seen_ms = self._acted_ms = now_ms
         elif ticks_diff(now_ms, self._seen_ms) >= _PROBE_MS:
             self._seen_ms = self._acted_ms = now_ms

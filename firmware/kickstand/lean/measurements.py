@@ -34,7 +34,7 @@ SIGMA_START = (
     radians(1.0),  # rad/s: drift of the gyro's bias since the calibration, left
     radians(1.0),  # rad/s: up
     radians(1.0),  # rad/s: forward
-    radians(5.0),  # rad: yaw error of the kickstand pose
+    radians(5.0),  # rad: yaw error of the alignment, caused by pitch in the kickstand pose
     # ratio: scale error of the gyro's left axis minus the scale error of its up axis. The data sheet allows 0.03 each.
     0.020,
     0.014,  # ratio: reading of the left axis per rate about up. The data sheet allows 0.02.

@@ -105,7 +105,7 @@ def calm_rates(force: Array, rate: Array, calm_rate: float) -> Array:
 
     force, rate: shape (m, cells, 3).
     calm_rate: the standard deviation of the rates that counts as much as a standard deviation CALM_G of the force.
-    Returns shape (k, 3).
+    Returns an array of shape (k, 3).
     """
     changes = np.sum(np.std(force, axis=1), axis=1) / CALM_G + np.sum(np.std(rate, axis=1), axis=1) / calm_rate
     return np.mean(rate, axis=1)[np.argsort(changes)[: max(LEAST, round(CALMEST * len(changes)))]]

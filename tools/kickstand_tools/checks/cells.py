@@ -39,8 +39,8 @@ class LogCells:
         """Integrate from the first cell to each of k times.
 
         at_s: the times, shape (k), in s.
-        Returns shape (k, 7): the integral of the force (3 columns, g s), the integral of the rate (3 columns, degrees),
-        and the duration of known cells (s).
+        Returns seven columns, shape (k, 7): the integral of the force (3, in g s), the integral of the rate (3, in
+        degrees), and the duration of known cells (s).
         """
         edges_s = self.first_s + np.arange(len(self.known) + 1) * CELL_S
         return np.column_stack([np.interp(at_s, edges_s, sums) for sums in self._sums])

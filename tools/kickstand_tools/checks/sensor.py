@@ -121,7 +121,7 @@ class SensorHealth:
 
         time_us: times of the samples, shape (n).
         readings: as in a Block, shape (n, 7).
-        Returns shape (n), True where the readings are faulty.
+        Returns True where the readings are faulty, shape (n).
         """
         time_s, values = time_us.astype(float) * 1e-6, readings[:, _MOTION]
         sick = np.zeros(len(time_s), dtype=bool)
@@ -174,7 +174,7 @@ class SensorHealth:
         spread: largest minus smallest reading of each axis, shape (6).
         noisy: True for axes with noise, shape (6).
         constant: True for a sensor whose axes do not change in a long part of the log, shape (2).
-        Returns shape (6), True for dead axes.
+        Returns True for dead axes, shape (6).
         """
         step = np.where(np.isfinite(self._step), self._step, 0.0)
         moves = noisy & (spread >= np.maximum(_LEAST, OTHER_STEPS * step))

@@ -56,7 +56,7 @@ class Turning:
     def rough(self, exchanges: Array) -> Array:
         """Compute the residual of each of k exchanges without fitting the velocity.
 
-        exchanges: shape (k, 3, 3). Rate = exchange @ reading.
+        exchanges: shape (k, 3, 3). The rate is exchange @ reading.
         Returns the mean square of the force that the integrated rates do not explain, shape (k), in g2.
         """
         sizes = np.mean(np.sum(self._force**2, axis=2))
@@ -71,7 +71,7 @@ class Turning:
         return left
 
     def unexplained(self, exchange: Array) -> Array:
-        """Compute the residual of one exchange in each window. Rate = exchange @ reading.
+        """Compute the residual of one exchange in each window. The rate is exchange @ reading.
 
         Returns the mean square of the force that the rates do not explain, shape (w), in g2.
         """

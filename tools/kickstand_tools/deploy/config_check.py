@@ -87,7 +87,7 @@ def in_words(path: Path, fault: tuple[int | None, str] | None, unused: list[tupl
 
 
 def fault(path: Path) -> tuple[int | None, str] | None:
-    """Find the first fault. Returns its line and reason, or None. Call this function within posed()."""
+    """Find the first fault in a config.py. Returns its line and the reason, or None. Call this within posed()."""
     from kickstand.console import sentence
     from kickstand.errors import SettingsError
     from kickstand.settings import Settings

@@ -47,7 +47,8 @@ def process_and_measurements(windows: Windows, x: Array) -> Array:
     """Evaluate both models in n windows.
 
     x: states in the middle of each window, then parameters, shape (STATES + PARAMETERS, n).
-    Returns shape (ROWS, n). The first STATES rows are the states' rates of change. The other rows are the measurements.
+    Returns an array of shape (ROWS, n). The first STATES rows are the states' rates of change. The other rows are the
+    measurements.
     """
     t, q, left, up, forward = x[: BIAS.start]
     p = x[STATES:]

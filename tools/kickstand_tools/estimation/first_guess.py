@@ -83,7 +83,7 @@ def standing(w: Windows) -> Bools:
 
     Rates and forces do not change, the mean rate is under BIAS_RADPS, and the speed, if known, agrees.
 
-    Returns shape (n), True where the bike stands.
+    Returns True where the bike stands, shape (n).
     """
     return _calm(w, STILL_S) & (np.linalg.norm(averaged(w.rate, STILL_S), axis=1) < BIAS_RADPS)
 
@@ -101,8 +101,8 @@ def in_hand(w: Windows) -> tuple[Bools, Bools]:
     at any lean.
 
     Returns:
-        surely: shape (n), True where a hand certainly moves the sensor, or the bike has fallen.
-        perhaps: shape (n), also True in the seconds around these windows, which may not be riding either.
+        surely: True where a hand certainly moves the sensor, or the bike has fallen, shape (n).
+        perhaps: the same, and also True in the seconds around these windows, which may not be riding either.
     """
     there = ~w.gap
     mean = averaged(w.force * there[:, None], MOUNTED_S)

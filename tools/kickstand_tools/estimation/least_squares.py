@@ -67,7 +67,7 @@ class Estimate:
 
         number: index of the window of each row of `states`, shape (k).
         states: shape (k, STATES).
-        Returns shape (STATES + PARAMETERS, k).
+        Returns an array of shape (STATES + PARAMETERS, k).
         """
         return np.concatenate((states.T, self.parameters[number // self._length].T))
 
@@ -114,7 +114,7 @@ class Estimate:
     def _false_standstill(self, still: Bools) -> Bools:
         """Find brief standstills that the motion around them contradicts.
 
-        Returns shape (n), True in these standstills.
+        Returns True in these standstills, shape (n).
         """
         contradicted = np.max(np.abs(self._residuals() / self.noise.sigma())[:, CONTRADICTING], axis=1) > CONTRADICTED
         false = np.zeros_like(still)

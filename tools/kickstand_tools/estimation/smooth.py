@@ -235,8 +235,8 @@ class Smoother:
         """Estimate the values of the samples in these segments.
 
         own: the samples that need a lean. The other samples only improve the estimate, and remarks do not count them.
-        Returns shape (samples, COLUMNS), NaN where the readings are not from riding. Returns None for under SLOWEST_HZ
-        samples per second.
+        Returns the values, shape (samples, COLUMNS); NaN where the readings are not from riding. Returns None for under
+        SLOWEST_HZ samples per second.
         """
         t_s = np.concatenate([segment.t_s for segment in segments])
         readings = np.concatenate([segment.readings for segment in segments])
@@ -305,7 +305,7 @@ def at_samples(windows: Windows, rate: Array, found: Estimate, delay_s: float) -
 
     rate: the rates that were passed to windows_of(), shape (samples, 3), in rad/s.
     delay_s: delay of the gyro's low-pass filter.
-    Returns shape (samples, 4): lean, its standard deviation and pitch in rad, and speed in m/s.
+    Returns four columns, shape (samples, 4): lean, its standard deviation and pitch in rad, and speed in m/s.
     """
     number, sigma = windows.number, found.sigma()[:, LEAN]
     duration = windows.before + windows.after

@@ -115,7 +115,7 @@ def covariances(reduced: Reduced, joint: Array) -> Array:
     """Compute the covariance of the states at both ends of each link, with each other and with the parameters.
 
     joint: covariance of the first state, the last state and the parameters, shape (B, s + s + m, s + s + m).
-    Returns shape (B, K, s + s, s + s + m).
+    Returns an array of shape (B, K, s + s, s + s + m).
     """
     s, width = reduced.s, joint.shape[1]
     ends = np.r_[:s, 2 * s : 3 * s]  # two neighbouring links have three states; these are the rows of the outer two
@@ -218,7 +218,7 @@ def posterior_covariance(blocks: Reduced, walks: RandomWalks, weight: Array) -> 
 
     It is the mean covariance within the hypotheses plus the covariance between their means.
 
-    Returns shape (B, s + s + m, s + s + m).
+    Returns an array of shape (B, s + s + m, s + s + m).
     """
     reduced, ends, _ = _chains(blocks, walks)
     s, n = blocks.s, reduced.s

@@ -45,7 +45,7 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None,
     """Read a whole log: CSV with the columns t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps and optionally
     speed_mps,lat_deg,lon_deg,utc_s,temp_c.
 
-    Repeated times are spread evenly. An incomplete last line is left out. A Log as the source is only checked.
+    Repeated times are spread evenly. An incomplete last line is left out. If the source is a Log, it is only checked.
 
     Args:
         source: a path (of a gzip file if it ends in .gz), an open file of text or bytes, a Log, or a Stretch of these.

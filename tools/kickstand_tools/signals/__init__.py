@@ -367,7 +367,7 @@ def cross_matrix(vector: Array) -> Array:
     """Return the skew-symmetric matrices K of vectors: K @ other = vector x other.
 
     vector: shape (..., 3).
-    Returns shape (..., 3, 3).
+    Returns an array of shape (..., 3, 3).
     """
     matrix = np.zeros((*vector.shape, 3))
     x, y, z = np.moveaxis(vector, -1, 0)
@@ -380,7 +380,7 @@ def rotation_matrix(vector: Array) -> Array:
     """Convert rotation vectors to matrices by Rodrigues' formula (the exponential map).
 
     vector: shape (..., 3), in rad.
-    Returns shape (..., 3, 3).
+    Returns an array of shape (..., 3, 3).
     """
     angle = np.linalg.norm(vector, axis=-1)[..., None, None] / np.pi
     cross = cross_matrix(vector)
@@ -392,7 +392,7 @@ def rotation_vector(matrix: Array) -> Array:
     """Convert rotation matrices to rotation vectors (the logarithm). Each rotation must be under 180 degrees.
 
     matrix: shape (..., 3, 3).
-    Returns shape (..., 3), in rad.
+    Returns an array of shape (..., 3), in rad.
     """
     axis = np.stack([matrix[..., i, j] - matrix[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=-1)
     sine = np.linalg.norm(axis, axis=-1, keepdims=True)  # twice the sine of the angle
@@ -421,7 +421,7 @@ def motionless(
     most_rate: largest standard deviation of each component of the rate.
     most_force: largest standard deviation of each component of the force.
     speed_mps: speed at each sample, shape (m), in m/s; NaN if unknown.
-    Returns shape (m), True where the bike seems to stand still.
+    Returns True where the bike seems to stand still, shape (m).
     """
     speed = np.full(len(rate), np.nan) if speed_mps is None else speed_mps
     allowed = np.where(speed < STANDING_MPS, STANDS, 1.0)

@@ -114,7 +114,7 @@ def averaged(values: Array, seconds: float) -> Array:
 
 
 def without_drift(values: Array) -> Array:
-    """Remove the slow changes of n values: subtract their moving mean over SLOW_S, applied twice."""
+    """Remove the slow changes of n values: average them twice over SLOW_S, and subtract the result."""
     return values - averaged(averaged(values, SLOW_S), SLOW_S)
 
 

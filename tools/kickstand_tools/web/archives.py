@@ -41,7 +41,7 @@ _LICENCES = "info/licenses/"
 
 
 class _ToolsFinder(ModuleFinder):
-    """Finds only modules of kickstand_tools. An installed kickstand_tools is in a folder with other packages."""
+    """Finds only modules of kickstand_tools, because the folder of an installed kickstand_tools has other packages."""
 
     def find_module(self, name: str, path: Any, parent: Any = None) -> Any:
         if path is None and name != "kickstand_tools":

@@ -31,7 +31,7 @@ UNCALIBRATED_G = 0.12  # the same for a ride without a rest, as a difference fro
 def standing(ride: Channels) -> Bools:
     """Find the standstills by the log's speed or, without a speed, by the shaking.
 
-    Returns shape (n), True where the vehicle stands still.
+    Returns True where the vehicle stands still, shape (n).
     """
     still = _quiet(ride)
     if not np.any(still):

@@ -54,7 +54,8 @@ class Trip:
     faults: Name, start and end of each fault.
     calls: Method of Faults and its arguments, for each fault.
     gps_faults: Faults of the GPS receiver, as for Gps.
-    cut_save: Number of bytes of the next calibration that are written before the power is cut. None for no such cut.
+    cut_save: Number of bytes of the next calibration that are written before the power is cut. None
+        if the power is not cut in a save.
     """
 
     kind: str
