@@ -23,7 +23,7 @@ _UNKNOWNS = const(18)
 _GYRO = 9  # index of the gyro's first unknown; it follows offset (3), slope (3) and N (3, in the order yz, xz, xy)
 _STEPS = const(5)
 _SIGMA_FORCE = const(0.0015)  # standard deviation of a pose's force, in g
-_SIGMA_TURN = const(0.0015)  # standard deviation of a turn's angle that the poses at its ends cause, in rad
+_SIGMA_TURN = const(0.0015)  # error of a turn's angle that the poses at its ends cause, 1 sigma, in rad
 # Random walk of the gyro's bias during a turn, in deg/s per sqrt(s). The poses at both ends measure the bias, so the
 # variance of the angle is walk^2 seconds^3 / 12.
 _BIAS_WALK_DPS = const(0.008)

@@ -24,7 +24,7 @@ LAGS = 11  # number of lags, from 0 to 2.5 s
 # over this time. The last three have 3 values each.
 _TERMS = const(15)
 SECONDS, A, C, AA, AC, CC, F, AF, CF = 0, 1, 2, 3, 4, 5, 6, 9, 12
-_RIDGE = const(1e-6)  # in g^2; it keeps the coefficient of c at zero if the drive had no curve
+_RIDGE = const(1e-6)  # ridge term in g^2, which keeps the coefficient of c at zero if the drive had no bend
 
 
 class Fit:

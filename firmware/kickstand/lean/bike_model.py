@@ -61,7 +61,8 @@ _BALANCE_MIN_SPEED = const(4.0)  # m/s. Larger: the balanced rate is not used in
 _BALANCE_RATE = const(0.1)  # rad/s. Larger: the balanced rate is used with a wrong lean or speed.
 _BALANCE_SHARE = const(0.5)  # ratio. Larger: the balanced rate is used with a wrong lean or speed.
 BALANCE_SIGMA = radians(20.0)  # rad. Larger: the balanced rate is used with a more uncertain lean.
-_BALANCE_MIN_COS = const(0.3)  # ratio: lower bound of cos(lean). Larger: too small a rate about left in deep leans.
+# ratio: lower bound of cos(lean). Larger: in deep leans the rate about left is too small.
+_BALANCE_MIN_COS = const(0.3)
 
 
 def predict(x, force, rate, seconds, sums):

@@ -30,7 +30,8 @@ LEANED_DEG = 25.0
 BACKWARD_DEG = 150.0  # if forward differs by more than this, forward and backward are exchanged
 TURNING_DPS, TURNING_S = 5.0, 10.0  # up is judged if the rates are over TURNING_DPS for at least TURNING_S in all
 STRAIGHT_DPS = 8.0  # the speed shows forward where the rates are under this
-SPEEDS, SPEED_MPS = 20, 0.5  # least number of changes of speed from second to second, and their standard deviation
+# least number of changes of speed from second to second, and their least standard deviation
+SPEEDS, SPEED_MPS = 20, 0.5
 LATE_S = (0, 1, 2)  # delays of the speed that are tried
 BENDS, BENDS_DPS = 120, 1.0  # least number of means, and least standard deviation of the changes of their yaw rate
 # Forward is certain if its correlation is over SURE_SPEED (by the speed) or SURE_BENDS (by the bends). Correct

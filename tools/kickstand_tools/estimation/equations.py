@@ -85,7 +85,7 @@ def jacobian(windows: Windows, x: Array, unknown: Ints) -> Array:
     """Compute the derivatives of process_and_measurements() by some rows of x, as finite differences.
 
     unknown: indices of these rows of x.
-    Returns shape (len(unknown), ROWS, n).
+    Returns an array of shape (len(unknown), ROWS, n).
     """
     found, moved = np.empty((len(unknown), ROWS, x.shape[1])), x.copy()
     here = process_and_measurements(windows, x)

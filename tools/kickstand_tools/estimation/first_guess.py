@@ -26,7 +26,7 @@ CALM_S = 1.0  # length of the calm stretches that show the gyro's bias if the ri
 MIN_RIDING_S = 30.0
 MIN_LEAN = np.radians(3.0)  # least rms of the lean; a ride with less lean does not show forward
 MIN_LIKENESS = 0.5  # least correlation between leaning and turning; bikes have over 0.75
-# Largest ratio of the force to the side to the lean in bends. Bikes have 0.1 to 0.2, due to the width of the tyres.
+# Largest force to the side in bends, divided by the lean. Bikes have 0.1 to 0.2, due to the width of the tyres.
 MAX_PUSHED = 0.5
 CAR_G, CAR_LEAN = 0.045, np.radians(5.0)  # a car has a larger rms of the force to the side, and a smaller rms of lean
 STUCK_MPS = 0.5  # a log's speed is stuck if it changes by less than this

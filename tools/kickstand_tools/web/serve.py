@@ -44,7 +44,7 @@ class Server(ThreadingHTTPServer):
 
     request_queue_size = 128
     daemon_threads = True
-    allow_reuse_address = os.name != "nt"  # on Windows it would share the port with another program
+    allow_reuse_address = os.name != "nt"  # on Windows the server would share the port with another program
 
     def __init__(self, *arguments: Any) -> None:
         self._free = BoundedSemaphore(MOST)

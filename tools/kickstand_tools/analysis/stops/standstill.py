@@ -15,8 +15,8 @@ STALE_S = 3.0  # largest age in s of a speed that is used
 # Without a speed, standstills are found by the shaking. At a standstill, the shaking over QUIET_S is less than a share
 # of the shaking while moving.
 QUIET_S = 1.0
-QUIET_SHARE = 0.15  # this share for the rates of pitch and yaw
-# This share for the vertical force. After a stop, the fork's shaking is below it. Smooth roads and idling engines shake
+QUIET_SHARE = 0.15  # the share for the rates of pitch and yaw
+# The share for the vertical force. After a stop the fork shakes less than this. Smooth roads and idling engines shake
 # more.
 QUIET_UP_SHARE = 0.2
 RIDING_PERCENTILE = 90.0  # percentile of the shaking that belongs to moving, even in a ride with long pauses
@@ -25,7 +25,7 @@ RIDING_PERCENTILE = 90.0  # percentile of the shaking that belongs to moving, ev
 ENGINE_S, BEND_S = 0.1, 0.5
 STILL_DPS, STILL_G = 1.0, 0.01  # at a standstill, largest rate, and largest change of the forward force over QUIET_S
 MAX_OFF_G = 0.05  # at a standstill, largest difference from the force at rest; even gentle braking and bends exceed it
-UNCALIBRATED_G = 0.12  # the same for a ride without a rest, as a difference from 1 g; the sensor may be uncalibrated
+UNCALIBRATED_G = 0.12  # for a ride without a rest: largest difference from 1 g, also of an uncalibrated sensor
 
 
 def standing(ride: Channels) -> Bools:

@@ -22,7 +22,7 @@ let current = ""; // the ride that was chosen last
 let loaded = false; // true when Python and everything that the tools need are loaded
 let turn = 0; // number of the current request; results of earlier requests are not shown
 
-/** Show a ride. files: File objects, added to earlier ones. */
+/** Show a ride. files: File objects, which are added to the held files. */
 export async function openRide(files) {
   held.add(files);
   await sortOut(files.map((file) => file.name));
