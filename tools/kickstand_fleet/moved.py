@@ -23,7 +23,7 @@ LEAST_DEG = 3.2  # smallest rotation that is reported. Roads, load and temperatu
 # Smallest rotation that is reported, in standard deviations. The limit is higher within a log than between two logs,
 # because a log has many moments, and one of them may exceed a low limit by chance
 BETWEEN_SIGMAS, WITHIN_SIGMAS = 3.3, 4.3
-SUDDEN_SIGMAS = 3.8  # the limit within a log for a moment at which the vertical jumps
+SUDDEN_SIGMAS = 3.8  # this limit is used within a log for a moment at which the vertical jumps
 SUSPECTED_SHARE = 0.7  # factor on the three limits if the firmware suspects that the mount moved
 # Standard deviations, in degrees, of the errors that are constant before the moment or after it. The three values are
 # for pitch, yaw and roll (about left, up and forward). ROAD_DEG is for two parts of one log, OTHER_ROAD_DEG for two
@@ -32,18 +32,18 @@ ROAD_DEG = np.array([0.5, 0.25, 0.35])
 OTHER_ROAD_DEG = np.array([0.75, 0.7, 0.5])
 REACH = 75  # number of blocks compared on each side of a moment, about ten minutes
 LEAST_BLOCKS = 7
-# Smallest variation by braking, speeding up and bends, in g^2 s, from which forward is computed on one side of a moment
+# Forward is computed on one side of a moment if braking, speeding up and bends vary by at least this much, in g^2 s
 LEAST_VARIED = 0.2
 # The jackknife underestimates the variance if a few blocks agree by chance. So the yaw gets an additional standard
 # deviation. YAW_PRIOR_DEG is its value at a variation of 1 g^2 s
 YAW_PRIOR_DEG = 0.4
-# Standard deviation, in degrees, by which roads change the direction of sway on each side of a moment: SWAY_DEG. The
-# sway is not used if its standard deviation over both sides is above SWAY_WORST_DEG. It is also not used if it
+# SWAY_DEG is the standard deviation, in degrees, of the direction of sway on each side of a moment, caused by the roads.
+# The sway is not used if its standard deviation over both sides is above SWAY_WORST_DEG. It is also not used if it
 # contradicts the braking by more than SWAY_SIGMAS standard deviations
 SWAY_DEG, SWAY_WORST_DEG, SWAY_SIGMAS = 0.7, 5.0, 3.0
-# Smallest tilt within a log that need not be sudden, in degrees. The slopes of roads differ by less
+# A larger tilt within a log, in degrees, need not be sudden. The slopes of roads differ by less
 SURELY_DEG = 8.0
-TILT_DEG = 2.2  # smallest tilt of a rotation that does not count as a rotation about the vertical
+TILT_DEG = 2.2  # a rotation with a smaller tilt counts as a rotation about the vertical
 # To find a jump, the vertical during the STEP_S before a moment is compared with the vertical during the STEP_S after
 # it. STEP_GAP_S on each side of the moment are left out
 STEP_S, STEP_GAP_S = 8.0, 1.0

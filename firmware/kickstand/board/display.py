@@ -41,7 +41,7 @@ KINDS = ("auto", "lcd", "ssd1306", "sh1106", "ssd1306-32")
 _PROBE_MS = const(200)  # time between two searches for a missing display
 # Longest time between two searches. While a driver cannot be loaded, the time doubles up to this limit
 MOST_WAIT_MS = 60_000
-_REOPEN_PROBES = const(5)  # number of searches without a display after which the bus is freed
+_REOPEN_PROBES = const(5)  # after this number of searches without a display, the bus is freed
 _POWER_UP_MS = const(40)  # a display found within this time may have been powered together with the board
 _FLUSH_STEPS = const(60)
 _STEP_MS = const(5)

@@ -36,7 +36,7 @@ from ..units import const
 _SHORT_S = const(3.0)
 # s: time constant of all other means. Larger: fewer right leans are hidden, and wrong leans are hidden later.
 _LONG_S = const(10.0)
-# standard deviations: limit to which larger innovations are reduced. Larger: a single blow counts for more.
+# standard deviations: larger innovations are reduced to this value. Larger: a single blow counts for more.
 _MOST = const(4.0)
 # Limits of the means. Larger: fewer leans are hidden, both right and wrong ones. Each comment gives the largest mean in
 # rides without a fault, on good and bad roads and mounts.
@@ -51,18 +51,18 @@ _SIDEWAYS = const(0.15)
 _STEEP = const(0.21)  # rad: pitch. Without a fault: at most 0.14
 # rad: root mean square of the pitch that the forward force does not confirm. On a recorded ride without a fault: 0.096
 _SLOPE = const(0.12)
-# square of standard deviations: spread above which the limits of left and up grow with the root of the spread. The
+# square of standard deviations: above this spread, the limits of left and up grow with the root of the spread. The
 # spread is the mean of half the squared change between windows. Larger: more leans are hidden on the roughest roads.
 _SPREAD = const(0.4)
 # rad: limit of a steady mean lean after a doubt. Larger: fewer leans are hidden in bends, and on straights that look
 # like bends.
 _ONE_SIDE = const(0.13)
-# rad: steady lean above which the lean is hidden only after _LONG_S, because the upward force confirms it. Smaller:
+# rad: a steady lean above this value is hidden only after _LONG_S, because the upward force confirms it. Smaller:
 # fewer leans are hidden.
 _SURE_LEAN = const(0.3)
 # ratio: the lean is steady if its squared mean exceeds this share of its mean square. Larger: fewer leans are hidden.
 _STEADY = const(0.75)
-# ratio: limit to which larger forces to the side are reduced. Larger: a single blow counts for more.
+# ratio: larger forces to the side are reduced to this value. Larger: a single blow counts for more.
 _MOST_SIDEWAYS = const(0.5)
 _STRICT = const(0.85)  # ratio: factor on the limits after a doubt. Larger: a lasting fault is detected later.
 # ratio: share of the limits below which the means fit again during a doubt. Larger: the lean is shown again sooner.
@@ -73,13 +73,13 @@ HOLDS_S = (3.0, 4.0, 4.0, 20.0, 60.0)
 # s: time for which everything must fit after a gap in the readings. Larger: after a gap the lean stays hidden for
 # longer.
 _GAP_S = const(4.5)
-# Number of doubts above which only time in turns counts as fitting, because on a straight nearly everything fits.
+# After more doubts than this, only time in turns counts as fitting, because on a straight nearly everything fits.
 MILD = 3
 # s: shortest time between two doubts after more than MILD doubts, so that rest can be detected. Larger: errors that
 # have changed are found later.
 _AGAIN_S = const(12.0)
 _TURNING = const(0.05)  # rad/s: smallest yaw rate of a turn. Larger: the lean stays hidden for longer.
-# s: time of fitting after which one doubt is forgotten. Larger: after a repeated fault the lean is hidden for longer.
+# s: after this time of fitting, one doubt is forgotten. Larger: after a repeated fault the lean is hidden for longer.
 FORGET_S = 60.0
 
 last_odd = None  # the last code of `odd`, for `kickstand status`

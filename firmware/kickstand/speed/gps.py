@@ -21,7 +21,7 @@ from ..units import const
 
 # Longest sentence in bytes. The standard says 82, but receivers with many decimals exceed this length.
 _MAX_SENTENCE = const(100)
-# Most bytes read per pass of the loop. With a pass each 10 ms this is twice as many as 10 fixes per second need.
+# Most bytes read per pass of the loop. With a pass every 10 ms, this is twice the need of 10 fixes per second.
 _MAX_CHUNK = const(64)
 _SILENT_MS = const(3000)  # fault() reports when no byte, sentence or fix has arrived for this time
 _LATE_MS = const(2000)  # a fix that waited in the receiver for longer than this is dropped

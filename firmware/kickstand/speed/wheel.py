@@ -19,7 +19,7 @@ _MAX_MPS = const(100.0)  # pulses that imply a higher speed are interference
 # A contact bounces if it was open for less than this time, and for less than a quarter of the shortest period
 _BOUNCE_US = const(3000)
 _STOPPED_MPS = const(0.5)  # a wheel slower than this counts as standing
-MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # limits of the time without a pulse after which the wheel counts as standing
+MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # after a time without a pulse the wheel counts as standing; limits of this time
 _REPORT_MS = const(100)  # shortest time between two speeds from poll()
 _STANDING_MS = const(200)  # shortest time between two speeds of zero from poll()
 # STORM_EDGES edges in less than STORM_US are a storm, over 8,000 edges per second. The interrupt takes 33 us on a Pico,

@@ -38,7 +38,7 @@ CLEARLY = 2.0
 LIKELY, SIGMAS = 1.25, 3.0
 # With at most FEW_WINDOWS windows, the factor must be FEW_CLEARLY, and the gyro's bias must be near 0, as in a phone.
 FEW_WINDOWS, FEW_CLEARLY = 3, 5.0
-# Least reduction of the mean square, whatever the factor. In a parked vehicle, drift reduces it by under 0.0002.
+# Least reduction of the mean square, for any factor. In a parked vehicle, drift reduces it by under 0.0002.
 LEAST_G2 = 0.001
 # Factors on the residual of an exchange. If several exchanges fit about equally well, the likeliest mistake is chosen.
 # All axes reversed (or none) are more likely than some axes reversed, and these are more likely than exchanged axes.

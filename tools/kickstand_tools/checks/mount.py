@@ -23,7 +23,7 @@ from ..common.messages import AT_REST, OPPOSITE_SIGN, Message, Remedy, WrongMoun
 from ..signals import Array, Lag, best_lag, correlation, rotated, rotation_vector
 from .cells import CELL_S, LogCells
 
-MEAN_S = 0.5  # length of the means by which up and the bends are judged
+MEAN_S = 0.5  # means over this time are used to judge up and the bends
 UP_DEG, FORWARD_DEG = 15.0, 20.0  # if up or forward differs by more, the calibration belongs to another mount
 # If the two poses were swapped, "up" is the up axis of the bike on the kickstand. It then leans by up to this angle.
 LEANED_DEG = 25.0

@@ -22,7 +22,8 @@ LEAN_STEP_DEG = 5.0
 MAX_LEAN_DEG = 50.0
 
 _STEP_S = 0.005
-_ROLL_RATE = 4.0  # natural frequency in rad/s with which the lean follows the commanded lean, critically damped
+# The lean follows the commanded lean like a critically damped oscillator with this natural frequency, in rad/s
+_ROLL_RATE = 4.0
 _SPEED_RATE = 1.5  # rate in 1/s at which the speed approaches the commanded speed
 _MAX_ACCELERATION, _MAX_BRAKING = 3.0, 5.0  # m/s2
 _SWAY_RADPS = 2.0 * pi * 0.4

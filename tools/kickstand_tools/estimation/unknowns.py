@@ -37,7 +37,7 @@ SENSOR = slice(GYRO.start, OFFSET.stop)
 MEAN, SIGMA = np.zeros(PARAMETERS), np.zeros(PARAMETERS)
 SIGMA[ROTATION], SIGMA[GYRO] = np.radians([1.5, 5.0, 2.0]), 0.012
 SIGMA[OFFSET], SIGMA[UP_SCALE] = (0.001, 0.003, 0.003), 0.004
-# Usual values. The data sheet allows three times as much.
+# Usual values. The data sheet allows three times these values.
 SIGMA[OFFSET_PER_C], SIGMA[BIAS_PER_C] = 0.0003, np.radians(0.06)
 # ratio: change of the gyro's errors with temperature since the six positions, as in the firmware
 GYRO_DRIFT = 0.002

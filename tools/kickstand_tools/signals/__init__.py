@@ -358,7 +358,7 @@ def rotated(matrix: Array, *vectors: Array) -> tuple[Array, ...]:
 
     matrix: the rows are the new axes, as in vehicle_from_sensor, shape (3, 3).
     vectors: one or more arrays of shape (n, 3).
-    Returns as many arrays of shape (n, 3).
+    Returns one array of shape (n, 3) for each of them.
     """
     return tuple(vector @ matrix.T for vector in vectors)
 

@@ -118,7 +118,10 @@ class Lcd:
         return True
 
     def write_byte(self, value):
-        """Set the levels of the eight pins. When E falls, the earlier levels are used. Returns True to acknowledge."""
+        """Set the levels of the eight pins. When E falls, the display reads the levels before the change.
+
+        Returns True to acknowledge.
+        """
         if self.wiring != 1:
             self._raw, value = value, self._as_usual(value)
         before = self._port

@@ -10,7 +10,7 @@ from kickstand.units import STANDARD_GRAVITY
 from .commands import Leg
 from .physics.road import CLASS_B
 
-_SHORTEST_S = 3.0  # shortest duration to which fit() shortens a leg
+_SHORTEST_S = 3.0  # fit() does not make a leg shorter than this
 _CLOSING_S = 45.0  # time for the straight and the stop at the end of every ride
 
 

@@ -49,7 +49,7 @@ OTHER = (
 )
 _STANDARD_ROW = "%03d %09.2f %+013.6f %+013.6f %07.3f %06.2f +00000.00 %+07.3f %+07.3f"
 _SATELLITES = 4
-_SAME_M = 1e-3  # smallest movement between two rows, 0.01 s apart, from which a new heading is computed
+_SAME_M = 1e-3  # a larger movement between two rows, which are 0.01 s apart, gives a new heading
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:

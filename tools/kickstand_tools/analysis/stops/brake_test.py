@@ -33,7 +33,7 @@ MIN_SPEED_MPS = 10.0 / 3.6
 # Smallest and largest mean deceleration of a stop. A larger deceleration means a fall or a fault.
 MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0
 LONGEST_S = 60.0  # longest time before a standstill in which the start of the braking is searched
-FEWEST = 10  # least number of samples at a standstill from which slope and bias are computed
+FEWEST = 10  # least number of samples at a standstill, to compute slope and bias
 GAP_S = 0.5  # longest gap in the readings over which speed and pitch are integrated
 REST_S = 2.5  # duration of the standstill that is used
 SETTLE_S = 0.5  # first part of a standstill that is not used, because the fork rebounds

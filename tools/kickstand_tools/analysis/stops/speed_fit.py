@@ -11,7 +11,7 @@ from ...signals import Array, best_lag, integral, smoothed
 from ..channels import Channels
 
 SMOOTH_S = 0.2  # averaging time of the acceleration that is multiplied by the delay of the speed
-LEAD_S = 4.0  # time before the braking from which logged speeds are used for the fit
+LEAD_S = 4.0  # the fit also uses the logged speeds in this time before the braking
 DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # delays of the speed to try, in s
 # A delay is searched only with at least ENOUGH_SPEEDS speeds, one per second. The standard deviation of their changes
 # must be at least ENOUGH_CHANGE_MPS.
