@@ -37,9 +37,9 @@ LEAST_VARIED = 0.2
 # The jackknife underestimates the variance if a few blocks agree by chance. So the yaw gets an additional standard
 # deviation. YAW_PRIOR_DEG is its value at a variation of 1 g^2 s
 YAW_PRIOR_DEG = 0.4
-# SWAY_DEG is the standard deviation, in degrees, of the direction of sway on each side of a moment, caused by the roads.
-# The sway is not used if its standard deviation over both sides is above SWAY_WORST_DEG. It is also not used if it
-# contradicts the braking by more than SWAY_SIGMAS standard deviations
+# SWAY_DEG is the standard deviation, in degrees, of the direction of sway on each side of a moment, caused by the
+# roads. The sway is not used if its standard deviation over both sides is above SWAY_WORST_DEG. It is also not used if
+# it contradicts the braking by more than SWAY_SIGMAS standard deviations
 SWAY_DEG, SWAY_WORST_DEG, SWAY_SIGMAS = 0.7, 5.0, 3.0
 # A larger tilt within a log, in degrees, need not be sudden. The slopes of roads differ by less
 SURELY_DEG = 8.0
@@ -47,7 +47,7 @@ TILT_DEG = 2.2  # a rotation with a smaller tilt counts as a rotation about the 
 # To find a jump, the vertical during the STEP_S before a moment is compared with the vertical during the STEP_S after
 # it. STEP_GAP_S on each side of the moment are left out
 STEP_S, STEP_GAP_S = 8.0, 1.0
-STEP_SHARE = 0.7  # smallest share of a sudden tilt that happens at one moment
+STEP_SHARE = 0.7  # a tilt is sudden if more than this share of it happens at one moment
 
 
 @dataclass

@@ -14,7 +14,7 @@ from .connection import ConnectedBoard
 _CTRL_A, _CTRL_C = b"\x01", b"\x03"
 _END = b"\x04"  # the board sends this after the program's output, and again after its error
 _PROMPT = b">"  # the board sends this after output and error
-_LAST_S = 10.0  # longest time for which the program's output continues after Ctrl-C
+_LAST_S = 10.0  # the program's output may continue for this time after Ctrl-C
 _POLL_S = 0.01
 _LONGEST_LINE = 100_000  # largest number of bytes in a line. The lines of rides have 2,000
 _AWAY_S = 1.0  # a streaming board stops if the computer reads nothing for longer, because it sleeps or is too busy

@@ -9,7 +9,7 @@ from .physics.chip import RATE_HZ, Chip
 from .physics.signals import band_noise
 
 POSE_S = 4.0
-_ASKEW_DEG = 4.0  # largest tilt of a sensor that a hand puts on one of its sides
+_ASKEW_DEG = 4.0  # a hand puts the sensor on a side with a tilt up to this angle
 _MOVE_DEG = 0.05  # rms of the lean's changes while the rider holds the bike upright
 
 

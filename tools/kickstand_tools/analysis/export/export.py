@@ -30,7 +30,7 @@ _WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
 }
 _NEEDS = {"gpx": ("GPX", "gpxpy"), "parquet": ("Parquet", "pyarrow")}  # name and library of a format
 _DATED = ("gpx", "racechrono", "vbo")  # formats that need date and time
-_CLOCK_S = 1e8  # least time in a log that is Unix time (March 1973)
+_CLOCK_S = 1e8  # a later time in a log is Unix time (March 1973)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ SHORTEST_S = 0.2  # least time between points
 SAME_M = 0.5  # least distance between points, so a standing bike is one point
 MOST_LAT_DEG = 85.0  # largest latitude on the map, because Mercator cannot show the poles
 _SHAPES = (0.6, 2.2)  # least and largest ratio of width to height
-LEAST_LEAN_DEG = 30.0  # least value of the lean that has the full colour
+LEAST_LEAN_DEG = 30.0  # smaller leans never have the full colour
 # Colours from left lean to right lean, with grey for upright. Colour-blind people can distinguish blue from orange.
 _COLOURS = [[0.0, "#0d3a73"], [0.25, LEFT_COLOUR], [0.5, "#c9c9c9"], [0.75, RIGHT_COLOUR], [1.0, "#7a2c05"]]
 

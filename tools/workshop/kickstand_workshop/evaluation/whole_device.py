@@ -21,7 +21,7 @@ LOOK_S = 0.1
 # Texts that name a fault of the sensor. `Lean --` and texts about a speed source or a display do not match
 NAMES = re.compile("Sensor|Gyro|Accel|No sensor", re.IGNORECASE)
 STARTED_S = 2.0  # before this time, the display shows the start
-WRITING = 2  # most successive reads that can see a half-written line
+WRITING = 2  # at most this many successive reads see a half-written line
 
 
 def display_of(
