@@ -38,7 +38,7 @@ WORK_STEPS = 21  # steps of the work on a window; a test counts them
 _SLOW_STEP_US = const(12_000)  # if samples are further apart than this, there is time for all steps at once
 DELAY_S = 0.0048  # delay of the MPU6050's gyro at DLPF 3
 # m/s: above this speed the filter restarts. A board that lies on its nose seems to accelerate, but standstill is
-# detected long before.
+# detected long before the estimated speed is this high.
 _MAX_SPEED = const(250.0)
 
 

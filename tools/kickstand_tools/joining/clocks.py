@@ -122,7 +122,7 @@ def _fitted(a: CellMotion, b: CellMotion, of_a: Array, of_b: Array, later_s: flo
         normal[1, 1] += float(np.mean(weight @ error**2)) / len(error) / USUAL_DRIFT**2
         step = np.linalg.solve(normal, gradient) if k > 0 else np.array([gradient[0] / max(normal[0, 0], 1e-9), 0.0])
         step[0] = np.clip(step[0], -0.5, 0.5)
-        # The step changes the shift in the middle of the compared part; compute the shift at the start from it
+        # The step changes the shift in the middle of the compared part. From this, compute the shift at the start
         drift, middle = drift + step[1], at_s[both].mean()
         later_s += step[0] - step[1] * (middle - later_s)
     if abs(drift) > MOST_DRIFT:

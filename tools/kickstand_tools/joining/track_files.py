@@ -17,7 +17,8 @@ _FEWEST = 30  # least number of points of a track
 # largest file; a day with a fix per second has 20 million, and parsing takes ten times as much memory
 _MOST_BYTES = 50_000_000
 
-Point = tuple[float, float, float, float]  # s since 1970, latitude and longitude in degrees, m/s or NaN
+# time in s since 1970, latitude and longitude in degrees, speed in m/s or NaN
+Point = tuple[float, float, float, float]
 
 
 def read_track(path: Path | str, progress: Progress | None = None) -> Track:
