@@ -160,7 +160,7 @@ class PublishedAlignment:
         self._speed = speed_mps
 
     def matrix(self, out: array) -> None:
-        """Fill `out` with the 9 numbers of vehicle from sensor, in rows left, up, forward.
+        """Write the rotation from sensor to vehicle axes into `out`: 9 numbers, with the rows left, up, forward.
 
         Raises AlignmentError while the alignment is not ready.
         """

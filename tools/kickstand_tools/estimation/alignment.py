@@ -195,7 +195,7 @@ def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) ->
     The alignment is the result's matrix times the guess's matrix. All blocks of the result have the same parameters.
 
     windows: along the sensor's axes.
-    expected: the matrix (3, 3), vehicle from sensor, of the mounting that the user named; None if unknown.
+    expected: rotation from sensor to vehicle axes of the mounting that the user named, shape (3, 3); None if unknown.
     Raises RefusedInput if no alignment fits.
     """
     sigma, mean = Prior.of_pose(six_done=False).sigma, MEAN.copy()

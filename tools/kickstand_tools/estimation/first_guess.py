@@ -146,7 +146,7 @@ def lean_and_speed(w: Windows, still: Bools) -> tuple[Array, Array]:
 class Axes:
     """The vehicle's axes and the gyro's bias.
 
-    matrix: vehicle from sensor, shape (3, 3). The rows are left, up and forward.
+    matrix: rotation from sensor to vehicle axes, shape (3, 3). The rows are left, up and forward.
     bias: the gyro's bias along the sensor's axes, shape (3), in rad/s.
     """
 

@@ -28,7 +28,7 @@ LEAST_LEAN = np.radians(2.0 / 57.3)
 class Leaning:
     """How a motorcycle's lean relates to its yaw rate.
 
-    matrix: rough vehicle from sensor, shape (3, 3). The rows are left, up and forward.
+    matrix: rough rotation from sensor to vehicle axes, shape (3, 3). The rows are left, up and forward.
     rolled: lean without its slow changes (see without_drift()), shape (n), in rad.
     turned: yaw rate without its slow changes, positive to the left, shape (n), in rad/s.
     likeness: correlation of rolled and -turned while riding.
