@@ -191,7 +191,7 @@ class LeanMeter:
             self._hold_again()
 
     def _hold_again(self):
-        """Restart the timing of a lean above its maximum, because it is within its maxima or not trusted."""
+        """Restart the timing of a lean above its maximum, because the lean is within its maxima or not trusted."""
         # _over_us: time for which the lean has exceeded a maximum. After each HELD_US it starts again from 0.
         # _least: smallest lean in this time. _least_before: smallest lean in the previous HELD_US, or 0 if the lean was
         # within its maxima then.

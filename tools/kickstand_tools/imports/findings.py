@@ -396,7 +396,7 @@ def _rows_in(span_s: float, seconds: Array | None, count: int) -> int:
 
 
 def calm_length(values: Array, seconds: Array | None) -> float:
-    """The median length of vectors (n, 3) in calm stretches, in which their length changes least."""
+    """The median length of vectors, shape (n, 3), in calm stretches, in which their length changes least."""
     values = values[np.all(np.isfinite(values), axis=1)]
     lengths = np.linalg.norm(values, axis=1)
     spread = moving_spread(lengths, _rows_in(CALM_S, seconds, len(values)))
@@ -410,8 +410,10 @@ def _gravities() -> dict[str, float]:
 
 
 def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> ColumnFinding:
-    """Find the unit of accelerations (n, 3) from the length of gravity. stated: the unit in their names. The finding's
-    columns are empty."""
+    """Find the unit of accelerations from the length of gravity. The finding names no columns.
+
+    values: the accelerations, shape (n, 3). stated: the unit in the names of their columns.
+    """
     length = calm_length(values, seconds)
     whole = _are_whole(values)
     gravities = {name: size for name, size in _gravities().items() if whole or not name.startswith("counts")}
@@ -431,8 +433,10 @@ def _are_whole(values: Array) -> bool:
 
 
 def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None, stated: str = "") -> ColumnFinding:
-    """Find the unit of rates (n, 3) from the turns of gravity or from the columns' names, otherwise from their size.
-    accel: the finding of the accelerometer. The finding's columns are empty."""
+    """Find the unit of rates from the turns of gravity or from the columns' names, otherwise from their size.
+
+    rates: shape (n, 3). accel: the finding of the accelerometer. The returned finding names no columns.
+    """
     fit = RateFit() if seconds is None else fit_rates(seconds, force, rates)
     candidates = gyro_units(rates, accel)
     by_fit = fit.unit_among(candidates)
@@ -451,8 +455,8 @@ def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None
 
 
 def gyro_units(rates: Array, accel: ColumnFinding) -> dict[str, float]:
-    """The possible units of rates (n, 3), with their factors to deg/s. Counts are possible if the accelerometer has
-    counts."""
+    """The possible units of rates, shape (n, 3), with their factors to deg/s. Counts are possible if the accelerometer
+    has counts."""
     if counts_per(accel.unit) and _are_whole(rates):
         return {f"counts/{size:g}": 1.0 / size for size in COUNTS_PER_DPS}
     return dict(RATES)

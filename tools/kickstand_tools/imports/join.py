@@ -102,7 +102,7 @@ def _damaged(time_ns: Ints) -> Bools:
 
 
 def on_clock(sensor: RecordedSensor, clock_ns: Ints, period_ns: float) -> Array:
-    """A sensor's values (n, 3) at the times of another clock (n). NaN outside the sensor's own times and in its gaps.
+    """A sensor's values at the n times of another clock, shape (n, 3). NaN outside the sensor's own times and in gaps.
 
     Values are interpolated along straight lines. If the sensor is faster than the clock, they are averaged over
     period_ns.
@@ -121,8 +121,8 @@ def on_clock(sensor: RecordedSensor, clock_ns: Ints, period_ns: float) -> Array:
 
 
 def _between(at: Array, since: Array, values: Array) -> Array:
-    """Interpolate values (n) linearly at other times, ignoring NaN. The result is NaN before the first and after the
-    last value."""
+    """Interpolate values, shape (n), linearly at other times. NaN are ignored. The result is NaN before the first and
+    after the last value."""
     there = ~np.isnan(values)
     if not np.any(there):
         return np.full(len(at), np.nan)
@@ -130,7 +130,7 @@ def _between(at: Array, since: Array, values: Array) -> Array:
 
 
 def _averaged(sensor: RecordedSensor, over_ns: float) -> Array:
-    """Return a sensor's values (n, 3), each averaged over the time over_ns around it."""
+    """Return a sensor's values, each averaged over the time over_ns around it, shape (n, 3)."""
     half = round(over_ns / 2.0)
     begin, end = (np.searchsorted(sensor.time_ns, sensor.time_ns + side, side="right") for side in (-half, half))
     sums = np.cumsum(np.vstack((np.zeros(3), np.nan_to_num(sensor.values))), axis=0)
@@ -173,7 +173,7 @@ def _period_ns(sensor: RecordedSensor) -> float:
 
 
 def _on_rows(track: ReceiverTrack | None, time_ns: Ints, utc_ns: int | None) -> dict[str, Any]:
-    """Speed, latitude, longitude and UTC (n each). Each value of the track is in the row that is nearest in time."""
+    """Speed, latitude, longitude and UTC, each of shape (n). A value of the track is in the row nearest in time."""
     found = {name: np.full(len(time_ns), np.nan) for name in TRACK}
     if utc_ns is not None:
         found["utc_s"][0] = (time_ns[0] + utc_ns) * 1e-9

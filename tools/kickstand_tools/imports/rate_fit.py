@@ -63,7 +63,7 @@ class RateFit:
 
 
 def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
-    """Fit rates to forces. seconds: (n). force, rates: (n, 3) in any unit.
+    """Fit rates to forces. seconds: shape (n). force, rates: in any unit, shape (n, 3).
 
     NaN is interpolated in each sensor, so each sensor may have its own rows."""
     cells = _in_cells(seconds, force, rates)
@@ -111,7 +111,10 @@ def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
 
 
 def turns_too_far(seconds: Array, force: Array, rates: Array) -> bool:
-    """True if rates (n, 3, deg/s) would turn gravity round and round although its direction is constant."""
+    """True if the rates would turn gravity round and round although its direction is constant.
+
+    rates: shape (n, 3), in deg/s.
+    """
     cells = _in_cells(seconds, force, rates)
     if cells is None:
         return False

@@ -134,7 +134,7 @@ def time_unit(cells: Cells, given: str = "") -> str:
 
 
 def of_seconds(seconds: Array) -> Nanoseconds:
-    """Seconds (n) as ns; NO_TIME for a value that is not a number."""
+    """Convert seconds to ns, shape (n). The result is NO_TIME for a value that is not a number."""
     return _scaled(seconds, TIMES["s"])
 
 
@@ -165,7 +165,7 @@ def _of_numbers(values: NDArray[Any], unit_name: str, where: str) -> Nanoseconds
 
 
 def unwrapped(values: NDArray[Any]) -> NDArray[Any]:
-    """Continue the counts (n) of a 32-bit clock after it restarts from 0."""
+    """Continue the counts of a 32-bit clock after it restarts from 0, shape (n)."""
     steps = np.diff(values)
     back = steps < -0.9 * _WRAP
     if not np.any(back) or np.nanmax(values) >= _WRAP or np.nanmin(values) < 0:

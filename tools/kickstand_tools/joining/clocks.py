@@ -134,7 +134,7 @@ def _fitted(a: CellMotion, b: CellMotion, of_a: Array, of_b: Array, later_s: flo
 def _correlation_at(
     a: CellMotion, b: CellMotion, of_a: Array, of_b: Array, later_s: float, drift: float = 0.0
 ) -> float:
-    """The correlation of rates (n, 3) and (m, 3) about the same axes."""
+    """The correlation of the rates of both sensors about the same axes. of_a: shape (n, 3). of_b: shape (m, 3)."""
     on_b = (a.t_s - later_s) * (1.0 - drift)
     both = _valid_at(b, on_b) & a.there
     one, other = of_a[both], _interpolated_at(b.t_s, of_b, on_b[both])

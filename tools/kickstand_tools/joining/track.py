@@ -149,7 +149,7 @@ def segments(course: Course) -> Segments:
 
 
 def without_trend(values: Array, weight: Array, at_s: Array) -> Array:
-    """Subtract from values (p, STEPS) the straight line that fits each row best."""
+    """Subtract from each row of `values`, shape (p, STEPS), the straight line that fits this row best."""
     total = np.maximum(weight.sum(axis=1, keepdims=True), 1e-12)
     since = at_s - (weight * at_s).sum(axis=1, keepdims=True) / total
     mean = (weight * values).sum(axis=1, keepdims=True) / total
