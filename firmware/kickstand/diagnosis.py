@@ -85,7 +85,7 @@ def scan(sda, scl, reopen, addresses):
         devices: list of (address, name, kind) of each device that answers, see other_chips.name_of().
 
     Raises:
-        the errors of reopen(), except OSError.
+        The errors of reopen(), except OSError.
     """
     notice = wire_fault(sda, scl)
     devices = []
@@ -112,7 +112,7 @@ def explain_sensor(sda, scl, reopen, chip, error):
         addresses: sorted list of the I2C addresses that answer on the bus.
 
     Raises:
-        the errors of reopen(), except OSError.
+        The errors of reopen(), except OSError.
     """
     notice, devices = scan(sda, scl, reopen, MOTION_ADDRESSES)
     if not notice:
