@@ -5,10 +5,9 @@ import json
 import pytest
 from support.emulated import pico
 
-pytestmark = pytest.mark.chip
+pytestmark = [pytest.mark.chip, pytest.mark.nightly, pytest.mark.long]
 
 
-@pytest.mark.long
 def test_the_loop_and_the_start_stay_within_their_limits():
     """No sample is lost, the heap does not shrink, and the first lean appears within 1.12 s."""
     pico()  # skips the test without the emulator
@@ -29,7 +28,6 @@ def test_the_loop_and_the_start_stay_within_their_limits():
     assert "kickstand.lean.lean_filter" in start.import_s
 
 
-@pytest.mark.nightly
 def test_bench(monkeypatch):
     """In a short run of all parts, the times of the stages add up, and each figure is in the tables."""
     pico()  # skips the test without the emulator

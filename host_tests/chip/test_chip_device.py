@@ -20,8 +20,9 @@ RECOVERY_S = 0.5
 FAULT_S = 0.6
 
 
+@pytest.mark.nightly  # takes minutes; host_tests/device has the same steps on MicroPython for Linux
 @pytest.mark.long
-@pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])])
+@pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_two_presses_align_a_new_board_for_good(chip):
     """The sensor is not calibrated. After the pose on the kickstand and the upright pose, the power is switched off and
     on. Then the display shows the lean of the bike."""
@@ -74,22 +75,29 @@ def starts_again(device):
     device.run_until(lambda: lean_is_right(device), 4.0)
 
 
+INJECT = {
+    "EIO": lambda faults, at_s: faults.nack_for(SENSOR, at_s, FAULT_S),
+    "ETIMEDOUT": lambda faults, at_s: faults.timeout_for(SENSOR, at_s, FAULT_S),
+    "SDA held": lambda faults, at_s: faults.stuck_sda(at_s),
+}
+
+
 @pytest.mark.parametrize(
-    "inject",
+    ("riding", "fault"),
     [
-        lambda faults, at_s: faults.nack_for(SENSOR, at_s, FAULT_S),
-        lambda faults, at_s: faults.timeout_for(SENSOR, at_s, FAULT_S),
-        lambda faults, at_s: faults.stuck_sda(at_s),
+        *(("pico", fault) for fault in INJECT),
+        pytest.param("esp32", "EIO", marks=pytest.mark.esp32),
+        *(pytest.param("esp32", fault, marks=[pytest.mark.esp32, pytest.mark.nightly]) for fault in [*INJECT][1:]),
     ],
-    ids=["EIO", "ETIMEDOUT", "SDA held"],
+    indirect=["riding"],
 )
-def test_bus_errors_are_shown_while_they_last(riding, inject, request):
+def test_bus_errors_are_shown_while_they_last(riding, fault):
     """A brief fault may begin and end between two reads of the display."""
-    inject(riding.board.faults, riding.time_s + 0.01)
+    INJECT[fault](riding.board.faults, riding.time_s + 0.01)
     texts = watch(riding, 0.01 + FAULT_S + RECOVERY_S)
     assert lean_is_right(riding), riding.lcd()
     said = any(re.search(r"No sensor|Sensor lost|Sensor silent", text) for text in texts)
-    assert said or "SDA held" in request.node.callspec.id, texts
+    assert said or fault == "SDA held", texts
 
 
 @pytest.mark.parametrize("riding", ["pico"], indirect=True)
@@ -112,6 +120,9 @@ def test_stalled_processor_keeps_the_lean_right(riding):
     assert samples.lost() > 200
 
 
+@pytest.mark.parametrize(
+    "riding", ["pico", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])], indirect=True
+)
 def test_watchdog_restarts_a_hung_program(riding):
     """The watchdog resets the board within 8.4 s. An ESP32 needs a second more, because it prints the reason. Then the
     display shows the lean again."""

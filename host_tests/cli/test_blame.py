@@ -67,11 +67,12 @@ def test_a_signal_leaves_no_temporary_file(name, tmp_path, monkeypatch):
             time.sleep(5)
 
     monkeypatch.setattr(main.kickstand, "invoke", works)
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell starts background jobs with it ignored
+    # A shell starts background jobs with SIGINT ignored, and nohup ignores SIGHUP
+    before = signal.signal(number, signal.default_int_handler if name == "SIGINT" else signal.SIG_DFL)
     try:
         result = command.run("report")
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(number, before)
     assert result.status == (130 if name == "SIGINT" else 128 + number)
     assert result.err.strip() == "kickstand: stopped"
     assert [path.read_text() for path in tmp_path.iterdir()] == ["before"]
