@@ -65,14 +65,15 @@ TURNS = port.turns_to_collect
 if not PLAN:
     port.turns_to_collect = lambda most: most
 gc.collect()
+room = bytearray(4 * used)  # this part of the free heap is one piece, the rest are gaps
 ballast = []
-for size in (1 << 20, 1 << 14, 1 << 10):
+for size in (1 << 20, 1 << 14, 1 << 10, 1 << 8):
     try:
-        for _ in range((real_free() - 15 * used) // (size + 64)):
+        while True:
             ballast.append(bytearray(size))
     except MemoryError:  # no such piece is left: smaller ones fill the rest
         pass
-    gc.collect()
+room = None
 gc.collect()
 free = real_free() // used
 turns.n = 0
@@ -88,19 +89,12 @@ print(json.dumps({"free": free, "turns": turns.n, "within": within, "plan": plan
 @pytest.mark.parametrize("plan", [True, False])
 def test_the_garbage_is_collected_between_turns(plan):
     """plan: True if the firmware checks the free heap. Without this check garbage is collected during turns, which
-    proves that the heap of the test is small enough.
-
-    MicroPython's collector also keeps what a number on the stack seems to point to. The addresses differ between runs.
-    So in about one run of a hundred less heap is free, and the test makes up to three runs.
-    """
-    for _ in range(3):
-        found = json.loads(run_mpy(_SCRIPT.replace("PLAN", str(plan)), heap="4M").splitlines()[-1])
-        assert 8 < found["free"] < 20  # number of turns until the heap is full
-        assert 3 <= found["plan"] <= 10
-        assert found["turns"] > 500
-        if (found["within"] == 0) is plan:
-            return
-    pytest.fail(str(found))
+    proves that the heap of the test is small enough."""
+    found = json.loads(run_mpy(_SCRIPT.replace("PLAN", str(plan)), heap="4M").splitlines()[-1])
+    assert 8 < found["free"] < 20  # number of turns until the heap is full
+    assert 3 <= found["plan"] <= 10
+    assert found["turns"] > 500
+    assert (found["within"] == 0) is plan, found
 
 
 def _nothing(*_):
