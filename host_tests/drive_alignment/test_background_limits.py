@@ -11,24 +11,28 @@ def said(problem):
     return problem and (problem.code, *problem.values)
 
 
-def background(real=False, **given: Any) -> Any:
+def background(real=False, leans=True, speed=None, **given: Any) -> Any:
+    """Return a BackgroundAlignment with stand-ins for the meter and the drive. The list `calls` collects their calls.
+
+    real: True to keep its own _adopt() and _restart(), which are otherwise replaced, too.
+    given: values of the stand-ins, and of attributes.
+    """
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):
         from kickstand.drive_alignment.background import BackgroundAlignment
-    made: Any = object.__new__(BackgroundAlignment)
     calls: list = []
     calibration = SimpleNamespace(aligned=given.pop("aligned", True), vehicle_from_sensor=[1, 0, 0, 0, 1, 0, 0, 0, 1])
-    made._meter = SimpleNamespace(
+    meter = SimpleNamespace(
         calibration=calibration, distrust=lambda code: calls.append(("distrust", code)), trim_deg=1.5,
         reset_maxima=lambda: calls.append("maxima"), speed_mps=given.pop("meter_mps", 0.0),
     )  # fmt: skip
+    made: Any = BackgroundAlignment(leans, speed, meter, SimpleNamespace())
     made.drive = SimpleNamespace(
         problem=given.pop("problem", None), ready=given.pop("ready", True), quality_deg=0.7,
         standing=SimpleNamespace(standing=given.pop("standing", True), bias=[0.1, 0.2, 0.3]),
         interrupt=lambda: calls.append("interrupt"), update=lambda *values: calls.append(("update", *values)),
         measure_speed=lambda *values: calls.append(("speed", *values)), matrix=lambda out: None,
     )  # fmt: skip
-    made._leans, made._asked, made._answered, made.message, made.result = True, False, [], None, None
-    made._speed_mps, made._speed_ms, made._fed_ms, made._look_ms = 0.0, 0, None, None
+    made._speed_ms = 0
     for name, value in given.items():
         setattr(made, name, value)
     made.calls = calls
@@ -62,9 +66,9 @@ def test_a_vehicle_is_away_above_two_mps(given, away):
     ("verdict", "given", "calls", "code"),
     [(1, {}, [("distrust", None)], None), (2, {}, [("adopt", False)], None), (2, {"ready": False}, [], None)]
     + [(3, {}, [("distrust", "other-side")], "other-side"), (4, {}, [("distrust", "mount-moved")], "mount-moved")]
-    + [(0, {}, [], None), (1, {"_leans": False}, [], None), (2, {"_leans": False}, [("adopt", False)], None)]
-    + [(3, {"_leans": False}, [("adopt", True)], None), (4, {"_leans": False, "ready": False}, [], None)]
-    + [(4, {"_leans": False}, [("adopt", True)], None), (4, {"_answered": ["mount-moved"]}, [], None)]
+    + [(0, {}, [], None), (1, {"leans": False}, [], None), (2, {"leans": False}, [("adopt", False)], None)]
+    + [(3, {"leans": False}, [("adopt", True)], None), (4, {"leans": False, "ready": False}, [], None)]
+    + [(4, {"leans": False}, [("adopt", True)], None), (4, {"_answered": ["mount-moved"]}, [], None)]
     + [(0, {"_asked": True}, [("adopt", True)], None), (0, {"_asked": True, "ready": False}, [], None)]
     + [(1, {"aligned": False}, [("adopt", True)], None), (1, {"standing": False}, [], None)]
     + [(1, {"_speed_ms": None}, [], None)],
@@ -89,7 +93,7 @@ def test_a_problem_is_said_only_if_an_alignment_is_in_use():
 
 
 def test_two_passes_of_counts_are_fed_together():
-    made = background(_force=[0.0] * 3, _rate=[0.0] * 3, _total=[0] * 7, _n=0, _us=0, _turns=0)
+    made = background()
     applied = []
     made._calibration = SimpleNamespace(apply=lambda means, force, rate: applied.append(means))
     made.feed([1] * 7, 1, 5000, 0)
@@ -103,12 +107,11 @@ def test_two_passes_of_counts_are_fed_together():
 
 
 def test_the_result_is_looked_at_once_a_second():
-    made = background(_fed_ms=0, _total=[0] * 7)
+    speeds = iter([None, 6.0, None, None, None])
+    made = background(speed=SimpleNamespace(poll=lambda now: next(speeds), age_us=70), _fed_ms=0)
     looks = []
     made._look = looks.append
     made._share = lambda speed: speed
-    speeds = iter([None, 6.0, None, None, None])
-    made.speed = SimpleNamespace(poll=lambda now: next(speeds), age_us=70)
     assert [made.poll(now) for now in (0, 500, 999, 1000, 2001)] == [None, 6.0, None, None, None]
     assert looks == [0, 1000, 2001] and ("speed", 6.0, 70) in made.calls
     assert made._speed_mps == 6.0 and made._speed_ms == 500
@@ -142,8 +145,8 @@ def test_a_saved_alignment_has_the_whole_bias():
 
 @pytest.mark.parametrize(
     ("given", "up", "bias", "shown"),
-    [({}, True, True, False), ({"_leans": False}, False, True, False), ({"aligned": False}, False, False, False)]
-    + [({"_asked": True}, False, True, False), ({"_leans": False, "aligned": False}, False, False, True)]
+    [({}, True, True, False), ({"leans": False}, False, True, False), ({"aligned": False}, False, False, False)]
+    + [({"_asked": True}, False, True, False), ({"leans": False, "aligned": False}, False, False, True)]
     + [({"shown": True}, True, True, True)],
 )
 def test_a_new_drive_knows_what_the_alignment_knows(given, up, bias, shown):
@@ -184,9 +187,8 @@ def test_an_adopted_alignment_is_saved_with_its_trim():
 
 
 def test_an_old_speed_is_forgotten_even_if_nobody_asks():
-    made = background(_total=[0] * 7)
+    made = background(speed=SimpleNamespace(poll=lambda now: None))
     made._look = lambda now: None
-    made.speed = SimpleNamespace(poll=lambda now: None)
     made.poll(2999)
     assert made._speed_ms == 0
     made.poll(3999)
