@@ -49,10 +49,15 @@ def test_a_speed_is_fresh_for_three_seconds():
 
 @pytest.mark.parametrize(
     ("given", "away"),
-    [({"_speed_mps": 2.0}, False), ({"_speed_mps": 2.1}, True), ({"meter_mps": 9.0}, False)]
-    + [({"meter_mps": 2.1, "problem": "stuck"}, True), ({"meter_mps": 2.0, "problem": "stuck"}, False)]
-    + [({"meter_mps": 9.0, "message": SimpleNamespace(code="other-side")}, False)]
-    + [({"meter_mps": 9.0, "message": SimpleNamespace(code="store")}, True)],
+    [
+        ({"_speed_mps": 2.0}, False),
+        ({"_speed_mps": 2.1}, True),
+        ({"meter_mps": 9.0}, False),
+        ({"meter_mps": 2.1, "problem": "stuck"}, True),
+        ({"meter_mps": 2.0, "problem": "stuck"}, False),
+        ({"meter_mps": 9.0, "message": SimpleNamespace(code="other-side")}, False),
+        ({"meter_mps": 9.0, "message": SimpleNamespace(code="store")}, True),
+    ],
 )
 def test_a_vehicle_is_away_above_two_mps(given, away):
     made = background(standing=False, **given)
@@ -64,14 +69,25 @@ def test_a_vehicle_is_away_above_two_mps(given, away):
 
 @pytest.mark.parametrize(
     ("verdict", "given", "calls", "code"),
-    [(1, {}, [("distrust", None)], None), (2, {}, [("adopt", False)], None), (2, {"ready": False}, [], None)]
-    + [(3, {}, [("distrust", "other-side")], "other-side"), (4, {}, [("distrust", "mount-moved")], "mount-moved")]
-    + [(0, {}, [], None), (1, {"leans": False}, [], None), (2, {"leans": False}, [("adopt", False)], None)]
-    + [(3, {"leans": False}, [("adopt", True)], None), (4, {"leans": False, "ready": False}, [], None)]
-    + [(4, {"leans": False}, [("adopt", True)], None), (4, {"_answered": ["mount-moved"]}, [], None)]
-    + [(0, {"_asked": True}, [("adopt", True)], None), (0, {"_asked": True, "ready": False}, [], None)]
-    + [(1, {"aligned": False}, [("adopt", True)], None), (1, {"standing": False}, [], None)]
-    + [(1, {"_speed_ms": None}, [], None)],
+    [
+        (1, {}, [("distrust", None)], None),
+        (2, {}, [("adopt", False)], None),
+        (2, {"ready": False}, [], None),
+        (3, {}, [("distrust", "other-side")], "other-side"),
+        (4, {}, [("distrust", "mount-moved")], "mount-moved"),
+        (0, {}, [], None),
+        (1, {"leans": False}, [], None),
+        (2, {"leans": False}, [("adopt", False)], None),
+        (3, {"leans": False}, [("adopt", True)], None),
+        (4, {"leans": False, "ready": False}, [], None),
+        (4, {"leans": False}, [("adopt", True)], None),
+        (4, {"_answered": ["mount-moved"]}, [], None),
+        (0, {"_asked": True}, [("adopt", True)], None),
+        (0, {"_asked": True, "ready": False}, [], None),
+        (1, {"aligned": False}, [("adopt", True)], None),
+        (1, {"standing": False}, [], None),
+        (1, {"_speed_ms": None}, [], None),
+    ],
 )
 def test_each_verdict_has_its_reaction(monkeypatch, verdict, given, calls, code):
     made = background(**given)
@@ -145,9 +161,14 @@ def test_a_saved_alignment_has_the_whole_bias():
 
 @pytest.mark.parametrize(
     ("given", "up", "bias", "shown"),
-    [({}, True, True, False), ({"leans": False}, False, True, False), ({"aligned": False}, False, False, False)]
-    + [({"_asked": True}, False, True, False), ({"leans": False, "aligned": False}, False, False, True)]
-    + [({"shown": True}, True, True, True)],
+    [
+        ({}, True, True, False),
+        ({"leans": False}, False, True, False),
+        ({"aligned": False}, False, False, False),
+        ({"_asked": True}, False, True, False),
+        ({"leans": False, "aligned": False}, False, False, True),
+        ({"shown": True}, True, True, True),
+    ],
 )
 def test_a_new_drive_knows_what_the_alignment_knows(given, up, bias, shown):
     """A motorcycle's upright pose is the vertical, unless the drive must replace the alignment. The bias of an aligned

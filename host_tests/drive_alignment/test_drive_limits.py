@@ -24,9 +24,17 @@ DRIVEN = {"_speed_mps": 9.0, "_top_mps": 9.0, "standing__stops": 1}
 
 @pytest.mark.parametrize(
     ("given", "state"),
-    [({"_speed_mps": -1.0}, 0), ({"_silent_us": 5_000_001}, 0), ({"_silent_us": 5_000_000}, 2)]
-    + [({"standing__stops": 0}, 1), ({}, 2), ({"quality__good": True}, 5), ({"standing__moved": True}, 6)]
-    + [({"quality__good": True, "_speed_mps": -1.0}, 5), ({"_speed_mps": 0.0}, 2)],
+    [
+        ({"_speed_mps": -1.0}, 0),
+        ({"_silent_us": 5_000_001}, 0),
+        ({"_silent_us": 5_000_000}, 2),
+        ({"standing__stops": 0}, 1),
+        ({}, 2),
+        ({"quality__good": True}, 5),
+        ({"standing__moved": True}, 6),
+        ({"quality__good": True, "_speed_mps": -1.0}, 5),
+        ({"_speed_mps": 0.0}, 2),
+    ],
 )
 def test_the_state_of_a_drive(given, state):
     assert drive(**DRIVEN | given).state == state
@@ -45,13 +53,15 @@ def test_braking_is_shown_as_straight_or_in_a_bend():
 
 @pytest.mark.parametrize(
     ("given", "counted", "reason"),
-    [({"_speed_mps": -1.0}, 5, ("no-speed",)), ({"_top_mps": 1.9}, 5, ("not-driven", 5))]
-    + [({"_top_mps": 2.0, "standing__stops": 0}, 5, ("not-stopped", 3.0)), ({}, 4, ("few-events", 4, 5, 2))]
-    + [
+    [
+        ({"_speed_mps": -1.0}, 5, ("no-speed",)),
+        ({"_top_mps": 1.9}, 5, ("not-driven", 5)),
+        ({"_top_mps": 2.0, "standing__stops": 0}, 5, ("not-stopped", 3.0)),
+        ({}, 4, ("few-events", 4, 5, 2)),
         ({}, 5, ("uncertain", 180.0, 0)),
         ({"quality__quality_deg": 3.0, "quality__agree": True}, 5, ("uncertain", 3.0, 0)),
-    ]
-    + [({"quality__quality_deg": 3.0, "quality__halves_deg": 12.0}, 5, ("parts-differ", 12.0))],
+        ({"quality__quality_deg": 3.0, "quality__halves_deg": 12.0}, 5, ("parts-differ", 12.0)),
+    ],
 )
 def test_what_a_drive_still_misses(given, counted, reason):
     assert said(drive(**DRIVEN | given).missing(counted, 5, 2)) == reason

@@ -100,9 +100,16 @@ def test_a_straight_interval_is_in_the_regression():
 
 @pytest.mark.parametrize(
     ("given", "used"),
-    [({"yaw_dps": 1.99}, True), ({"yaw_dps": -2.01}, False), ({"speeds": (1.0, 1.0, 1.0)}, False)]
-    + [({"speeds": (1.3, 0.9, 0.8)}, True), ({"force": (0.0, 2.9, 0.0)}, True), ({"force": (0.0, 3.1, 0.0)}, False)]
-    + [({"every_us": 2_200_000}, True), ({"every_us": 2_300_000}, False)],
+    [
+        ({"yaw_dps": 1.99}, True),
+        ({"yaw_dps": -2.01}, False),
+        ({"speeds": (1.0, 1.0, 1.0)}, False),
+        ({"speeds": (1.3, 0.9, 0.8)}, True),
+        ({"force": (0.0, 2.9, 0.0)}, True),
+        ({"force": (0.0, 3.1, 0.0)}, False),
+        ({"every_us": 2_200_000}, True),
+        ({"every_us": 2_300_000}, False),
+    ],
 )
 def test_an_interval_is_straight_fast_and_without_a_knock(given, used):
     assert (driven(**{"speeds": (20.0, 19.0, 18.0), **given}).regression._sums[0][0] > 0.0) is used
@@ -198,8 +205,14 @@ def test_angles_and_priors_by_hand():
 
 @pytest.mark.parametrize(
     ("count", "weight", "seconds", "forward", "pitch"),
-    [(4, 0.11, 20.0, True, True), (3, 0.2, 30.0, False, True), (4, 0.04, 20.0, False, True), (4, 0.2, 6.0, True, False)]
-    + [(2, 9.0, 19.9, False, False), (2, 9.0, 20.0, False, True)],
+    [
+        (4, 0.11, 20.0, True, True),
+        (3, 0.2, 30.0, False, True),
+        (4, 0.04, 20.0, False, True),
+        (4, 0.2, 6.0, True, False),
+        (2, 9.0, 19.9, False, False),
+        (2, 9.0, 20.0, False, True),
+    ],
 )
 def test_parts_need_blocks_weight_and_time(count, weight, seconds, forward, pitch):
     made = DriveParts()

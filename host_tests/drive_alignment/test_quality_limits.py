@@ -42,8 +42,14 @@ def judged(**given) -> Any:
 
 @pytest.mark.parametrize(
     ("given", "good"),
-    [({}, True), ({"quality_deg": 1.51}, False), ({"halves_deg": 4.01}, False), ({"counted": 4}, False)]
-    + [({"parts_deg": 4.1, "sigmas": 3.1}, False), ({"parts_deg": 9.0, "sigmas": 3.0}, True)],
+    [
+        ({}, True),
+        ({"quality_deg": 1.51}, False),
+        ({"halves_deg": 4.01}, False),
+        ({"counted": 4}, False),
+        ({"parts_deg": 4.1, "sigmas": 3.1}, False),
+        ({"parts_deg": 9.0, "sigmas": 3.0}, True),
+    ],
 )
 def test_a_drive_becomes_ready_within_its_limits(given, good):
     made = judged(**given)
@@ -54,8 +60,13 @@ def test_a_drive_becomes_ready_within_its_limits(given, good):
 
 @pytest.mark.parametrize(
     ("given", "good"),
-    [({"quality_deg": 2.5, "halves_deg": 6.0}, True), ({"quality_deg": 2.51}, False), ({"halves_deg": 6.01}, False)]
-    + [({"parts_deg": 6.1, "sigmas": 4.0}, True), ({"parts_deg": 6.1, "sigmas": 4.1}, False)],
+    [
+        ({"quality_deg": 2.5, "halves_deg": 6.0}, True),
+        ({"quality_deg": 2.51}, False),
+        ({"halves_deg": 6.01}, False),
+        ({"parts_deg": 6.1, "sigmas": 4.0}, True),
+        ({"parts_deg": 6.1, "sigmas": 4.1}, False),
+    ],
 )
 def test_a_ready_drive_stays_ready_within_wider_limits(given, good):
     made = judged(**given)
@@ -73,14 +84,20 @@ def test_a_speed_is_checked_from_two_events():
 
 @pytest.mark.parametrize(
     ("given", "level_deg", "problem"),
-    [({}, 8.0, None), ({}, 8.1, ("mount-moved", "vertical", 8.1)), ({"roll_deg": 7.1}, 0.0, ("mount-moved", "parts"))]
-    + [({"pitch_deg": 7.1}, 0.0, ("mount-moved", "parts")), ({"pitch_deg": 7.1, "is_car": False}, 0.0, None)]
-    + [({"parts_deg": 30.1, "sigmas": 4.1}, 0.0, ("mount-moved", "forward"))]
-    + [({"parts_deg": 30.1, "sigmas": 4.0}, 0.0, None), ({"parts_deg": 29.9, "sigmas": 4.1}, 0.0, None)]
-    + [({"last": [0.0, 0.0, -0.51], "weight": 0.0121}, 0.0, ("mount-moved", "forward"))]
-    + [({"last": [0.0, 0.0, -0.51], "weight": 0.0119}, 0.0, None)]
-    + [({"last": [0.0, 0.0, -0.49], "weight": 0.0121}, 0.0, None)]
-    + [({"last": [np.sin(1.38), 0.0, np.cos(1.38)], "weight": 1.0}, 0.0, None)]  # 79 degrees
+    [
+        ({}, 8.0, None),
+        ({}, 8.1, ("mount-moved", "vertical", 8.1)),
+        ({"roll_deg": 7.1}, 0.0, ("mount-moved", "parts")),
+        ({"pitch_deg": 7.1}, 0.0, ("mount-moved", "parts")),
+        ({"pitch_deg": 7.1, "is_car": False}, 0.0, None),
+        ({"parts_deg": 30.1, "sigmas": 4.1}, 0.0, ("mount-moved", "forward")),
+        ({"parts_deg": 30.1, "sigmas": 4.0}, 0.0, None),
+        ({"parts_deg": 29.9, "sigmas": 4.1}, 0.0, None),
+        ({"last": [0.0, 0.0, -0.51], "weight": 0.0121}, 0.0, ("mount-moved", "forward")),
+        ({"last": [0.0, 0.0, -0.51], "weight": 0.0119}, 0.0, None),
+        ({"last": [0.0, 0.0, -0.49], "weight": 0.0121}, 0.0, None),
+        ({"last": [np.sin(1.38), 0.0, np.cos(1.38)], "weight": 1.0}, 0.0, None),
+    ]  # 79 degrees
     + [({"last": [np.sin(1.41), 0.0, np.cos(1.41)], "weight": 1.0}, 0.0, ("mount-moved", "forward"))],
 )
 def test_a_moved_mount_is_found_beyond_its_limits(given, level_deg, problem):

@@ -18,8 +18,15 @@ MS = 1_000_000
 
 @pytest.mark.parametrize(
     ("name", "stem", "axis"),
-    [("accX", "acc", "x"), ("Acc X (g)", "acc", "x"), ("x_acc", "acc", "x"), ("gyro:Y axis", "gyro:", "y")]
-    + [("data12", "data", "12"), ("xacc", "acc", "x"), ("accX_mg", "acc", "x")],
+    [
+        ("accX", "acc", "x"),
+        ("Acc X (g)", "acc", "x"),
+        ("x_acc", "acc", "x"),
+        ("gyro:Y axis", "gyro:", "y"),
+        ("data12", "data", "12"),
+        ("xacc", "acc", "x"),
+        ("accX_mg", "acc", "x"),
+    ],
 )
 def test_an_axis_is_split_from_a_name(name, stem, axis):
     assert list(findings._split_axis(name)) == [(stem, axis)]
@@ -32,8 +39,19 @@ def test_names_without_an_axis_have_none():
 
 @pytest.mark.parametrize(
     ("name", "said"),
-    [("acc (m/s^2)", "m/s2"), ("acc_mg", "mg"), ("millis", "ms"), ("micros", "us"), ("timeNano", "ns"), ("t_ms", "ms")]
-    + [("seconds", "s"), ("s", "s"), ("acc", ""), ("x (left)", ""), ("gyro_counts/131", "counts/131")],
+    [
+        ("acc (m/s^2)", "m/s2"),
+        ("acc_mg", "mg"),
+        ("millis", "ms"),
+        ("micros", "us"),
+        ("timeNano", "ns"),
+        ("t_ms", "ms"),
+        ("seconds", "s"),
+        ("s", "s"),
+        ("acc", ""),
+        ("x (left)", ""),
+        ("gyro_counts/131", "counts/131"),
+    ],
 )
 def test_a_unit_is_stated_in_a_name(name, said):
     assert findings.stated_unit(name) == said
@@ -51,8 +69,16 @@ def calm(length, count=200):
 
 @pytest.mark.parametrize(
     ("length", "stated", "unit", "certain"),
-    [(1.0, "", "g", True), (1.29, "", "g", True), (1.31, "", "g", False), (1 / 1.31, "", "g", False)]
-    + [(9.8, "m/s2", "m/s2", True), (9.8, "g", "m/s2", False), (1000.0, "", "mg", True), (1.2, "g", "g", True)],
+    [
+        (1.0, "", "g", True),
+        (1.29, "", "g", True),
+        (1.31, "", "g", False),
+        (1 / 1.31, "", "g", False),
+        (9.8, "m/s2", "m/s2", True),
+        (9.8, "g", "m/s2", False),
+        (1000.0, "", "mg", True),
+        (1.2, "g", "g", True),
+    ],
 )
 def test_gravity_shows_the_unit_of_accelerations(length, stated, unit, certain):
     found = findings.accelerometer(calm(length) + 0.25 * (length > 20.0), np.arange(200) / 50.0, stated)
@@ -79,8 +105,8 @@ def test_whole_numbers_above_20_are_counts():
 
 @pytest.mark.parametrize(
     ("most", "moving", "unit"),
-    [(2.9, True, "rad/s"), (3.1, True, "deg/s"), (999.0, True, "deg/s"), (1001.0, True, "mdeg/s")]
-    + [(0.1, False, "deg/s"), (0.1 / 57.3, False, "rad/s"), (100.0, False, "mdeg/s"), (1.75, False, "mrad/s")],
+    [(2.9, True, "rad/s"), (3.1, True, "deg/s"), (999.0, True, "deg/s"), (1001.0, True, "mdeg/s"),
+     (0.1, False, "deg/s"), (0.1 / 57.3, False, "rad/s"), (100.0, False, "mdeg/s"), (1.75, False, "mrad/s")],
 )  # fmt: skip
 def test_a_unit_of_rates_by_their_size(most, moving, unit):
     """A sensor at rest has a noise of 0.1 deg/s. In motion the 90th percentile of the rates decides."""

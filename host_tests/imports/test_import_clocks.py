@@ -151,8 +151,14 @@ def log_of(count=100, start=0.0) -> Log:
 
 @pytest.mark.parametrize(
     ("begin", "end", "count", "first"),
-    [(None, None, 100, 0.0), (2.0, None, 80, 2.0), (2.0, 3.0, 11, 2.0), (-1.0, None, 11, 8.9), (None, -1.0, 90, 0.0)]
-    + [(-99.0, 0.1, 2, 0.0)],
+    [
+        (None, None, 100, 0.0),
+        (2.0, None, 80, 2.0),
+        (2.0, 3.0, 11, 2.0),
+        (-1.0, None, 11, 8.9),
+        (None, -1.0, 90, 0.0),
+        (-99.0, 0.1, 2, 0.0),
+    ],
 )
 def test_a_stretch_counts_from_the_start_or_the_end(begin, end, count, first):
     found = importing._stretch(log_of(), begin, end)

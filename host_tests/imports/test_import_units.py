@@ -66,8 +66,17 @@ def test_files_together_have_a_largest_size(monkeypatch):
 
 @pytest.mark.parametrize(
     ("text", "name"),
-    [("m/s^2", "m/s2"), ("M/S²", "m/s2"), ("m s-2", "m/s2"), ("m*s^-2", "m/s2"), ("°/s", "deg/s"), ("kph", "km/h")]
-    + [("µs", "us"), ("furlong", "furlong"), (" G ", "g")],
+    [
+        ("m/s^2", "m/s2"),
+        ("M/S²", "m/s2"),
+        ("m s-2", "m/s2"),
+        ("m*s^-2", "m/s2"),
+        ("°/s", "deg/s"),
+        ("kph", "km/h"),
+        ("µs", "us"),
+        ("furlong", "furlong"),
+        (" G ", "g"),
+    ],
 )
 def test_units_have_many_spellings(text, name):
     assert units.unit(text) == name
@@ -91,9 +100,23 @@ def test_factors_of_units_by_hand():
 
 @pytest.mark.parametrize(
     ("first", "step", "name"),
-    [(0.0, 0.02, "s"), (0.0, 0.89, "s"), (0.0, 0.91, "ms"), (0.0, 599.0, "ms"), (0.0, 601.0, "us")]
-    + [(0.0, 599e3, "us"), (0.0, 601e3, "ns"), (1.7e9, 0.01, "s"), (1.7e9, 99.0, "s"), (1.7e9, 101.0, "ms")]
-    + [(1.7e12, 10.0, "ms"), (1.7e15, 10e3, "us"), (1.7e18, 1e7, "ns"), (0.9e8, 10.0, "ms"), (1.1e10, 10e3, "us")],
+    [
+        (0.0, 0.02, "s"),
+        (0.0, 0.89, "s"),
+        (0.0, 0.91, "ms"),
+        (0.0, 599.0, "ms"),
+        (0.0, 601.0, "us"),
+        (0.0, 599e3, "us"),
+        (0.0, 601e3, "ns"),
+        (1.7e9, 0.01, "s"),
+        (1.7e9, 99.0, "s"),
+        (1.7e9, 101.0, "ms"),
+        (1.7e12, 10.0, "ms"),
+        (1.7e15, 10e3, "us"),
+        (1.7e18, 1e7, "ns"),
+        (0.9e8, 10.0, "ms"),
+        (1.1e10, 10e3, "us"),
+    ],
 )
 def test_the_unit_of_times_is_guessed_by_size_and_step(first, step, name):
     assert units._guessed(first + step * np.arange(50.0)) == name

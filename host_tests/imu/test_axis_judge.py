@@ -56,11 +56,18 @@ def after(count, gyro_range=1, dlpf=3, **changed):
 
 @pytest.mark.parametrize(
     ("gyro_range", "dlpf", "column", "looks", "fault"),
-    [(1, 3, 0, 1, ("axis-ill", "Accel", "x", "stuck")), (1, 3, 6, 1, ("axis-ill", "Gyro", "z", "dead"))]
-    + [(1, 5, 1, 15, ("axis-ill", "Accel", "y", "stuck")), (0, 6, 4, 11, ("axis-ill", "Gyro", "x", "dead"))]
-    + [(2, 4, 5, 10, ("axis-ill", "Gyro", "y", "dead")), (3, 3, 4, 14, ("axis-ill", "Gyro", "x", "dead"))]
-    + [(1, 6, 2, 80, ("axis-ill", "Accel", "z", "stuck")), (2, 5, 4, 62, ("axis-ill", "Gyro", "x", "dead"))]
-    + [(0, 4, 6, 3, ("axis-ill", "Gyro", "z", "dead")), (1, 4, 0, 4, ("axis-ill", "Accel", "x", "stuck"))],
+    [
+        (1, 3, 0, 1, ("axis-ill", "Accel", "x", "stuck")),
+        (1, 3, 6, 1, ("axis-ill", "Gyro", "z", "dead")),
+        (1, 5, 1, 15, ("axis-ill", "Accel", "y", "stuck")),
+        (0, 6, 4, 11, ("axis-ill", "Gyro", "x", "dead")),
+        (2, 4, 5, 10, ("axis-ill", "Gyro", "y", "dead")),
+        (3, 3, 4, 14, ("axis-ill", "Gyro", "x", "dead")),
+        (1, 6, 2, 80, ("axis-ill", "Accel", "z", "stuck")),
+        (2, 5, 4, 62, ("axis-ill", "Gyro", "x", "dead")),
+        (0, 4, 6, 3, ("axis-ill", "Gyro", "z", "dead")),
+        (1, 4, 0, 4, ("axis-ill", "Accel", "x", "stuck")),
+    ],
 )
 def test_an_axis_without_noise_is_ill_after_its_looks(gyro_range, dlpf, column, looks, fault):
     seen = {column: 0b0001}
@@ -125,10 +132,16 @@ def test_the_gyros_axes_are_named_before_the_accelerometers():
 
 @pytest.mark.parametrize(
     ("given", "notice", "fault"),
-    [({"clipped": 9}, None, None), ({"clipped": 10}, ("clips", "Accel"), None), ({"shaken": 9}, None, None)]
-    + [({"clipped": 10, "gyro": 5}, ("clips", "Gyro"), None), ({"clipped": 10, "gyro": 4}, ("clips", "Accel"), None)]
-    + [({"shaken": 10}, ("clips", "Accel"), ("clips", "Accel")), ({"clipped": 49}, ("clips", "Accel"), None)]
-    + [({"clipped": 50}, ("clips", "Accel"), ("clips", "Accel"))],
+    [
+        ({"clipped": 9}, None, None),
+        ({"clipped": 10}, ("clips", "Accel"), None),
+        ({"shaken": 9}, None, None),
+        ({"clipped": 10, "gyro": 5}, ("clips", "Gyro"), None),
+        ({"clipped": 10, "gyro": 4}, ("clips", "Accel"), None),
+        ({"shaken": 10}, ("clips", "Accel"), ("clips", "Accel")),
+        ({"clipped": 49}, ("clips", "Accel"), None),
+        ({"clipped": 50}, ("clips", "Accel"), ("clips", "Accel")),
+    ],
 )
 def test_samples_at_the_end_of_the_range_clip(given, notice, fault):
     """A tenth of the samples gives a notice. Half of them in two looks, or a shaken sensor, is a fault."""

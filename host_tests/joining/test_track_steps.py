@@ -39,8 +39,8 @@ def test_a_course_turns_to_the_left_by_hand():
 
 
 @pytest.mark.parametrize(
-    ("step_s", "step_m", "good"), [(1.0, 2.4, False), (1.0, 2.6, True), (1.0, 99.0, True), (1.0, 101.0, False)]
-    + [(5.9, 60.0, True), (6.1, 60.0, False)],
+    ("step_s", "step_m", "good"), [(1.0, 2.4, False), (1.0, 2.6, True), (1.0, 99.0, True), (1.0, 101.0, False),
+     (5.9, 60.0, True), (6.1, 60.0, False)],
 )  # fmt: skip
 def test_a_step_is_good_between_a_walk_and_a_jump(step_s, step_m, good):
     assert course(track([0.0, step_s], [0.0, step_m], [0.0, 0.0])).good.tolist() == [good]

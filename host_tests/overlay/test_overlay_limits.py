@@ -74,11 +74,19 @@ def part(offset=None, begin=None, end=None, seconds=60.0, film=True):
 
 @pytest.mark.parametrize(
     ("given", "found"),
-    [({"film": False}, (0.0, 100.0)), ({"film": False, "begin": 20.0, "end": 150.0}, (20.0, 100.0))]
-    + [({"film": False, "begin": -30.0, "end": -10.0}, (70.0, 90.0)), ({"film": False, "begin": -300.0}, (0.0, 100.0))]
-    + [({"offset": 12.5}, (12.5, 72.5)), ({"offset": -1.0}, (-1.0, 59.0)), ({"offset": 41.0}, (41.0, 101.0))]
-    + [({"offset": 12.5, "begin": 5.0}, (12.5, 72.5)), ({"offset": 12.5, "begin": 20.0, "end": 30.0}, (20.0, 30.0))]
-    + [({"offset": -20.0, "end": 90.0}, (0.0, 40.0)), ({"offset": 60.0, "begin": 70.0}, (70.0, 100.0))],
+    [
+        ({"film": False}, (0.0, 100.0)),
+        ({"film": False, "begin": 20.0, "end": 150.0}, (20.0, 100.0)),
+        ({"film": False, "begin": -30.0, "end": -10.0}, (70.0, 90.0)),
+        ({"film": False, "begin": -300.0}, (0.0, 100.0)),
+        ({"offset": 12.5}, (12.5, 72.5)),
+        ({"offset": -1.0}, (-1.0, 59.0)),
+        ({"offset": 41.0}, (41.0, 101.0)),
+        ({"offset": 12.5, "begin": 5.0}, (12.5, 72.5)),
+        ({"offset": 12.5, "begin": 20.0, "end": 30.0}, (20.0, 30.0)),
+        ({"offset": -20.0, "end": 90.0}, (0.0, 40.0)),
+        ({"offset": 60.0, "begin": 70.0}, (70.0, 100.0)),
+    ],
 )
 def test_the_drawn_part_of_a_ride(given, found):
     assert part(**given) == pytest.approx(found)
@@ -86,13 +94,14 @@ def test_the_drawn_part_of_a_ride(given, found):
 
 @pytest.mark.parametrize(
     ("given", "words"),
-    [({"offset": 100.0}, "they have nothing in common"), ({"offset": -60.0}, "they have nothing in common")]
-    + [({"offset": -1.1}, r"from -1\.1 to 58\.9 s of .* with --from 0\.0 --to 58\.9")]
-    + [
+    [
+        ({"offset": 100.0}, "they have nothing in common"),
+        ({"offset": -60.0}, "they have nothing in common"),
+        ({"offset": -1.1}, r"from -1\.1 to 58\.9 s of .* with --from 0\.0 --to 58\.9"),
         ({"offset": 41.1}, r"with --from 41\.1 --to 100\.0"),
         ({"film": False, "begin": 30.0, "end": 30.0}, "nothing from"),
-    ]
-    + [({"film": False, "begin": 100.0, "end": 110.0}, r"RIDE lasts 100\.0 s: there is nothing from 100\.0 to")],
+        ({"film": False, "begin": 100.0, "end": 110.0}, r"RIDE lasts 100\.0 s: there is nothing from 100\.0 to"),
+    ],
 )
 def test_a_part_outside_the_ride_is_refused(given, words):
     with pytest.raises(InputError, match=words):

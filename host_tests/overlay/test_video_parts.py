@@ -47,17 +47,14 @@ def test_a_video_is_described_by_ffmpegs_words(monkeypatch, tmp_path):
         ("nothing", "", 0, "is not a video that"),
         ("Input #0", "", 0, "has no pictures"),
         (HEAD.format(""), "frame=9", 0, "damaged"),
-    ]
-    + [(HEAD.format("30 fps"), "frame=0", 0, "damaged"), (HEAD.format("30 fps"), "frame=9", 1, "damaged")]
-    + [
+        (HEAD.format("30 fps"), "frame=0", 0, "damaged"),
+        (HEAD.format("30 fps"), "frame=9", 1, "damaged"),
         (HEAD.format("30 fps, attached pic"), "frame=9", 0, "has no pictures"),
         (HEAD.format("30 fps"), "", 0, "damaged"),
-    ]
-    + [
         (HEAD.format("1001 fps"), "frame=9", 0, "1920x1080 pixels, 1001 pictures"),
         (HEAD.format("0 fps"), "frame=9", 0, "not a"),
-    ]
-    + [(HEAD.format("30 fps").replace("1920", "16385"), "frame=9", 0, "not a camera's video: 16385x1080")],
+        (HEAD.format("30 fps").replace("1920", "16385"), "frame=9", 0, "not a camera's video: 16385x1080"),
+    ],
 )
 def test_a_file_that_is_no_cameras_video_is_refused(monkeypatch, tmp_path, text, frames, code, words):
     with pytest.raises(InputError, match=words):

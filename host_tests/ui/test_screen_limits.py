@@ -200,8 +200,13 @@ def test_the_page_of_the_drive_follows_or_is_first(monkeypatch):
 
 @pytest.mark.parametrize(
     ("given", "trusted"),
-    [({}, True), ({"lean_deg": 65.0}, True), ({"lean_deg": -65.1}, False), ({"fallen": True}, False)]
-    + [({"trusted": False}, False)],
+    [
+        ({}, True),
+        ({"lean_deg": 65.0}, True),
+        ({"lean_deg": -65.1}, False),
+        ({"fallen": True}, False),
+        ({"trusted": False}, False),
+    ],
 )
 def test_a_lean_is_shown_only_if_it_is_trusted(given, trusted):
     shown = screen()

@@ -56,8 +56,8 @@ def test_the_progress_of_a_pose_is_a_bar():
 
 @pytest.mark.parametrize(
     ("tilt", "waited_ms", "fresh", "line1", "line2"),
-    [(8.0, 89_999, True, "Aligned!   8.0\xdf", "Ride safely")]
-    + [
+    [
+        (8.0, 89_999, True, "Aligned!   8.0\xdf", "Ride safely"),
         (7.94, 90_000, False, "Aligned!   7.9\xdf", "Little, 8\xdf best"),
         (12.3, 0, True, "Aligned!  12.3\xdf", "Ride safely"),
     ],
@@ -162,8 +162,12 @@ def test_the_progress_of_a_side_is_named():
 
 @pytest.mark.parametrize(
     ("accel", "lines"),
-    [([0.0, 0.0, 1.0], None), ([0.0, 0.49, 0.87], None), ([0.0, 0.52, 0.855], ("Not on a side:", "31\xdf off"))]
-    + [([1.0, 0.0, 0.0], ("Side +x is done", "1/6, turn it"))],
+    [
+        ([0.0, 0.0, 1.0], None),
+        ([0.0, 0.49, 0.87], None),
+        ([0.0, 0.52, 0.855], ("Not on a side:", "31\xdf off")),
+        ([1.0, 0.0, 0.0], ("Side +x is done", "1/6, turn it")),
+    ],
 )
 def test_a_side_is_accepted_up_to_30_degrees_and_once(accel, lines):
     made = six(_sides=[0, -1, -1, -1, -1, -1])
@@ -209,8 +213,13 @@ def test_a_turn_that_is_too_fast_is_said_once():
 
 @pytest.mark.parametrize(
     ("fault", "running", "bears"),
-    [(Notice("clips", "Gyro"), True, True), (Notice("clips", "Gyro"), False, False)]
-    + [(Notice("clips", "Accel"), True, False), (Notice("sensor-lost"), True, False), (None, True, False)],
+    [
+        (Notice("clips", "Gyro"), True, True),
+        (Notice("clips", "Gyro"), False, False),
+        (Notice("clips", "Accel"), True, False),
+        (Notice("sensor-lost"), True, False),
+        (None, True, False),
+    ],
 )
 def test_only_rates_at_the_end_of_the_range_are_borne(fault, running, bears):
     made = six()
