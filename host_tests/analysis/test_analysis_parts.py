@@ -142,7 +142,7 @@ def test_what_a_ride_must_have_to_show_its_alignment():
         return quality(made(n, forward_g=push, yaw_rate_dps=yaw_dps), standing)
 
     assert of(yaw_dps=1.9).roll_deg is not None and of(yaw_dps=2.1).roll_deg is None
-    assert of(seconds=12.6).roll_deg is not None and of(seconds=11.4).roll_deg is None  # it stands for 2 s of this
+    assert of(seconds=12.6).roll_deg is not None and of(seconds=11.4).roll_deg is None  # standstill takes 2 s of it
     assert of(push_g=0.06).yaw_deg is not None and of(push_g=0.04).yaw_deg is None
     assert of(seconds=63.0).pitch_deg is not None and of(seconds=61.0).pitch_deg is None
     assert of(stands=False).pitch_deg is None and of(stands=False).gravity_g is None

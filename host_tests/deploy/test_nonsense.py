@@ -1,5 +1,4 @@
-"""A board may send nonsense. Whatever it answers, each command prints one line and writes no file outside its
-folder."""
+"""A board may send nonsense. Each command then prints one line and writes no file outside its folder."""
 
 import binascii
 import contextlib

@@ -230,7 +230,7 @@ def test_nothing_is_joined_across_missing_samples():
 )
 def test_an_alignment_is_compared_with_driving(against, brakings, verdict):
     """A change of pitch by 2 degrees between two poses 10 degrees apart causes a yaw error of 11.4 degrees. The cases
-    use this angle."""
+    use this yaw error."""
     up = against[3:6] if against[3:6] == PLAIN[3:6] else PLAIN[3:6]
     options = {"vehicle": "motorcycle", "up": up, "bias": [0.0, 0.0, 0.0], "against": against}
     assert drive(around(brakings), PLAIN, **options)["compare"] == verdict

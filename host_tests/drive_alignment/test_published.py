@@ -215,7 +215,7 @@ def test_a_shaking_of_ten_times_a_second_is_averaged_away():
     ],
 )
 def test_which_change_of_speed_is_a_braking(seconds, mps2, counted):
-    """A braking event that reduces the speed too little is noise. It is not counted as refused either."""
+    """A braking event that reduces the speed too little is treated as noise. It is neither counted nor refused."""
     drive = Drive()
     drive.brake(seconds=seconds, mps2=mps2)
     assert (drive.alignment.counted, drive.alignment.turned) == (counted, 0)

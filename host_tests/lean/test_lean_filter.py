@@ -182,7 +182,7 @@ def test_an_even_braking_on_a_smooth_road_is_no_rest(braking_mps2):
 
 
 def test_the_work_on_a_window_has_WORK_STEPS_pieces():
-    """One piece is done per sample. At rest the work has fewer pieces."""
+    """Each sample does one piece of the work. At rest the work has fewer pieces."""
     lean, speed = held_turns(60.0)
     estimator, taken, pieces = lean_filter.LeanFilter(), 0, {True: set(), False: set()}
     for f, w in zip(*(values.tolist() for values in balanced(60.0, lean, speed)), strict=True):

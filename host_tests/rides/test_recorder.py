@@ -115,8 +115,8 @@ def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
 
 
 def test_a_wheel_is_not_misread_while_flash_is_erased(tmp_path, monkeypatch):
-    """Interrupts are off for 45 ms once per block. Of the wheel's edges in that time the firmware notices only one, and
-    late."""
+    """Interrupts are off for 45 ms once per block. In this time the firmware notices only one of the wheel's edges, and
+    notices it late."""
     boards, writes = [], []
     fit, write = Board.fit_wheel, RideRing.write
 

@@ -150,7 +150,7 @@ def test_damaged_lines_are_refused_and_the_next_is_read():
     for at in range(len(good) - 2):
         bad = good[:at] + chr(ord(good[at]) ^ 1) + good[at + 1 :]
         assert speeds_of(bad + later, piece=37) in ([5000], [10000, 5000]), bad
-        # A damaged talker does not matter. Every speed that is read is true.
+        # A sentence whose first two letters are damaged is still read. Every speed that is read is true.
         assert (10000 in speeds_of(bad)) <= (at in (1, 2)), bad
     for at in range(1, len(good) - 3):
         assert speeds_of(good[at:] + later) == [5000]  # the beginning is missing

@@ -35,7 +35,7 @@ _STANDS_IN = {
 }
 _MPREMOTE = ("__init__.py", "mp_errno.py", "transport.py", "transport_serial.py")
 _NUMPY = "lib/python3.12/site-packages/"  # the folder of numpy in the conda package
-# These folders are a third of numpy. They contain parts for its developers, for compilers and for random numbers.
+# These folders are a third of numpy's size. They contain parts for developers, for compilers and for random numbers.
 _LEFT_OUT = ("/tests/", "/f2py/", "/random/", "/distutils/", "/testing/", "/include/", "/_pyinstaller/")
 _LICENCES = "info/licenses/"
 

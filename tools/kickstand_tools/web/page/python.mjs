@@ -14,7 +14,7 @@ export async function loadPython(archives, tell) {
   const packed = come.slice(0, archives.length);
   const python = await loadPyodide({ indexURL: new URL("./pyodide/", HERE).href });
   // numpy calls backtrace(), which Pyodide lacks, to find out whether it may avoid copying an array. If backtrace()
-  // returns 0, numpy copies the array.
+  // returns 0 callers, numpy copies the array.
   python._module.LDSO.loadedLibsByName["__main__"].exports.backtrace = () => 0;
   for (const archive of packed) python.unpackArchive(archive, "zip", { extractDir: PACKAGES });
   python.runPython(`import sys; sys.path.insert(0, "${PACKAGES}")`);
