@@ -150,8 +150,8 @@ def test_silence_is_a_fault_after_100_ms(board):
 
 
 def test_an_overflow_is_no_silence(board):
-    """After an overflow the driver empties the FIFO, so there are no samples for a moment. The sensor is not reported as
-    silent, even if the loop read the time before the overflow."""
+    """After an overflow the driver empties the FIFO, so there are no samples for a moment. The sensor is not reported
+    as silent, even if the loop read the time before the overflow."""
     sensor, chip, now_ms = running(board)
     board.clock.advance(now_ms * 1000 + 400_000)
     chip.waiting = [0, 0, 0]
