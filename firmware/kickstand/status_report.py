@@ -154,7 +154,9 @@ def _speed(settings):
 
 
 def _worst(chip):
-    """Print the worst values of the app if it has run since the board started.
+    """Print what the app noticed since the board started: readings that did not fit, and its worst values.
+
+    Nothing is printed if the app has not run.
 
     Args:
         chip: an Mpu6050.

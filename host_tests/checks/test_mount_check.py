@@ -1,4 +1,4 @@
-"""Commands that use a calibration report it if it belongs to another mount. They never report a right calibration."""
+"""A command warns if its calibration belongs to another mount. It never warns about a right calibration."""
 
 import json
 import re

@@ -59,7 +59,11 @@ class Talker:
 
 @pytest.fixture
 def answers(monkeypatch):
-    """Return a function that returns the lines, or the reason of an end, and the bytes sent to the board."""
+    """Return a function that runs lines() with a board that prints these pieces.
+
+    The function returns a list and the bytes that were sent to the board. The list has the program's lines. If lines()
+    broke off, the message of this error is the last item.
+    """
     clock = Clock()
     fake = SimpleNamespace(monotonic=lambda: clock.now, time=lambda: clock.wall)
     monkeypatch.setattr(board_console, "time", fake)

@@ -47,8 +47,10 @@ def test_no_turn_is_lost_and_positions_keep_their_turn(every, length):
 
 
 def said(*values: int) -> list:
-    """Return the positions that the tools read from a block with one position. values: date, ms, latitude,
-    longitude."""
+    """Write one position into a block, read the block with the tools, and return the positions that they find.
+
+    values: date, ms, latitude, longitude.
+    """
     block = ride_writer.begun(1024)
     block.add_place(values)
     block.add([0, 0, 8192, 0, 0, 0, 0], 2, 10_000)

@@ -95,8 +95,8 @@ def fit(poses):
 
 
 def check_plausible(offset, slope, poses):
-    """Raise CalibrationError unless offset and slope are plausible and each side's axis was within _MAX_TILT_DEG of the
-    vertical."""
+    """Raise CalibrationError unless offset and slope are plausible, and in each pose one axis was within _MAX_TILT_DEG
+    of the vertical."""
     for i in range(3):
         if not (abs(offset[i]) < MAX_OFFSET_G and MIN_SLOPE < slope[i] < MAX_SLOPE):
             raise CalibrationError("odd-axis", AXES[i], offset[i], slope[i])

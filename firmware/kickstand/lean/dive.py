@@ -6,8 +6,8 @@ nearly proportional to the forward acceleration a. With ' for the derivative by 
 
     dive' = share a'                                                                  (8)
 
-The pitch rate of the road itself does not depend on a'. So a regression of the pitch rate on a' gives the share:
-sum(a' pitch rate) / sum(a'^2). Each sum begins with a prior.
+The part of the pitch rate that comes from the road does not depend on a'. So a regression of the pitch rate on a' gives
+the share: sum(a' pitch rate) / sum(a'^2). Each sum begins with a prior.
 """
 
 from ..units import STANDARD_GRAVITY, const

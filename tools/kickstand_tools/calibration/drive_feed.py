@@ -56,7 +56,8 @@ class Bin:
 def drive_bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterator[Bin]:
     """Split the samples of a log into the shortest bins that last at least length_us.
 
-    If length_us is 0, each bin has one sample.
+    The last bin before a gap or before the end of the log may be shorter. If length_us is 0, each bin has one sample,
+    but the first bin of each stretch has two.
     """
     time_us = log.time_us
     step_us = np.diff(time_us, prepend=time_us[0])

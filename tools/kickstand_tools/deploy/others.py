@@ -53,7 +53,7 @@ class Others:
 
     files: Files and folders of the board, after renaming.
     moves: New path of each file to rename, by its present path.
-    config: Content that the user's config.py should have. None if there is no such file, or if it is renamed.
+    config: Content that the user's config.py should have. None if the board has no config.py, or if it is renamed.
     mended: True if this content differs from the present content.
     """
 

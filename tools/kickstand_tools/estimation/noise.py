@@ -192,7 +192,9 @@ class Noise:
         return np.clip(found, 1.0, MOST_MISFIT)
 
     def estimate_unbalance(self, force: Array, over_s: float) -> None:
-        """Set the unbalance.
+        """Set the unbalance, which is the factor on the standard deviation of BALANCED. An average ride has 1.
+
+        With too few balanced windows it stays 1.
 
         force: the measurement BALANCED, shape (n), in g.
         over_s: BRIEF_S or LONG_S.

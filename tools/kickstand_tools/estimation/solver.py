@@ -145,8 +145,8 @@ class RandomWalks:
 
     prior: normal equations of the first block's parameters, shape (G, m, m + 1).
     variance: variance of the parameters' change from block to block (process noise), shape (G, B - 1, m).
-    between: current change of the parameters from block to block, shape (B - 1, m). The equations were linearised at
-        these parameters.
+    between: change of the parameters from block to block, shape (B - 1, m), in the current estimate of the parameters,
+        at which the equations were linearised.
     """
 
     prior: Array

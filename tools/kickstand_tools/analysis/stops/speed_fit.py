@@ -13,8 +13,8 @@ from ..channels import Channels
 SMOOTH_S = 0.2  # averaging time of the acceleration that is multiplied by the delay of the speed
 LEAD_S = 4.0  # the fit also uses the logged speeds in this time before the braking
 DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # delays of the speed to try, in s
-# A delay is searched only with at least ENOUGH_SPEEDS speeds, one per second. The standard deviation of their changes
-# must be at least ENOUGH_CHANGE_MPS.
+# A delay is searched only with at least ENOUGH_SPEEDS speeds, one per second. The standard deviation of the changes
+# from one speed to the next must be at least ENOUGH_CHANGE_MPS.
 ENOUGH_SPEEDS, ENOUGH_CHANGE_MPS = 30, 0.5
 
 # Standard deviations of each fitted parameter, and of a logged speed

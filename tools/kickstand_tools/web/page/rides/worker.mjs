@@ -4,7 +4,7 @@
 //     {files}: the files that were given to the page.
 //     {call: [name, ...arguments]}: call a function of web/rides_guest.py.
 // Sends these messages:
-//     {done, of}: the progress of a call. With {loading}, the progress of fetching the tools.
+//     {done, of, loading}: the progress of fetching the tools if loading is true, otherwise of a call.
 //     {ready}: the tools are fetched.
 //     {said}: the result of a call. With {made}, the file that the call made.
 //     {failed: text}: the reason for a failure.
