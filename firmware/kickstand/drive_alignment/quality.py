@@ -20,7 +20,8 @@ MIN_EVENTS_TO_CHECK_SPEED = 2
 # Each pair of limits is a hysteresis against flicker: the limit to become ready, and the limit to stay ready.
 # Largest standard error of forward. In one drive of ten, the real error of forward is twice this standard error
 READY_DEG, STAY_READY_DEG = 1.5, 2.5
-AGREE_DEG, STAY_AGREE_DEG = 4.0, 6.0  # largest difference of forward between the halves, and between the parts
+# Largest angle between the forward directions of the two halves. The same limit holds for two parts
+AGREE_DEG, STAY_AGREE_DEG = 4.0, 6.0
 # A larger difference between the parts is allowed if it is within this number of standard deviations
 AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0
 # The mount moved if two parts differ by more than one of the next three limits

@@ -41,7 +41,7 @@ class Dive:
         self._pitch_rate = 0.0
 
     def update(self, push, pitch_rate, speed, seconds):
-        """Take one window. Return speed x dive' / g, in g. (4) and (5) need this term.
+        """Take one window. Return speed x dive' / g, in g. Equations (4) and (5) need this term.
 
         Args:
             push: mean forward acceleration in g.

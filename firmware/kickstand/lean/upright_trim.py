@@ -56,7 +56,7 @@ class UprightTrim:
         self._covariance = 0.0
 
     def update(self, sideways, lean, yaw_rate, seconds):
-        """Take one measurement while riding.
+        """Update the angle with one measurement made while riding.
 
         Args:
             sideways: force to the left divided by force up.

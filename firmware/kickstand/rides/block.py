@@ -2,7 +2,7 @@
 
 A block has these parts, in this order:
 1. the head
-2. the calibration as store.pack() writes it; only blocks of format 2 have its matrices
+2. the calibration as store.pack() writes it; only blocks of format 2 have the calibration's matrices
 3. the entries
 4. zeros
 5. the positions, the last position first

@@ -26,7 +26,8 @@ OTHER_G, OTHER_DPS, OTHER_STEPS = 0.01, 0.3, 20.0
 NOISY = 0.15
 # If all axes of a sensor are constant, the sensor is judged only in a part of the log that is longer than this.
 DEAD_ALL_S = 20.0
-DEAD_FROM_S = 2.0  # least time of a dead axis; for one second, rounding alone may hide the noise
+# An axis is dead only if it is without noise for at least this time. Rounding alone may hide the noise for one second.
+DEAD_FROM_S = 2.0
 SATURATED_DPS, SATURATED_S, SATURATED_SAMPLES = 100.0, 0.1, 5
 # An accelerometer is clipped if CLIPPED_SAMPLES have the same largest reading, over CLIPPED_G. This reading
 # must be over CLIPPED_STEPS steps of the last digit.

@@ -108,7 +108,8 @@ def in_hand(w: Windows) -> tuple[Bools, Bools]:
     mean = averaged(w.force * there[:, None], MOUNTED_S)
     off = there & (mean[:, 1] < np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(mean, axis=1))
     places = np.flatnonzero(off)
-    # Between two movements in a hand, or between one and an end of the log, the sensor may not be mounted.
+    # If the time between two movements in a hand is short, the sensor was perhaps in the hand all this time. The same
+    # holds for the time from the beginning of the log to the first movement, and from the last movement to the end.
     if len(places):
         ends = np.concatenate(([0], places, [len(w) - 1]))
         for begin, end in itertools.pairwise(ends):

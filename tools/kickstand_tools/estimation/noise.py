@@ -22,7 +22,7 @@ BIAS_ROOT = np.radians(0.005)  # rad/s: the gyro's bias if the log has a tempera
 # rad/s: the gyro's bias without a temperature. The bias of a gyro that warms up changes by 0.6 deg/s in five minutes.
 WARMING_ROOT = np.radians(0.01)
 # Noise while readings are missing or a hand holds the sensor: lean and pitch (rad), velocity left, up, forward (m/s).
-# LOST_ROOT is per square root of a second, and LOST_MOST is the limit over a long time.
+# It grows with the square root of the time, by LOST_ROOT in the first second, and never exceeds LOST_MOST.
 LOST_ROOT = np.array([np.radians(30.0), np.radians(5.0), 3.0, 1.0, 4.0])
 LOST_MOST = np.array([np.radians(60.0), np.radians(8.0), 20.0, 2.0, 20.0])
 # In a jolt, a sample's rate differs from the window's mean by more than JOLTED_RADPS. The angles are then wrong by

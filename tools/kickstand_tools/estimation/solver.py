@@ -112,7 +112,7 @@ def back(reduced: Reduced, ends: Array, parameters: Array) -> Array:
 
 
 def covariances(reduced: Reduced, joint: Array) -> Array:
-    """Compute the covariance of the states at both ends of each link, with each other and with the parameters.
+    """Compute for each link the covariance of the states at its two ends, and their covariance with the parameters.
 
     joint: covariance of the first state, the last state and the parameters, shape (B, s + s + m, s + s + m).
     Returns an array of shape (B, K, s + s, s + s + m).

@@ -20,7 +20,7 @@ MOST_CELLS = 12_000  # ten minutes are enough for a unit
 WINDOW_S = 0.4
 LEAST_TURN = 0.03  # rad, rms: with a smaller turn of gravity in the windows, no unit is found
 STRAIGHT = 0.25  # the force in a cell counts as gravity if its length is this close to the median
-EXPLAINED = 0.5  # least share of the turns' variance that the rates must explain
+EXPLAINED = 0.5  # the rates must explain at least this share of the variance of gravity's turns
 # with this share, units that differ by a factor of 2 can be distinguished, as the ranges of raw counts do
 CLEARLY = 0.9
 FEWEST = 8  # least number of windows

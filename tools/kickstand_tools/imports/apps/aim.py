@@ -2,8 +2,8 @@
 
 Column names and signs were found from the session tests/test_data/SFJ/*_0101.csv of
 https://github.com/m3rlin45/libxrk: at rest VerticalAcc is -1. LateralAcc and YawRate are positive in a right turn,
-InlineAcc when speeding up. The axes are therefore forward, right and down. If VerticalAcc is +1 at rest, that channel
-points up and keeps its sign; the other channels are treated in the same way.
+InlineAcc when speeding up. The axes are therefore forward, right and down. If VerticalAcc is +1 at rest,
+VerticalAcc points up and keeps its sign. The signs of the other channels do not depend on this.
 """
 
 import numpy as np
