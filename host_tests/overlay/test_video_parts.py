@@ -121,7 +121,8 @@ def test_readings_of_a_packet_are_spread_over_its_time(monkeypatch):
 
 @pytest.fixture
 def offset(monkeypatch):
-    """Return a function of what each shift gives: {place: (correlation, evidence)}.
+    """Return a function that finds the offset. Its argument has the result of each shift to try: {place: (correlation,
+    evidence)}.
 
     The video has 200 cells of 50 ms. Its readings begin 0.3 s after its first picture."""
 
