@@ -191,7 +191,7 @@ def test_log_in_memory_without_a_clock_ends_now(tmp_path, monkeypatch, form, sta
 
 
 def test_every_row_of_a_vbo_has_a_speed(tmp_path):
-    """A speed comes at 0.5 s and at 1.5 s. Between these times it is interpolated."""
+    """The log has a speed at 0.5 s and at 1.5 s. Between these times the speed is interpolated."""
     speed = np.full(200, np.nan)
     speed[[50, 150]] = 10.0, 20.0
     ride = open_ride(squarely(speed_mps=speed), SQUARE)

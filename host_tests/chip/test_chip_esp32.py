@@ -136,7 +136,8 @@ _SIDES = [[1, 0, 0], [0, 0, -1], [0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, -1, 0], [
 
 @pytest.mark.nightly
 def test_six_positions_by_the_button():
-    """The rider begins in the menu. After the six sides comes a free pose. At the end the calibration is in flash."""
+    """The rider begins in the menu. The last pose, after the six sides, is a free one. At the end the calibration is in
+    flash."""
     steps = [[0, None]]
     for i, up in enumerate(_SIDES):
         steps += [[8.0 + 6.0 * i, up], [13.0 + 6.0 * i, None]]

@@ -87,7 +87,8 @@ def test_a_warmer_sensor_has_other_offsets():
 
 
 def test_the_jacobian_is_that_of_the_equations():
-    """The derivatives by all states and parameters equal central differences, for forward and backward speeds."""
+    """The derivatives with respect to each state and parameter equal central differences. Forward and backward speeds
+    are tested."""
     rng, n = np.random.default_rng(3), 30
     force, rate = rng.normal(size=(2, n, 3))
     windows = windows_of(np.linspace(0.0, 6.0, n), force, rate, rng.normal(size=n), rng.normal(size=n))

@@ -279,7 +279,7 @@ def test_cells_are_means_over_50_ms():
 
 @pytest.mark.parametrize(("dps", "too_far"), [(59.0, False), (61.0, True)])
 def test_rates_may_turn_constant_gravity_by_120_degrees(dps, too_far):
-    """In 2 s it is 60 deg/s. Only the rate across gravity counts."""
+    """120 degrees in 2 s are a rate of 60 deg/s. Only the rate across gravity counts."""
     t_s = np.arange(0.0, 10.0, 0.01)
     force = np.tile([0.0, 1.0, 0.0], (len(t_s), 1))
     assert rate_fit.turns_too_far(t_s, force, np.tile([dps, 500.0, 0.0], (len(t_s), 1))) is too_far

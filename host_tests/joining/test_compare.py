@@ -101,7 +101,7 @@ def test_remark_appears_once(ride):
     stuck = np.where(np.abs(log.t_s - 80.0) < 3.0, np.argmax(log.t_s > 80.0), np.arange(len(log.t_s)))
     frozen = api.Log(log.t_s, log.accel_g[stuck], log.gyro_dps[stuck])
     for said in api.compare_rides(frozen, frozen, calibration, calibration).notices.values():
-        (line,) = [one.line() for one in said]  # the log is read in two ways, and both find the frozen readings
+        (line,) = [one.line() for one in said]  # the log is read in two ways, and each way finds the frozen readings
         assert line.startswith("the readings froze from 77.0 to 83.0 s")
 
 

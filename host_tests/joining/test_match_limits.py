@@ -249,7 +249,7 @@ def test_a_picture_shows_both_leans_and_their_difference(monkeypatch, tmp_path):
 
 
 def test_a_time_without_a_zone_is_universal():
-    """Both formats write Universal Time. One day has 86,400 s."""
+    """Both formats of tracks write Universal Time. One day has 86,400 s."""
     day = dt.datetime(1970, 1, 2)
     assert track_files._utc_s(day) == track_files._utc_s(day.replace(tzinfo=dt.UTC)) == 86_400.0
     assert track_files._utc_s(day.replace(tzinfo=dt.timezone(dt.timedelta(hours=2)))) == 79_200.0

@@ -140,8 +140,8 @@ def test_machine_code_keeps_a_matrix_symmetric():
 
 
 def test_machine_code_at_the_ends_of_the_range():
-    """Values that are too small count as 0. A value that is infinite or not a number, or a sum that is too large, gives
-    not-a-number."""
+    """Values that are too small count as 0. The result is not-a-number if an input is infinite or not-a-number, or if
+    the sum is too large."""
     cases = {
         (0.0, 1e-30, 1e-30): 0.0,
         (2.5, 1e-30, 1e-30): 2.5,

@@ -12,8 +12,8 @@ from kickstand_tools.logs.reader import read_blocks, read_log
 from support import command
 
 HEADER = command.HEADER + ",speed_mps,temp_c,lat_deg,lon_deg,utc_s"
-# The widest ranges of the chips are 16 g and 2000 deg/s, so larger values are in another unit. Their data sheets end at
-# 85 C. Each entry is {column: (largest value, unit)}.
+# The widest ranges of the chips are 16 g and 2000 deg/s, so larger values are in another unit. The data sheets of the
+# chips allow up to 85 C. Each entry is {column: (largest value, unit)}.
 LIMITS = {
     "t_s": (1e10, "seconds"),
     "ax_g": (20.0, "g"),

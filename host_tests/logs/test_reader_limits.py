@@ -206,7 +206,7 @@ def test_the_temperature_does_not_count():
 
 @pytest.mark.parametrize("blocks_of", [1, 7, 130, 1000])
 def test_stretches_over_blocks_are_one(blocks_of):
-    """A stretch is marked from the block on in which it is known to be frozen. Its times are those of the stretch."""
+    """A frozen stretch is marked from the block in which it is found. The notice has the times of the whole stretch."""
     found, finder = marks(coarse(0.0001, 0.001), blocks_of=blocks_of)
     (notice,) = finder.notices()
     assert found[179] and not found[:101].any() and not found[180:].any()

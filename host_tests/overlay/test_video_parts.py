@@ -155,7 +155,8 @@ def test_an_offset_by_hand(offset):
 
 
 def test_slow_and_quick_changes_of_the_rate_are_removed():
-    """A steady rate leaves nothing. One cell of 40 deg/s counts as 10 over 4 or 8 over 5 cells, less its mean."""
+    """The result of a steady rate is 0. A single cell of 40 deg/s is smoothed to 10 deg/s over 4 cells or 8 deg/s over
+    5 cells, and its mean is subtracted."""
     assert camera_match._turning(np.tile([3.0, 4.0, 0.0], (300, 1))) == pytest.approx(np.zeros(300))
     pulse = np.zeros((300, 3))
     pulse[150, 1] = -40.0

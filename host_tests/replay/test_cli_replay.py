@@ -128,7 +128,7 @@ def test_the_trim_that_riding_found_is_used(tmp_path):
 
 
 def test_times_of_the_log_are_kept_exactly(tmp_path):
-    """The times of a log may begin at a Unix time. They stay exact to the microsecond."""
+    """The times of a log may begin at a Unix time. The replay keeps them to the microsecond."""
     cal = command.write_cal(tmp_path / "CAL.json")
     tables = []
     for start_s in 1_700_000_000.0, 0.0:

@@ -118,8 +118,8 @@ def signals():
 @pytest.mark.parametrize("before", [signal.default_int_handler, signal.SIG_IGN], ids=["shell", "background"])
 @pytest.mark.usefixtures("signals")
 def test_ctrl_c_ends_a_whole_log(before, streaming, tmp_path):
-    """Ctrl-C also works if a shell has started the command with this signal ignored. Afterwards the earlier handler is
-    in use again."""
+    """Ctrl-C also works if a shell has started the command with this signal ignored. When the command ends, the earlier
+    handler is restored."""
     signal.signal(signal.SIGINT, before)
     data, turns = half_seconds(9)
     board = streaming(data[:-1], "ctrl-c", _said(data[-1]))

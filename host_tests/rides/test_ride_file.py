@@ -74,7 +74,7 @@ def written(turns):
 
 
 def held(block):
-    """Return [(sums, n, dt_us), ...] of the turns in a block."""
+    """Return [(sums, n, dt_us), ...] of the loop turns in a block."""
     times = [block.time_us] + [turn.time_us for turn in block.turns]
     return [(t.sums, t.n, t.time_us - before) for t, before in zip(block.turns, times[:-1], strict=True)]
 

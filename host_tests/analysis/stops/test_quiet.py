@@ -1,4 +1,4 @@
-"""A standstill is found because the bike shakes little. Each condition is tested slightly on both sides of its limit.
+"""A standstill is found by its low vibration. Each condition is tested just below and just above its limit.
 
 The simulated log has 10 s of riding, 4 s that may be a standstill, and 10 s of riding. It has no speed.
 """
