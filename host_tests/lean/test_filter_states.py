@@ -63,8 +63,8 @@ def speed_sigma_mps(forward_g, before_mps, now_mps):
 
 
 def test_a_changing_measured_speed_counts_less():
-    """A pitch error looks like a force forward, and a steady measured speed shows that there is no such force.
-    A force forward must therefore not reduce the weight of the speed."""
+    """A pitch error looks like a force forward, and a steady measured speed shows that there is no such force. A force
+    forward must therefore not reduce the weight of the speed."""
     steady, changing = speed_sigma_mps(0.0, 12.0, 12.0), speed_sigma_mps(0.0, 6.0, 12.0)
     assert changing > steady + 0.2
     near(speed_sigma_mps(0.3, 12.0, 12.0), steady, 0.1)
