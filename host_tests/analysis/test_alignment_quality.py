@@ -26,12 +26,12 @@ AXES = {"roll": (0.0, 0.0, -1.0), "pitch": (1.0, 0.0, 0.0), "yaw": (0.0, 1.0, 0.
 
 
 def turn(name, degrees):
-    """Return the rotation (3, 3) that adds an error to this angle of the alignment."""
+    """Return the rotation matrix that adds an error of `degrees` to the angle `name` of the alignment."""
     return rotation_matrix(np.radians(degrees) * np.array(AXES[name]))
 
 
 def turned(calibration, name, degrees):
-    """Return the calibration with this alignment error."""
+    """Return the calibration with an alignment error of `degrees` in the angle `name`."""
     matrix = turn(name, degrees) @ calibration.vehicle_from_sensor
     return dataclasses.replace(calibration, vehicle_from_sensor=matrix)
 
@@ -92,7 +92,7 @@ def test_calibrate_drive_corrects_yaw(ride):
 
 
 def with_calibration(ride, name, degrees, **changed):
-    """Return the path of a CAL.json with this error."""
+    """Write a CAL.json whose alignment has an error of `degrees` in the angle `name`. Return its path."""
     matrix = turn(name, degrees).tolist()
     return analysis_rides.calibration(ride.with_name(f"{name}.json"), vehicle_from_sensor=matrix, **changed)
 

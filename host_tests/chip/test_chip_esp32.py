@@ -171,7 +171,7 @@ def test_power_cut_loses_only_the_last_block_of_a_ride():
 
 
 def test_ride_removes_the_oldest_parts_first():
-    """The flash is full of rides. The new ride removes only as many parts as it needs room for."""
+    """The flash is full of rides. The new ride removes no more parts than it needs room for."""
     parts = [part_path("rides", ride, number) for ride in (1, 2) for number in range(11)]
     full = dict.fromkeys(parts, bytes(PART_BLOCKS * BLOCK))
     with board(files=modules("esp32") | full) as device:

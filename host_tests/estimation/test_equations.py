@@ -67,7 +67,7 @@ def test_sensor_above_the_roll_axis_moves_with_the_roll(lean):
 @pytest.mark.parametrize(
     ("force", "lean", "parameters"),
     [
-        (0.1 * np.sin(0.7) * 1.2, 0.7, {of.TYRES: 0.1}),  # wide tyres touch the road beside their middle
+        (0.1 * np.sin(0.7) * 1.2, 0.7, {of.TYRES: 0.1}),  # a leaned tyre touches the road beside its middle
         (0.03 * np.cos(0.5), 0.5, {of.BESIDE: 0.03}),  # the force of a side wind is level
         (0.01, 0.0, {of.CAMBER: 0.01}),  # the camber of the road matters only on straights
         (0.01, 0.02, {of.CAMBER: 0.01}),

@@ -1,4 +1,4 @@
-"""What the values of unknown columns show, with a value on either side of each limit."""
+"""Tests what is concluded from the values of unknown columns, with a value on either side of each limit."""
 
 import functools
 import itertools

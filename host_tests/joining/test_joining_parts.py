@@ -152,8 +152,8 @@ def test_a_lean_is_unknown_in_gaps_and_outside_the_log():
 
 
 def test_a_difference_by_hand():
-    """B's lean differs by 3 and by -1 degrees in turn. The mean difference is 1, and the rms around it is 2. The
-    standard deviations of 1.2 and 1.6 degrees together are 2.0 degrees."""
+    """The leans of A and B differ by 3 and -1 degrees alternately. The mean difference is 1 degree, and the rms around
+    it is 2 degrees. The standard deviations of 1.2 and 1.6 degrees combine to 2.0 degrees."""
     n, zeros = 1200, np.zeros(1200)
     other = np.where(np.arange(n) % 2, 3.0, -1.0)
     seen = agreement._difference((zeros, zeros + 1.2), (other, zeros + 1.6))

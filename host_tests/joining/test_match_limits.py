@@ -30,7 +30,7 @@ def found_fit(shift_s=10.0, evidence=50.0, **others) -> fit.TrackFit:
 
 @pytest.fixture
 def matched(monkeypatch):
-    """Return a function that returns the Match, or the refusal, of a track for these fits."""
+    """Return a function. It returns the Match, or the refusal, of a track for given fits."""
     track = Track(1000.0 + np.arange(100.0), np.zeros(100), np.arange(100.0) * 1e-4, np.full(100, 9.0), "t")
     motion = moved(np.zeros((1600, 3)))
 

@@ -273,8 +273,8 @@ def test_the_data_before_a_broken_stream_are_kept(end, words, streaming, tmp_pat
 
 
 def test_a_computer_that_slept_is_reported(streaming, tmp_path, monkeypatch):
-    """Meanwhile the board has stopped streaming. The command notices this sooner than it gives up a sensor that is
-    off."""
+    """While the computer slept, the board stopped streaming. The command notices this quickly. It waits longer for a
+    board whose sensor is off."""
     monkeypatch.setattr(board_console, "_AWAY_SILENT_S", 0.1)
     data, turns = half_seconds(3)
     streaming(data, "asleep")

@@ -86,7 +86,7 @@ def test_no_turn_delays_the_loop(board, display):
 
 @on_each()
 def test_nothing_is_sent_while_nothing_changes(board, display):
-    """The driver only checks the connection, five times per second."""
+    """The driver only checks five times per second that the display answers."""
     address = board.lcd.address
     before = board.lcd_bus.transfers[address]
     for _ in range(20):

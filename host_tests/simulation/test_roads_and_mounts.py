@@ -88,7 +88,7 @@ def test_bands_are_those_of_a_sine():
 
 def test_simulated_roads_are_as_rough_as_real_ones():
     """A recorded ride through town has a vertical vibration of 0.078 g from 1 to 3 Hz and 0.151 g from 3 to 10 Hz, see
-    tools/docs/simulation.md. This is between the simulated road classes C and D."""
+    tools/docs/simulation.md. The recorded values are between those of the simulated road classes C and D."""
     calm, rough = (of_simulated("street", 0, 100.0, road, None)[QUANTITIES[0]] for road in "CD")
     assert len(calm) == len(BANDS_HZ)
     assert calm[3] < 0.151 and rough[3] > 0.078
