@@ -1,4 +1,4 @@
-"""The plan, the room and the steps of an update, and the files of other projects."""
+"""Tests the plan, the required space and the steps of an update, and how files of other projects are treated."""
 
 from typing import Any
 

@@ -1,7 +1,7 @@
 """The heap of an ESP32 is small at the start. The firmware still collects garbage only between turns of the loop.
 
-The test runs MicroPython's unix port with a nearly full heap, as on an ESP32. Its objects are twice as large, and the
-simulated parts are on the heap, too. So the test first measures how much heap one turn uses.
+The test runs MicroPython's unix port with a nearly full heap, as on an ESP32. Objects of the unix
+port are twice as large, and the simulated parts also use heap. So the test first measures how much heap one turn uses.
 """
 
 import json

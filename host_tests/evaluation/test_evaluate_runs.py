@@ -87,7 +87,7 @@ def test_the_calibration_is_from_the_poses_alone(calibrated):
     assert np.any(calibration.gyro_sigma) == (calibrated is runs.calibrated_by_log)
     matrix = calibration.vehicle_from_sensor
     turned = np.degrees(np.arccos((np.trace(matrix @ made.vehicle_from_sensor.T) - 1.0) / 2.0))
-    assert turned < 1.5  # within the slope of the ground and the accuracy of a hand
+    assert turned < 1.5  # caused by the slope of the ground and the rider's hand
     assert calibration.accel_slope == pytest.approx([1.0] * 3, abs=0.002)
     assert calibration.six_done and calibration.aligned
 

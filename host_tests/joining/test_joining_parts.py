@@ -86,7 +86,7 @@ def test_rates_are_limited_to_60_before_clocks_are_compared():
 
 
 def test_rotation_brings_the_rates_of_b_to_those_of_a():
-    """B begins 0.5 s later than A. Its sensor is turned by 40 degrees."""
+    """B begins 0.5 s later than A. The sensor of B is turned by 40 degrees."""
     rates, turn = bends(60.0), turn_about_z(40.0)
     assert clocks._rotation(cells(rates), cells(rates[10:] @ turn), 0.5) == pytest.approx(turn, abs=1e-3)
 
@@ -305,7 +305,7 @@ def test_least_squares_leave_out_what_has_no_weight():
 def test_the_standard_deviation_of_a_fit_by_hand():
     """The variance of the shift is a sum of three terms.
 
-    * Three segments pull by 1, 1 and -2. This gives 6 * 3 / 1 * 0.1^2 = 0.18 s2, where 6 is the sum of the squares.
+    * Three segments pull by 1, 1 and -2. The sum of the squares is 6. This gives 6 * 3 / 1 * 0.1^2 = 0.18 s2.
     * The end is 70 s from the middle. With its standard deviation of the drift of 0.01 this gives 0.49 s2.
     * The receiver's delay has a standard deviation of 0.05 s, which gives 0.0025 s2.
     """

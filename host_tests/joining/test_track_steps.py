@@ -34,7 +34,7 @@ def test_a_course_turns_to_the_left_by_hand():
     assert found.speed_mps == pytest.approx([20.0, 20.0, 20.0, 1.5, 400.0], rel=1e-3)
     assert found.good.tolist() == [True, True, True, False, False]
     assert found.turn_deg == pytest.approx([0.0, 90.0, 90.0, 0.0, 0.0], abs=0.01)
-    # an error of 1 m to the side over 20 m is 2.865 degrees; with other errors of 4 degrees, the sum is 4.920
+    # An error of 1 m to the side over 20 m is 2.865 degrees. Together with other errors of 4 degrees it is 4.920.
     assert found.sigma_deg[:3] == pytest.approx(4.920, abs=0.005)
 
 

@@ -1,4 +1,4 @@
-"""Tests each measurement of the lean filter, and what raises its noise. Also runs on MicroPython.
+"""Tests each measurement of the lean filter, and the conditions that raise its noise. Also runs on MicroPython.
 
 test_known_ride.py tests the values of the variances.
 """

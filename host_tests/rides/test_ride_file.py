@@ -28,8 +28,8 @@ _EXTREMES = [
     ([1, -1, 4096, 0, 0, -1, 1], 2, 9999),
 ]
 
-# Code random entries with machine code and with Python. Most entries are typical. The states and the bytes must be the
-# same.
+# Encode random entries with machine code and with Python. Most entries are typical. Both must give the same states and
+# bytes.
 _BOTH = """
 import random
 from array import array

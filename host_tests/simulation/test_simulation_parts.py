@@ -97,8 +97,8 @@ def test_a_plan_goes_on_until_45_s_before_its_end():
 
 
 def test_a_turn_lasts_until_its_heading_has_changed():
-    """A lean of 45 degrees at 9.80665 m/s gives a yaw rate of 1 rad/s. A turn by 90 degrees takes 1.571 s. Half of the
-    roll of 1 s counts as a part of this time."""
+    """A lean of 45 degrees at 9.80665 m/s gives a yaw rate of 1 rad/s. A turn by 90 degrees takes 1.571 s. The bike
+    rolls into the lean in 1 s, and half of this second counts as part of the turn."""
     plan = a_plan()
     plan.turn(45.0, G, heading_deg=90.0, roll_s=1.0)
     assert plan.legs[-1].seconds == pytest.approx(1.0 + np.pi / 2.0 - 0.5)
@@ -242,8 +242,8 @@ def test_gears_keep_the_engine_under_its_shift():
 
 
 def test_vibration_grows_with_the_engine():
-    """At 6000 revolutions per minute the vibration has the rms rms_g. At idle this is multiplied by
-    0.25 + 0.75 (1250 / 6000)^2. The rms is at most 0.5 g. The rates have 15 deg/s per g."""
+    """At 6000 revolutions per minute the vibration has the rms rms_g. At idle the rms is multiplied by
+    0.25 + 0.75 (1250 / 6000)^2. It is at most 0.5 g. The rates vibrate by 15 deg/s per g."""
     running = np.ones(20_000)
 
     def rms(speed, rms_g, share=1.0):
