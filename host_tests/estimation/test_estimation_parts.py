@@ -280,8 +280,8 @@ FIGURES = {"lean_deg": 3.0298, "lean_sigma_deg": 0.87673, "pitch_deg": 1.6246, "
 
 
 def test_the_figures_of_a_smoothed_ride():
-    """The figures are the rms of the lean, of its standard deviation, of the pitch and of the speed. A change of nearly
-    any number of the model changes them."""
+    """The figures are the rms of the lean, of its standard deviation, of the pitch and of the speed. If nearly any
+    number of the model is changed, these figures change."""
     made = simulate_ride("street", seed=4, seconds=60.0)
     log = Log.from_readings(made.readings[::4], made.rate_hz / 4)
     found = smooth(log, CalibrationFile(vehicle_from_sensor=made.vehicle_from_sensor, aligned=True))

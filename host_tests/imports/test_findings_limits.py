@@ -237,7 +237,7 @@ def test_gravity_has_a_constant_length():
 
 @functools.cache
 def turning(dps=40.0, seconds=12.0, hz=100.0):
-    """Gravity turns about x and z, as the rates say: du/dt = u x w."""
+    """Simulate a sensor that turns about all axes. The direction of gravity u follows the rates w: du/dt = u x w."""
     t_s = np.arange(0.0, seconds, 1.0 / hz)
     w = np.radians(dps) * np.column_stack((np.sin(t_s), 0.2 * np.cos(0.7 * t_s), np.sin(1.3 * t_s + 1.0)))
     u = np.zeros((len(t_s), 3))

@@ -14,7 +14,8 @@ LATER_S, SLOW = 7.3, 80e-6
 
 
 def shifted(log, later_s, drift):
-    """Return the log of a second device. It was started later_s later, and its clock is slow by the share `drift`."""
+    """Return the log of a second device. The device starts later_s after the first, and its clock is slow by the share
+    `drift`."""
     kept = log.t_s >= later_s
     t_s = (log.t_s[kept] - later_s) * (1.0 - drift)
     return api.Log(t_s, log.accel_g[kept], log.gyro_dps[kept])

@@ -84,8 +84,8 @@ def test_a_drift_or_another_pace_is_another_day(matched):
 
 
 def test_rough_shifts_need_a_tenth_of_the_best_evidence(monkeypatch):
-    """The likelihoods are 20 at 10 s and 1.9 or 2.1 at 30 s: the second is tried only if it has 2. Of a ride with
-    100 values, the place 119 is the shift 10 s."""
+    """The likelihoods are 20 at the shift 10 s and 1.9 or 2.1 at the shift 30 s. The second shift is tried only if its
+    likelihood is at least 2. The ride has 100 values, so index 119 is the shift 10 s."""
     known = np.ones(200, dtype=bool)
     for other, tried in ((1.9, [10.0]), (2.1, [10.0, 30.0])):
         found = np.zeros(299)

@@ -71,7 +71,7 @@ def test_a_changing_measured_speed_counts_less():
 
 
 def test_coming_to_rest_the_force_is_the_vertical():
-    """This is true for any earlier estimate. Here the bike has a lean of 10 degrees that the gyro did not measure."""
+    """The earlier estimate does not matter. Here the bike has a lean of 10 degrees that the gyro did not measure."""
     estimator = LeanFilter()
     hold(estimator, 3.0)
     hold(estimator, 4.0, [0.0, 1.0, 2.0 / GRAVITY_MPS2])

@@ -238,7 +238,7 @@ def test_even_blocks_are_not_changed():
 
 @pytest.mark.parametrize("size", [700, 5000, 9000])
 def test_repeated_times_are_spread_over_blocks(size):
-    """Pairs of samples have one time. The result has even steps of 5 ms, whatever the size of the blocks."""
+    """Every two samples have the same time. The result has even steps of 5 ms, for any size of the blocks."""
     times = np.repeat(np.arange(4500) / 100.0, 2)
     blocks, remarks = spread_blocks(times, size)
     time_us = np.concatenate([one.time_us for one in blocks])

@@ -260,8 +260,8 @@ def test_no_status_leaves_an_oled_dark():
 
 
 def test_a_panel_of_32_rows_shows_both_lines():
-    """Letters of 16 rows fill the display. The picture moves down by one or two rows. These rows
-    of the letters are blank."""
+    """Two lines of letters with 16 rows fill the display. The picture moves down by one or two rows. The last rows of
+    the letters are blank, so nothing is lost."""
 
     def run(board):
         display = open_display(board, None, "ssd1306-32")

@@ -461,8 +461,8 @@ def test_feet_help_below_4_mps():
 
 
 def test_the_motion_of_a_body_by_hand():
-    """The vehicle turns left with 0.5 rad/s at 10 m/s, which is 5 m/s2. First it is upright on a road that rises by
-    0.1 rad. Then it leans by 30 degrees on a level road."""
+    """The vehicle turns left with 0.5 rad/s at 10 m/s, so its lateral acceleration is 5 m/s2. First it is
+    upright on a road that rises by 0.1 rad. Then it leans by 30 degrees on a level road."""
     left, up, forward, w_left, w_up, w_forward = script.body_motion(0.0, 0.2, 10.0, 2.0, 0.5, 0.1, 0.03)
     assert left * G == pytest.approx(5.0 * np.cos(0.1)) and up * G == pytest.approx(G * np.cos(0.1) + 0.3)
     assert forward * G == pytest.approx(2.0 + G * np.sin(0.1))
