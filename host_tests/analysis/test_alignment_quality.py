@@ -69,7 +69,7 @@ def test_yaw_and_pitch_cause_the_stated_lean_error(ride, name, degrees):
     said = vars(lean_cost(Quality(**angles, gravity_g=1.0, straight_s=60.0, lateral_g=NONE, forward_g=NONE)))
     most = said.pop(f"{name}_deg")
     assert cost < 1.75 * most + 0.15
-    if ride[3] != "city":  # the error is smaller in slow rides
+    if ride[3] != "city":  # in slow rides the cost is smaller
         assert cost > 0.3 * most
     assert set(said.values()) == {0.0}
 

@@ -60,8 +60,8 @@ G = 9.80665
         ((0.6, 0.8, 0.0), UP, 0, [[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]]),
         ((2 / 3, 1 / 3, 2 / 3), UP, 0, LEVEL),
         ((0.6, 0.0, -0.8), BACKWARD, 1, TURN),
-        # a is over 90 degrees from b. The rotation about the third axis has sin t = 0.6 and cos t = -0.8, as in the
-        # article
+        # The angle from a to b is over 90 degrees. As in the article, the rotation about the third axis has sin t = 0.6
+        # and cos t = -0.8.
         ((0.6, -0.8, 0.0), UP, 2, [[-0.8, -0.6, 0], [0.6, -0.8, 0], [0, 0, 1]]),
         # a half turn about the first axis takes a to (0.6, 0.8, 0), so the result is the first case's matrix times
         # diag(1, -1, -1)

@@ -121,7 +121,7 @@ def test_a_stuck_high_byte_wraps_in_two_looks():
 )
 def test_two_equal_axes_are_ill(bit, sensor, axes):
     assert after(1, differ=0b1110111 & ~(1 << bit)) == ("axis-ill", sensor, axes, "equal")
-    assert after(1, 1, 6, differ=0b1110111 & ~(1 << bit)) is None  # with a slow low-pass it is not judged
+    assert after(1, 1, 6, differ=0b1110111 & ~(1 << bit)) is None  # with a slow low-pass, equal axes are not judged
 
 
 def test_the_gyros_axes_are_named_before_the_accelerometers():

@@ -49,7 +49,7 @@ def test_the_clocks_are_found(found, ride):
 
 
 def test_the_difference_is_that_of_both_errors(found, ride):
-    """The difference between the two leans equals the difference between their errors."""
+    """The difference between the leans of the two devices equals the difference between their errors."""
     for kind, seen in (("live", found.live), ("smoothed", found.smoothed)):
         leans = [found.leans[f"{kind} {name}"] for name in "AB"]
         riding = ~np.isnan(leans[0] + leans[1])

@@ -129,8 +129,8 @@ def test_speed_changes_take_their_time():
 
 
 def test_braking_into_a_turn_has_two_parts():
-    """The bike brakes from 20 to 10 m/s at 5 m/s2. The first part takes 1.3 s to 13.5 m/s. The second part takes 0.9 s
-    instead of 0.7 s, and has half of the lean."""
+    """The bike brakes from 20 to 10 m/s at 5 m/s2. The first part takes 1.3 s, and ends at 13.5 m/s. The second
+    part takes 0.9 s instead of 0.7 s, and has half of the lean."""
     plan = a_plan()
     plan.to_speed(20.0, 5.0)
     plan.into_turn(30.0, 10.0, 5.0)
