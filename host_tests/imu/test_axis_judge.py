@@ -144,7 +144,8 @@ def test_the_gyros_axes_are_named_before_the_accelerometers():
     ],
 )
 def test_samples_at_the_end_of_the_range_clip(given, notice, fault):
-    """A tenth of the samples gives a notice. Half of them in two looks, or a shaken sensor, is a fault."""
+    """If a tenth of the samples clip, there is a notice. If half of them clip in two looks, or the sensor is shaken, it
+    is a fault."""
     judge, watch = AxisJudge(1, 3), Watch()
     watch.look(judge, **given)
     assert words(watch.notice) == notice and watch.fault is None

@@ -29,8 +29,8 @@ def in_vehicle(made):
 
 
 def test_each_road_class_is_twice_as_rough(rides):
-    """Each road class has four times the power of the class before it. The engine adds to the vibration on the quietest
-    road. The rides differ otherwise only in rider and camber."""
+    """Each road class has four times the power of the class before it. On the quietest road the engine adds to the
+    vibration. Apart from the road class, the rides differ only in rider and camber."""
     assert np.array_equal(rides("A").truth["speed_mps"], rides("D").truth["speed_mps"])
     off = rides("C").truth["lean_deg"] - rides().truth["lean_deg"]
     assert 0.1 < np.sqrt(np.mean(off**2)) < 2.0
