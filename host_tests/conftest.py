@@ -45,7 +45,7 @@ def _compiled_once(source: Path, architecture: str = "armv6m") -> bytes:
     return _compiled_before(source, source.read_bytes(), architecture)
 
 
-bytecode.cross_compiled = _compiled_once  # before a module of the tools or a test imports it by name
+bytecode.cross_compiled = _compiled_once  # replaced before any module imports it by name
 
 ROOT = Path(__file__).resolve().parent.parent
 # Features that depend on the machine: fixtures, markers, and modules that use programs, boards or pages.

@@ -58,7 +58,7 @@ LATE = {
     "status_report": {"rides"},  # reports whether its machine code is used
     "app": {"state", "user_code"},
     "devices": {"diagnosis"},  # finds out why no sensor answers
-    "start": {"app", "console", "ui.messages", "live"},  # the display says "starting" meanwhile
+    "start": {"app", "console", "ui.messages", "live"},  # imported while the display says "starting"
 }
 # MicroPython's hardware modules, which only drivers may import
 HARDWARE = {"machine", "micropython", "esp32", "rp2", "neopixel", "network", "bluetooth"}

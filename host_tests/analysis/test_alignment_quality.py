@@ -26,12 +26,12 @@ AXES = {"roll": (0.0, 0.0, -1.0), "pitch": (1.0, 0.0, 0.0), "yaw": (0.0, 1.0, 0.
 
 
 def turn(name, degrees):
-    """Return the rotation (3, 3) that adds an error to this angle of the alignment."""
+    """Return the rotation matrix that adds an error of `degrees` to the angle `name` of the alignment."""
     return rotation_matrix(np.radians(degrees) * np.array(AXES[name]))
 
 
 def turned(calibration, name, degrees):
-    """Return the calibration with this alignment error."""
+    """Return the calibration with an alignment error of `degrees` in the angle `name`."""
     matrix = turn(name, degrees) @ calibration.vehicle_from_sensor
     return dataclasses.replace(calibration, vehicle_from_sensor=matrix)
 
@@ -69,7 +69,7 @@ def test_yaw_and_pitch_cause_the_stated_lean_error(ride, name, degrees):
     said = vars(lean_cost(Quality(**angles, gravity_g=1.0, straight_s=60.0, lateral_g=NONE, forward_g=NONE)))
     most = said.pop(f"{name}_deg")
     assert cost < 1.75 * most + 0.15
-    if ride[3] != "city":  # the error is smaller in slow rides
+    if ride[3] != "city":  # in slow rides the cost is smaller
         assert cost > 0.3 * most
     assert set(said.values()) == {0.0}
 
@@ -92,7 +92,7 @@ def test_calibrate_drive_corrects_yaw(ride):
 
 
 def with_calibration(ride, name, degrees, **changed):
-    """Return the path of a CAL.json with this error."""
+    """Write a CAL.json whose alignment has an error of `degrees` in the angle `name`. Return its path."""
     matrix = turn(name, degrees).tolist()
     return analysis_rides.calibration(ride.with_name(f"{name}.json"), vehicle_from_sensor=matrix, **changed)
 

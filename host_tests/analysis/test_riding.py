@@ -13,7 +13,7 @@ from support.recordings import analysis_rides
 
 
 def standing(seconds, shake_g, shake_dps, speed_mps=np.nan, bias_dps=0.0):
-    """Simulate a bike on its wheels whose engine shakes it with this rms."""
+    """Simulate a bike that stands upright with a running engine. shake_g, shake_dps: rms of the vibration."""
     count = round(100 * seconds)
     random = np.random.default_rng(2)
     force = [0.0, 1.0, 0.0] + random.normal(0.0, shake_g, (count, 3))

@@ -1,4 +1,5 @@
-"""Each notice and refusal is a sentence that says what to do. A terminal and a page have different words for it."""
+"""Each notice and refusal is a sentence that says what to do. The words on a terminal and
+on a page may differ."""
 
 import json
 import pickle

@@ -1,5 +1,5 @@
-"""The gyro is calibrated by the turns between still poses. Tests the integration of the turns, the fit and the check of
-the result."""
+"""Tests the calibration of the gyro by the turns between still poses: the integration of the turns, the fit, and the
+check of the result."""
 
 import numpy as np
 import pytest

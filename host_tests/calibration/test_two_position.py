@@ -90,7 +90,8 @@ class Pose:
 @pytest.mark.parametrize("size", [0.9, 1.1])
 def test_after_the_six_positions_a_pose_reads_1_g_more_closely(pose, size):
     """The force in a pose must be 1 g within a tolerance. Before the six positions, the data sheet allows an offset of
-    80 mg and a scale error of 3 %. After them only drift is left, so the tolerance is smaller."""
+    80 mg and a scale error of 3 %. After the six positions only drift is left, so the tolerance
+    is smaller."""
     forces = np.array([at(12), at(0)])
     forces[pose] *= size
     kickstand, upright = (Pose(force.tolist(), [0.0] * 3) for force in forces)

@@ -1,5 +1,5 @@
-"""Tests which exchange of the gyro's axes is reported for known residuals, and the basis functions of an unknown
-velocity."""
+"""Tests which exchange of the gyro's axes is reported for known residuals. Also tests the basis functions that describe
+an unknown velocity."""
 
 from types import SimpleNamespace
 

@@ -79,7 +79,8 @@ def ask(board, expression):
 
 
 def test_i2c_bits_take_time(board):
-    """At 400 kHz, 156 bits take 390 us plus MicroPython's overhead. At 100 kHz, 69 bytes take 6.2 ms."""
+    """The sensor's bus has 400 kHz: 156 bits take 390 us plus MicroPython's overhead. The display's bus has 100 kHz: 69
+    bytes take 6.2 ms."""
     us, _ = ask(board, "timed(sensor.readfrom_mem, 0x68, 0x3B, 14)")
     assert 390 < us < 500
     us, _ = ask(board, "timed(lcd.writeto, 0x27, bytes(68))")

@@ -71,7 +71,7 @@ def test_alignment_by_driving_on_the_chip(at_prompt, monkeypatch):
     between = np.reshape(chip["matrix"], (3, 3)) @ np.reshape(host["result"]["matrix"], (3, 3)).T
     assert np.degrees(np.linalg.norm(rotation_vector(between))) < 0.05
     assert chip["longest"] < 2100, "microseconds"
-    # The heap grows until each attribute has its number. It must not grow in the second half of the drive.
+    # The heap grows until each attribute holds a number. The heap must not grow in the second half of the drive.
     later = chip["memory"][len(chip["memory"]) // 2 :]
     assert max(later) - min(later) < 400, chip["memory"]
     assert later[-1] - chip["memory"][0] < 3000

@@ -136,7 +136,8 @@ _SIDES = [[1, 0, 0], [0, 0, -1], [0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, -1, 0], [
 
 @pytest.mark.nightly
 def test_six_positions_by_the_button():
-    """The rider begins in the menu. After the six sides comes a free pose. At the end the calibration is in flash."""
+    """The rider begins in the menu. The last pose, after the six sides, is a free one. At the end the calibration is in
+    flash."""
     steps = [[0, None]]
     for i, up in enumerate(_SIDES):
         steps += [[8.0 + 6.0 * i, up], [13.0 + 6.0 * i, None]]
@@ -170,7 +171,7 @@ def test_power_cut_loses_only_the_last_block_of_a_ride():
 
 
 def test_ride_removes_the_oldest_parts_first():
-    """The flash is full of rides. The new ride removes only as many parts as it needs room for."""
+    """The flash is full of rides. The new ride removes no more parts than it needs room for."""
     parts = [part_path("rides", ride, number) for ride in (1, 2) for number in range(11)]
     full = dict.fromkeys(parts, bytes(PART_BLOCKS * BLOCK))
     with board(files=modules("esp32") | full) as device:

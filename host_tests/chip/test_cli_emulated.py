@@ -1,4 +1,4 @@
-"""The command `kickstand emulate`, and the commands flash and status with mpremote on an emulated board."""
+"""Tests the command `kickstand emulate`, and the commands flash and status on an emulated board, through mpremote."""
 
 import math
 import queue

@@ -108,7 +108,8 @@ def test_each_limit_of_a_sensor_at_rest(given, what, verdict):
 
 @pytest.mark.parametrize(("off_percent", "verdict"), [(13.9, GOOD), (-13.9, GOOD), (14.1, BAD), (-14.1, BAD)])
 def test_the_self_test_is_compared_with_the_factory_trim(off_percent, verdict):
-    """The gyro's trim code is 1 on each axis. This means 25 x 131 counts, with the opposite sign about y."""
+    """The gyro's trim code is 1 on each axis. A code of 1 means a self-test response of 25 x 131 counts. Its
+    sign is reversed about y."""
     trims = [0.0] * 3 + [3275.0, -3275.0, 3275.0]
     on = tuple(100.0 + trim * (1.0 + off_percent / 100.0) for trim in trims)
     found = limits.self_test((1, 1, 1, 0), (100.0,) * 6, on)

@@ -1,4 +1,4 @@
-"""The measurements of a check, in their order, and what is left out."""
+"""Tests the order of the measurements in a check, and which measurements are left out."""
 
 from pathlib import Path
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""The faults and the values of a config.py."""
+"""Tests which faults of a config.py are found, and which values are read from it."""
 
 from types import SimpleNamespace
 

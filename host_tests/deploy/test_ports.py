@@ -127,8 +127,8 @@ def test_only_port_py_knows_the_port():
 
 
 def test_device_works_on_an_esp32(tmp_path):
-    """The ESP32 has other default pins than the Pico. It also has another error number for a device that does not
-    answer."""
+    """The ESP32's default pins differ from the Pico's. Its error number for a device that does not answer differs
+    too."""
     faults = [["unplug_sensor", [2.0, 1.0]], ["unplug_lcd", [4.0, 0.5]]]
     plan = {"lean": [[0, 25]], "board": {"machine": "esp32"}, "faults": faults, "until": 6}
     record = device_plans.run("cpython", tmp_path, plan)

@@ -1,4 +1,4 @@
-"""The plan, the room and the steps of an update, and the files of other projects."""
+"""Tests the plan, the required space and the steps of an update, and how files of other projects are treated."""
 
 from typing import Any
 
@@ -45,7 +45,8 @@ def test_the_blocks_of_a_file_have_pointers():
 
 
 def test_the_room_for_an_update_by_hand():
-    """Three files need 1, 2 and 1 blocks. A removed file frees 2. One folder more takes 2, and 4 must stay free."""
+    """Three files need 1, 2 and 1 blocks. A removed file frees 2 blocks. A new folder takes 2 blocks, and 4 blocks must
+    stay free."""
     copy = {"/a": b"x", "/b": bytes(5000), "/main.py": b"m"}
     made = update.Update(["/old"], [], ["/new"], copy, [], [], False)
     there = BoardFiles({"/old": (5000, b"")}, frozenset(), 4096, 8, False)

@@ -101,7 +101,7 @@ def test_a_sagging_supply_while_the_calibration_is_read(fault, aligned):
 
 @pytest.fixture
 def in_turn_300(monkeypatch):
-    """Return a function that runs its argument in place of pass 300 of the app's loop."""
+    """Return a function. It replaces pass 300 of the app's loop by a call of its argument."""
     from kickstand import app
 
     original, calls = app.App.turn, []

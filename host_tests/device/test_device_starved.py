@@ -36,7 +36,7 @@ def run(engine, flash, faults, config, **more):
 def too_old(record, from_s=FROM_S - 5.0):
     """Return the displayed leans that the bike has not had within the last OLDEST_S.
 
-    Returns [(t_s, line, least lean in this time, largest lean), ...].
+    Returns a list of (t_s, line, smallest lean, largest lean). Both leans are the bike's within the last OLDEST_S.
     """
     found = []
     for k in range(int(10 * (FROM_S + 8.0 - from_s))):

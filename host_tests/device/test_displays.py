@@ -1,4 +1,4 @@
-"""The whole device with each display. All displays show the same lean, and recover from every fault."""
+"""Tests the whole device with each display. All displays show the same lean, and recover from every fault."""
 
 import random
 

@@ -1,7 +1,7 @@
 """The heap of an ESP32 is small at the start. The firmware still collects garbage only between turns of the loop.
 
-The test runs MicroPython's unix port with a nearly full heap, as on an ESP32. Its objects are twice as large, and the
-simulated parts are on the heap, too. So the test first measures how much heap one turn uses.
+The test runs MicroPython's unix port with a nearly full heap, as on an ESP32. Objects of the unix
+port are twice as large, and the simulated parts also use heap. So the test first measures how much heap one turn uses.
 """
 
 import json
@@ -110,8 +110,8 @@ IDLE = SimpleNamespace(
 
 @pytest.mark.parametrize("part", ["drive", "live", "user"])
 def test_a_part_that_uses_heap_shortens_the_next_wait(part, tmp_path, monkeypatch):
-    """The part comes in the first turn, when four collections are planned already. Only the first of them keeps its
-    plan."""
+    """The part uses heap in the first turn, when four collections are already planned. Only the first collection is
+    still made as planned."""
     monkeypatch.chdir(tmp_path)
     turns = [0]  # between two collections
     with Board(sensor_errors.resting(sensor_errors.Sensor(), (0, 1, 0))) as board:

@@ -47,7 +47,7 @@ def test_every_link_leads_somewhere(page):
 
 def test_a_link_out_of_the_checkout_has_its_depth():
     """GitHub shows a file at OWNER/NAME/blob/BRANCH/, so a link to the issues must go up by that many folders. GitHub
-    shows the first page also at OWNER/NAME."""
+    also shows the first page at OWNER/NAME."""
     for page in PAGES:
         for link in filter(OF_THE_REPOSITORY.match, links(page)):
             assert link.count("../") == 1 + len(page.relative_to(ROOT).parts), link

@@ -209,7 +209,7 @@ def test_a_log_with_too_few_samples_per_second_is_refused(tmp_path):
 @pytest.mark.parametrize("name", RECORDED)
 def test_recorded_cars_remounted_at_random(tmp_path, shared_data, name):
     """The result differs from a reference matrix by less than 1.6 degrees in yaw and 3 degrees in total. The reference
-    itself has an error of 1 to 2 degrees."""
+    matrix has an error of 1 to 2 degrees."""
     q = np.reshape(random_mounting(1), (3, 3))
     log = remount(shared_data / f"{name}.csv.gz", tmp_path / "log.csv", q)
     command.works("calibrate", "drive", log, "--out", tmp_path / "CAL.json")

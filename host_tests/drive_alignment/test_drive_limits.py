@@ -1,4 +1,4 @@
-"""The states of a drive, what it still needs, and the sums of its bins."""
+"""Tests the states of an alignment by driving, the list of what it still needs, and the sums of its bins."""
 
 from typing import Any
 

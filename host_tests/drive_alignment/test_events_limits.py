@@ -1,4 +1,4 @@
-"""Braking events, the regression and the parts of a drive, with sums computed by hand."""
+"""Tests braking events, the regression and the parts of a drive with sums computed by hand."""
 
 import numpy as np
 import pytest

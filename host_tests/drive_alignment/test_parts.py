@@ -121,7 +121,8 @@ def test_two_fits_at_the_same_time_do_not_interfere():
 @pytest.mark.parametrize("engine", ENGINES)
 def test_parts_of_a_drive(engine):
     """Forward turns by 12 degrees after five of eight blocks, and pitch by 5 degrees after four. The differences
-    between the parts match numpy. They do not depend on the forward direction of the whole drive, so two are tried."""
+    between the parts match numpy. These differences do not depend on the forward direction of the whole drive, so two
+    directions are tried."""
     rng = np.random.default_rng(5)
     weights, seconds = rng.uniform(0.1, 0.5, 8), rng.uniform(25.0, 40.0, 8)
     angles = np.array([0.0] * 5 + [12.0] * 3) + rng.normal(0.0, 1.0, 8)

@@ -60,8 +60,8 @@ G = 9.80665
         ((0.6, 0.8, 0.0), UP, 0, [[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]]),
         ((2 / 3, 1 / 3, 2 / 3), UP, 0, LEVEL),
         ((0.6, 0.0, -0.8), BACKWARD, 1, TURN),
-        # a is over 90 degrees from b. The rotation about the third axis has sin t = 0.6 and cos t = -0.8, as in the
-        # article
+        # The angle from a to b is over 90 degrees. As in the article, the rotation about the third axis has sin t = 0.6
+        # and cos t = -0.8.
         ((0.6, -0.8, 0.0), UP, 2, [[-0.8, -0.6, 0], [0.6, -0.8, 0], [0, 0, 1]]),
         # a half turn about the first axis takes a to (0.6, 0.8, 0), so the result is the first case's matrix times
         # diag(1, -1, -1)
@@ -155,8 +155,9 @@ def test_stops_and_three_brakings_give_the_mount_by_hand(every_s, mount):
 
 def test_forward_is_along_the_sum_of_the_brakings_forces():
     """Three braking events have the levelled forces (0.18, -0.24), (0, -0.3) and (-0.18, -0.24) g along left and
-    forward. Their sum points straight back. Their dispersion is 4.32 / 13.52, as computed above for three directions.
-    The standard error of their mean is therefore the root of 4.32 / 13.52 / 3, which is 18.70 degrees."""
+    forward. The sum of these forces points straight back. The dispersion of their directions is 4.32 / 13.52, see
+    above. The standard error of the mean direction is therefore the root of 4.32 / 13.52 / 3, which is 18.70
+    degrees."""
     drive = Drive()
     assert drive.alignment.quality_deg == 180.0
     drive.brake((0.18, 1.0, -0.24), mps2=-0.24 * G)

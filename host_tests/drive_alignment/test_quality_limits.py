@@ -20,7 +20,7 @@ def said(problem):
 
 
 def judged(**given) -> Any:
-    """Return a DrivingQuality before _decide(). The limits are exact at the values that are the default here."""
+    """Return a DrivingQuality before _decide(). Each default value is exactly at its limit."""
     drive = {"counted": 5, "lag_s": 0.5} | {k: given.pop(k) for k in ("counted", "lag_s") if k in given}
     up = SimpleNamespace(problem=lambda level: given.get("vertical"), is_car=given.get("is_car", True))
 

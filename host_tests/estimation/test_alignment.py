@@ -101,8 +101,8 @@ def test_the_offset_across_the_bike_is_found():
 
 
 def test_left_handed_axes_are_refused():
-    """There are 48 ways to exchange and reverse axes. The 24 right-handed ways are only another mounting, and the 24
-    others are refused. This test tries every fifth way; checks/test_handedness.py tries all."""
+    """There are 48 ways to exchange and reverse axes. The 24 right-handed ways are only another mounting. The 24
+    left-handed ways are refused. This test tries every fifth way; checks/test_handedness.py tries all."""
     log = log_of(simulated(), speed=False)
     want = first_guess.axes(mounted_windows(log)).matrix
     for order, signs in [*itertools.product(itertools.permutations(range(3)), SIGNS)][::5]:

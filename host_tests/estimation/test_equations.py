@@ -67,7 +67,7 @@ def test_sensor_above_the_roll_axis_moves_with_the_roll(lean):
 @pytest.mark.parametrize(
     ("force", "lean", "parameters"),
     [
-        (0.1 * np.sin(0.7) * 1.2, 0.7, {of.TYRES: 0.1}),  # wide tyres touch the road beside their middle
+        (0.1 * np.sin(0.7) * 1.2, 0.7, {of.TYRES: 0.1}),  # a leaned tyre touches the road beside its middle
         (0.03 * np.cos(0.5), 0.5, {of.BESIDE: 0.03}),  # the force of a side wind is level
         (0.01, 0.0, {of.CAMBER: 0.01}),  # the camber of the road matters only on straights
         (0.01, 0.02, {of.CAMBER: 0.01}),
@@ -87,7 +87,8 @@ def test_a_warmer_sensor_has_other_offsets():
 
 
 def test_the_jacobian_is_that_of_the_equations():
-    """The derivatives by all states and parameters equal central differences, for forward and backward speeds."""
+    """The derivatives with respect to each state and parameter equal central differences. Forward and backward speeds
+    are tested."""
     rng, n = np.random.default_rng(3), 30
     force, rate = rng.normal(size=(2, n, 3))
     windows = windows_of(np.linspace(0.0, 6.0, n), force, rate, rng.normal(size=n), rng.normal(size=n))

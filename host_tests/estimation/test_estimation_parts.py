@@ -107,7 +107,7 @@ def test_outliers_weigh_less():
 
 def test_roughness_follows_the_residuals():
     """Residuals of the expected size give a roughness of 1. Residuals of half this size give 0.5. The roughness is
-    limited to 0.1 to 4."""
+    kept between 0.1 and 4."""
     expected = np.zeros((400, eq.ROWS))
     expected[:, [of.LEAN, of.PITCH, of.LEFT, of.UP, of.FORWARD]], expected[:, [eq.SLIDING, eq.CLIMBING]] = 0.38, 0.5
     for factor, roughness in ((1.0, 1.0), (0.5, 0.5), (0.01, 0.1), (9.0, 4.0)):
@@ -217,7 +217,7 @@ def test_a_step_of_over_170_ms_is_a_gap():
             np.asarray(t_s, dtype=float), np.ones((100, 3)), np.ones((100, 3)), np.full(100, np.nan), np.zeros(100)
         )
         assert np.count_nonzero(made.gap) == gaps
-    assert made.seconds[made.gap] == pytest.approx([0.17])  # half a step on each side belongs to the readings
+    assert made.seconds[made.gap] == pytest.approx([0.17])  # the gap begins and ends half a step from a reading
     assert made.edges[0] == pytest.approx(-0.005) and made.before[0] == pytest.approx(0.005)
 
 
@@ -280,8 +280,8 @@ FIGURES = {"lean_deg": 3.0298, "lean_sigma_deg": 0.87673, "pitch_deg": 1.6246, "
 
 
 def test_the_figures_of_a_smoothed_ride():
-    """The figures are the rms of the lean, of its standard deviation, of the pitch and of the speed. A change of nearly
-    any number of the model changes them."""
+    """The figures are the rms of the lean, of its standard deviation, of the pitch and of the speed. If nearly any
+    number of the model is changed, these figures change."""
     made = simulate_ride("street", seed=4, seconds=60.0)
     log = Log.from_readings(made.readings[::4], made.rate_hz / 4)
     found = smooth(log, CalibrationFile(vehicle_from_sensor=made.vehicle_from_sensor, aligned=True))

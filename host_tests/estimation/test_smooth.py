@@ -270,8 +270,8 @@ def test_short_log_has_a_lean_with_a_large_sigma(street, seconds):
 
 
 def test_long_ride_is_estimated_in_parts(street, monkeypatch):
-    """A long ride is estimated in parts, so its length does not increase the memory. The end of each part depends on
-    the samples after it, so it is estimated again with the next part. Remarks count each second once."""
+    """A long ride is estimated in parts, so a longer ride needs no more memory. The end of each part depends on the
+    samples after it, so it is estimated again with the next part. Remarks count each second once."""
     whole, sizes, added = smoothed("street"), [], []
     estimated = module.Smoother.estimated
 

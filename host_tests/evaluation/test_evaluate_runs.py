@@ -87,7 +87,7 @@ def test_the_calibration_is_from_the_poses_alone(calibrated):
     assert np.any(calibration.gyro_sigma) == (calibrated is runs.calibrated_by_log)
     matrix = calibration.vehicle_from_sensor
     turned = np.degrees(np.arccos((np.trace(matrix @ made.vehicle_from_sensor.T) - 1.0) / 2.0))
-    assert turned < 1.5  # within the slope of the ground and the accuracy of a hand
+    assert turned < 1.5  # caused by the slope of the ground and the rider's hand
     assert calibration.accel_slope == pytest.approx([1.0] * 3, abs=0.002)
     assert calibration.six_done and calibration.aligned
 
@@ -205,7 +205,8 @@ def test_bands_of_a_recording_without_riding_are_refused(tmp_path):
 
 
 def test_simulate_states_both_leans_on_the_stand(tmp_path):
-    """The two poses are taken at another place than the start of the ride, so the stand leans the bike differently."""
+    """The two poses are not taken where the ride starts. The ground there differs, so the stand leans the bike
+    differently."""
     arguments = "--profile", "street", "--seconds", "20", "--pitch-change", "0", "--out", tmp_path
     said = works("simulate", *arguments).out.splitlines()[-1]
     pose, begin = (float(number) for number in re.findall(r"-\d+\.\d", said))

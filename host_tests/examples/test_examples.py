@@ -99,7 +99,8 @@ def test_try_refuses_what_only_cpython_can_run(tmp_path):
 
 
 def test_user_light(tmp_path):
-    """The light stays off at 35 degrees, and turns on there with a lower limit."""
+    """The bike leans by 35 degrees. The light stays off with its limit of 45 degrees, and turns on with a limit of 30
+    degrees."""
     _, seen = run_all(tmp_path, "user_light.py", 12.0)
     assert not any(seen["lamp"])
     lower = (tmp_path / "user.py").read_text().replace("LIMIT_DEG = 45", "LIMIT_DEG = 30")

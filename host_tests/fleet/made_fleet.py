@@ -13,7 +13,7 @@ from kickstand_fleet.simulation.vehicle import HANDLING, Receiver, drive_log, ra
 from kickstand_tools.logs.csv_lines import write_log
 from kickstand_tools.signals import rotation_matrix
 
-# the fault of each vehicle, "" for none; the kinds of vehicle are car, bus and motorcycle in turn
+# The fault of each vehicle, or "" for none. The vehicles are a car, a bus, a motorcycle, a car, and so on.
 TROUBLES = ["", "", "", "moved-between", "garbage", "moved-within", "km/h", "dead", "late"]
 
 

@@ -1,5 +1,5 @@
-"""The fleet computes forward from whole logs. It is more exact than the device's forward, and its standard error is
-right."""
+"""The fleet's tool computes the direction forward from whole logs. This direction is more exact than the device's, and
+its standard error is right."""
 
 import dataclasses
 

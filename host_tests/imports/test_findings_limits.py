@@ -1,4 +1,4 @@
-"""What the values of unknown columns show, with a value on either side of each limit."""
+"""Tests what is concluded from the values of unknown columns, with a value on either side of each limit."""
 
 import functools
 import itertools
@@ -237,7 +237,7 @@ def test_gravity_has_a_constant_length():
 
 @functools.cache
 def turning(dps=40.0, seconds=12.0, hz=100.0):
-    """Gravity turns about x and z, as the rates say: du/dt = u x w."""
+    """Simulate a sensor that turns about all axes. The direction of gravity u follows the rates w: du/dt = u x w."""
     t_s = np.arange(0.0, seconds, 1.0 / hz)
     w = np.radians(dps) * np.column_stack((np.sin(t_s), 0.2 * np.cos(0.7 * t_s), np.sin(1.3 * t_s + 1.0)))
     u = np.zeros((len(t_s), 3))
@@ -279,7 +279,7 @@ def test_cells_are_means_over_50_ms():
 
 @pytest.mark.parametrize(("dps", "too_far"), [(59.0, False), (61.0, True)])
 def test_rates_may_turn_constant_gravity_by_120_degrees(dps, too_far):
-    """In 2 s it is 60 deg/s. Only the rate across gravity counts."""
+    """120 degrees in 2 s are a rate of 60 deg/s. Only the rate across gravity counts."""
     t_s = np.arange(0.0, 10.0, 0.01)
     force = np.tile([0.0, 1.0, 0.0], (len(t_s), 1))
     assert rate_fit.turns_too_far(t_s, force, np.tile([dps, 500.0, 0.0], (len(t_s), 1))) is too_far

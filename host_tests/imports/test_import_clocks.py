@@ -107,7 +107,7 @@ def joined(accel, gyro, **more):
 
 
 def test_sensors_are_joined_and_lost_rows_counted():
-    """The gyro lasts from 20 to 1000 ms, so two samples have no rate. A reading of 401 g is past any sensor's."""
+    """The gyro lasts from 20 to 1000 ms, so two samples have no rate. No sensor can read 401 g."""
     accel = sensor(np.arange(0.0, 1010.0, 10.0))
     accel.values[50] = [0.0, 401.0, 0.0]
     accel.damaged, steady = 3, sensor(np.arange(20.0, 1010.0, 10.0), np.tile([1.0, 2.0, 3.0], (99, 1)), "gyro")

@@ -167,7 +167,7 @@ def test_a_sheet_finds_its_columns_in_the_order_of_names():
 def test_a_common_beginning_of_names_is_not_repeated():
     sheet = Sheet("f", ["gyroscopeX (g)", "gyroscopeY", "gyroscopeZ", "accelX", "accelY", "accelZ"], [])
     assert sheet.named([0, 1, 2]) == "f: gyroscopeX, …Y, …Z"
-    assert sheet.named([3, 4, 5]) == "f: accelX, accelY, accelZ"  # only 5 letters after the first are alike
+    assert sheet.named([3, 4, 5]) == "f: accelX, accelY, accelZ"  # the common beginning is too short: 5 letters
     assert sheet.named([0, 1]) == "f: gyroscopeX, gyroscopeY"
 
 

@@ -52,7 +52,7 @@ def driving(mps, rows=40, period_s=0.5, east=True, per_degree=(1.0, 1.0)):
 
     Returns:
         times: in ns.
-        columns: latitudes and longitudes, in units of which one is per_degree[k] degrees.
+        columns: latitudes and longitudes. One unit of column k is per_degree[k] degrees.
     """
     t_s = period_s * np.arange(rows)
     way = mps * t_s / 111_194.9

@@ -39,7 +39,7 @@ def ride(seconds, seed=0):
 
 
 def judged(samples, gyro_range=1, dlpf=3, accel_range=3):
-    """Return a list of the changes of the notice. Each one is a pair: the time in s, and the words or None."""
+    """Return the changes of the notice. Each change is a pair of its time in s and the new notice or None."""
     axes = AxisWatch(RATE_HZ, accel_range, gyro_range, dlpf, 20)
     sums = array("i", [0] * 7)
     said: list[tuple[float, str | None]] = [(0.0, None)]

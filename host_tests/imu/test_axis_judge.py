@@ -121,7 +121,7 @@ def test_a_stuck_high_byte_wraps_in_two_looks():
 )
 def test_two_equal_axes_are_ill(bit, sensor, axes):
     assert after(1, differ=0b1110111 & ~(1 << bit)) == ("axis-ill", sensor, axes, "equal")
-    assert after(1, 1, 6, differ=0b1110111 & ~(1 << bit)) is None  # with a slow low-pass it is not judged
+    assert after(1, 1, 6, differ=0b1110111 & ~(1 << bit)) is None  # with a slow low-pass, equal axes are not judged
 
 
 def test_the_gyros_axes_are_named_before_the_accelerometers():
@@ -144,7 +144,8 @@ def test_the_gyros_axes_are_named_before_the_accelerometers():
     ],
 )
 def test_samples_at_the_end_of_the_range_clip(given, notice, fault):
-    """A tenth of the samples gives a notice. Half of them in two looks, or a shaken sensor, is a fault."""
+    """If a tenth of the samples clip, there is a notice. If half of them clip in two looks, or the sensor is shaken, it
+    is a fault."""
     judge, watch = AxisJudge(1, 3), Watch()
     watch.look(judge, **given)
     assert words(watch.notice) == notice and watch.fault is None

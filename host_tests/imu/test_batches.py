@@ -48,7 +48,7 @@ def test_a_frame_is_seven_big_endian_numbers(engine):
 @pytest.mark.parametrize("dead", [0, -1])
 def test_all_zeros_or_ones_is_a_dead_frame(engine, dead):
     """A frame is dead if all three forces are zero or all bits are one. Only the frames before it count. A frame with
-    such forces on only two axes is good."""
+    these values on only two axes is good."""
     samples = noise(4)
     samples[2, 0:3] = dead
     alive = noise(1)
@@ -119,8 +119,8 @@ def test_a_watch_records_the_low_bits_wraps_and_differences(engine):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_integers_are_as_good_as_floats(engine):
-    """Integers cause errors of at most 0.03 degrees of lean and 0.05 % of a rate. The sum of eight samples at the ends
-    of the range does not overflow."""
+    """Integers instead of floats cause errors of at most 0.03 degrees of lean and 0.05 % of a rate. The sum of eight
+    samples at the ends of the range does not overflow."""
     rng = np.random.default_rng(2)
     calls = []
     for _ in range(30):

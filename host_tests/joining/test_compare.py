@@ -14,7 +14,8 @@ LATER_S, SLOW = 7.3, 80e-6
 
 
 def shifted(log, later_s, drift):
-    """Return the log of a second device. It was started later_s later, and its clock is slow by the share `drift`."""
+    """Return the log of a second device. The device starts later_s after the first, and its clock is slow by the share
+    `drift`."""
     kept = log.t_s >= later_s
     t_s = (log.t_s[kept] - later_s) * (1.0 - drift)
     return api.Log(t_s, log.accel_g[kept], log.gyro_dps[kept])
@@ -48,7 +49,7 @@ def test_the_clocks_are_found(found, ride):
 
 
 def test_the_difference_is_that_of_both_errors(found, ride):
-    """The difference between the two leans equals the difference between their errors."""
+    """The difference between the leans of the two devices equals the difference between their errors."""
     for kind, seen in (("live", found.live), ("smoothed", found.smoothed)):
         leans = [found.leans[f"{kind} {name}"] for name in "AB"]
         riding = ~np.isnan(leans[0] + leans[1])
@@ -101,7 +102,7 @@ def test_remark_appears_once(ride):
     stuck = np.where(np.abs(log.t_s - 80.0) < 3.0, np.argmax(log.t_s > 80.0), np.arange(len(log.t_s)))
     frozen = api.Log(log.t_s, log.accel_g[stuck], log.gyro_dps[stuck])
     for said in api.compare_rides(frozen, frozen, calibration, calibration).notices.values():
-        (line,) = [one.line() for one in said]  # the log is read in two ways, and both find the frozen readings
+        (line,) = [one.line() for one in said]  # the log is read in two ways, and each way finds the frozen readings
         assert line.startswith("the readings froze from 77.0 to 83.0 s")
 
 

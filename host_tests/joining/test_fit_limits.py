@@ -102,8 +102,8 @@ def fit_cost(compared, shift_s, drift) -> float:
 
 
 def test_a_cost_of_one_shift_by_numpy(compared, monkeypatch):
-    """The fit's shift is at the ride's first sample. With a drift of 0.01 and the middle at 140 s, the shift in the
-    middle is 2 * 0.99 + 1.4."""
+    """The result's shift is that at the ride's first sample. With a drift of 0.01 and the middle at 140 s, the shift in
+    the middle is 2 * 0.99 + 1.4."""
     monkeypatch.setattr(fit, "Comparison", lambda *_: compared)
     assert compared.middle_s == pytest.approx((20 + 60 + 110 + 150 + 200 + 240) / 6.0 + 15.0)
     found = fit.TrackFit(2.0, 1e-4, 0.1, 0.9, 20.0, np.array([0.1, 0.2]), 6)

@@ -86,7 +86,7 @@ def test_rates_are_limited_to_60_before_clocks_are_compared():
 
 
 def test_rotation_brings_the_rates_of_b_to_those_of_a():
-    """B begins 0.5 s later than A. Its sensor is turned by 40 degrees."""
+    """B begins 0.5 s later than A. The sensor of B is turned by 40 degrees."""
     rates, turn = bends(60.0), turn_about_z(40.0)
     assert clocks._rotation(cells(rates), cells(rates[10:] @ turn), 0.5) == pytest.approx(turn, abs=1e-3)
 
@@ -152,8 +152,8 @@ def test_a_lean_is_unknown_in_gaps_and_outside_the_log():
 
 
 def test_a_difference_by_hand():
-    """B's lean differs by 3 and by -1 degrees in turn. The mean difference is 1, and the rms around it is 2. The
-    standard deviations of 1.2 and 1.6 degrees together are 2.0 degrees."""
+    """The leans of A and B differ by 3 and -1 degrees alternately. The mean difference is 1 degree, and the rms around
+    it is 2 degrees. The standard deviations of 1.2 and 1.6 degrees combine to 2.0 degrees."""
     n, zeros = 1200, np.zeros(1200)
     other = np.where(np.arange(n) % 2, 3.0, -1.0)
     seen = agreement._difference((zeros, zeros + 1.2), (other, zeros + 1.6))
@@ -217,14 +217,14 @@ def test_a_tracks_change_of_course_is_over_four_seconds():
     whose cosine is 0.98741."""
     change, known = match._changes_of_track(steps(30))
     assert change[20] == pytest.approx(36.0 * 0.98741, abs=0.001)
-    assert len(change) == 60 and np.flatnonzero(known)[[0, -1]].tolist() == [4, 56]  # these cells are 2 to 28 s
+    assert len(change) == 60 and np.flatnonzero(known)[[0, -1]].tolist() == [4, 56]  # the cells from 2 to 28 s
     known = match._changes_of_track(steps(30, bad=[15]))[1]  # the bad step is from 15 to 16 s
     assert known[25] and not known[27:36].any() and known[37]  # at 12.5 and 18.5 s the 4 s do not contain the bad step
 
 
 def test_a_rides_change_of_course_is_over_four_seconds():
     there = np.ones(600, dtype=bool)
-    there[300:307] = False  # a gap of 0.35 s; the limit is 0.4 s in 4 s
+    there[300:307] = False  # a gap of 0.35 s; up to 0.4 s of 4 s may be missing
     moved = cells(np.tile([0.0, 9.0, 0.0], (600, 1)), there)
     change, known = match._changes_of_ride(moved)
     assert change[20] == pytest.approx(36.0)
@@ -305,7 +305,7 @@ def test_least_squares_leave_out_what_has_no_weight():
 def test_the_standard_deviation_of_a_fit_by_hand():
     """The variance of the shift is a sum of three terms.
 
-    * Three segments pull by 1, 1 and -2. This gives 6 * 3 / 1 * 0.1^2 = 0.18 s2, where 6 is the sum of the squares.
+    * Three segments pull by 1, 1 and -2. The sum of the squares is 6. This gives 6 * 3 / 1 * 0.1^2 = 0.18 s2.
     * The end is 70 s from the middle. With its standard deviation of the drift of 0.01 this gives 0.49 s2.
     * The receiver's delay has a standard deviation of 0.05 s, which gives 0.0025 s2.
     """

@@ -30,7 +30,7 @@ def found_fit(shift_s=10.0, evidence=50.0, **others) -> fit.TrackFit:
 
 @pytest.fixture
 def matched(monkeypatch):
-    """Return a function that returns the Match, or the refusal, of a track for these fits."""
+    """Return a function. It returns the Match, or the refusal, of a track for given fits."""
     track = Track(1000.0 + np.arange(100.0), np.zeros(100), np.arange(100.0) * 1e-4, np.full(100, 9.0), "t")
     motion = moved(np.zeros((1600, 3)))
 
@@ -48,7 +48,8 @@ def matched(monkeypatch):
 
 
 def test_a_match_by_hand(matched):
-    """The ride of 80 s begins at 10 s of the track of 99 s, so 80 s are in common; from 40 s on, it is 59 s."""
+    """The ride lasts 80 s, the track 99 s. If the ride begins at 10 s of the track, 80 s are in common. If it begins at
+    40 s, 59 s are in common."""
     found = matched(None, found_fit(), found_fit(30.0, 43.9))
     assert (found.start_utc_s, found.drift, found.sigma_s, found.correlation) == (1010.0, 0.0, 0.1, 0.95)
     assert found.common_s == pytest.approx(80.0)
@@ -83,8 +84,8 @@ def test_a_drift_or_another_pace_is_another_day(matched):
 
 
 def test_rough_shifts_need_a_tenth_of_the_best_evidence(monkeypatch):
-    """The likelihoods are 20 at 10 s and 1.9 or 2.1 at 30 s: the second is tried only if it has 2. Of a ride with
-    100 values, the place 119 is the shift 10 s."""
+    """The likelihoods are 20 at the shift 10 s and 1.9 or 2.1 at the shift 30 s. The second shift is tried only if its
+    likelihood is at least 2. The ride has 100 values, so index 119 is the shift 10 s."""
     known = np.ones(200, dtype=bool)
     for other, tried in ((1.9, [10.0]), (2.1, [10.0, 30.0])):
         found = np.zeros(299)
@@ -249,7 +250,7 @@ def test_a_picture_shows_both_leans_and_their_difference(monkeypatch, tmp_path):
 
 
 def test_a_time_without_a_zone_is_universal():
-    """Both formats write Universal Time. One day has 86,400 s."""
+    """Both formats of tracks write Universal Time. One day has 86,400 s."""
     day = dt.datetime(1970, 1, 2)
     assert track_files._utc_s(day) == track_files._utc_s(day.replace(tzinfo=dt.UTC)) == 86_400.0
     assert track_files._utc_s(day.replace(tzinfo=dt.timezone(dt.timedelta(hours=2)))) == 79_200.0

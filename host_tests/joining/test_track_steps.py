@@ -34,7 +34,7 @@ def test_a_course_turns_to_the_left_by_hand():
     assert found.speed_mps == pytest.approx([20.0, 20.0, 20.0, 1.5, 400.0], rel=1e-3)
     assert found.good.tolist() == [True, True, True, False, False]
     assert found.turn_deg == pytest.approx([0.0, 90.0, 90.0, 0.0, 0.0], abs=0.01)
-    # an error of 1 m to the side over 20 m is 2.865 degrees; with other errors of 4 degrees, the sum is 4.920
+    # An error of 1 m to the side over 20 m is 2.865 degrees. Together with other errors of 4 degrees it is 4.920.
     assert found.sigma_deg[:3] == pytest.approx(4.920, abs=0.005)
 
 
@@ -56,8 +56,8 @@ def test_speeds_without_their_own_are_means_over_four_steps():
 
 
 def test_segments_have_thirty_steps_and_at_least_eight():
-    """47 good steps give segments of 30 and 17 steps. 7 good steps are too few for a segment. Mean and trend are
-    subtracted from each segment, so a constant bend gives zeros."""
+    """The 47 good steps before a bad step give segments of 30 and 17 steps. The 7 good steps after it are too few for
+    a segment. Mean and trend are subtracted from each segment, so a constant bend gives zeros."""
     n = 55
     good = np.ones(n, dtype=bool)
     good[47] = False

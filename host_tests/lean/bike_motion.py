@@ -1,4 +1,4 @@
-"""Simulates the readings of a sensor on a bike from the equations of motion. For tests that also run on MicroPython."""
+"""Simulates the readings of a sensor on a bike from the equations of motion. Also runs on MicroPython."""
 
 from math import cos, degrees, pi, radians, sin, tan
 

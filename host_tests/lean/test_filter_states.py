@@ -63,15 +63,15 @@ def speed_sigma_mps(forward_g, before_mps, now_mps):
 
 
 def test_a_changing_measured_speed_counts_less():
-    """A pitch error looks like a force forward, and a steady measured speed contradicts it. So a force forward must not
-    reduce the weight of the speed."""
+    """A pitch error looks like a force forward, and a steady measured speed shows that there is no such force. A force
+    forward must therefore not reduce the weight of the speed."""
     steady, changing = speed_sigma_mps(0.0, 12.0, 12.0), speed_sigma_mps(0.0, 6.0, 12.0)
     assert changing > steady + 0.2
     near(speed_sigma_mps(0.3, 12.0, 12.0), steady, 0.1)
 
 
 def test_coming_to_rest_the_force_is_the_vertical():
-    """This is true for any earlier estimate. Here the bike has a lean of 10 degrees that the gyro did not measure."""
+    """The earlier estimate does not matter. Here the bike has a lean of 10 degrees that the gyro did not measure."""
     estimator = LeanFilter()
     hold(estimator, 3.0)
     hold(estimator, 4.0, [0.0, 1.0, 2.0 / GRAVITY_MPS2])
@@ -159,7 +159,7 @@ def test_a_large_correction_is_made_once():
 
 
 def test_rest_corrects_a_large_bias_at_once():
-    """The bias is 5 deg/s, and the bike is at rest with a lean of 20 degrees. Lean and pitch must not drift then."""
+    """The bias is 5 deg/s, and the bike is at rest with a lean of 20 degrees. Lean and pitch must not drift."""
     force, _ = force_and_rate(20.0)
     for axis in range(3):
         estimator, rate = LeanFilter(), [0.08 * (axis == i) for i in range(3)]

@@ -119,7 +119,7 @@ def added(cases):
 
 @pytest.mark.parametrize("decades", [0, 3, 12])
 def test_machine_code_rounds_a_sum_once(decades):
-    """The sum is rounded to the nearest float. The larger of its two terms has 30 bits, so the rest may be lost."""
+    """The sum is rounded to the nearest float. The larger term is computed with 30 bits, so finer parts may be lost."""
     chance = np.random.default_rng(decades)
     size = chance.normal(size=(3, 400)) * 10.0 ** chance.uniform(-decades, decades, (3, 400))
     size[0, ::3] = -size[1, ::3] * size[2, ::3] * (1.0 + 1e-3 * chance.normal(size=134))  # nearly cancelled
@@ -140,8 +140,8 @@ def test_machine_code_keeps_a_matrix_symmetric():
 
 
 def test_machine_code_at_the_ends_of_the_range():
-    """Values that are too small count as 0. A value that is infinite or not a number, or a sum that is too large, gives
-    not-a-number."""
+    """Values that are too small count as 0. The result is not-a-number if an input is infinite or not-a-number, or if
+    the sum is too large."""
     cases = {
         (0.0, 1e-30, 1e-30): 0.0,
         (2.5, 1e-30, 1e-30): 2.5,

@@ -1,4 +1,4 @@
-"""Tests each measurement of the lean filter, and what raises its noise. Also runs on MicroPython.
+"""Tests each measurement of the lean filter, and the conditions that raise its noise. Also runs on MicroPython.
 
 test_known_ride.py tests the values of the variances.
 """
@@ -106,7 +106,7 @@ def test_a_measured_speed_is_less_certain_while_it_changes():
 
 
 def test_ten_measured_speeds_per_second_count_as_one():
-    """All ten have the same errors, from the delay, the tyre's radius and the scale of the gyro's axis up."""
+    """The ten speeds have the same errors, from the delay, the tyre's radius and the scale of the gyro's axis up."""
     once, often = (measurements.measured_speed(20.0, 20.0, 0.0, seconds)[2] for seconds in (1.0, 0.4))
     near(often, once / 0.4, 1e-3 * often)
     assert measurements.measured_speed(40.0, 40.0, 0.0, 1.0)[2] > 2.0 * once  # errors of scale grow with the speed

@@ -64,7 +64,8 @@ def test_the_known_bias_is_not_a_turn():
 
 
 def test_a_wrong_estimate_of_the_bias_does_not_hide_rest():
-    """The rate is small without the estimate, so the calibration's bias is right."""
+    """Rest is also found if the rate is small before the estimated bias is subtracted. The calibration's bias is right
+    in this case."""
     assert rested_after(RestDetector(False), 3.0, bias=(0.05, 0.0, 0.0)) == 1.5
     assert rested_after(RestDetector(False), 12.0, rates=(0.03, 0.0, 0.0), bias=(0.06, 0.0, 0.0)) is None
 

@@ -82,7 +82,7 @@ def test_our_page_gets_every_packet_without_side_effects(run):
 
 
 def test_a_lean_that_is_not_trusted_is_never_a_number(run):
-    """At first there is no alignment, and later no sensor. RaceChrono gets no lean, too."""
+    """At first there is no alignment, and later no sensor. RaceChrono gets no lean either."""
     acts = [[3.0, "connect"], [3.1, "write", "rate", [40, 0]], [3.1, "write", "filter", [1, 0, 40]]]
     faults = [["unplug_sensor", [30.0, 4.0]]]
     plan = {**device_plans.ALIGNED, **LIVE, "phones": [acts], "until": 40}
@@ -142,7 +142,7 @@ def test_the_loop_continues_if_the_phone_is_out_of_reach(run):
 
 
 def test_the_menu_switches_live_off(run):
-    """The rider presses from "Reset maxima" to the last entry but one."""
+    """The rider presses to move from the entry "Reset maxima" to the last entry but one."""
     presses = device_plans.PRESSES + [[22.0, 1.0]] + [[23.5 + 0.4 * k, 0.15] for k in range(5)] + [[26.0, 1.0]]
     record = run(
         {**device_plans.ALIGNED, **LIVE, "phones": [ASK + [[40.0, "found"], [41.0, "connect"]]], "presses": presses}

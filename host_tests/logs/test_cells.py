@@ -1,4 +1,4 @@
-"""The largest values that a log may have. Both readers refuse slightly larger values and name the unit."""
+"""Tests the largest values that a log may have. Both readers refuse slightly larger values and name the unit."""
 
 import contextlib
 import io
@@ -12,8 +12,8 @@ from kickstand_tools.logs.reader import read_blocks, read_log
 from support import command
 
 HEADER = command.HEADER + ",speed_mps,temp_c,lat_deg,lon_deg,utc_s"
-# The widest ranges of the chips are 16 g and 2000 deg/s, so larger values are in another unit. Their data sheets end at
-# 85 C. Each entry is {column: (largest value, unit)}.
+# The widest ranges of the chips are 16 g and 2000 deg/s, so larger values are in another unit. The data sheets of the
+# chips allow up to 85 C. Each entry is {column: (largest value, unit)}.
 LIMITS = {
     "t_s": (1e10, "seconds"),
     "ax_g": (20.0, "g"),
@@ -43,7 +43,7 @@ def test_values_out_of_range_are_refused(name, quoted):
                 rows.append(",".join(cells.values()))
             rows[0] = rows[0].replace("0", '"0"', quoted)
             log = io.StringIO("\n".join([HEADER, *rows]) + "\n")
-            if name == "t_s":  # a large step in seconds means milliseconds, which another check refuses
+            if name == "t_s":  # a step this large means that the unit is ms, which another check refuses
                 words = "milliseconds" if good else "line 6: t_s is '.*', past any reading: its unit is seconds"
                 with pytest.raises(InputError, match=words):
                     read_log(log)

@@ -1,4 +1,4 @@
-"""The log of a recorder that lost its power. A broken end is left out. A log with a broken middle is refused."""
+"""Tests reading the log of a recorder that lost its power. A broken end is left out. A broken middle is refused."""
 
 import gzip
 

@@ -92,7 +92,8 @@ def test_example_in_the_docstring_works():
 
 @pytest.mark.parametrize(("gap", "error"), [(4, 0.01), (8, 0.01), (40, 0.01)])
 def test_gaps_do_not_lengthen_the_period(gap, error):
-    """The samples are 10.4 ms apart, and their times are rounded to 10 ms. After each 20 samples some are missing."""
+    """The samples are 10.4 ms apart, and their times are rounded to 10 ms. After every 20 samples some samples are
+    missing."""
     numbers = np.concatenate([np.arange(20) + (19 + gap) * k for k in range(60)])
     found = even_times(np.rint(numbers * 1.04) / 100.0)
     steps = np.diff(found).reshape(-1)

@@ -162,7 +162,7 @@ def test_quiet_phone_in_a_ride_is_not_frozen(digits):
 @pytest.mark.parametrize(("count", "marked"), [(9, 0), (10, 9), (11, 10)])
 @pytest.mark.parametrize("block", [6, 24])
 def test_ten_equal_readings_are_frozen_across_blocks(count, marked, block):
-    """At two readings per second the number of equal readings decides. If a freeze begins in an earlier block, only its
+    """At two readings per second, ten equal readings count as frozen. If a freeze begins in an earlier block, only its
     readings in later blocks are marked."""
     readings = np.insert(riding(24 / HZ), 3, 20.0, axis=1)
     readings[4 : 4 + count] = readings[4]

@@ -87,7 +87,8 @@ def test_mistake_far_down_is_reported_with_its_line(tmp_path, monkeypatch, row, 
 
 
 def test_memory_does_not_grow_with_the_log(tmp_path, monkeypatch):
-    """To check the text columns, only the cells of the last hour stay in memory. In this test it is half a minute."""
+    """To check the text columns, only the cells of the last hour stay in memory. In this test, only the cells of half a
+    minute stay there."""
     monkeypatch.setattr(reader, "BLOCK_BYTES", 1 << 16)
     monkeypatch.setattr(cells, "KEPT", 300)
     peaks = []

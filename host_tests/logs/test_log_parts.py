@@ -213,7 +213,7 @@ def marked(equal: int, step_s: float):
 
 
 def test_readings_are_frozen_after_half_a_second_and_ten_samples():
-    assert not marked(50, 0.01)[0].any()  # the readings are equal for 0.49 s
+    assert not marked(50, 0.01)[0].any()  # 50 equal readings in 0.49 s
     found, finder = marked(51, 0.01)
     assert np.flatnonzero(found).tolist() == list(range(51, 101))
     assert [notice.line() for notice in finder.notices()] == [

@@ -206,7 +206,7 @@ def test_the_temperature_does_not_count():
 
 @pytest.mark.parametrize("blocks_of", [1, 7, 130, 1000])
 def test_stretches_over_blocks_are_one(blocks_of):
-    """A stretch is marked from the block on in which it is known to be frozen. Its times are those of the stretch."""
+    """A frozen stretch is marked from the block in which it is found. The notice has the times of the whole stretch."""
     found, finder = marks(coarse(0.0001, 0.001), blocks_of=blocks_of)
     (notice,) = finder.notices()
     assert found[179] and not found[:101].any() and not found[180:].any()
@@ -238,7 +238,7 @@ def test_even_blocks_are_not_changed():
 
 @pytest.mark.parametrize("size", [700, 5000, 9000])
 def test_repeated_times_are_spread_over_blocks(size):
-    """Pairs of samples have one time. The result has even steps of 5 ms, whatever the size of the blocks."""
+    """Every two samples have the same time. The result has even steps of 5 ms, for any size of the blocks."""
     times = np.repeat(np.arange(4500) / 100.0, 2)
     blocks, remarks = spread_blocks(times, size)
     time_us = np.concatenate([one.time_us for one in blocks])

@@ -22,7 +22,7 @@ def test_every_pattern_of_the_table_has_files(name):
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
 def test_noticed_unnoticed_and_for_ever(tmp_path):
-    """The function runs in separate processes, because it forks."""
+    """The tests of changed code run in forked processes. A separate process therefore runs this script."""
     (tmp_path / "tools").mkdir()
     (tmp_path / "tools" / "code_under.py").write_text("def twice(x):\n    return 2 * x\n")
     (tmp_path / "test_code.py").write_text(

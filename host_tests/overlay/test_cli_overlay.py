@@ -123,7 +123,7 @@ def test_a_gopros_gyro_finds_the_offset(tmp_path):
 
 
 def walk(count: int) -> np.ndarray:
-    """Return the rates of another motion, shape (count, 3)."""
+    """Return the rates of a random motion, in deg/s, shape (count, 3)."""
     steps = np.random.default_rng(5).normal(size=(count, 3))
     return 40.0 * np.apply_along_axis(lambda v: np.convolve(v, np.ones(80) / 80.0, "same"), 0, steps)
 

@@ -1,4 +1,4 @@
-"""The words, numbers and directions of the gauge. Their places and sizes are the designer's."""
+"""Tests the words, numbers and directions of the gauge. Their places and sizes are design and are not tested."""
 
 import math
 

@@ -121,7 +121,7 @@ def test_the_gauge_is_in_the_lower_left_corner():
 
 
 def overlaid(monkeypatch, film=None, **given):
-    """Return the Overlaid, ffmpeg's arguments, the number of pictures, and what the gauge gets."""
+    """Return the Overlaid, ffmpeg's arguments, the number of pictures, and the gauge's arguments."""
     calls: list = []
     ride = seen(np.arange(0.0, 10.0, 0.1), np.arange(100.0), np.ones(100))
     monkeypatch.setattr(overlay, "_check", lambda *_: film)

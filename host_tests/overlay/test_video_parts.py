@@ -121,10 +121,11 @@ def test_readings_of_a_packet_are_spread_over_its_time(monkeypatch):
 
 @pytest.fixture
 def offset(monkeypatch):
-    """Return a function that finds the offset. Its argument has the result of each shift to try: {place: (correlation,
-    evidence)}.
+    """Return a function that returns the offset, or the refusal, for a given match at some shifts. The first argument
+    is {index of the shift: (correlation, evidence)}.
 
-    The video has 200 cells of 50 ms. Its readings begin 0.3 s after its first picture."""
+    The video has 200 cells of 50 ms. Its readings begin 0.3 s after its first picture.
+    """
 
     def result(given, common=160):
         monkeypatch.setattr(camera_match, "correlations", lambda *_: (found, np.full(799, common)))
@@ -145,7 +146,8 @@ def offset(monkeypatch):
 
 
 def test_an_offset_by_hand(offset):
-    """The place 199 is the same begin; the place 299 is 5 s later. The first reading is 0.3 s after the picture."""
+    """At index 199 the ride's cells begin with the camera's. At index 299 the shift is 5 s. The first reading of the
+    camera is 0.3 s after its first picture."""
     assert offset({199: (0.9, 30.0)}) == pytest.approx((-0.3, 0.9))
     assert offset({299: (0.9, 30.0), 399: (0.8, 24.0)}) == pytest.approx((4.7, 0.9))
     assert offset({299: (0.9, 30.0), 399: (0.8, 24.1)}) == "the camera turns like the bike at several times"
@@ -156,7 +158,8 @@ def test_an_offset_by_hand(offset):
 
 
 def test_slow_and_quick_changes_of_the_rate_are_removed():
-    """A steady rate leaves nothing. One cell of 40 deg/s counts as 10 over 4 or 8 over 5 cells, less its mean."""
+    """The result of a steady rate is 0. A single cell of 40 deg/s is smoothed to 10 deg/s over 4 cells or 8 deg/s over
+    5 cells, and its mean is subtracted."""
     assert camera_match._turning(np.tile([3.0, 4.0, 0.0], (300, 1))) == pytest.approx(np.zeros(300))
     pulse = np.zeros((300, 3))
     pulse[150, 1] = -40.0

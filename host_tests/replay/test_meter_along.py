@@ -12,7 +12,7 @@ from kickstand_tools.replay import replay, replay_engine
 from kickstand_tools.replay.meter_along import MeterAlong
 from support.recordings import smoothed_rides
 
-# numpy computes these two columns. Its arc functions may differ in the last digit of a double.
+# numpy computes these two columns. The arc functions of numpy may differ in the last digit of a double.
 BY_NUMPY = ("lean_formula_deg", "static_lean_deg")
 
 

@@ -79,8 +79,8 @@ def test_rides_become_logs_with_their_calibration(board, tmp_path):
     ("vehicle", "by_drive", "said"), [("car", True, "car"), ("car", False, None), ("motorcycle", True, None)]
 )
 def test_the_log_of_a_car_says_that_it_is_a_car(vehicle, by_drive, said, board, tmp_path, monkeypatch):
-    """Such a log shows no lean. A ride that was aligned by two poses was recorded before the board was used in the
-    car."""
+    """The log of a car shows no lean. A ride that was aligned by two poses counts as a motorcycle's, because it was
+    recorded before the board was used in the car."""
     made = ride_writer.calibration()
     made.by_drive = by_drive
     monkeypatch.setattr(ride_writer, "calibration", lambda _trim_deg: made)
@@ -155,7 +155,7 @@ def test_readings_that_are_missing_in_a_ride_are_reported(board, tmp_path, monke
 
 def test_a_board_without_rides_or_without_the_recorder(board, tmp_path):
     assert "no rides on the board" in command.works("pull", "--out", tmp_path / "out").out
-    del board.modules["kickstand.rides"]  # as in 0.2.0, whose modules are all in one folder
+    del board.modules["kickstand.rides"]  # as on a board with release 0.2.0, which has no such package
     words = "kickstand flash brings it up to date"
     command.refused(tmp_path, "pull", "--out", tmp_path / "out", words=words)
     command.refused(tmp_path, "pull", "--out", tmp_path / "out" / "a" / "b", words="make it first")

@@ -118,8 +118,8 @@ def signals():
 @pytest.mark.parametrize("before", [signal.default_int_handler, signal.SIG_IGN], ids=["shell", "background"])
 @pytest.mark.usefixtures("signals")
 def test_ctrl_c_ends_a_whole_log(before, streaming, tmp_path):
-    """Ctrl-C also works if a shell has started the command with this signal ignored. Afterwards the earlier handler is
-    in use again."""
+    """Ctrl-C also works if a shell has started the command with this signal ignored. When the command ends, the earlier
+    handler is restored."""
     signal.signal(signal.SIGINT, before)
     data, turns = half_seconds(9)
     board = streaming(data[:-1], "ctrl-c", _said(data[-1]))
@@ -273,8 +273,8 @@ def test_the_data_before_a_broken_stream_are_kept(end, words, streaming, tmp_pat
 
 
 def test_a_computer_that_slept_is_reported(streaming, tmp_path, monkeypatch):
-    """Meanwhile the board has stopped streaming. The command notices this sooner than it gives up a sensor that is
-    off."""
+    """While the computer slept, the board stopped streaming. The command notices this quickly. It waits longer for a
+    board whose sensor is off."""
     monkeypatch.setattr(board_console, "_AWAY_SILENT_S", 0.1)
     data, turns = half_seconds(3)
     streaming(data, "asleep")

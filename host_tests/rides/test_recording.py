@@ -1,4 +1,4 @@
-"""The recorder at its limits, with a fake writer."""
+"""Tests the limits of the recorder with a fake writer."""
 
 import contextlib
 import io

@@ -28,8 +28,8 @@ _EXTREMES = [
     ([1, -1, 4096, 0, 0, -1, 1], 2, 9999),
 ]
 
-# Code random entries with machine code and with Python. Most entries are typical. The states and the bytes must be the
-# same.
+# Encode random entries with machine code and with Python. Most entries are typical. Both must give the same states and
+# bytes.
 _BOTH = """
 import random
 from array import array
@@ -74,7 +74,7 @@ def written(turns):
 
 
 def held(block):
-    """Return [(sums, n, dt_us), ...] of the turns in a block."""
+    """Return [(sums, n, dt_us), ...] of the loop turns in a block."""
     times = [block.time_us] + [turn.time_us for turn in block.turns]
     return [(t.sums, t.n, t.time_us - before) for t, before in zip(block.turns, times[:-1], strict=True)]
 

@@ -84,7 +84,7 @@ def test_a_recorded_ride_has_positions(engine, tmp_path):
     placed = np.isfinite(log.lat_deg)
     seconds = log.t_s[-1] - log.t_s[0]
     assert np.count_nonzero(placed) > 9.5 * seconds - 10
-    noon_s = 1_795_262_400.0  # noon on 21 November 2026; the model's clock began 20 s earlier
+    noon_s = 1_795_262_400.0  # noon on 21 November 2026, 20 s after the model's clock began
     fix_s = log.utc_s[placed] - (noon_s - 20.0)
     at_s = log.t_s[placed] + blocks[0].time_us * 1e-6
     assert np.all((at_s - fix_s > 0.09) & (at_s - fix_s < 0.2))

@@ -34,8 +34,7 @@ def missing_s(record):
 
 
 def leans_on(record, since_s):
-    """Return True if the display still shows the right lean some 10 s after since_s, and the board has not
-    restarted."""
+    """Return True if the display shows the right lean about 10 s after since_s, and the board has not restarted."""
     later = [record.at(since_s + 9.5 + 0.25 * k)[0] for k in range(8)]  # a message may hide the lean for a while
     return record.ends == ["off"] and any(line.startswith("Raw   20°") for line in later)
 

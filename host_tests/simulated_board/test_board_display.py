@@ -86,7 +86,7 @@ def test_no_turn_delays_the_loop(board, display):
 
 @on_each()
 def test_nothing_is_sent_while_nothing_changes(board, display):
-    """The driver only checks the connection, five times per second."""
+    """The driver only checks five times per second that the display answers."""
     address = board.lcd.address
     before = board.lcd_bus.transfers[address]
     for _ in range(20):
@@ -260,8 +260,8 @@ def test_no_status_leaves_an_oled_dark():
 
 
 def test_a_panel_of_32_rows_shows_both_lines():
-    """Letters of 16 rows fill the display. The picture moves down by one or two rows. These rows
-    of the letters are blank."""
+    """Two lines of letters with 16 rows fill the display. The picture moves down by one or two rows. The last rows of
+    the letters are blank, so nothing is lost."""
 
     def run(board):
         display = open_display(board, None, "ssd1306-32")

@@ -1,4 +1,4 @@
-"""The models of the OLED controllers, and framebuf. The tests also run on MicroPython."""
+"""Tests the simulated OLED controllers and the simulated framebuf, also on MicroPython."""
 
 import sys
 

@@ -57,7 +57,7 @@ def test_an_invalid_position_is_none_and_does_no_harm():
 
 
 def test_a_date_that_is_not_known_yet_is_0():
-    for date in ("", "xx1126", "0x1126", "311299"):  # the last date is older than any receiver
+    for date in ("", "xx1126", "0x1126", "311299"):  # a date in 1999 is too old to be right
         assert places_of(rmc(date=date))[0][:2] == [0, NOON]
     assert places_of(rmc(date="311226"))[0][0] == 26 << 9 | 12 << 5 | 31
 

@@ -258,8 +258,8 @@ def test_a_contact_that_bounces_is_counted_once():
 
 
 def test_a_storm_of_pulses_is_reported_and_the_speed_returns():
-    """The firmware disables the interrupt for a pause. The storm lasts twice as long, so the interrupt is enabled again
-    in the middle of the storm."""
+    """The firmware disables the interrupt of the wheel for some time. Here the pulses last twice as long, so they still
+    come when the interrupt is enabled again."""
     for port, pulses_per_s in (("rp2", 50_000), ("esp32", 6_000)):
 
         def fit(board, pulses_per_s=pulses_per_s):

@@ -1,4 +1,4 @@
-"""A few minutes of the soak, and proof that each of its checks can fail."""
+"""Runs the soak for a few minutes, and proves that each of its checks can fail."""
 
 import pytest
 from kickstand_tools.simulation.scripted import script

@@ -54,7 +54,7 @@ def test_a_low_pass_of_second_order_at_its_own_frequency():
 
 
 def test_a_mount_that_creeps_turns_slowly_and_at_once():
-    """The mount turns by 2 degrees about one axis. It makes 60 % of the turn evenly, and 40 % within a second."""
+    """The mount turns by 2 degrees about one axis. 60 % of this turn is slow and even. The rest takes one second."""
     turned = ride._creep(np.random.default_rng(3), 20_000, 2.0)
     size = np.degrees(np.linalg.norm(turned, axis=1))
     assert size[0] == pytest.approx(0.0, abs=1e-3)

@@ -29,8 +29,8 @@ def in_vehicle(made):
 
 
 def test_each_road_class_is_twice_as_rough(rides):
-    """Each road class has four times the power of the class before it. The engine adds to the vibration on the quietest
-    road. The rides differ otherwise only in rider and camber."""
+    """Each road class has four times the power of the class before it. On the quietest road the engine adds to the
+    vibration. Apart from the road class, the rides differ only in rider and camber."""
     assert np.array_equal(rides("A").truth["speed_mps"], rides("D").truth["speed_mps"])
     off = rides("C").truth["lean_deg"] - rides().truth["lean_deg"]
     assert 0.1 < np.sqrt(np.mean(off**2)) < 2.0
@@ -88,7 +88,7 @@ def test_bands_are_those_of_a_sine():
 
 def test_simulated_roads_are_as_rough_as_real_ones():
     """A recorded ride through town has a vertical vibration of 0.078 g from 1 to 3 Hz and 0.151 g from 3 to 10 Hz, see
-    tools/docs/simulation.md. This is between the simulated road classes C and D."""
+    tools/docs/simulation.md. The recorded values are between those of the simulated road classes C and D."""
     calm, rough = (of_simulated("street", 0, 100.0, road, None)[QUANTITIES[0]] for road in "CD")
     assert len(calm) == len(BANDS_HZ)
     assert calm[3] < 0.151 and rough[3] > 0.078

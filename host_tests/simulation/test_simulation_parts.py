@@ -97,8 +97,8 @@ def test_a_plan_goes_on_until_45_s_before_its_end():
 
 
 def test_a_turn_lasts_until_its_heading_has_changed():
-    """A lean of 45 degrees at 9.80665 m/s gives a yaw rate of 1 rad/s. A turn by 90 degrees takes 1.571 s. Half of the
-    roll of 1 s counts as a part of this time."""
+    """A lean of 45 degrees at 9.80665 m/s gives a yaw rate of 1 rad/s. A turn by 90 degrees takes 1.571 s. The bike
+    rolls into the lean in 1 s, and half of this second counts as part of the turn."""
     plan = a_plan()
     plan.turn(45.0, G, heading_deg=90.0, roll_s=1.0)
     assert plan.legs[-1].seconds == pytest.approx(1.0 + np.pi / 2.0 - 0.5)
@@ -129,8 +129,8 @@ def test_speed_changes_take_their_time():
 
 
 def test_braking_into_a_turn_has_two_parts():
-    """The bike brakes from 20 to 10 m/s at 5 m/s2. The first part takes 1.3 s to 13.5 m/s. The second part takes 0.9 s
-    instead of 0.7 s, and has half of the lean."""
+    """The bike brakes from 20 to 10 m/s at 5 m/s2. The first part takes 1.3 s, and ends at 13.5 m/s. The second
+    part takes 0.9 s instead of 0.7 s, and has half of the lean."""
     plan = a_plan()
     plan.to_speed(20.0, 5.0)
     plan.into_turn(30.0, 10.0, 5.0)
@@ -242,8 +242,8 @@ def test_gears_keep_the_engine_under_its_shift():
 
 
 def test_vibration_grows_with_the_engine():
-    """At 6000 revolutions per minute the vibration has the rms rms_g. At idle this is multiplied by
-    0.25 + 0.75 (1250 / 6000)^2. The rms is at most 0.5 g. The rates have 15 deg/s per g."""
+    """At 6000 revolutions per minute the vibration has the rms rms_g. At idle the rms is multiplied by
+    0.25 + 0.75 (1250 / 6000)^2. It is at most 0.5 g. The rates vibrate by 15 deg/s per g."""
     running = np.ones(20_000)
 
     def rms(speed, rms_g, share=1.0):
@@ -461,8 +461,8 @@ def test_feet_help_below_4_mps():
 
 
 def test_the_motion_of_a_body_by_hand():
-    """The vehicle turns left with 0.5 rad/s at 10 m/s, which is 5 m/s2. First it is upright on a road that rises by
-    0.1 rad. Then it leans by 30 degrees on a level road."""
+    """The vehicle turns left with 0.5 rad/s at 10 m/s, so its lateral acceleration is 5 m/s2. First it is
+    upright on a road that rises by 0.1 rad. Then it leans by 30 degrees on a level road."""
     left, up, forward, w_left, w_up, w_forward = script.body_motion(0.0, 0.2, 10.0, 2.0, 0.5, 0.1, 0.03)
     assert left * G == pytest.approx(5.0 * np.cos(0.1)) and up * G == pytest.approx(G * np.cos(0.1) + 0.3)
     assert forward * G == pytest.approx(2.0 + G * np.sin(0.1))

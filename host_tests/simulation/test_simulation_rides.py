@@ -145,7 +145,7 @@ def test_speed_is_written_once_per_second_if_requested(tmp_path):
 
 @pytest.mark.parametrize(("profile", "seed"), [("hills", 3), ("fall", 1)])
 def test_ride_has_the_requested_length(profile, seed):
-    """This includes a ride that would continue to the end of its bend, and one that ends with a fall."""
+    """The first ride is cut off in a bend. The second ride ends with a fall."""
     assert len(ride(profile, seed, 120.0, exact=True).readings) == 120 * 200
 
 

@@ -131,7 +131,8 @@ class Device:
     def run(self, config, off_s, streams=False):
         """Run the firmware with these settings.
 
-        off_s: times in s at which the power is switched off. After each but the last it is switched on again.
+        off_s: times in s at which the power is switched off. After each switch-off except the last, the power is
+            switched on again.
         streams: True to start the app as `kickstand record` does.
         """
         self.board.every(FRAME_S, self._watch)

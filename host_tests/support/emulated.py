@@ -63,7 +63,7 @@ MPY = {"pico": bytecode.PICO, "esp32": bytecode.ESP32}
 
 @functools.cache
 def firmware(chip: str = "pico") -> dict[str, bytes]:
-    """Return the firmware's compiled files. A board starts in half the time with them."""
+    """Return the firmware's compiled files. With compiled files, a board starts in half the time."""
     from kickstand_emulator import flash_image
 
     return flash_image.firmware(True, MPY[chip])

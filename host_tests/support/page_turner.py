@@ -8,7 +8,7 @@ class PageTurner:
 
     def __init__(self):
         self._wanted = []
-        self._seen = []  # the views shown at the presses so far, while searching the first view of _wanted
+        self._seen = []  # the views shown at the presses so far, in the search for _wanted[0]
 
     def turn_to(self, name):
         """Add a view to the wanted ones. The names are in kickstand/state.py."""

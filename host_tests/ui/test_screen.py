@@ -106,7 +106,7 @@ def test_a_fault_hides_the_pages_and_the_menu_the_fault(sensor, screen):
 
 def test_pages_of_the_owner_follow_the_last_page(screen):
     screen.pages.own += [lambda: ("one", ""), lambda: ("two", "")]
-    screen._meter.trusted = False  # so that each page has the same lines
+    screen._meter.trusted = False  # then each page shows the same lines
     shown = []
     from kickstand.ui import page_ring
 

@@ -1,4 +1,4 @@
-"""The entries of the menu, the order of the pages, and the times of notices."""
+"""Tests the entries of the menu, the order of the pages, and how long notices are shown."""
 
 from types import SimpleNamespace
 from typing import Any

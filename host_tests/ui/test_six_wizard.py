@@ -9,7 +9,8 @@ UPS = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1], [0.6
 
 
 def test_the_bias_is_the_mean_of_all_seven_poses(monkeypatch):
-    """The mean of 1, 2, ... 7 about x is 4; the mean of -2, -4, ... -14 about y is -8."""
+    """The rates about x in the poses are 1, 2, ... 7, and their mean is 4. The rates about y are -2, -4, ... -14, and
+    their mean is -8."""
     saved, chip = [], SimpleNamespace(accel_lsb_per_g=4096, gyro_lsb_per_dps=65.5, SATURATED=32700)
     fit = SimpleNamespace(offset=[0.0] * 3, slope=[1.0] * 3, unproved=(), matrices=lambda: None, run=lambda: iter(()))
     with Board(lambda t_s: (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 25.0)):

@@ -192,7 +192,7 @@ def test_a_spoilt_turn_may_be_repeated_up_to_12_poses():
     made = six(_poses=[0] * 10, _sides=[0, 1, 2, 3, 4, -1])
     assert not made._again()
     made._turn.running, made._turn.quick, made._turn.lost = True, False, True
-    assert not made._again()  # 10 poses, the repeated one, the missing side, and the slanted pose are 13
+    assert not made._again()  # 10 + 3: the repeated pose, the missing side, the slanted pose
     made._poses = [0] * 9
     assert made._again()
     made._turn.running = False

@@ -61,7 +61,7 @@ def test_pulled_cable_leaves_the_log(line, rider, board, tmp_path):
 
 
 def test_car_shows_g_instead_of_a_lean(line, rider, board, tmp_path, monkeypatch):
-    """The calibration in the log says "car", too. For the next motorcycle the gauge appears again."""
+    """The calibration in the log also says "car". When a motorcycle is connected next, the gauge appears again."""
     monkeypatch.setattr(ride_writer, "turns", braking_in_a_left_bend)
     line.plug_in(RawPrompt(board, half_seconds(3)[0], vehicle="car"))
     rider.page.click("#start")

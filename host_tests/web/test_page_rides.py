@@ -178,7 +178,8 @@ def test_axe_finds_nothing(page, ride, calibration, kind):
 
 @pytest.mark.nightly
 def test_page_responds_while_reading_thirty_megabytes(chromium, address, calibration, tmp_path):
-    """The log lasts more than half an hour at 200 samples per second. The page's memory hardly grows."""
+    """The log lasts more than half an hour at 200 samples per second. The memory of the page hardly
+    grows."""
     short = app_exports.riding()
     readings = np.column_stack((short.force_g, short.rates_dps))
     lines = [",".join(f"{value:.7f}" for value in row) for row in readings.tolist()]

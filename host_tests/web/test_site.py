@@ -220,7 +220,7 @@ def test_every_page_has_a_policy_and_charts_no_rights(files):
 
 
 def ask(port, said):
-    """Send these bytes to the server. Return its whole answer until it disconnects."""
+    """Send the bytes `said` to the server. Return everything that the server sends until it disconnects."""
     with socket.create_connection((serve.HOST, port), timeout=20) as connection:
         connection.sendall(said)
         return b"".join(iter(lambda: connection.recv(4096), b""))

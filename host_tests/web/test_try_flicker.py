@@ -7,7 +7,7 @@ import pytest
 from support.mpy import run_mpy
 from support.web.rider import LAPTOP, Rider
 
-# This script simulates a ride from the first press on, as fast as possible. Each tick is 20 ms.
+# This script simulates a ride as fast as possible, beginning with the first press. Each tick is 20 ms.
 DRIVE = """
 import json
 from kickstand_tools.web.device import PageDevice

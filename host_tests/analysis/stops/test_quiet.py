@@ -1,4 +1,4 @@
-"""A standstill is found because the bike shakes little. Each condition is tested slightly on both sides of its limit.
+"""A standstill is found by its low vibration. Each condition is tested just below and just above its limit.
 
 The simulated log has 10 s of riding, 4 s that may be a standstill, and 10 s of riding. It has no speed.
 """
@@ -66,7 +66,7 @@ def share(ride: Channels) -> float:
         ({"rolling": 4.0}, {"rolling": 6.0}),  # the filter finds rest in half of the samples of a second
         ({"heavier": 0.115}, {"heavier": 0.125}),  # the force differs by 0.12 g, for a sensor without six positions
         ({"heavier": -0.115}, {"heavier": -0.125}),
-        # the force differs by 0.05 g from the force of a rest during the ride
+        # the force differs by 0.05 g from the force that was measured at a rest during the ride
         ({"heavier": 0.145, "rested": 1.1}, {"heavier": 0.155, "rested": 1.1}),
         ({"heavier": 0.055, "rested": 1.1}, {"heavier": 0.045, "rested": 1.1}),
     ],

@@ -351,12 +351,13 @@ def test_the_straight_line_is_the_direction_just_before_braking():
     ("hard", "easy", "earlier_s"), [((2.0, -6.0), (1.4, -2.0), 0.71), ((10.0 / 9.0, -9.0), (2.4, -2.0), 4.08)]
 )
 def test_full_deceleration_is_from_the_last_two_seconds(hard, easy, earlier_s):
-    """The rider eases the brake from 6 to 2 m/s2. Before braking the engine slows the bike by 0.8 m/s2. A stop begins
-    at 15 % of the full deceleration.
+    """The rider brakes hard and then eases the brake to 2 m/s2. Before this the engine slows the bike by 0.8 m/s2. A
+    stop begins at 15 % of the full deceleration.
 
-    * If 6 m/s2 fill a quarter of the last two seconds, 15 % are 0.9 m/s2. The engine's braking does not count.
-    * If they end earlier, the full deceleration is 2 m/s2, and 15 % are 0.3 m/s2. The stop begins with the engine's
-      braking.
+    * If the hard braking fills a quarter of the last two seconds, it is the full deceleration. 15 % of its 6 m/s2 are
+      0.9 m/s2, so the engine's braking does not count.
+    * If the hard braking ends earlier, the full deceleration is 2 m/s2, and 15 % are 0.3 m/s2. The stop begins with the
+      engine's braking.
     """
     legs = (REST_S, 0.0), (6.0, 3.0), (3.0, 0.0), (4.0, -0.8), hard, easy, (REST_S, 0.0)
     (stop,) = find_stops(Road(*legs).channels())
@@ -364,7 +365,7 @@ def test_full_deceleration_is_from_the_last_two_seconds(hard, easy, earlier_s):
 
 
 def test_rolling_out_after_braking_is_left_out():
-    """With released brakes the speed falls by 0.4 m/s2 at the end. The stop ends before that."""
+    """With released brakes the bike decelerates by 0.4 m/s2 at the end. The stop ends before this part."""
     legs = (REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (1.25, -0.4), (REST_S, 0.0)
     (stop,) = find_stops(Road(*legs).channels())
     assert stop.initial_speed_mps == pytest.approx(20.0, rel=1e-3)

@@ -18,7 +18,7 @@ from kickstand_tools.simulation.scripted import script
 START_UTC_S = 1_715_938_200.25  # 2024-05-17 09:30:00.25 UTC
 BERLIN = 52.5, 13.4
 G = 9.80665
-# The axes of a phone that stands tilted in its holder, as rows in the vehicle's left, up, forward
+# The axes of a phone that is tilted in its holder. Each row is an axis, with its left, up and forward in the vehicle.
 PHONE = np.array([[-0.96, 0.0, -0.28], [-0.168, 0.8, 0.576], [0.224, 0.6, -0.768]])
 _EARTH_M = 6_371_000.0
 
@@ -114,7 +114,7 @@ def into(target: Path, files: dict[str, str]) -> Path:
 def phyphox(ride: Riding, separator: str = ",", comma: bool = False) -> dict[str, str]:
     """Write the files and columns of the app's own template.
 
-    The gyro has half the accelerometer's rate and starts slightly later. GPS comes once per second.
+    The gyro has half the accelerometer's rate and starts slightly later. The GPS has one fix per second.
     """
 
     def number(value: float, digits: int = 9) -> str:

@@ -168,7 +168,7 @@ def _about(axis, angle):
 
 
 def _smooth(values, seconds):
-    """Apply a moving mean three times. The result is as smooth as the movement of a hand."""
+    """Apply a moving mean three times. This gives movements as smooth as those of a rider."""
     width = max(1, round(seconds * FINE_HZ))
     window = np.full(width, 1.0 / width)
     for _ in range(3):

@@ -18,7 +18,7 @@ FAKE = Path(__file__).with_name("fake_bluetooth.js").read_text()
 
 
 class Bridge:
-    """Runs a board in a thread.
+    """Runs a simulated board in a thread.
 
     plan: see run_device() in device_runs.py.
     begin_s: the board's time from which on it runs in real time. Before that it runs as fast as possible.

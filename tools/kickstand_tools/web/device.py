@@ -99,7 +99,7 @@ class Device:
             board.clock.power_off()
 
     def rest(self):
-        """Advance the time by a step in which no firmware runs."""
+        """Advance the board's time by one step without running the firmware."""
         self.board.clock.advance(REST_US)
 
     def resume(self, function):
@@ -162,7 +162,7 @@ class Device:
         return None
 
     def _display(self):
-        """Return display(). While an OLED receives a new picture, keep the text of the old picture."""
+        """Return the result of display(). While an OLED receives a new picture, the text is that of the old picture."""
         seen = display(self.board.lcd)
         if not seen["text"][0].startswith("?"):
             self._text = {name: seen[name] for name in ("text", "shown_deg")}

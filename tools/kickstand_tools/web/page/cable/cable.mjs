@@ -103,7 +103,8 @@ export class SerialLine {
 
   async close() {
     this.lost = true; // otherwise #read would continue with the port's next stream
-    // Each of these calls fails if the cable is unplugged. If the port stayed open, it could not be opened again.
+    // Each of these calls fails if the cable is unplugged. All are tried, because a port that stays open cannot be
+    // opened again.
     await this.#reader?.cancel().catch(() => {});
     this.#reader?.releaseLock();
     await this.#port.close().catch(() => {});

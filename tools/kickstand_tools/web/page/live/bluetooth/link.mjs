@@ -5,7 +5,7 @@ import { BOARD, NOW, PERIOD_MS, RATE, RIDE, SERVICE, VERSION } from "./packets.m
 const AGAIN_MS = 1000;
 const QUIET_MS = 5000; // a connection without data for this time is treated as lost
 
-/** Ask the rider to choose a board. Returns it. Without one, calls tell(text) with the reason and returns null. */
+/** Ask the rider to choose a board, and return it. If none is chosen, call tell(reason) and return null. */
 export async function chooseBoard(tell) {
   try {
     return await navigator.bluetooth.requestDevice({ filters: [{ services: [SERVICE] }] });
