@@ -50,6 +50,14 @@ PACKAGES = {
         "rides/test_block rides/test_recording rides/test_ring rides/test_stream rides/test_card_trial",
     ),
     "live": _package("firmware/kickstand/live/*.py", "live/test_bonds live/test_live_packets live/test_live_device"),
+    "board": _package(
+        "firmware/kickstand/board/*.py",
+        "simulated_board/test_board_[!ms]* simulated_board/test_board_sensor device/test_boards rides/test_sd_card",
+    ),
+    "firmware": _package(  # the modules outside folders
+        "firmware/kickstand/[!r]*.py",
+        "device/test_boards device/test_who_is_there device/test_start device/test_user_code",
+    ),
     "published": _package("tools/kickstand_tools/calibration/published.py", "drive_alignment/test_published"),
     "aligning": _package(
         "tools/kickstand_tools/calibration/[!p]*.py tools/kickstand_tools/calibration/p[or]*.py",
@@ -92,6 +100,28 @@ PACKAGES = {
         "tools/kickstand_tools/rides/*.py",
         "rides/test_pull_parts rides/test_ride_file rides/test_stream rides/test_cli_pull rides/test_cli_record",
     ),
+    "common": _package(
+        "tools/kickstand_tools/common/*.py",
+        "cli/test_output cli/test_blame cli/test_added_commands api/test_remedies logs/test_log_parts",
+    ),
+    "cli": _package(
+        "tools/kickstand_tools/cli/*.py",
+        "cli/test_cli_usage cli/test_blame cli/test_added_commands calibration/test_cli_calibration_file"
+        " logs/test_cli_logs rides/test_cli_pull",
+    ),
+    "simulated_board": _package(
+        "tools/kickstand_tools/simulated_board/*.py tools/kickstand_tools/simulated_board/fakes/*.py",
+        "simulated_board/test_board_[!m]* simulated_board/test_gps_hostile imu/test_registers imu/test_sensor"
+        " device/test_boards",
+    ),
+    "demo": _package("tools/kickstand_tools/demo/*.py", "demo/test_demo_parts"),
+    "web": _package("tools/kickstand_tools/web/*.py", "web/test_rides_guest"),
+    "fleet": _package(
+        "tools/kickstand_fleet/**/*.py",
+        "fleet/test_evidence fleet/test_manifest fleet/test_moved fleet/test_forward fleet/test_period"
+        " fleet/test_full_disk",
+    ),
+    "emulator": _package("tools/kickstand_emulator/*.py", "chip/test_chip_corrections"),
     "signals": _package("tools/kickstand_tools/signals/*.py", "signals/*"),
     "checks": _package("tools/kickstand_tools/checks/*.py", "checks/*"),
     "replay": _package("tools/kickstand_tools/replay/*.py", "replay/test_meter_along replay/test_cli_replay"),
