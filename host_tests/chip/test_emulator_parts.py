@@ -254,9 +254,20 @@ class PlainDevice(EmulatedDevice):
         self.answers, self.sent, self.levels, self._time_s, self._stopped = list(answers), [], [], 0.0, False
         super().__init__(Board(lambda t_s: (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)))
 
-    time_s = property(lambda self: self._time_s)
-    reading = property(lambda self: False)
-    file_system = property(lambda self: b"", lambda self, system: None)
+    @property
+    def time_s(self):
+        return self._time_s
+
+    @property
+    def reading(self):
+        return False
+
+    @property
+    def file_system(self):
+        return b""
+
+    @file_system.setter
+    def file_system(self, system): ...
 
     def power_on(self):
         self.powered = True
@@ -381,6 +392,7 @@ def test_flash_takes_time_and_is_torn_where_power_is_cut(chip):
     assert chip.flash[0x11100:0x11104] == b"\x01\x02\xff\xff"
     chip.flash[0x10000:0x30000] = bytes(0x20000)
     for command, size in ((0x20, 4096), (0xD8, 65536)):
+        flash, send = nor_flash(chip)
         flash.cut_power(1, 0.25)
         with pytest.raises(PowerCut):
             took_ms(command, 1, 0, 0)

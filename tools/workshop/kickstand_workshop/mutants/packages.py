@@ -122,7 +122,7 @@ PACKAGES = {
         " fleet/test_full_disk",
     ),
     "emulator": _package(  # the other modules run only with an emulated chip, whose tests take minutes
-        "tools/kickstand_emulator/con*.py tools/kickstand_emulator/device.py tools/kickstand_emulator/flash*.py"
+        "tools/kickstand_emulator/console_*.py tools/kickstand_emulator/device.py tools/kickstand_emulator/flash*.py"
         " tools/kickstand_emulator/host*.py tools/kickstand_emulator/i*.py",
         "chip/test_emulator_parts",
     ),
