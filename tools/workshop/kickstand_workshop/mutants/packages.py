@@ -114,7 +114,7 @@ PACKAGES = {
         "simulated_board/test_board_[!m]* simulated_board/test_gps_hostile imu/test_registers imu/test_sensor"
         " device/test_boards",
     ),
-    "demo": _package("tools/kickstand_tools/demo/*.py", "demo/test_demo_parts"),
+    "demo": _package("tools/kickstand_tools/demo/*.py", "demo/test_demo_p* simulation/test_rides"),
     "web": _package("tools/kickstand_tools/web/*.py", "web/test_rides_guest"),
     "fleet": _package(
         "tools/kickstand_fleet/**/*.py",
