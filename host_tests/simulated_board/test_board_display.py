@@ -317,6 +317,16 @@ def test_the_rows_of_a_larger_display_are_blanked():
 
 
 @on_each((None,), OLEDS)
+def test_an_oled_is_rewritten_no_earlier(board, display):
+    board.lcd.ram[200] ^= 0xFF
+    noise = board.lcd.ram[200]
+    turns(board, display, 800)
+    assert board.lcd.ram[200] == noise
+    turns(board, display, 210)
+    assert board.lcd.ram[200] != noise
+
+
+@on_each((None,), OLEDS)
 def test_an_oled_is_rewritten_every_ten_seconds_and_moves(board, display):
     board.lcd.ram[200] ^= 0xFF
     starts = set()

@@ -52,7 +52,8 @@ PACKAGES = {
     "live": _package("firmware/kickstand/live/*.py", "live/test_bonds live/test_live_packets live/test_live_device"),
     "board": _package(
         "firmware/kickstand/board/*.py",
-        "simulated_board/test_board_[!ms]* simulated_board/test_board_sensor device/test_boards rides/test_sd_card",
+        "simulated_board/test_board_parts simulated_board/test_board_display simulated_board/test_board_[io]*"
+        " device/test_boards",
     ),
     "firmware": _package(  # the modules outside folders
         "firmware/kickstand/[!r]*.py",
