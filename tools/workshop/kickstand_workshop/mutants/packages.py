@@ -103,7 +103,7 @@ PACKAGES = {
     ),
     "common": _package(
         "tools/kickstand_tools/common/*.py",
-        "cli/test_output cli/test_blame cli/test_added_commands api/test_remedies logs/test_log_parts",
+        "cli/test_common_parts cli/test_output cli/test_blame cli/test_added_commands api/test_remedies",
     ),
     "cli": _package(
         "tools/kickstand_tools/cli/*.py",
