@@ -329,6 +329,26 @@ def test_code_at_the_prompt_gives_its_output_or_its_traceback():
     assert device.time_s == pytest.approx(begun_s + 3.0)
 
 
+def test_the_button_pulls_its_pin_low_while_it_is_pressed():
+    device = PlainDevice()
+    device.press(at_s=1.0, for_s=0.2)
+    levels = [device.levels[-1][1] if device.levels else 1]
+    for until_s in (0.9, 1.1, 1.4):
+        device.board.clock.advance(round(until_s * 1e6) - device.board.clock.now_us)
+        levels.append(device.levels[-1][1] if device.levels else 1)
+    assert levels == [1, 1, 0, 1]
+    assert {number for number, _ in device.levels} == {device.board.button_pin}
+
+
+def test_code_at_the_prompt_may_run_for_ten_seconds():
+    device = PlainDevice(b"\x04\x04>")
+    device.exec("pass")
+    begun_s = device.time_s
+    with pytest.raises(NotReached):
+        device.exec("while True: pass")
+    assert device.time_s == pytest.approx(begun_s + 10.0)
+
+
 def test_all_output_is_passed_on():
     device = PlainDevice()
     heard = bytearray()

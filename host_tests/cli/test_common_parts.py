@@ -271,10 +271,11 @@ def test_a_bar_appears_after_a_second_of_work(monkeypatch):
         shown = Terminal()
         monkeypatch.setattr(sys, "stderr", shown)
         with progress.Bar("riding", 4) as bar:
+            bar.describe("walking")
             now_s[0] += after_s
             bar.advance(1)
-            bar.describe("walking")
-        assert ("riding" in shown.getvalue()) is seen
+        assert ("walking" in shown.getvalue()) is seen
+        assert "riding" not in shown.getvalue()
 
 
 def test_lines_of_progress_come_after_their_interval(monkeypatch, capsys):

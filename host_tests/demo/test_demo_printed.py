@@ -15,7 +15,7 @@ from kickstand_tools.demo.demo import DeviceStopped, demo
 from kickstand_tools.demo.device_process import DeviceProcess
 from kickstand_tools.demo.hand_bike import HandBike
 from kickstand_tools.demo.score import Score, State
-from kickstand_tools.demo.screen import lcd_lines, lean_text, oled_lines
+from kickstand_tools.demo.screen import bike, lcd_lines, lean_text, oled_lines
 
 STATE: State = {
     "t_s": 1.0,
@@ -129,6 +129,36 @@ def test_the_device_steered_by_commands():
     assert {state["of_s"] for state in states} == {None}
     pressed = [state["t_s"] for state in states if state["pressed"]]
     assert pressed[-1] - pressed[0] < 0.3
+
+
+def test_the_scripted_rider_aligns_the_board_and_its_battery_has_12_6_volts(tmp_path):
+    """The user's program measures the battery through a divider of 11."""
+    user = tmp_path / "my.py"
+    user.write_text("import machine\nprint('battery', round(machine.ADC(26).read_u16() * 3.3 / 65535 * 11, 1))\n")
+    shown, last_s = set(), 0.0
+    with DeviceProcess("cpython", "script", 0.0, user=user) as device:
+        while last_s < 16.0 and not device.ended:
+            for state in device.ticks(10.0):
+                last_s = state["t_s"]
+                shown.add(" ".join(state["lcd"]))
+        device.send("quit")
+    assert any("Aligned!" in text for text in shown)
+    assert "battery 12.6" in device.console
+
+
+def test_the_picture_of_the_other_side_is_mirrored():
+    """A letter of braille is mirrored by exchanging its two columns of dots."""
+    swapped = {0x01: 0x08, 0x02: 0x10, 0x04: 0x20, 0x40: 0x80}
+    swapped |= {other: one for one, other in swapped.items()}
+
+    def mirrored(text):
+        dots = [ord(c) - 0x2800 if c != " " else 0 for c in reversed(text)]
+        return [sum(swapped[bit] for bit in swapped if bit & d) for d in dots]
+
+    left, right = (bike(lean, None).plain.split("\n") for lean in (-20.0, 20.0))
+    assert len(left) == len(right)
+    for one, other in zip(left, right, strict=True):
+        assert mirrored(one) == [ord(c) - 0x2800 if c != " " else 0 for c in other]
 
 
 @pytest.mark.parametrize("engine", ["CPython", "MicroPython"])
