@@ -83,7 +83,7 @@ def test_blocks_last_eight_seconds_and_name_their_log():
     assert np.trace(whole.sway, axis1=1, axis2=2).max() == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(("missing_s", "used"), [(0.0, True), (GAP_S + 0.03, False)])
+@pytest.mark.parametrize(("missing_s", "used"), [(0.0, True), (GAP_S, False)])
 def test_an_interval_needs_nine_tenths_of_its_samples(missing_s, used):
     log, _ = drive(41, seconds=60.0)
     there = (log.t_s < 20.3) | (log.t_s > 20.3 + missing_s)
@@ -132,7 +132,7 @@ def test_a_move_is_described_by_its_angle_and_its_tilt():
 
 def made_log(start_utc_s):
     count = 300
-    t_s = np.arange(count) * 0.1
+    t_s = np.linspace(0.0, 29.9, count)
     force = np.tile(MOUNT[1] + 0.5 * MOUNT[2], (count, 1))
     rates = np.tile(10.0 * MOUNT[0], (count, 1))
     utc_s = np.full(count, np.nan) if start_utc_s is None else start_utc_s + t_s
@@ -147,7 +147,7 @@ def test_signals_are_along_the_vehicles_axes_and_one_file_per_day(tmp_path):
     assert [Path(path).parent.name for path in paths] == ["day=2024-10-03", "day=2024-10-04"]
     assert {Path(path).parent.parent.name for path in paths} == {"vehicle=bus%2012"}
     assert len({Path(path).name for path in paths}) == 1 and "front%20drive%201" in paths[0]
-    first, second = (parquet.read_table(path, partitioning=None).to_pydict() for path in paths)
+    first, second = (parquet.ParquetFile(path).read().to_pydict() for path in paths)
     assert (len(first["t_s"]), len(second["t_s"])) == (100, 200)
     assert list(first) == list(signals.COLUMNS)
     assert second["t_s"][0] == pytest.approx(10.0) and second["utc_s"][0] == pytest.approx(midnight + 0.05)
@@ -159,7 +159,7 @@ def test_signals_are_along_the_vehicles_axes_and_one_file_per_day(tmp_path):
     assert schema.field("t_s").type == "double" and schema.field("up_g").type == "float"
     (path,) = signals.write(str(tmp_path), period, made_log(None), calibration)
     assert Path(path).parent.name == "day=unknown"
-    assert parquet.read_table(path, partitioning=None).to_pydict()["utc_s"][0] is None
+    assert parquet.ParquetFile(path).read().to_pydict()["utc_s"][0] is None
 
 
 def test_tables_are_written_in_groups_with_their_units(tmp_path, monkeypatch):
