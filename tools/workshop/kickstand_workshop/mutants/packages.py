@@ -107,8 +107,8 @@ PACKAGES = {
     ),
     "cli": _package(
         "tools/kickstand_tools/cli/*.py",
-        "cli/test_cli_usage cli/test_blame cli/test_added_commands calibration/test_cli_calibration_file"
-        " logs/test_cli_logs rides/test_cli_pull",
+        "cli/test_printed_lines cli/test_cli_usage cli/test_blame cli/test_added_commands"
+        " calibration/test_cli_calibration_file",
     ),
     "simulated_board": _package(
         "tools/kickstand_tools/simulated_board/*.py tools/kickstand_tools/simulated_board/fakes/*.py",
