@@ -1,5 +1,6 @@
 """The lines that the commands print for known results. The computations are replaced, because other tests test them."""
 
+import contextlib
 import dataclasses
 import json
 from pathlib import Path
@@ -371,3 +372,63 @@ def test_a_refused_question_changes_nothing_on_the_board(monkeypatch):
         else:
             with pytest.raises(InputError, match="nothing was changed"):
                 board._agree(["a"])
+
+
+def test_status_prints_what_the_board_says(monkeypatch):
+    monkeypatch.setattr(board, "status", lambda port, wirings: f"{port} {wirings}")
+    assert command.works("status").out == "None False\n"
+    assert command.works("status", "--port", "COM3", "--wirings").out == "COM3 True\n"
+
+
+@pytest.mark.parametrize(("count", "name"), [(1, "fit_procedure"), (6, "fit_six_positions")])
+def test_six_positions_are_written(count, name, tmp_path, monkeypatch):
+    monkeypatch.setattr(calibrate, name, lambda _: six_positions())
+    poses = [command.still(tmp_path / f"{k}.csv", (0, 1, 0), seconds=1.0) for k in range(count)]
+    done = command.works("calibrate", "six", *poses, "--out", tmp_path / "CAL.json")
+    assert done.out.endswith(f"written: {tmp_path / 'CAL.json'}\n")
+    assert json.loads((tmp_path / "CAL.json").read_text())["accel_slope"] == [1.01, 0.99, 1.0]
+
+
+@pytest.mark.parametrize("verb", ["six", "two", "drive", "ride"])
+def test_a_calibration_never_overwrites_its_log(verb, tmp_path):
+    """The log is refused as output before it is read."""
+    log, other = (command.still(tmp_path / name, (0, 1, 0), seconds=1.0) for name in ("a.csv", "b.csv"))
+    given = [other, log] if verb == "two" else [log]
+    command.refused(tmp_path, "calibrate", verb, *given, "--out", log, words="a.csv is also an input")
+
+
+def test_a_ride_is_aligned_as_its_phone_was_mounted(tmp_path, monkeypatch):
+    log = command.still(tmp_path / "a.csv", (0, 1, 0), seconds=1.0)
+    asked = []
+
+    def fit(_log, phone, _progress):
+        asked.append(phone)
+        return dataclasses.replace(RIDDEN, notices=[Plain("the speed is late")])
+
+    monkeypatch.setattr(calibrate, "fit_ride", fit)
+    done = command.works("calibrate", "ride", log, "--phone", "flat", "--out", tmp_path / "CAL.json")
+    assert asked == ["flat"] and done.err == f"warning: {log}: the speed is late\n"
+    assert (tmp_path / "CAL.json").exists()
+
+
+def test_record_shows_the_last_reading_and_ends_with_its_notes(tmp_path, monkeypatch):
+    shown = []
+
+    @contextlib.contextmanager
+    def line():
+        yield shown.append
+
+    def record(port, out, begin, reading):
+        begin("COM3")
+        reading(READING)
+        calibration = out.with_suffix(".cal.json")
+        return SimpleNamespace(log=out, seconds=12.34, readings=600, calibration=calibration, notes=["a block is lost"])
+
+    monkeypatch.setattr(board, "live_line", line)
+    monkeypatch.setattr(board, "record", record)
+    done = command.works("record", "--out", "a.csv")
+    assert done.out == (
+        "recording from COM3: press Ctrl-C to stop\nwritten: a.csv, 12.3 s, 600 readings, and a.cal.json\n"
+    )
+    assert done.err == "warning: a block is lost\n"
+    assert shown == [board._live_text(READING)]

@@ -2,11 +2,12 @@
 
 import errno
 import gc
+import importlib
 import sys
 import types
 
 import pytest
-from kickstand_tools.simulated_board.fakes import framebuf
+from kickstand_tools.simulated_board.fakes import chips, framebuf
 from kickstand_tools.simulated_board.fakes.fake_machine import SPI, Pin
 from support.board_access import on_board
 
@@ -228,3 +229,100 @@ def test_in_a_small_heap_of_an_esp32_garbage_is_collected_more_often(free, turns
     assert port.turns_to_collect(50) == 50
     monkeypatch.setattr(port, "IS_ESP32", True)
     assert port.turns_to_collect(50) == turns
+
+
+def fresh_port(monkeypatch, machine):
+    """Return the module of the differences between boards, as a board of this kind imports it."""
+    monkeypatch.setitem(chips.MACHINES, "tested", machine)
+    found = []
+
+    def program(board):
+        from kickstand.board import port
+
+        found.append(importlib.reload(port))
+
+    try:
+        assert on_board(program, machine="tested")[0] == "returned"
+        return types.SimpleNamespace(**vars(found[0]))
+    finally:
+        assert on_board(program)[0] == "returned"  # the other tests' board is a Pico
+
+
+CLASSIC = (1, 3, 6, 7, 8, 9, 10, 11)
+
+
+@pytest.mark.parametrize(
+    ("chip", "taken"),
+    [
+        ("ESP32", CLASSIC),
+        ("ESP32-UNICORE", CLASSIC),
+        ("ESP32-PICO-D4", CLASSIC),
+        ("ESP32-D2WD", CLASSIC),
+        ("ESP32-S2", (19, 20)),
+        ("ESP32S3", (19, 20)),
+        ("ESP32C3", (18, 19)),
+        ("ESP32C6", (12, 13)),
+        ("ESP32H2", (26, 27)),
+        ("ESP32P4", ()),
+    ],
+)
+def test_pins_that_the_chip_needs_are_taken(chip, taken, monkeypatch):
+    """An output on them would stop the board. Only a classic chip has pins without outputs."""
+    port = fresh_port(monkeypatch, f"Some board with {chip}")
+    assert port.IS_ESP32 and port.TAKEN_PINS == taken
+    assert port.INPUT_PINS == ((34, 35, 36, 37, 38, 39) if taken == CLASSIC else ())
+    assert port.SENSOR_PINS == port.LCD_PINS == port.GPS_PINS == (None, None)  # an unknown board has no usual pins
+    assert port.BUTTON_PIN is port.WHEEL_PIN is None
+
+
+@pytest.mark.parametrize(
+    ("machine", "sensor", "gps", "button"),
+    [
+        ("Generic ESP32 module with ESP32", (21, 22), (17, 16), 4),
+        ("Generic ESP32 module with SPIRAM with ESP32", (21, 22), (None, None), 4),
+        ("Raspberry Pi Pico with RP2040", (4, 5), (8, 9), 15),
+        ("Another board with RP2040", (None, None), (None, None), None),
+    ],
+)
+def test_known_boards_have_usual_pins(machine, sensor, gps, button, monkeypatch):
+    port = fresh_port(monkeypatch, machine)
+    assert (port.SENSOR_PINS, port.GPS_PINS, port.BUTTON_PIN) == (sensor, gps, button)
+
+
+@pytest.mark.parametrize(
+    ("entries", "opened"),
+    [
+        ([("lib", 0x4000, 0, 0), ("sd", 0x4000, 0)], 0),
+        ([("sd", 0x4000, 0, 0), ("other", 0x4000, 0)], 1),  # a folder in flash, and another mounted file system
+    ],
+)
+def test_a_card_is_mounted_once(entries, opened, monkeypatch):
+    calls = []
+
+    def program(board):
+        from kickstand.board import port, sd_card
+
+        there = types.SimpleNamespace(ilistdir=lambda _: entries, mount=lambda *given: calls.append(given))
+        monkeypatch.setattr(sd_card, "os", there)
+        monkeypatch.setattr(port, "open_sd_card", lambda *_: "card")
+        pins = types.SimpleNamespace(SD_SPI=0, SD_SCK=18, SD_MOSI=19, SD_MISO=16, SD_CS=17)
+        assert sd_card.mount(pins) == "/sd"
+
+    assert on_board(program)[0] == "returned"
+    assert calls == [("card", "/sd")] * opened
+
+
+def test_the_usual_backpack_needs_no_setting():
+    def program(board):
+        from kickstand.board.hd44780 import Lcd
+        from kickstand.board.i2c_bus import open_i2c
+
+        driver = Lcd()
+        driver.show("a", "b")
+        driver.begin(open_i2c(1, 6, 7, 100_000), 0x27, 100_000, True)
+        while driver.busy:
+            driver.tick(board.clock.now_us // 1000)
+            board.clock.advance(10_000)
+        assert [line.rstrip() for line in board.lcd.text()] == ["a", "b"] and board.lcd.backlight
+
+    assert on_board(program, 10.0)[0] == "returned"

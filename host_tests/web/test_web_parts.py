@@ -202,6 +202,44 @@ def test_the_sites_home_is_that_of_the_package(monkeypatch):
     assert site.home() == ""
 
 
+def test_the_site_has_every_page_filled_in(monkeypatch):
+    """Packages, documents and the sample ride are replaced, because making them takes long."""
+    packages = {"esptool/LICENSE": b"licence", "plotly/plotly.min.js": b"plot()", "numpy/pkg/numpy.tar.gz": b"conda"}
+    monkeypatch.setattr(npm_packages, "find", lambda: dict(packages))
+    monkeypatch.setattr(site.documents, "document_files", lambda home: {"docs/a.html": home.encode()})
+    monkeypatch.setattr(site.sample_ride, "sample_ride", lambda: {"ride.csv.gz": b"a ride"})
+    monkeypatch.setattr(site.sample_ride, "preview", lambda: "<svg/>")
+    for name in ("install_archive", "rides_archive", "firmware"):
+        monkeypatch.setattr(archives, name, lambda name=name: name.encode())
+    monkeypatch.setattr(archives, "numpy_archive", lambda conda: (conda + b" zipped", b"its licence"))
+    monkeypatch.setattr(site, "home", lambda: "https://an.example")
+    made = site.site_files()
+    pages = {name for name in made if name.endswith(".html")}
+    assert {"index.html", "live.html", "install.html", "rides.html"} <= pages
+    for name in (*pages, "style.css"):
+        assert b"{{" not in made[name] and b"{%" not in made[name], name
+    assert b'href="https://an.example"' in made["index.html"] and made["docs/a.html"] == b"https://an.example"
+    assert made["sample/ride.csv.gz"] == b"a ride"
+    assert (made["numpy/numpy.zip"], made["numpy/licence.txt"]) == (b"conda zipped", b"its licence")
+    assert made["esptool/licence.txt"] == b"licence" and not set(packages) - {"plotly/plotly.min.js"} & set(made)
+    assert (made["install.zip"], made["firmware.zip"], made["rides.zip"]) == (
+        b"install_archive",
+        b"firmware",
+        b"rides_archive",
+    )
+    sizes = json.loads(made["sizes.json"])
+    assert sizes["sample/ride.csv.gz"] == 6 and "index.html" not in sizes
+    assert set(json.loads(made["python.json"])) == set(site.python_files())
+    worker = made["service_worker.js"].decode()
+    kept = json.loads(worker.partition("const FILES = ")[2].partition(";")[0])
+    later = {name for name in made if name.startswith((*site.LATER, "docs/"))}
+    assert set(kept) == {"./", *made} - {"service_worker.js", "index.html"} - later
+    made_later = site.site_files()
+    assert made_later["service_worker.js"] == made["service_worker.js"]
+    monkeypatch.setattr(site, "home", lambda: "")
+    assert site.site_files()["service_worker.js"] != made["service_worker.js"]  # another version of the site
+
+
 def test_the_tables_of_wiring_name_each_wire():
     tables = site.wiring_tables()
     assert set(tables) == {"pico", "esp32"}
@@ -239,6 +277,7 @@ def test_the_page_gets_a_record_every_20_ms(board):
     assert found[-1]["phase"] == "kickstand" and found[-1]["lean_deg"] == pytest.approx(-12.0, abs=0.1)
     assert found[-1]["powered"] and found[-1]["speed_mps"] == 0.0
     assert last(found, "meter") == [None, None]  # not aligned yet
+    assert "display" in found[1]  # the dark display is sent too
     assert sum("display" in tick for tick in found) < 10  # only changes are sent
     shown = last(found, "display")
     assert shown["lit"] and len(shown["codes"]) == 2 and len(shown["cgram"]) == 64 and shown["shown_deg"] is None
