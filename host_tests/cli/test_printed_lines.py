@@ -17,9 +17,11 @@ from kickstand_tools.calibration.file import CalibrationFile, write_calibration
 from kickstand_tools.calibration.poses import SixPositions, TwoPositions
 from kickstand_tools.cli import board, calibrate, common, ride
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.common.messages import Plain
+from kickstand_tools.common.messages import Plain, WrongAxes
 from kickstand_tools.estimation.alignment import RideFit
+from kickstand_tools.imports.recording import Taken
 from kickstand_tools.joining.match import Match
+from kickstand_tools.logs.log import Stretch
 from kickstand_tools.rides.pull import PulledRide, PullResult
 from kickstand_tools.rides.stream import LiveReading
 from support import command
@@ -45,6 +47,11 @@ READING = LiveReading(
     aligned=True, car=False, moments=[(0.0, 1.0, 0.1, None), (0.1, 2.0, 0.2, None), (0.2, -30.0, 0.25, None)],
     max_left_deg=0.0, max_right_deg=0.0, max_accel_g=0.0, max_brake_g=0.0, rate_hz=49.6, seconds=65.0,
 )  # fmt: skip
+
+
+@dataclasses.dataclass(frozen=True)
+class MirroredAxes(WrongAxes):
+    text = "the axes are mirrored"
 
 
 def pose(name, samples=300) -> Any:
@@ -432,3 +439,153 @@ def test_record_shows_the_last_reading_and_ends_with_its_notes(tmp_path, monkeyp
     )
     assert done.err == "warning: a block is lost\n"
     assert shown == [board._live_text(READING)]
+
+
+@pytest.fixture
+def log(tmp_path):
+    """Return a log with its calibration beside it."""
+    command.write_cal(tmp_path / "a.cal.json")
+    return command.still(tmp_path / "a.csv", (0, 1, 0), seconds=1.0)
+
+
+def test_two_recordings_are_compared_and_drawn_on_request(log, tmp_path, monkeypatch):
+    other = command.still(tmp_path / "b.csv", (0, 1, 0), seconds=1.0)
+    cal = command.write_cal(tmp_path / "B.json")
+    found = SimpleNamespace(notices={"a": [Plain("odd")], "b": [Plain("late")]}, as_data=lambda: {"differ_deg": 1.5})
+    drawn = []
+    monkeypatch.setattr(ride.agreement, "compare_rides", lambda *_: found)
+    monkeypatch.setattr(ride.agreement, "words", lambda _: ["they differ by 1.5 degrees"])
+    monkeypatch.setattr(ride.agreement, "check_picture", lambda _: drawn.append("checked"))
+    monkeypatch.setattr(ride.agreement, "draw", lambda path, _: drawn.append("drawn") or path.write_text(""))
+    given = "compare", log, other, "--calibration-b", cal
+    done = command.works(*given)
+    assert (done.out, drawn) == ("they differ by 1.5 degrees\n", [])
+    assert done.err == f"warning: {log}: odd\nwarning: {other}: late\n"
+    done = command.works(*given, "--plot", tmp_path / "p.png")
+    assert done.out == f"they differ by 1.5 degrees\nwritten: {tmp_path / 'p.png'}\n"
+    assert drawn == ["checked", "drawn"] and (tmp_path / "p.png").exists()
+    assert command.works(*given, "--json").out == '{"differ_deg": 1.5}\n'
+    command.refused(tmp_path, *given, "--plot", log, words="a.csv is also an input")
+
+
+@pytest.mark.parametrize(
+    ("verb", "more", "name", "result", "words"),
+    [
+        ("smooth", [], "smooth_to_csv", (300, [Plain("odd")]), "300 samples"),
+        ("replay", [], "replay_to_csv", (200, [Plain("odd")]), "200 samples"),
+        ("export", ["--to", "gpx"], "export", 70, "70 rows"),
+    ],
+)
+def test_a_written_file_is_named_with_its_size(verb, more, name, result, words, log, tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(ride, name, lambda *given: asked.append(given) or result)
+    monkeypatch.setattr(ride, "open_ride", lambda *given, **named: asked.append((given, named)) or "opened")
+    out = tmp_path / "out.file"
+    done = command.works(verb, log, *more, "--out", out)
+    assert done.out == f"written: {out}, {words}\n"
+    assert ("odd" in done.err) == (verb != "export")
+    command.refused(tmp_path, verb, log, *more, "--out", log, words="is also an input")
+    command.refused(tmp_path, verb, log, *more, "--out", tmp_path / "a.cal.json", words="is also an input")
+    if verb == "export":
+        assert asked[0][1] == {"smoothed": True}
+        command.works(verb, log, *more, "--live", "--out", out)
+        assert asked[2][1] == {"smoothed": False}
+
+
+@pytest.mark.parametrize("given", [(), ("--from", 1), ("--to", 2), ("--from", 1, "--to", 2)])
+def test_only_the_named_stretch_is_replayed(given, log, tmp_path, monkeypatch):
+    seen = []
+    monkeypatch.setattr(ride, "replay_to_csv", lambda source, *_: seen.append(source) or (1, []))
+    command.works("replay", log, *given, "--out", tmp_path / "out.csv")
+    if given:
+        options = dict(zip(given[::2], given[1::2], strict=True))
+        assert seen == [Stretch(log, options.get("--from"), options.get("--to"))]
+    else:
+        assert seen == [log]
+
+
+@pytest.mark.parametrize("found", [True, False])
+def test_a_video_says_where_it_begins_if_that_was_found(found, log, tmp_path, monkeypatch):
+    asked = []
+    made = SimpleNamespace(
+        notices=[Plain("odd")], correlation=0.876 if found else None, offset_s=12.345, pictures=300, begin_s=1.0,
+        end_s=11.0, fps=29.97,
+    )  # fmt: skip
+    monkeypatch.setattr(ride, "overlay", lambda *given, **named: asked.append((given, named)) or made)
+    out = tmp_path / "o.mov"
+    done = command.works("overlay", log, "--fps", 60, "--mph", "--offset", "-1:00", "--out", out)
+    assert done.out.endswith(f"written: {out}, 300 frames, 10.0 s, 29.97 per second\n")
+    assert ("--offset 12.35" in done.out or "--offset 12.34" in done.out) is found
+    assert done.err == f"warning: {log}: odd\n"
+    ((_, named),) = asked
+    assert named["fps"] == 60.0 and named["mph"] and named["offset_s"] == -60.0 and not named["live"]
+
+
+def test_a_joined_ride_names_the_next_command(log, tmp_path, monkeypatch):
+    track = tmp_path / "t.gpx"
+    track.write_text("")
+    match = Match(1.79e9, 0.0, 0.05, 0.9, 600.0)
+    joined = SimpleNamespace(match=match, track=SimpleNamespace(utc_s=np.array([1.79e9])), own_speed=False, notices=[])
+    for name, result in (("read_track", None), ("join_track", joined), ("write_joined", 55)):
+        monkeypatch.setattr(ride, name, lambda *_, result=result: result)
+    out = tmp_path / "out.csv"
+    said = command.works("join", log, track, "--out", out).out
+    assert f"written: {out}, 55 positions\n" in said
+    assert said.endswith(f"next: kickstand report {out} --calibration {tmp_path / 'a.cal.json'}\n")
+    command.write_cal(tmp_path / "out.cal.json")
+    assert "next:" not in command.works("join", log, track, "--out", out).out
+    for name in ("a.csv", "t.gpx"):
+        command.refused(tmp_path, "join", log, track, "--out", tmp_path / name, words="is also an input")
+
+
+def imported(shortfalls=(), notices=(), gaps_s=(), vehicle_axes=False):
+    taken = [
+        Taken("acceleration", "a.csv", "g", 99.6, "x, y, z", "a guess"),
+        Taken("speed", "b.csv", "m/s", 0.96, "", ""),
+    ]
+    return SimpleNamespace(
+        app="phyphox", log=SimpleNamespace(t_s=np.linspace(0.0, 12.0, 5)), taken=taken, notices=list(notices),
+        shortfalls=list(shortfalls), gaps_s=np.array(gaps_s), rate_hz=99.6, vehicle_axes=vehicle_axes,
+    )  # fmt: skip
+
+
+def test_an_import_is_described_with_its_next_steps(tmp_path, monkeypatch):
+    source, out = tmp_path / "x.csv", tmp_path / "out.csv"
+    source.write_text("")
+    found = [imported()]
+    asked = []
+    monkeypatch.setattr(ride, "import_recording", lambda *given: asked.append(given) or found[0])
+    monkeypatch.setattr(ride, "write_imported", lambda *_: None)
+    done = command.works("import", source, "--columns", "t=a", "--units", "a=g", "--from", 1, "--out", out)
+    assert asked == [(source, {"t": "a"}, {"a": "g"}, 1.0, None)]
+    assert "phyphox" in done.out and "100 Hz" in done.out and "0.96 Hz" in done.out
+    assert "acceleration: a guess\n" in done.out and "\nspeed: " not in done.out
+    assert f"written: {out}, 5 samples in 12.0 s, 100 per second\n" in done.out
+    assert f"next: kickstand calibrate ride {out} --out {tmp_path / 'out.cal.json'}\n" in done.out
+    assert "x is left" not in done.out
+    found[0] = imported(gaps_s=[1.5], vehicle_axes=True, notices=[Plain("odd")])
+    done = command.works("import", source, "--out", out)
+    assert asked[-1][1] is None
+    assert "100 per second, 1 gap of 1.5 s in all\n" in done.out and "x is left, y up, z forward" in done.out
+    assert done.err == f"warning: {source}: odd\n"
+    found[0] = imported(gaps_s=[1.0, 2.0], shortfalls=[Plain("too short")])
+    done = command.works("import", source, "--out", out)
+    assert "2 gaps of 3.0 s in all" in done.out and "next:" not in done.out
+    assert done.err == f"warning: {source}: too short\n"
+    found[0] = imported(notices=[MirroredAxes()])
+    assert "next:" not in command.works("import", source, "--out", out).out
+    command.write_cal(tmp_path / "out.cal.json")
+    done = command.works("import", source, "--out", out)
+    assert f"{tmp_path / 'out.cal.json'} belongs to an earlier ride.\n" in done.out and "next:" not in done.out
+
+
+@pytest.mark.parametrize("as_json", [True, False])
+def test_a_report_has_the_notices_of_its_ride(as_json, log, monkeypatch):
+    seen = SimpleNamespace(notices=[Plain("odd")])
+    monkeypatch.setattr(ride, "open_ride", lambda *_, **__: "opened")
+    monkeypatch.setattr(ride, "overview", lambda *_: seen)
+    monkeypatch.setattr(ride, "page", lambda _: "the report")
+    monkeypatch.setattr(ride, "as_data", lambda _: {"max_deg": 40})
+    done = command.works("report", log, *(["--json"] if as_json else []))
+    assert done.out == ('{"max_deg": 40}\n' if as_json else "the report\n")
+    assert done.err == f"warning: {log}: odd\n"
