@@ -57,7 +57,7 @@ PACKAGES = {
     ),
     "firmware": _package(  # the modules outside folders
         "firmware/kickstand/[!r]*.py",
-        "device/test_boards device/test_who_is_there device/test_start device/test_user_code",
+        "device/test_settings_limits device/test_boards device/test_who_is_there device/test_user_code",
     ),
     "published": _package("tools/kickstand_tools/calibration/published.py", "drive_alignment/test_published"),
     "aligning": _package(
