@@ -135,6 +135,13 @@ def test_an_absent_or_full_device_does_not_acknowledge():
     assert device.written == [1, 2]
 
 
+def test_the_chip_reads_the_levels_that_it_drives():
+    pins = Pins()
+    for sda, scl in ((0, 1), (0, 0), (1, 0), (1, 1)):
+        pins.drive(sda=sda, scl=scl)
+        assert (pins.sda_in, pins.scl_in) == (sda, scl)
+
+
 def test_clock_pulses_free_a_device_that_holds_the_wire():
     pins = Pins(Memory())
     pins.bus.hang(3)
@@ -484,6 +491,20 @@ def test_an_absent_device_aborts_after_its_address(chip):
     assert controller.read_uint32(RAW_INTERRUPTS) & TX_EMPTY
     passed_bits(chip, controller, lambda raw: raw & STOP_SEEN)
     assert not bus.open
+
+
+def test_an_enabled_controller_continues_its_transfer(chip):
+    """Enabling it again changes nothing, and other registers may be written during a transfer."""
+    device = Memory(sends=b"\x42")
+    controller, bus = i2c(chip, device)
+    controller.write_uint32(DATA, 1 << 9 | 1 << 8)
+    while not controller.reading():
+        controller.read_uint32(RAW_INTERRUPTS)
+    for register, value in ((0x6C, 1), (0x38, 0)):
+        controller.write_uint32(register, value)
+        assert bus.open and controller.reading()
+    passed_bits(chip, controller, lambda raw: raw & STOP_SEEN)
+    assert controller.read_uint32(DATA) & 0xFF == 0x42
 
 
 def test_disabled_controller_frees_wires_but_a_reset_does_not(chip):
