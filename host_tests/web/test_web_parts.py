@@ -5,6 +5,7 @@ import http.client
 import io
 import json
 import os
+import sys
 import tarfile
 import threading
 import zipfile
@@ -138,6 +139,12 @@ def test_each_architecture_gets_its_machine_code(monkeypatch):
 
     monkeypatch.setattr(bytecode, "cross_compiled", lacking)
     assert archives._compiled() == {}
+
+
+def test_missing_libraries_of_the_page_rides_are_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "fitdecode", None)
+    with pytest.raises(InputError, match=r"needs fitdecode and gpxpy: .*web\]"):
+        archives.rides_archive()
 
 
 @pytest.mark.parametrize(
