@@ -3,6 +3,7 @@ the files given to the page Rides."""
 
 import http.client
 import io
+import itertools
 import json
 import os
 import sys
@@ -17,7 +18,7 @@ from kickstand_tools.common.errors import InputError
 from kickstand_tools.deploy import bytecode
 from kickstand_tools.deploy.firmware_files import firmware_files
 from kickstand_tools.web import archives, npm_packages, rides_given, serve, site
-from kickstand_tools.web.device import STATE, PageDevice, display
+from kickstand_tools.web.device import STATE, WHOLE_TICKS, PageDevice, display
 from support.recordings import analysis_rides, app_exports
 
 FILES = {"index.html": b"home", "a b.mjs": b"code", "x/y.unknown": b"?", "empty.txt": b""}
@@ -287,8 +288,21 @@ def test_the_page_gets_a_record_every_20_ms(board):
     assert "display" in found[1]  # the dark display is sent too
     assert sum("display" in tick for tick in found) < 10  # only changes are sent
     shown = last(found, "display")
-    assert shown["lit"] and len(shown["codes"]) == 2 and len(shown["cgram"]) == 64 and shown["shown_deg"] is None
+    assert shown["codes"][0][:4] == list(b"Raw ") and found[1]["display"]["codes"] == [[0x20] * 16] * 2
+    assert shown["lit"] and len(shown["cgram"]) == 64 and shown["shown_deg"] is None
     assert json.loads(board.take()) == []
+
+
+def test_a_display_that_keeps_changing_is_sent_now_and_then(board):
+    """Usually a display is sent only if it has not changed for 20 ms."""
+
+    def change():
+        board.board.lcd.changes += 1
+
+    board.board.every(0.01, change)
+    found = ticks(board, 1.0)
+    sent = [k for k, tick in enumerate(found) if "display" in tick]
+    assert len(sent) >= 3 and max(b - a for a, b in itertools.pairwise(sent)) <= WHOLE_TICKS + 1 < 12
 
 
 def test_a_press_aligns_and_the_bike_rides_on(board):
