@@ -8,7 +8,9 @@ import pytest
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.fakes import fake_bluetooth, fake_machine
 from kickstand_tools.simulated_board.fakes.fake_machine import ADC, I2C, SPI, UART, Pin, SoftI2C, Timer
+from kickstand_tools.simulated_board.gps import Gps, sentence
 from kickstand_tools.simulated_board.oled import Oled
+from kickstand_tools.simulated_board.other_devices import Ds3231, Registers
 from kickstand_tools.simulated_board.radio import EVENT_S, ROOM, Radio
 from support.board_access import firmware, on_board, raised
 
@@ -376,3 +378,76 @@ def test_pins_are_those_of_the_controllers(board):
     uart.write("a\n")
     uart.write(b"b")
     assert board.sent == b"a\nb" and uart.any() == 0 and uart.read(5) is None
+
+
+def test_a_sentence_ends_with_its_check_sum():
+    """This is a real receiver's sentence."""
+    body = "GPGGA,092750.000,5321.6802,N,00630.3372,W,1,8,1.03,61.7,M,55.2,M,,"
+    assert sentence(body) == f"${body}*76\r\n"
+
+
+def heard(seconds, **kind):
+    """Return [(time of its last byte in s, sentence)] of a receiver."""
+    clock, found, text = Clock(), [], []
+    gps = Gps(clock, lambda t_s: 10.0 * t_s, **kind)
+
+    def receive(data):
+        text.append(data)
+        if b"\n" in data:
+            *whole, rest = b"".join(text).decode("ascii", "replace").split("\r\n")
+            found.extend((clock.now_us / 1e6, one) for one in whole)
+            text[:] = [rest.encode()]
+
+    gps.connect(receive)
+    clock.advance(round(seconds * 1e6))
+    return found
+
+
+def test_a_receiver_sends_each_fix_late_and_byte_by_byte():
+    (time_s, rmc), (_, gsa), (last_s, vtg) = heard(2.0, place=lambda t_s: (-48.5, -11.25))
+    assert rmc.startswith("$GPRMC,115941.00,A,4830.00000,S,01115.00000,W,19.438,84.4,211126,,,A*")
+    assert gsa.startswith("$GPGSA,A,3,") and vtg.startswith("$GPVTG,84.4,T,,M,19.438,N,36.000,K,A*")
+    size = sum(len(one) + 2 for one in (rmc, gsa, vtg))
+    assert last_s == pytest.approx(1.0 + 0.2 + size * 10 / 9600, abs=0.001)
+    assert 1.2 < time_s < last_s
+    faster = heard(1.5, hz=5, latency_s=0.05, baud=115_200, kinds=("RMC",), talker="GN")
+    first = next(one for _, one in faster if "RMC" in one)
+    assert first.startswith("$GNRMC,115940.20,A,4807.03800,N,01131.00000,E,3.888")
+    assert faster[0][0] == pytest.approx(0.25, abs=0.02) and not any("VTG" in one for _, one in faster)
+    assert len(faster) in (12, 14)
+
+
+def test_a_receiver_may_have_no_fix_or_repeat_itself():
+    faults = [["void", 2.0, 3.0], ["stuck", 4.0, 5.0]]
+    found = [one for _, one in heard(6.6, kinds=("RMC",), faults=faults) if "RMC" in one]
+    assert [one.split(",")[2] for one in found] == ["A", "V", "A", "A", "A", "A"]
+    assert "V,,,,,,,211126,,,N*" in found[1]
+    assert found[3] == found[2] and found[4] != found[3]
+    unplugged = heard(4.6, faults=[["unplugged", 1.9, 2.9]])
+    assert {int(time_s) for time_s, _ in unplugged} == {1, 3, 4}
+    garbled = heard(3.6, kinds=("RMC",), faults=[["garbled", 2.0, 3.0]])
+    whole = [text == sentence(text[1:-3]).strip() for _, text in garbled]
+    assert whole[:2] == [True, True] and not all(whole)
+
+
+def test_other_devices_keep_what_is_written():
+    device = Registers(0x50, {0: 1, 1: 2, 2: 3}, writable=(1,))
+    device.start(0x50, False)
+    for value in (1, 9, 9):
+        assert device.write_byte(value)
+    device.start(0x50, False)
+    device.write_byte(0)
+    device.start(0x50, True)
+    assert [device.read_byte() for _ in range(3)] == [1, 9, 3]
+    assert device.written == [1, 2]
+
+
+def test_a_clock_at_the_sensors_address_counts_in_decimal_digits():
+    clock = Clock()
+    device = Ds3231(clock)
+    for advance_s, time in ((0, [0x15, 0x40, 0x11]), (50, [0x05, 0x41, 0x11]), (50_000, [0x25, 0x34, 0x01])):
+        clock.advance(advance_s * 1_000_000)
+        device.start(0x68, False)
+        device.write_byte(0)
+        device.start(0x68, True)
+        assert [device.read_byte() for _ in range(3)] == time
