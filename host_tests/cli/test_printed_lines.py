@@ -244,7 +244,8 @@ def test_flash_says_what_it_copied_and_kept(installed, tmp_path, monkeypatch):
         board="Pico", port="COM3", config=tmp_path / "config.py", others=["main.py as main_old.py"], unused=["SIDE"],
         why_sources="no mpy-cross", installed=files,
     )  # fmt: skip
-    monkeypatch.setattr(board, "flash", lambda *_, **__: done)
+    asked = []
+    monkeypatch.setattr(board, "flash", lambda *given, **named: asked.append((*given[:2], named["agree"])) or done)
     monkeypatch.setattr(board.firmware_path, "installed", lambda: installed)
     monkeypatch.setattr(board.firmware_path, "directory", lambda: tmp_path)
     said = command.works("flash").out.splitlines()
@@ -255,10 +256,15 @@ def test_flash_says_what_it_copied_and_kept(installed, tmp_path, monkeypatch):
     assert "removed: x.py is no longer part of the firmware" in said
     assert said[-2] == "copied 2 files, 12.3 kB, and verified them; 1 left as they were"
     assert any("--config would replace it" in line for line in said)
+    files.removed = [f"/{k}.py" for k in range(5)]
+    assert "removed: 4.py is no longer part of the firmware" in command.works("flash").out.splitlines()
     files.removed, files.config_differs = [f"/{k}.py" for k in range(6)], False
     said = command.works("flash").out.splitlines()
     assert "removed: 6 files that are no longer part of the firmware" in said
     assert not any("--config" in line and "kept" in line for line in said)
+    assert set(asked) == {(None, False, board._agree)}
+    command.works("flash", "--yes", "--config", "--port", "COM3")
+    assert asked[-1] == ("COM3", True, None)
 
 
 def test_check_ends_with_status_1_if_a_figure_is_beyond_its_limit(monkeypatch):
