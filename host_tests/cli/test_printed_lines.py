@@ -181,7 +181,7 @@ def test_a_ride_is_described():
     assert other[3] == "phone: mounted as --phone says, within 4 degrees"
 
 
-def test_a_drive_prints_its_events_and_the_remarks_about_its_logs(tmp_path, monkeypatch):
+def test_a_drive_prints_its_events_and_remarks_about_its_logs(tmp_path, monkeypatch):
     cal = command.write_cal(tmp_path / "CAL.json")
     logs = [command.still(tmp_path / name, (0, 1, 0)) for name in ("a.csv", "b.csv")]
     asked = []
@@ -267,7 +267,7 @@ def test_flash_says_what_it_copied_and_kept(installed, tmp_path, monkeypatch):
     assert asked[-1] == ("COM3", True, None)
 
 
-def test_check_ends_with_status_1_if_a_figure_is_beyond_its_limit(monkeypatch):
+def test_check_ends_with_status_1_if_a_figure_is_at_fault(monkeypatch):
     for faults, status in (([], 0), (["x"], 1)):
         monkeypatch.setattr(board, "check", lambda *_, faults=faults: SimpleNamespace(findings=[], faults=faults))
         monkeypatch.setattr(board, "verdict", lambda _: "the verdict")
@@ -322,7 +322,7 @@ def test_replay_warns_of_a_calibration_that_is_not_aligned(tmp_path, monkeypatch
 
 @pytest.mark.parametrize("beside", [True, False])
 @pytest.mark.parametrize("given", [True, False])
-def test_an_export_is_aligned_by_its_bends_only_without_a_calibration(beside, given, tmp_path, monkeypatch):
+def test_only_an_export_without_calibration_is_aligned_by_bends(beside, given, tmp_path, monkeypatch):
     source = tmp_path / "export.csv"
     source.write_text("not a log")
     found = SimpleNamespace(app="phyphox", log=SimpleNamespace(t_s=np.zeros(5)), rate_hz=99.6)

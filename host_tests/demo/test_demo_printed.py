@@ -78,7 +78,7 @@ def test_an_oled_is_printed_as_its_pixels(monkeypatch, capsys):
     assert lines[1:18] == [*["\u28ff" * 64] * 16, "The lean was not shown yet."]
 
 
-def test_the_boards_console_is_printed_only_for_the_users_program(monkeypatch, capsys, tmp_path):
+def test_the_console_is_printed_only_for_a_users_program(monkeypatch, capsys, tmp_path):
     user = tmp_path / "my.py"
     user.write_text("print('from my code')\n")
     monkeypatch.setattr(user_program, "check", lambda *_: None)
@@ -131,7 +131,7 @@ def test_the_device_steered_by_commands():
     assert pressed[-1] - pressed[0] < 0.3
 
 
-def test_the_scripted_rider_aligns_the_board_and_its_battery_has_12_6_volts(tmp_path):
+def test_the_scripted_rider_aligns_a_board_with_12_6_volts(tmp_path):
     """The user's program measures the battery through a divider of 11."""
     user = tmp_path / "my.py"
     user.write_text("import machine\nprint('battery', round(machine.ADC(26).read_u16() * 3.3 / 65535 * 11, 1))\n")

@@ -42,7 +42,7 @@ def test_a_frame_keeps_up_and_turns_forward_into_the_level():
 
 
 @pytest.mark.parametrize(("left_g", "bends", "ratio"), [(0.9, 1.0, 0.9), (-1.0, 1.0, -1.0), (1.0, 0.04, 0.0)])
-def test_handedness_compares_the_force_in_bends_with_its_expected_side(left_g, bends, ratio):
+def test_handedness_divides_measured_by_computed_force(left_g, bends, ratio):
     assert evidence.handedness(coefficients(left_g), np.array([1.0, bends])) == pytest.approx(ratio)
 
 
@@ -54,7 +54,7 @@ def test_direction_of_sway_counts_from_forward_to_left(direction_deg):
     assert found == pytest.approx([direction_deg, direction_deg])
 
 
-def test_normal_equations_give_the_coefficients_and_their_variation():
+def test_normal_equations_give_coefficients_and_variation():
     rng = np.random.default_rng(1)
     terms = np.column_stack((np.ones(400), rng.normal(size=(400, 2))))
     truth = rng.normal(size=(3, 3))
@@ -96,7 +96,7 @@ def yawed(degrees):
     return turn_of(degrees, UP) @ MOUNT
 
 
-def test_the_mean_of_two_alignments_is_weighted_by_their_variances():
+def test_the_mean_of_two_alignments_is_weighted_by_variance():
     """Both methods use the same braking, so half of their errors are common. The mean is less exact than it would be
     otherwise."""
     sensor = forward.SENSOR_DEG**2
@@ -139,7 +139,7 @@ def made_log(start_utc_s):
     return Log(t_s, force, rates, np.full(count, 7.0), utc_s=utc_s, name="a/drive 1.csv.gz")
 
 
-def test_signals_are_along_the_vehicles_axes_and_one_file_per_day(tmp_path):
+def test_signals_are_along_vehicle_axes_in_one_file_per_day(tmp_path):
     calibration = CalibrationFile(vehicle_from_sensor=MOUNT, aligned=True)
     period = Period("bus 12", "front", "car", ())
     midnight = 20_000 * 86_400.0

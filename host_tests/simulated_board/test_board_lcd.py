@@ -57,3 +57,10 @@ def test_each_change_of_a_letter_is_counted():
         before = lcd.changes
         send(lcd, ord(letter), RS)
         assert (lcd.changes > before) is changed
+
+
+def test_each_bit_of_a_command_has_its_switch():
+    for value, switches in ((0x0C, (True, False, False)), (0x0A, (False, True, False)), (0x09, (False, False, True))):
+        lcd = ready()
+        send(lcd, value)
+        assert (lcd.on, lcd.cursor, lcd.blink) == switches

@@ -171,7 +171,7 @@ def columns(code):
     return "".join("#" if pixels[x] else "." for x in range(8))
 
 
-def test_the_bars_patterns_fill_a_letter_from_the_left_or_the_right():
+def test_the_bars_patterns_fill_a_letter_from_either_side():
     assert [columns(code) for code in (0, 1, 2, 3)] == ["##......", "####....", "######..", "########"]
     assert [columns(code) for code in (4, 5, 6, 7)] == ["......##", "....####", "..######", "########"]
     assert columns(0xFF) == "########"
@@ -192,7 +192,7 @@ def test_letters_of_double_height_have_each_row_twice():
     assert [canvas.pixel(x, 31) for x in (7, 8, 127)] == [0, 1, 1]
 
 
-def test_a_picture_is_drawn_with_its_values_and_is_only_redrawn_for_others():
+def test_a_picture_is_redrawn_only_for_other_values():
     drawn = []
 
     def program(board):
@@ -219,7 +219,7 @@ def test_a_picture_is_drawn_with_its_values_and_is_only_redrawn_for_others():
 
 
 @pytest.mark.parametrize(("free", "turns"), [(1_000_000, 50), (100_000, 10), (61_000, 3), (0, 3)])
-def test_in_a_small_heap_of_an_esp32_garbage_is_collected_more_often(free, turns, monkeypatch):
+def test_garbage_is_collected_more_often_in_a_small_heap(free, turns, monkeypatch):
     """One pass of the loop uses 2000 bytes. Half of the present heap may fill up. The heap may still grow by 60 KB."""
     from kickstand.board import port
 
