@@ -451,3 +451,18 @@ def test_a_clock_at_the_sensors_address_counts_in_decimal_digits():
         device.write_byte(0)
         device.start(0x68, True)
         assert [device.read_byte() for _ in range(3)] == time
+
+
+@pytest.mark.parametrize(
+    ("kind", "counts"),
+    [
+        ("ssd1306", {0x20: 1, 0x21: 2, 0x22: 2, 0x8D: 1, 0x26: 6, 0x27: 6, 0x29: 5, 0x2A: 5, 0xA3: 2, 0x2E: 0}),
+        ("sh1106", {0xAD: 1, 0x30: 0, 0x33: 0, 0xE0: 0, 0xEE: 0}),
+    ],
+)
+def test_each_chip_has_commands_of_its_own(kind, counts):
+    """The numbers of their arguments are those of the data sheets. The other chip ignores or does not know them."""
+    for code, count in counts.items():
+        oled = Oled(Clock(), kind=kind)
+        commands(oled, code, *([0x02] * count), 0x45)
+        assert (oled.start_line, oled.unknown) == (5, 0), hex(code)
