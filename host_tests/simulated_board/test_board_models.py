@@ -2,11 +2,14 @@
 
 import errno
 import io
+import os
+import sys
+import time
 from typing import Any
 
 import pytest
 from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.fakes import fake_bluetooth, fake_machine
+from kickstand_tools.simulated_board.fakes import fake_bluetooth, fake_machine, framebuf
 from kickstand_tools.simulated_board.fakes.fake_machine import ADC, I2C, SPI, UART, Pin, SoftI2C, Timer
 from kickstand_tools.simulated_board.gps import Gps, sentence
 from kickstand_tools.simulated_board.oled import Oled
@@ -445,12 +448,12 @@ def test_other_devices_keep_what_is_written():
 def test_a_clock_at_the_sensors_address_counts_in_decimal_digits():
     clock = Clock()
     device = Ds3231(clock)
-    for advance_s, time in ((0, [0x15, 0x40, 0x11]), (50, [0x05, 0x41, 0x11]), (50_000, [0x25, 0x34, 0x01])):
+    for advance_s, digits in ((0, [0x15, 0x40, 0x11]), (50, [0x05, 0x41, 0x11]), (50_000, [0x25, 0x34, 0x01])):
         clock.advance(advance_s * 1_000_000)
         device.start(0x68, False)
         device.write_byte(0)
         device.start(0x68, True)
-        assert [device.read_byte() for _ in range(3)] == time
+        assert [device.read_byte() for _ in range(3)] == digits
 
 
 @pytest.mark.parametrize(
@@ -466,3 +469,49 @@ def test_each_chip_has_commands_of_its_own(kind, counts):
         oled = Oled(Clock(), kind=kind)
         commands(oled, code, *([0x02] * count), 0x45)
         assert (oled.start_line, oled.unknown) == (5, 0), hex(code)
+
+
+@firmware(10.0)
+def test_an_interrupt_comes_at_the_chosen_edge_only(board):
+    pin = Pin(board.button_pin, Pin.IN, Pin.PULL_UP)
+    for trigger, edges in ((Pin.IRQ_FALLING, {0}), (Pin.IRQ_RISING, {1}), (Pin.IRQ_FALLING | Pin.IRQ_RISING, {0, 1})):
+        seen = []
+        pin.irq(lambda one, seen=seen: seen.append(board.pin_level(one.id)), trigger)
+        board.press()
+        board.clock.advance(1_000_000)
+        assert set(seen) == edges
+    pin.irq(None)
+    count = len(seen)
+    board.press()
+    board.clock.advance(1_000_000)
+    assert len(seen) == count
+
+
+def test_the_real_modules_are_restored():
+    before = {name: sys.modules.get(name) for name in ("machine", "time", "os", "sys", "bluetooth", "esp32")}
+    seen = []
+
+    def program(board):
+        seen.append(hasattr(time, "ticks_ms") and hasattr(os, "ilistdir") and "esp32" in sys.modules)
+
+    assert on_board(program, machine="esp32")[0] == "returned"
+    assert seen == [True]
+    assert {name: sys.modules.get(name) for name in before} == before
+    assert not hasattr(time, "ticks_ms") and not hasattr(os, "ilistdir")
+
+
+@pytest.mark.parametrize("end", [(9, 3), (3, 9), (9, 9), (0, 5), (5, 0)])
+def test_a_line_is_the_same_in_every_direction(end):
+    """Mirroring a line at the picture's middle gives the line to the mirrored end."""
+    width, height = end
+
+    def pixels(x1, y1, x2, y2):
+        canvas = framebuf.FrameBuffer(bytearray(32 * 4), 32, 32, framebuf.MONO_VLSB)
+        canvas.line(x1, y1, x2, y2, 1)
+        return {(x, y) for x in range(32) for y in range(32) if canvas.pixel(x, y)}
+
+    line = pixels(15, 15, 15 + width, 15 + height)
+    assert {(15, 15), (15 + width, 15 + height)} <= line and len(line) == 1 + max(width, height)
+    for across, along in ((-1, 1), (1, -1), (-1, -1)):
+        found = pixels(15, 15, 15 + across * width, 15 + along * height)
+        assert found == {(15 + across * (x - 15), 15 + along * (y - 15)) for x, y in line}
