@@ -208,6 +208,18 @@ def test_any_address_of_a_backpack_is_found():
         assert on_board(run, 1e6, lcd_address=address)[0] == "returned"
 
 
+def test_both_addresses_of_an_oled_are_found():
+    for address in (0x3C, 0x3D):
+
+        def run(board, address=address):
+            display = open_display(board)
+            display.show(*OLD)
+            turns(board, display, 100)
+            assert display.address == address and display.draws and board.lcd.text() == as_text(OLD)
+
+        assert on_board(run, 1e6, display="ssd1306", lcd_address=address)[0] == "returned"
+
+
 def test_the_set_kind_is_used():
     """Controllers without a useful status, and displays at unusual addresses, need the setting."""
     for kind in KINDS:

@@ -467,7 +467,7 @@ def test_each_chip_has_commands_of_its_own(kind, counts):
     """The numbers of their arguments are those of the data sheets. The other chip ignores or does not know them."""
     for code, count in counts.items():
         oled = Oled(Clock(), kind=kind)
-        commands(oled, code, *([0x02] * count), 0x45)
+        commands(oled, code, *([0xFF] * count), 0x45)
         assert (oled.start_line, oled.unknown) == (5, 0), hex(code)
 
 
