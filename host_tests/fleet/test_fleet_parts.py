@@ -4,19 +4,21 @@ a picture, and the signals of a day."""
 import os
 from math import cos, radians, sin
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pyarrow.parquet as parquet
 import pytest
 from kickstand.units import GAP_US
-from kickstand_fleet import evidence, files, forward, moved, signals, tables
+from kickstand_fleet import evidence, files, forward, moved, run, signals, tables
 from kickstand_fleet.manifest import Period
 from kickstand_fleet.period import failed
-from kickstand_fleet.show import panel
+from kickstand_fleet.show import page, panel
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs.log import Log
 from made_fleet import drive, turn_of
+from support import command
 
 UP = (0.0, 1.0, 0.0)
 GAP_S = GAP_US * 1e-6
@@ -238,3 +240,77 @@ def test_a_store_works_as_a_directory_does():
     assert set(files.listed(base)) == {"memory:///fleet-parts/a", "memory:///fleet-parts/b.csv"}
     assert files.listed("memory://nowhere") == {}
     assert files.matches(f"{base}/*.csv") == ["memory:///fleet-parts/b.csv"]
+
+
+def seen_rows(*rows):
+    """Return a Glance of these results. A row changes the alignment of a result, and may have lists of its tables."""
+    glance = page.Glance()
+    for changed in rows:
+        result = failed(Period(changed.pop("vehicle"), "", "car", ()), "unreadable", "x")
+        result.errors = changed.pop("errors", [])
+        result.moved, result.brake_tests = changed.pop("moved", []), changed.pop("brake_tests", [])
+        result.alignment |= {"status": "aligned", "reason": "", "driven_s": 1800.0, "quality_deg": 0.5} | changed
+        glance.add(result)
+    return glance
+
+
+def test_the_page_counts_results_and_names_the_worst():
+    glance = seen_rows(
+        {"vehicle": "/a/b/1", "quality_deg": 0.4, "moved": [{"turned_deg": 4.0}, {"turned_deg": 9.0}]},
+        {"vehicle": "/a/bc/2", "quality_deg": 1.2, "brake_tests": [{"utc_s": None, "mfdd_mps2": 5.0}]},
+        {"vehicle": "/a/b/3", "status": "refused", "reason": "mount-moved"},
+        {
+            "vehicle": "/a/b/4",
+            "status": "error",
+            "reason": "unreadable",
+            "errors": [{"vehicle": "4", "log": "", "message": "gone"}],
+        },
+    )
+    assert (glance.count, glance.driven_s, glance.below) == (4, 7200.0, "/a/")
+    assert glance.statuses == {"aligned": 2, "refused": 1, "error": 1}
+    assert glance.reasons == {("refused", "mount-moved"): 1, ("error", "unreadable"): 1}
+    assert (glance.moved_count, glance.moved_vehicles, glance.errors) == (2, 2, 1)
+    assert glance.first_errors == [("4", "gone")]
+    assert [row["quality_deg"] for row in glance.worst] == [1.2, 0.4]
+    assert [move["turned_deg"] for move, _ in glance.moved] == [9.0, 4.0]
+    assert np.isnan(glance.decelerations[0][0]) and list(glance.decelerations[1]) == [5.0]
+
+
+def test_medians_are_those_of_each_stretch_of_time():
+    day = 86_400.0
+    dated = [(0.1 * day, 3.0), (0.2 * day, 9.0), (0.9 * day, 4.0), (2.5 * day, 7.0)]
+    assert page._medians(dated, day) == [(0.5 * day, 4.0), (2.5 * day, 7.0)]
+    assert page._share(1, 3) == "33 %" and page._share(0, 0) == "--"
+
+
+@pytest.mark.parametrize(("values", "pictures"), [([], 0), ([5.0], 1), ([5.0, 6.0], 2)])
+def test_decelerations_are_drawn_over_time_if_two_have_a_date(values, pictures):
+    times = [1.79e9 + 1000.0 * k for k in range(len(values))]
+    assert len(page._braking(times, values)) == pictures
+    assert len(page._braking([float("nan")] * len(values), values)) == min(1, pictures)
+
+
+@pytest.mark.parametrize(("count", "more"), [(1, False), (2, True)])
+def test_the_command_counts_and_names_the_first_errors(count, more, tmp_path, monkeypatch):
+    manifest = tmp_path / "MANIFEST.csv"
+    manifest.write_text("vehicle,path,kind\n1,a.csv,car\n")
+    glance = seen_rows(
+        {"vehicle": "1", "brake_tests": [{"utc_s": None, "mfdd_mps2": 5.0}]},
+        {"vehicle": "2", "status": "error", "reason": "unreadable", "errors": [{"log": "a.csv", "message": "gone"}]},
+    )
+    glance.errors = count
+    found = SimpleNamespace(vehicles=5, new=2, damaged=1, seen=glance)
+    asked = []
+    monkeypatch.setattr(run, "run_fleet", lambda periods, out, **how: asked.append((len(periods), out, how)) or found)
+    done = command.works("fleet", manifest, "--out", "results", "--workers", 3, "--signals")
+    assert done.out.splitlines()[:5] == [
+        "mounted sensors: 5, 3 of them finished earlier",
+        "aligned: 1, refused: 0, errors: 1",
+        "      1  error: unreadable",
+        f"mounts that seem to have moved: 0; brake tests: 1; rows of errors: {count}",
+        "error: a.csv: gone",
+    ]
+    assert ("more errors are in errors.parquet" in done.out) is more
+    assert done.err.startswith("1 earlier results were damaged")
+    ((periods, out, how),) = asked
+    assert (periods, out, how["workers"], how["with_signals"], how["timeout_s"]) == (1, "results", 3, True, 600.0)
