@@ -15,7 +15,7 @@ from kickstand_tools.calibration import drive_events as events
 from kickstand_tools.calibration.drive import DriveFit, PoseCheck
 from kickstand_tools.calibration.file import CalibrationFile, write_calibration
 from kickstand_tools.calibration.poses import SixPositions, TwoPositions
-from kickstand_tools.cli import board, calibrate, common, ride
+from kickstand_tools.cli import board, calibrate, common, main, ride, without_a_board
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.common.messages import Plain, WrongAxes
 from kickstand_tools.estimation.alignment import RideFit
@@ -595,3 +595,28 @@ def test_a_report_has_the_notices_of_its_ride(as_json, log, monkeypatch):
     done = command.works("report", log, *(["--json"] if as_json else []))
     assert done.out == ('{"max_deg": 40}\n' if as_json else "the report\n")
     assert done.err == f"warning: {log}: odd\n"
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (FileNotFoundError(2, "No such file", "x"), "x: No such file: check the name and its directory"),
+        (IsADirectoryError(21, "Is a directory", "x"), "x: Is a directory: give the name of a file"),
+        (OSError(28, "No space left"), "No space left: check the disk, the file or the connection, then repeat this"),
+    ],
+)
+def test_an_error_of_the_system_has_its_remedy(error, words, tmp_path, monkeypatch):
+    def fails(*_, **__):
+        raise error
+
+    monkeypatch.setattr(main.kickstand, "main", fails)
+    assert command.refused(tmp_path, "report") == f"kickstand: {words}\n"
+
+
+def test_the_site_is_written_to_a_directory_only(tmp_path, monkeypatch):
+    monkeypatch.setattr(without_a_board.site, "site_files", lambda: {"index.html": b"home", "a/b.js": b"code"})
+    (tmp_path / "file").write_text("")
+    command.refused(tmp_path, "web", "--out", tmp_path / "file", words="is a file: give --out the name of a directory")
+    done = command.works("web", "--out", tmp_path / "site")
+    assert done.out.startswith(f"written: {tmp_path / 'site'}, 2 files for a web server")
+    assert (tmp_path / "site" / "a" / "b.js").read_bytes() == b"code"
