@@ -208,6 +208,18 @@ def test_any_address_of_a_backpack_is_found():
         assert on_board(run, 1e6, lcd_address=address)[0] == "returned"
 
 
+def test_both_addresses_of_an_oled_are_found():
+    for address in (0x3C, 0x3D):
+
+        def run(board, address=address):
+            display = open_display(board)
+            display.show(*OLD)
+            turns(board, display, 100)
+            assert display.address == address and display.draws and board.lcd.text() == as_text(OLD)
+
+        assert on_board(run, 1e6, display="ssd1306", lcd_address=address)[0] == "returned"
+
+
 def test_the_set_kind_is_used():
     """Controllers without a useful status, and displays at unusual addresses, need the setting."""
     for kind in KINDS:
@@ -314,6 +326,16 @@ def test_the_rows_of_a_larger_display_are_blanked():
         assert board.lcd.ddram[0x14] == 0x20
 
     assert on_board(run, 1e6)[0] == "returned"
+
+
+@on_each((None,), OLEDS)
+def test_an_oled_is_rewritten_no_earlier(board, display):
+    board.lcd.ram[200] ^= 0xFF
+    noise = board.lcd.ram[200]
+    turns(board, display, 800)
+    assert board.lcd.ram[200] == noise
+    turns(board, display, 210)
+    assert board.lcd.ram[200] != noise
 
 
 @on_each((None,), OLEDS)

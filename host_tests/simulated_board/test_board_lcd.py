@@ -48,3 +48,19 @@ def test_bytes_during_the_long_home_command_are_lost():
     lcd.clock.advance(done_us - lcd.clock.now_us)
     send(lcd, ord("x"), RS)
     assert lcd.text()[0].startswith("xbc")
+
+
+def test_each_change_of_a_letter_is_counted():
+    lcd = ready()
+    for letter, changed in (("a", True), ("a", False), ("b", True)):
+        send(lcd, 0x80)
+        before = lcd.changes
+        send(lcd, ord(letter), RS)
+        assert (lcd.changes > before) is changed
+
+
+def test_each_bit_of_a_command_has_its_switch():
+    for value, switches in ((0x0C, (True, False, False)), (0x0A, (False, True, False)), (0x09, (False, False, True))):
+        lcd = ready()
+        send(lcd, value)
+        assert (lcd.on, lcd.cursor, lcd.blink) == switches

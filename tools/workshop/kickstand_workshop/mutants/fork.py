@@ -107,6 +107,8 @@ class Tests:
         status = 3
         try:
             os.setpgid(0, 0)
+            for number in (signal.SIGTERM, signal.SIGHUP):  # as at the start of a program, which some tests rely on
+                signal.signal(number, signal.SIG_DFL)
             os.dup2(self._output.fileno(), 1)
             os.dup2(self._output.fileno(), 2)
             os.chdir(self.root)

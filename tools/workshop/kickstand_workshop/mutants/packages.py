@@ -50,6 +50,15 @@ PACKAGES = {
         "rides/test_block rides/test_recording rides/test_ring rides/test_stream rides/test_card_trial",
     ),
     "live": _package("firmware/kickstand/live/*.py", "live/test_bonds live/test_live_packets live/test_live_device"),
+    "board": _package(
+        "firmware/kickstand/board/*.py",
+        "simulated_board/test_board_parts simulated_board/test_board_display simulated_board/test_board_[io]*"
+        " device/test_boards",
+    ),
+    "firmware": _package(  # the modules outside folders
+        "firmware/kickstand/[!r]*.py",
+        "device/test_settings_limits device/test_boards device/test_who_is_there device/test_user_code",
+    ),
     "published": _package("tools/kickstand_tools/calibration/published.py", "drive_alignment/test_published"),
     "aligning": _package(
         "tools/kickstand_tools/calibration/[!p]*.py tools/kickstand_tools/calibration/p[or]*.py",
@@ -91,6 +100,32 @@ PACKAGES = {
     "pull": _package(
         "tools/kickstand_tools/rides/*.py",
         "rides/test_pull_parts rides/test_ride_file rides/test_stream rides/test_cli_pull rides/test_cli_record",
+    ),
+    "common": _package(
+        "tools/kickstand_tools/common/*.py",
+        "cli/test_common_parts cli/test_output cli/test_blame cli/test_added_commands api/test_remedies",
+    ),
+    "cli": _package(
+        "tools/kickstand_tools/cli/*.py",
+        "cli/test_printed_lines cli/test_cli_usage cli/test_blame cli/test_added_commands"
+        " calibration/test_cli_calibration_file",
+    ),
+    "simulated_board": _package(
+        "tools/kickstand_tools/simulated_board/*.py tools/kickstand_tools/simulated_board/fakes/*.py",
+        "simulated_board/test_board_models simulated_board/test_board_[!m]* simulated_board/test_gps_hostile"
+        " imu/test_registers imu/test_sensor device/test_boards",
+    ),
+    "demo": _package("tools/kickstand_tools/demo/*.py", "demo/test_demo_p* simulation/test_rides"),
+    "web": _package("tools/kickstand_tools/web/*.py", "web/test_web_parts web/test_rides_guest"),
+    "fleet": _package(
+        "tools/kickstand_fleet/**/*.py",
+        "fleet/test_fleet_parts fleet/test_journal fleet/test_evidence fleet/test_manifest fleet/test_moved"
+        " fleet/test_forward fleet/test_period fleet/test_full_disk",
+    ),
+    "emulator": _package(  # the other modules run only with an emulated chip, whose tests take minutes
+        "tools/kickstand_emulator/console_*.py tools/kickstand_emulator/device.py tools/kickstand_emulator/flash*.py"
+        " tools/kickstand_emulator/host*.py tools/kickstand_emulator/i*.py",
+        "chip/test_emulator_parts",
     ),
     "signals": _package("tools/kickstand_tools/signals/*.py", "signals/*"),
     "checks": _package("tools/kickstand_tools/checks/*.py", "checks/*"),
