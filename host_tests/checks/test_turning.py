@@ -18,7 +18,8 @@ def reported(*left, windows=10, unbiased=True, swing=0.0):
     left: pairs (exchange, mean square of the residual force in g2). All other exchanges have 9 g2.
     windows: number of windows.
     unbiased: True if the gyro's bias is about 0.
-    swing: change of the residual of the unchanged gyro, in g2. It is added in even windows and subtracted in odd ones.
+    swing: amount in g2 that is added in even windows and subtracted in odd ones, to the residual of the exchange
+        AS_IT_IS.
     """
 
     def unexplained(exchange):

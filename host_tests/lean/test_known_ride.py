@@ -47,7 +47,7 @@ LEGS = (
     (10, 0, 24, 0, False),
 )
 RESTART_S = 95.0
-LOST = (0.01, 0.3), (60.07, 0.2), (119.12, 0.4)  # (time in s, seconds of lost readings before it)
+LOST = (0.01, 0.3), (60.07, 0.2), (119.12, 0.4)  # (time of the first reading after a gap, length of the gap), in s
 SLOW_S = 30.0, 44.0  # begin and end of the time in which samples are 20 ms apart
 BIAS = radians(0.4), radians(-0.3), radians(0.6)
 YAW_ERROR = radians(4.0)

@@ -1,4 +1,5 @@
-"""The same tests for the driver of each display, on the model of this display. They also run on MicroPython."""
+"""Every display driver passes the same tests, on the simulated model of its own display. They also run on
+MicroPython."""
 
 import gc
 import sys

@@ -56,7 +56,7 @@ class FakeBoard(Transport):
                 return self.modules[name]
             if name == "kickstand":
                 return self._kickstand()
-            if name.startswith("kickstand."):  # not the module installed on the host
+            if name.startswith("kickstand."):  # never import the package installed on the host
                 raise ImportError(f"no module named '{name}'")
             return __import__(name, *rest)
 

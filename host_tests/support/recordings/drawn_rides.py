@@ -1,7 +1,8 @@
-"""Rides whose road, bike, rider, mount and sensor are drawn at random from realistic values. They use the second
-simulator (other_bike.py), which shares nothing with kickstand_tools.simulation. The only exception is the data sheet's
-sensor with its six positions, if a caller asks for it. Parameters of the estimators are fitted with even seeds only,
-and figures are reported for odd ones:
+"""Rides whose road, bike, rider, mount and sensor are drawn at random from realistic values.
+
+They use the second simulator (other_bike.py), which shares only one part with kickstand_tools.simulation: on request,
+the sensor with the data sheet's errors and its calibration by six positions. Parameters of the estimators are fitted
+with even seeds only, and figures are reported for odd ones:
 
     OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.drawn_rides odd 100
 """

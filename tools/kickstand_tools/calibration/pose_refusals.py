@@ -239,7 +239,7 @@ class SamePose(Message):
 
     code = "same-pose"
     text = "both poses are the same ({apart_deg:.1f} degrees apart)"
-    todo = Remedy("one on the kickstand, one upright")
+    todo = Remedy("take one on the kickstand and one upright")
 
 
 @dataclass(frozen=True)

@@ -122,7 +122,7 @@ def sentence(message: Message, page: bool = False) -> str:
 
     >>> from kickstand_tools.calibration.pose_refusals import SamePose
     >>> sentence(SamePose(0.4))
-    'both poses are the same (0.4 degrees apart): one on the kickstand, one upright'
+    'both poses are the same (0.4 degrees apart): take one on the kickstand and one upright'
     """
     return message.line(page)
 

@@ -177,8 +177,10 @@ def _rereadable(source: File | Log) -> File | Log:
 
 
 def _unchecked(source: Source, remarks: list[Message]) -> Iterator[Block]:
-    """The blocks of a source before units and number of samples are checked. remarks: notices about the file are
-    appended."""
+    """Return the blocks of a source. Their units and their number of samples are not checked yet.
+
+    remarks: notices about the file are appended.
+    """
     if isinstance(source, Log):
         return _blocks_of(source)
     if not isinstance(source, Stretch):

@@ -13,8 +13,8 @@ from urllib.parse import unquote, urlsplit
 
 HOST = "127.0.0.1"
 MOST, PATIENCE_S = 64, 10.0  # maximum number of connections; longest wait for a browser's data
-# If all connections are in use, a new connection waits for this time in s, and then the oldest connection is ended. If
-# some connections have sent no request, the oldest of these is ended at once.
+# Time in s for which a new connection waits if there are already MOST connections. Then the oldest connection is ended.
+# If some connections have sent no request, the oldest of these is ended at once.
 FULL_S = 1.0
 PORT = 8377  # always the same, because the browser keeps files by address
 # Defined here, because the Windows registry may have other types. With a wrong type a browser does not run modules.

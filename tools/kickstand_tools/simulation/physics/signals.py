@@ -13,7 +13,7 @@ _PAD_S = 4.0
 
 
 def smoothstep(u: Signal) -> Signal:
-    """Return a step from 0 to 1 while u goes from 0 to 1. The step is constant outside.
+    """Return a step from 0 to 1 while u goes from 0 to 1. Below 0 and above 1 the step is constant.
 
     Its value and its first and second derivative have no jumps.
     """
