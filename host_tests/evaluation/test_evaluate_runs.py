@@ -16,6 +16,8 @@ from kickstand_workshop.evaluation import estimators, real_ride, runs
 from kickstand_workshop.evaluation.estimators import Samples
 from support.command import refused, works
 
+pytestmark = pytest.mark.long  # the rides of a fixture are computed anew in each process that gets one of its tests
+
 THERE = [name for name in estimators.OTHERS if estimators.PACKAGES.get(name) not in estimators.missing()]
 
 

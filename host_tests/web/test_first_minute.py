@@ -26,7 +26,7 @@ def test_a_first_visit(chromium, address, tmp_path):
         rider.click("#cut")
         rider.page.wait_for_selector(f"#cut[aria-pressed={armed}]")
     is_what_the_firmware_shows(rider, tmp_path)
-    assert rider.seen("shifts") == [], "the layout moved"
+    assert rider.moved() == []
     works_without_a_network(rider, address)
     assert rider.errors == []
     assert [url for url in rider.asked if not url.startswith(address)] == []

@@ -39,7 +39,7 @@ def test_a_phones_first_screen_has_all_for_the_first_minute(chromium, address):
     assert guide["y"] >= device["y"] + device["height"], "what the guide says of it is not in sight"
     rider.page.tap("#power")
     rider.guide_says("display is dark")
-    assert rider.seen("shifts") == []
+    assert rider.moved() == []
     rider.context.close()
 
 

@@ -31,6 +31,7 @@ _LOOK_S = 0.5  # time between two checks for tasks that take too long
 _TOPIC = "kickstand-fleet"  # topic of the messages by which a worker announces that it begins a task
 Outcome = tuple[int, Any | None, str, str]
 _LOCAL_PATIENCE_S, _REMOTE_PATIENCE_S = 60.0, 20.0  # longest time to wait for the first worker
+_RESTART_S = 120.0  # longest wait for the restart of a worker. A later restart would end the worker's next task, too
 _LOST_S = 60.0  # longest time without any worker. Dask replaces a dead worker sooner, if it can
 
 
@@ -220,7 +221,7 @@ class Cluster:
                 self._started.pop(key, None)
                 future.cancel(force=True)
                 with contextlib.suppress(Exception):  # the worker may already be dead
-                    self._client.restart_workers([worker], timeout=30, raise_for_error=False)
+                    self._client.restart_workers([worker], timeout=_RESTART_S, raise_for_error=False)
                 yield index, None, TIMED_OUT, f"took longer than {self._timeout_s:.0f} s, so it was ended"
 
     def _note_begin(self, event: tuple[float, Any]) -> None:

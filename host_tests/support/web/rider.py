@@ -79,6 +79,14 @@ class Rider:
         """Return the kept messages with this name, one of window.seen in keep.js."""
         return self.page.evaluate(f"seen.{what}")
 
+    def moved(self):
+        """Return the layout shifts if they add up to more than 0.01. People notice 0.1.
+
+        If the machine is busy while a page is loading, the browser draws the header in parts, and it shifts by 0.001.
+        """
+        shifts = self.seen("shifts")
+        return shifts if sum(shift[0] for shift in shifts) > 0.01 else []
+
     def text(self, selector):
         return self.page.inner_text(selector)
 
