@@ -56,7 +56,7 @@ def test(arguments):
     pyright = subprocess.Popen(
         [PYTHON, "-m", "pyright"], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8"
     )
-    processes = str((os.cpu_count() or 1) + 2)  # two more than the processors, because tests of pages often wait
+    processes = str((os.cpu_count() or 1) + 1)  # one more than the processors, because tests of pages often wait
     failed = []
     for tool, command in (
         ("ruff", ("-m", "ruff", "check", ".")),

@@ -8,6 +8,8 @@ import threading
 import time
 from collections import Counter
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pyarrow.parquet as parquet
 import pytest
@@ -201,3 +203,31 @@ def test_next_run_retries_a_crashed_vehicle(tmp_path, monkeypatch):
     first = run_fleet(periods, tmp_path)
     assert first.seen.reasons[("error", CRASHED)] == 1
     assert run_fleet(periods, tmp_path).new == 1
+
+
+def test_a_result_that_is_lost_with_its_worker_is_computed_again():
+    """The first worker ends the task, but dies before its result is fetched. The cluster has no real workers."""
+    submitted = []
+
+    class Ended:
+        status = "finished"
+
+        def __init__(self, key):
+            self.key = key
+            submitted.append(key)
+
+        def add_done_callback(self, callback):
+            callback(self)
+
+        def result(self):
+            if len(submitted) == 1:
+                raise OSError("the worker is gone")
+            return "found"
+
+        def release(self):
+            pass
+
+    alone: Any = Cluster(None, 1, timeout_s=600.0)
+    alone._client, alone._started = SimpleNamespace(submit=lambda *_, key, pure: Ended(key)), {}
+    assert list(alone.run(task, [(0,)])) == [(0, "found", "", "")]
+    assert len(submitted) == 2

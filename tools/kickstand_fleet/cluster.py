@@ -186,7 +186,12 @@ class Cluster:
                 return
             index, status = place[0], future.status
             if status == "finished":
-                yield index, future.result(), "", ""
+                try:
+                    result = future.result()
+                except Exception:  # its worker died before the result was fetched
+                    suspects.append(index)
+                else:
+                    yield index, result, "", ""
             elif status == "error":
                 error = future.exception()
                 if type(error).__name__ == "KilledWorker":
