@@ -18,6 +18,7 @@ NEAR_DEG = 2.0
 SENSOR = 0x68
 RECOVERY_S = 0.5
 FAULT_S = 0.6
+ON_A_PICO = ["pico", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])]  # nightly on both chips
 
 
 @pytest.mark.nightly  # takes minutes; host_tests/device has the same steps on MicroPython for Linux
@@ -85,7 +86,9 @@ INJECT = {
 @pytest.mark.parametrize(
     ("riding", "fault"),
     [
-        *(("pico", fault) for fault in INJECT),
+        ("pico", "EIO"),
+        ("pico", "SDA held"),
+        pytest.param("pico", "ETIMEDOUT", marks=pytest.mark.nightly),
         pytest.param("esp32", "EIO", marks=pytest.mark.esp32),
         *(pytest.param("esp32", fault, marks=[pytest.mark.esp32, pytest.mark.nightly]) for fault in [*INJECT][1:]),
     ],
@@ -120,9 +123,7 @@ def test_stalled_processor_keeps_the_lean_right(riding):
     assert samples.lost() > 200
 
 
-@pytest.mark.parametrize(
-    "riding", ["pico", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])], indirect=True
-)
+@pytest.mark.parametrize("riding", ON_A_PICO, indirect=True)
 def test_watchdog_restarts_a_hung_program(riding):
     """The watchdog resets the board within 8.4 s. An ESP32 needs a second more, because it prints the reason. Then the
     display shows the lean again."""
@@ -133,6 +134,7 @@ def test_watchdog_restarts_a_hung_program(riding):
     starts_again(riding)
 
 
+@pytest.mark.parametrize("riding", ON_A_PICO, indirect=True)
 def test_reset_during_a_read_frees_the_bus(riding):
     """The sensor holds SDA until the restarted firmware clocks it free."""
     resets = riding.resets

@@ -38,6 +38,7 @@ def board(config="", world=None, files=None):
     return esp32(world or leaning(LEAN_DEG), (files or firmware("esp32")) | own)
 
 
+@pytest.mark.nightly  # host_tests/device has the same faults on MicroPython for Linux
 def test_board_survives_ctrl_c_unplugging_and_soft_reset():
     """The owner does all three to a running board."""
     with board() as device:
@@ -103,6 +104,7 @@ def states_of_flash(device, code):
     return states
 
 
+@pytest.mark.nightly  # test_chip_power_cut.py has the same test on the Pico
 def test_old_or_new_wherever_a_save_is_cut(tmp_path):
     """The power is cut after each write of four saves. A board that then starts has the old or the new calibration."""
     with board(files=modules("esp32")) as device:
@@ -170,6 +172,7 @@ def test_power_cut_loses_only_the_last_block_of_a_ride():
     assert seen >= 3
 
 
+@pytest.mark.nightly  # host_tests/rides/test_ring.py has the same on the host
 def test_ride_removes_the_oldest_parts_first():
     """The flash is full of rides. The new ride removes no more parts than it needs room for."""
     parts = [part_path("rides", ride, number) for ride in (1, 2) for number in range(11)]

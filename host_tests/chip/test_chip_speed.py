@@ -29,7 +29,11 @@ print(got)
 
 
 @pytest.mark.parametrize(
-    ("chip", "sources"), [("pico", ["wheel"]), pytest.param("esp32", ["wheel", "gps"], marks=pytest.mark.esp32)]
+    ("chip", "sources"),
+    [
+        ("pico", ["wheel"]),
+        pytest.param("esp32", ["wheel", "gps"], marks=[pytest.mark.esp32, pytest.mark.nightly]),
+    ],
 )
 def test_wheel_and_gps(chip, sources):
     """The contact of the wheel sensor bounces."""

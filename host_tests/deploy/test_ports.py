@@ -33,7 +33,7 @@ ESP32S = {0x2B06: "xtensawin", 0x2F06: "rv32imc", 0x12F06: "rv32imc"}
 UNTYPED = '"None"', 'for class "NoRec', 'for class "Settings', 'of type "ptr', "Variable not allowed in", '"_Ticks'
 
 
-@pytest.fixture(scope="module", params=["rp2", "esp32"])
+@pytest.fixture(scope="module", params=["rp2", pytest.param("esp32", marks=pytest.mark.nightly)])
 def stubs(request):
     """Return a port and the directory with the stubs of its MicroPython. The first use installs them in .venv."""
     groups = tomllib.loads((ROOT / "pyproject.toml").read_text())["dependency-groups"]
