@@ -40,7 +40,7 @@ _PINS = 40
 _VIRTUAL = 1  # QEMU_CLOCK_VIRTUAL
 _NEVER = 1 << 62
 _GUARD_NS = 1_000_000
-_SHORTEST_S, _LONGEST_S = 5e-5, 1e-3  # times between two checks whether the processors sleep
+_SHORTEST_S, _LONGEST_S = 5e-5, 1e-3  # time between two checks whether the processors sleep
 
 _PIN_CALL = c.CFUNCTYPE(None, c.c_int, c.c_int)
 _I2C_CALL = c.CFUNCTYPE(c.c_int, c.c_uint8, c.c_uint8, c.c_uint16)

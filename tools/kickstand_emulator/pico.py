@@ -67,7 +67,7 @@ class Pico(EmulatedDevice):
 
     @property
     def reading(self) -> bool:
-        """True while the sensor is sending."""
+        """True while the sensor sends data over I2C."""
         return self.chip.controllers[0].reading()
 
     def reset(self) -> None:

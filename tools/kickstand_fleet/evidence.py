@@ -1,7 +1,7 @@
 """Collects the normal equations of a regression that finds the sensor's alignment, in blocks of some seconds.
 
 As in the firmware's ForwardRegression, the regression explains the mean force f between two consecutive speeds of the
-log. Such a stretch is an interval. In a car, in the sensor's own axes:
+log. The time between these two speeds is called an interval. In a car, in the sensor's own axes:
 
     f = level + forward a + left c + arm w
 
@@ -10,11 +10,11 @@ log. Such a stretch is an interval. In a car, in the sensor's own axes:
     w = d(yaw rate)/dt          change of the yaw rate
 
 level, forward, left and arm are vectors, the coefficients. Unlike the firmware, this regression also uses bends. In a
-car, bends show left as well as braking shows forward.
+car, bends show which way is left, just as braking shows which way is forward.
 
 A sensor ahead of the rear axle is accelerated sideways when a bend begins and ends. Drivers brake and speed up at the
-same moments, so this acceleration would falsify forward. The coefficient arm absorbs it. Its length is the distance
-from the sensor to the rear axle.
+same moments, so this acceleration would falsify forward. The coefficient arm takes up this acceleration. The length of
+arm is the distance from the sensor to the rear axle.
 
 A motorcycle leans into bends. Its force stays along its own up, and grows to sqrt(1 + c^2). So for a motorcycle
 
@@ -38,8 +38,8 @@ from kickstand_tools.signals import STANDING_MPS, Array, moving_mean, runs
 
 INTERVAL_S = 0.9  # shortest time between two speeds that are used
 MOVING_MPS = 2.0
-# Weight of a second at a standstill, compared with a second of driving. It is small, because a long stop shows the
-# slope of the road at one place only, like a short stop
+# Weight of a second at a standstill, compared with a second of driving. The weight is small, because even a long stop
+# shows the slope of the road at one place only
 STANDING_WEIGHT = 0.3
 LEVEL_S = 20.0  # the mean force over this time is roughly vertical. The rate about this direction is the yaw rate
 BLOCK_S = 8.0
@@ -51,8 +51,8 @@ SWING_S = 0.2  # averaging time of the yaw rate at each end of an interval
 # the difference removes braking, speeding up and bends
 SWAY_S = 0.05, 0.3
 # Yaw rate at which an interval of a car has half its weight. In a tight turn, a sensor ahead of the rear axle does not
-# move along the vehicle's heading. The angle between both is the sensor's distance from that axle divided by the
-# turn's radius.
+# move along the vehicle's heading. The sensor's direction of motion differs by an angle: its distance from that axle
+# divided by the turn's radius.
 TIGHT_DPS = 20.0
 
 

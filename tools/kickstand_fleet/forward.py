@@ -35,7 +35,7 @@ class Forward:
     frame: Rotation from sensor to vehicle axes, shape (3, 3). Its rows are left, up, forward.
     sigma_deg: Standard error of forward about up.
     attitude_deg: Standard error of the whole rotation.
-    halves_deg: Angle between the forwards of the two halves of the driving.
+    halves_deg: Angle between forward from the first half of the driving and forward from the second half.
     """
 
     frame: Array

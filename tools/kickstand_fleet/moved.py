@@ -41,7 +41,8 @@ YAW_PRIOR_DEG = 0.4
 # roads. The sway is not used if its standard deviation over both sides is above SWAY_WORST_DEG. It is also not used if
 # it contradicts the braking by more than SWAY_SIGMAS standard deviations
 SWAY_DEG, SWAY_WORST_DEG, SWAY_SIGMAS = 0.7, 5.0, 3.0
-# A larger tilt within a log, in degrees, need not be sudden. The slopes of roads differ by less
+# A tilt larger than this within a log, in degrees, is reported even if it is gradual. The slopes of roads differ by
+# less
 SURELY_DEG = 8.0
 TILT_DEG = 2.2  # a rotation with a smaller tilt counts as a rotation about the vertical
 # To find a jump, the vertical during the STEP_S before a moment is compared with the vertical during the STEP_S after

@@ -180,7 +180,7 @@ def downsampled(blocks: Iterable[Channels], step_s: float, rounded: bool = False
 
 
 def rounded_to(t_s: Array, step_s: float) -> Array:
-    """Round times to multiples of step_s. Each stretch of downsampled(..., rounded=True) has a different result."""
+    """Round times to multiples of step_s. Two stretches of downsampled(..., rounded=True) never get the same time."""
     return _stretches(t_s, step_s, True) * step_s
 
 

@@ -90,7 +90,7 @@ class CalibrationFile:
             setattr(self, name, np.reshape(np.array(getattr(self, name), dtype=float), (3, 3)))
 
     def __eq__(self, other: object) -> bool:
-        """True if both would be written to equal files."""
+        """True if both calibrations would be written to equal files."""
         return isinstance(other, CalibrationFile) and self.as_json() == other.as_json()
 
     def parameters(self) -> list[float]:

@@ -158,7 +158,7 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
 
 
 def wrong_number(captures: int) -> InputError:
-    """Return the error for a wrong number of captures."""
+    """Return the error for a wrong number of logs of poses."""
     return InputError(
         f"{captures} captures given: six are needed, one for each side up, or seven with a free pose; or one log of "
         "the whole procedure"

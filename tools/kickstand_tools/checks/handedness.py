@@ -28,8 +28,8 @@ from .turning import Turning
 
 WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # short windows are used if the log has no long window without a gap
 MOST_WINDOWS = 16  # number of judged windows, those with the largest rates
-CALM_DPS = 2.0  # the argument calm_rate of calm_rates(), in deg/s
-TRIED = 6  # number of exchanges that are fitted; they are the best ones before velocity and bias are fitted
+CALM_DPS = 2.0  # value of calm_rate for calm_rates(), in deg/s
+TRIED = 6  # velocity and bias are fitted for this number of exchanges, the best without such a fit
 
 # An exchange must reduce the mean square of the residual force (g2) by this factor. In correct logs, simulated and
 # recorded, the factor is at most 1.1 for every exchange. If the gyro has the opposite sign, the factor is 1.7 to 470.

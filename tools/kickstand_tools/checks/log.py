@@ -17,7 +17,7 @@ from .handedness import handedness
 from .units import speed_unit
 
 _LIMITS = np.array(3 * [MOST_G] + [np.inf] + 3 * [MOST_DPS])  # limits of readings; a log made in Python may exceed them
-_AGAIN_S = 20.0  # the unit of the speed is checked again after each such part of the log
+_AGAIN_S = 20.0  # the unit of the speed is checked again each time this much of the log was read
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,8 @@ from .cells import CELL_S
 KNOT_S = 5.0  # time between the knots of an unknown velocity
 EVENED = 10  # number of cells over which the rotated forces are averaged, to remove vibration
 FORCE_G = 0.1  # standard deviation of the noise of these means
-# Standard deviations of the prior. VELOCITY_MPS is that of an unknown velocity. DIRECTION is that of each component of
-# the constant direction. BIAS_DPS is that of the correction of the gyro's bias.
+# Standard deviations of the prior. VELOCITY_MPS is for an unknown velocity. DIRECTION is for each component of the
+# constant direction. BIAS_DPS is for the correction of the gyro's bias.
 VELOCITY_MPS, DIRECTION, BIAS_DPS = 20.0, 1.0, 3.0
 BIAS_STEPS, MOST_DPS = 2, 5.0  # number of steps that correct the bias, and largest change in one step
 LATE_S = (0.0, 0.5, 1.0, 1.5)  # delays of the speed that are tried, because a satellite receiver's speed is late
@@ -65,7 +65,7 @@ class Turning:
             turn = _turn(sign * np.radians(self._rate - self._bias))
             both = np.einsum("wnij,wnk->wijk", turn, self._force) / turn.shape[1]
             right = np.linalg.det(exchanges) * sign > 0.0
-            # To rotate the gyro's readings is the same as to rotate the forces by the inverse.
+            # Rotating the gyro's readings has the same effect as rotating the forces by the inverse rotation.
             up = np.einsum("wijk,qkj->qwi", both, sign * exchanges[right])
             left[right] = sizes - np.mean(np.sum(up**2, axis=2), axis=1)
         return left

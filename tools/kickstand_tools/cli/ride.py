@@ -114,8 +114,8 @@ def join_command(ride: Path, track: Path, out: Path) -> None:
 @click.command()
 @common.file_argument("a", "A.csv")
 @common.file_argument("b", "B.csv")
-@click.option("--calibration-a", type=common.PATH, help="The CAL.json of A. Default: the one beside A.")
-@click.option("--calibration-b", type=common.PATH, help="The CAL.json of B. Default: the one beside B.")
+@click.option("--calibration-a", type=common.PATH, help="The CAL.json of A. Default: the file beside A.")
+@click.option("--calibration-b", type=common.PATH, help="The CAL.json of B. Default: the file beside B.")
 @click.option("--plot", "picture", type=common.PATH, metavar="FILE.png", help="Draw both leans and their difference.")
 @common.JSON
 @common.RIGHT_HANDED

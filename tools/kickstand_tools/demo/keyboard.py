@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 # Each key that steers a bike, with its command of hand_bike.HandBike
 BIKE_KEYS = {"a": "left", "left": "left", "d": "right", "right": "right", "k": "kickstand", "u": "upright"}
 
-# Codes of the arrow keys. The last one of each key is from Windows
+# Codes of the arrow keys. For each key, the last code is the code on Windows
 _LEFT, _RIGHT = ("\x1b[D", "\x1bOD", "\xe0K"), ("\x1b[C", "\x1bOC", "\xe0M")
 
 

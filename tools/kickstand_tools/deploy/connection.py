@@ -254,7 +254,7 @@ def literal(text: bytes, *shapes: Any) -> Any:
     try:
         value = ast.literal_eval(text.decode().strip())
     except (SyntaxError, ValueError, TypeError, MemoryError, RecursionError):
-        value = literal  # this function matches none of the shapes
+        value = literal  # no answer: this stands for a value that matches none of the shapes
     if any(_fits(value, shape) for shape in shapes):
         return value
     shown = ascii(text[:40].decode(errors="replace").strip())

@@ -34,8 +34,8 @@ from .windows import WINDOW_S, Windows, windows_of
 SLOWEST_HZ = 20.0  # least sample rate
 LONGEST_S = 1800.0  # the longest part of a ride that is used; a longer part does not improve the result
 # Standard deviations of the prior
-ROTATION_SIGMA = 10.0  # rad: misalignment, so large because the misalignment is unknown
-AXES_SIGMA = 0.012  # ratio: scale and cross-axis errors of the accelerometer
+ROTATION_SIGMA = 10.0  # misalignment, in rad; large, because nothing is known about it
+AXES_SIGMA = 0.012  # scale and cross-axis errors of the accelerometer, as a ratio
 BESIDE_SIGMA_G = 0.005  # force to the side on straights, caused by luggage or camber
 UNSETTLED = np.radians(0.5)  # if the last step changed an angle by more than this, the estimate has not converged
 # An estimated error of the sensor over ODD_SIGMAS standard deviations of its prior enlarges the standard errors. An
@@ -228,7 +228,7 @@ def mounted_windows(log: Log) -> Windows:
     if not len(mounted):
         raise RefusedInput(RideShort(0.0, MIN_RIDING_S))
     begin, end = mounted[np.argmax(np.diff(mounted, axis=1))]
-    margin = round(MOUNTED_S / WINDOW_S)  # a mean this many windows from the edge contains only the ride
+    margin = round(MOUNTED_S / WINDOW_S)  # number of windows from the edge after which a mean contains only the ride
     first = windows.edges[begin + margin * (begin > 0)]
     last = windows.edges[end - margin * (end < len(windows))]
     return _windows(log, (log.t_s >= first) & (log.t_s < min(last, first + LONGEST_S)))

@@ -57,7 +57,7 @@ class SensorOdd(Message):
 
 @dataclass(frozen=True)
 class NotTheBikes(Message):
-    """The accelerations are not a bike's. percent: the share of the riding in which they are not."""
+    """The accelerations are not a bike's. percent: the share of the riding time with such accelerations."""
 
     percent: float
 

@@ -284,8 +284,9 @@ def _seconds(time_ns: Nanoseconds) -> Array:
 
 
 def _check_rates(name: str, seconds: Array, force: Array, rates: Array) -> None:
-    """Raise InputError if rates do not fit the turns of gravity. Either another unit fits, or gravity's direction is
-    constant although the rates would turn it."""
+    """Raise InputError if rates do not fit the turns of gravity: if another unit fits, or if gravity keeps its
+    direction although the rates would turn it.
+    """
     fit = fit_rates(seconds, force, rates)
     shown = float(np.degrees(fit.factor))
     if fit.decides and not 1.0 / _TIMES_OFF < shown < _TIMES_OFF:

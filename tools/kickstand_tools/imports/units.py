@@ -46,7 +46,7 @@ Nanoseconds = Ints
 NO_TIME = np.iinfo(np.int64).min  # value for a cell without a time
 REPEATED = NO_TIME + 1  # value for a row that repeats the sample of an earlier row
 DATES = "date or clock"
-EPOCH_NS = 10**17  # 1973; larger times count from 1970
+EPOCH_NS = 10**17  # March 1973; a larger time counts from 1970
 DAY_NS = 86400 * 10**9
 _LATEST_NS = 4.0e18  # the year 2096; twice this value still fits into 64 bits
 _WRAP = 2**32  # micros() of a microcontroller restarts from 0 after 71.6 minutes, millis() after 49.7 days
@@ -186,7 +186,7 @@ def _guessed(values: Array) -> str:
     size = float(np.median(np.abs(good)))
     steps = np.diff(good)
     step = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
-    # with larger steps, it is a clock of microseconds that has run for minutes
+    # with steps of 100 or more, the clock counts microseconds and has run for minutes
     if size > 1e8 and size < 1e10 and step < 100.0:
         return "s"
     for name, from_1970 in (("ns", 1e17), ("us", 1e14), ("ms", 1e11)):

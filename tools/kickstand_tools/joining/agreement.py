@@ -1,8 +1,8 @@
 """Compares the leans of two devices on one bike, to test a lean meter without a reference.
 
-The comparison does not show errors that both devices share, such as errors of the bike's model. It shows the separate
-errors of each device, of its sensor, its mount and its calibration. If both devices are equally good, the error of each
-is the difference divided by the square root of two.
+The comparison does not show errors that both devices share, such as errors of the bike's model. It shows the errors
+that each device has alone: of its sensor, its mount and its calibration. If both devices are equally good, each
+device's error is the difference divided by the square root of two.
 """
 
 from collections.abc import Iterator
@@ -176,7 +176,7 @@ def check_picture(path: Path) -> None:
 
 
 def draw(path: Path, found: Agreement) -> None:
-    """Write a PNG with the leans of both over time, and their difference."""
+    """Write a PNG with the leans of both devices over time, and the difference of the leans."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import MultipleLocator
 

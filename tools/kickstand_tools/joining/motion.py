@@ -15,7 +15,7 @@ from ..logs.source import Progress, name_of
 from ..signals import Array, Bools, Cells
 
 STEP_S = 0.05
-_MOST_DPS = 20.0  # higher rates do not increase a cell's weight in the direction of up
+_MOST_DPS = 20.0  # a cell with a higher rate gets no more weight when up is computed
 _LONGEST_S = 100 * 3600.0  # longest ride; memory limits it
 
 

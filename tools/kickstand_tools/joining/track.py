@@ -11,11 +11,11 @@ import numpy as np
 from ..logs.log import Table
 from ..signals import Array, Bools, distance_m, stretches
 
-LONGEST_S = 6.0  # longest time between two points of a course, as watches write them on straights
+LONGEST_S = 6.0  # longest time between two points of a course; watches write points this far apart on straights
 SLOWEST_MPS = 2.5  # in slower steps, the errors of the positions dominate
 FASTEST_MPS = 100.0  # a faster step is a jump of the receiver's position
-STEP_ERROR_M = 1.0  # 1 sigma of a step across its direction, as of phones' receivers from second to second
-COURSE_ERROR_DEG = 4.0  # 1 sigma of other errors: the gyro's scale factor, and the smoothing of positions
+STEP_ERROR_M = 1.0  # standard deviation of a step across its direction, for a phone's receiver and one second
+COURSE_ERROR_DEG = 4.0  # standard deviation of other errors, due to the gyro's scale factor and smoothed positions
 _OFTEN_S = 0.7
 _AROUND = 2  # number of points on each side from which a speed is computed
 STEPS = 30  # largest number of steps in a segment

@@ -17,7 +17,7 @@ from ..common.messages import Message
 from ..signals import Array, Ints, window_means
 from .log import Block
 
-COARSE = 0.05  # times with a smaller tick are not changed; a share of the time between samples
+COARSE = 0.05  # share of the time between samples; times with a smaller tick are not changed
 # If more than this share of the times repeats the previous time, the recorder writes one time for several samples
 OFTEN = 0.05
 # If at least this share of the steps is equal, the times are already even, and only some samples are missing

@@ -1,8 +1,9 @@
 """Writes Racelogic's VBO, which Circuit Tools opens and RaceChrono imports.
 
 Sections and standard channels follow
-https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.html. Only other channels have units.
-Columns and signs follow https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and the user guide
+https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.html. Standard channels have no units, all
+other channels have. Columns and signs follow
+https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and the user guide
 of the VBOX HD Lite:
 
 * time: HHMMSS.SS
@@ -15,7 +16,7 @@ of the VBOX HD Lite:
 
 A log does not contain the number of satellites. The file says 4, because a position needs at least 4. Without a
 position, satellites and position are written as 0. Other columns without values are left out. VBO requires a velocity.
-Without a speed it is 0, and a comment in the file says so.
+If the log has no speed, the velocity is 0, and a comment in the file says so.
 """
 
 import time

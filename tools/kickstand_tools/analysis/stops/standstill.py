@@ -19,7 +19,7 @@ QUIET_SHARE = 0.15  # the share for the rates of pitch and yaw
 # The share for the vertical force. After a stop the fork shakes less than this. Smooth roads and idling engines shake
 # more.
 QUIET_UP_SHARE = 0.2
-RIDING_PERCENTILE = 90.0  # percentile of the shaking that belongs to moving, even in a ride with long pauses
+RIDING_PERCENTILE = 90.0  # this percentile of the shaking comes from a moving vehicle, even with long pauses
 # Limits of the road's shaking. Shaking faster than ENGINE_S is the engine's. Changes slower than BEND_S are bends and
 # the dive of the fork
 ENGINE_S, BEND_S = 0.1, 0.5
