@@ -76,7 +76,7 @@ def overlay(
         video: a video of the ride. None writes a clip.
         offset_s: the ride's time at the video's first picture, in s since the ride's first sample. It is negative if
             the video begins before the ride. None finds it from the gyro of a GoPro.
-        fps: pictures per second. None takes the video's, or 30 for a clip.
+        fps: pictures per second. None uses the video's rate, or 30 for a clip.
         from_s, to_s: limits of the part of the ride, see Stretch.
         height: height in pixels of the video that a clip is for. None means 1080.
         mph: True to show the speed in miles per hour.

@@ -130,7 +130,7 @@ def write_video(
             except BrokenPipeError:
                 pass  # ffmpeg has stopped, and prints the reason
             process.wait()
-        except BaseException:  # also Ctrl-C: ffmpeg must not continue to write
+        except BaseException:  # also after Ctrl-C, because ffmpeg must not continue to write
             process.kill()
             process.wait()
             raise

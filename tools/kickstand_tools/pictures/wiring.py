@@ -91,11 +91,11 @@ def draw(board: DrawnBoard, display: str) -> str:
     _draw_ground(page, _pin_y(ground))
     sensor = _draw_signals(page, board, pins["sensor"], _SENSOR_PINS_Y[:2], _CHANNELS)
     screen = _draw_signals(page, board, pins["display"], _DISPLAY_PINS_Y[1:], _CHANNELS[::-1])
-    if grounds[-1] > max(row["display"]):  # a ground near the button's pin, above it
+    if grounds[-1] > max(row["display"]):  # a ground pin is further up than the button's pin
         used_near.add(grounds[-1])
         page.wire(BLACK, (_RIGHT, _pin_y(grounds[-1])), (_MODULE_LEFT, _BUTTON_PINS_Y[0]))
         _draw_signals(page, board, pins["button"], _BUTTON_PINS_Y[1:], _CHANNELS)
-    else:  # a ground on the other side, led around the board
+    else:  # the ground wire starts on the other side and leads around the board
         ground = board.far.index("GND")
         used_far.add(ground)
         _draw_signals(page, board, pins["button"], _BUTTON_PINS_Y[:1], _CHANNELS)

@@ -205,5 +205,5 @@ def _records(blocks: Iterable[Block], calibration: CalibrationFile) -> Iterator[
     )
     for block in blocks:
         for time_us, reading, speed in block.measured.rows():
-            given = speed if speed >= 0.0 else replay_engine.NO_SPEED  # NaN is not >= 0
+            given = speed if speed >= 0.0 else replay_engine.NO_SPEED  # NaN is not >= 0 either
             yield struct.pack(replay_engine.RECORD, time_us, *reading, given)

@@ -48,7 +48,7 @@ class StoredTurn:
     time_us: time of the turn's last sample.
     n: number of samples.
     sums: sums of the counts of these samples, in the order ax ay az gx gy gz.
-    speed_mps, place: speed and position that arrived in this turn, None without one.
+    speed_mps, place: speed and position that arrived in this turn, None if none arrived.
     """
 
     time_us: int

@@ -77,7 +77,7 @@ class PulledRide:
     log: the written file, with its calibration beside it, or None if the ride cannot be read.
     seconds, readings: duration of the log and its number of readings.
     problems: one line per fault.
-    whole: True if everything was copied. An end lost in a power cut does not count.
+    whole: True if everything was copied. An end that the board itself lost in a power cut does not count as missing.
     deleted: True if the ride was removed from the board.
     """
 

@@ -436,7 +436,8 @@ EARTH_M = 6_371_000.0
 
 
 def distance_m(lat: Array, lon: Array, next_lat: Array, next_lon: Array) -> tuple[Array, Array]:
-    """Compute the distance from each position to the next one. It is exact enough for up to some kilometres.
+    """Compute the distance from each position to the next one. The result is exact enough for distances of up to some
+    kilometres.
 
     lat, lon: positions, shape (n), in degrees.
     next_lat, next_lon: next positions, shape (n), in degrees.

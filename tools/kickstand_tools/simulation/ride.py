@@ -191,7 +191,7 @@ def _motion(
 ) -> tuple[Motion, Shaking]:
     n, rate = len(command.time), command.rate_hz
     command.crosswind += conditions.gust_mps2 * band_noise(chance, n, 0.05, 0.5, rate)
-    # A rider who moves around makes the bike lean only while it rides
+    # A rider who moves around makes the bike lean only while the bike moves
     command.hang += conditions.sway_m * band_noise(chance, n, 0.02, 0.3, rate) * smoothstep(command.speed / 5.0)
     rolled = roll(command, bike, weave(chance, command, conditions.unrest_deg))
     surface = profile_slope(chance, float(command.distance[-1]) + 10.0, conditions.roughness)
