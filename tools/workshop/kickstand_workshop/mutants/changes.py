@@ -25,9 +25,7 @@ OPERATORS = (
     *("ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ExceptionReplacer", "ZeroIterationForLoop"),
     "AddNot",  # replaces a condition by its opposite
 )
-SMALL = (
-    16  # integers up to 16 are counts and indices, and are changed by +1 and -1. Larger integers are doubled and halved
-)
+SMALL = 16  # integers up to 16 (counts, indices) are changed by +1 and -1, larger integers are doubled and halved
 
 
 class Change(NamedTuple):
