@@ -45,7 +45,7 @@ def _compiled_once(source: Path, architecture: str = "armv6m") -> bytes:
     return _compiled_before(source, source.read_bytes(), architecture)
 
 
-bytecode.cross_compiled = _compiled_once  # replaced before any module imports it by name
+bytecode.cross_compiled = _compiled_once  # replaced before any module imports the function by name
 
 ROOT = Path(__file__).resolve().parent.parent
 # Features that depend on the machine: fixtures, markers, and modules that use programs, boards or pages.
@@ -134,7 +134,9 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 def _why_skipped(reason: str) -> str:
-    """Return the cause of a skip for the summary line. If the reason names a missing thing, it is "for want of" it."""
+    """Return the cause of a skip for the summary line. If the reason names a missing thing X, the cause is "for want of
+    X".
+    """
     missing = re.match(r"no (.+?)(?: for this system)?(?:: |$)|needs (.+)|could not import '([\w.]+)'", reason)
     return "for want of " + next(filter(None, missing.groups())) if missing else f"because {reason}"
 

@@ -106,7 +106,7 @@ def test_the_free_pose_is_the_one_further_from_its_axis():
             with pytest.raises(InputError, match=r"side \+z exists twice \(e and g\)"):
                 poses._sides([*named, pose("g", slanted(deg))])
     with pytest.raises(InputError, match="exists twice"):
-        poses._sides([*tilted, pose("g", slanted(24.4))])  # under 3 degrees more than the side pose
+        poses._sides([*tilted, pose("g", slanted(24.4))])  # tilted under 3 degrees more than the side pose
     assert poses._sides([*tilted, pose("g", slanted(24.6))])[1] is not None
     with pytest.raises(InputError, match=r"side -z is missing, and side \+z is there 2 times"):
         poses._sides([*named[:5], pose("g", slanted(25.0))])
@@ -152,7 +152,7 @@ def moving_log(stretches_s, hz=100.0, size_g=0.5, between_s=1.0) -> Log:
 def test_stillness_lasts_a_second_between_margins():
     found = procedure._still_stretches(moving_log([1.15, 1.35, 3.0]))
     assert [last - first for first, last in found] == pytest.approx([115, 280], abs=6)
-    assert found[0][0] == pytest.approx(325, abs=6)  # 1 + 1.15 + 1 s, and a margin of 0.1 s
+    assert found[0][0] == pytest.approx(325, abs=6)  # begins after 1 + 1.15 + 1 s and a margin of 0.1 s
     with pytest.raises(InputError, match="too short for the six positions"):
         procedure._still_stretches(Log(np.arange(40) / 100.0, np.zeros((40, 3)), np.zeros((40, 3))))
 
@@ -204,7 +204,9 @@ def test_the_least_tilted_pose_is_a_sides():
     ("most", "used"), [(240.0, True), (246.0, True), (246.3, False), (252.4, False), (252.6, True)]
 )
 def test_turns_at_the_end_of_a_range_are_left_out(most, used):
-    """98.5 to 101 % of 250 deg/s are at the end of the range. Then rates over 237.5 deg/s are too quick."""
+    """A rate of 98.5 to 101 % of 250 deg/s is treated as the end of a range of 250 deg/s. Then all rates over 237.5
+    deg/s are left out.
+    """
     rates = np.zeros((100, 3))
     rates[50] = [0.0, most, 0.0]
     log = Log(np.arange(100) / 100.0, np.tile([0.0, 1.0, 0.0], (100, 1)), rates)
@@ -335,7 +337,7 @@ def test_stops_are_found_in_each_log_of_its_own():
 
 
 def test_a_speed_counts_as_known_for_5_s(monkeypatch):
-    """Each bin lasts 100 ms. After the speed in the first bin, 50 more bins are known."""
+    """Each bin lasts 100 ms. After the speed in the first bin, the speed is known in 50 more bins."""
     seen: list = []
     monkeypatch.setattr(drive_feed.StandingVertical, "update", lambda _, force, rate, mps, s: seen.append((mps, s)))
     speed = np.full(801, np.nan)

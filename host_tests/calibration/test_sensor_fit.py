@@ -95,7 +95,7 @@ def test_samples_of_a_pose_that_is_spoilt_count_after_all():
         turn.end()
         return np.degrees(turn.angle())
 
-    assert turned(spoilt=True) == pytest.approx(10.0, abs=0.01)  # 20 deg/s for half a second
+    assert turned(spoilt=True) == pytest.approx(10.0, abs=0.01)  # a rate of 20 deg/s for half a second
     assert turned(spoilt=False) == pytest.approx(8.0, abs=0.01)
 
 

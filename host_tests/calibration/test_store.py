@@ -52,7 +52,7 @@ def test_the_largest_trim_that_the_filter_finds_is_loaded_again(store, sign):
 
 
 IDENTITY = [1, 0, 0, 0, 1, 0, 0, 0, 1]
-NUMBERS = [0.25, -0.125, 0.375, 1.125, 0.875, 1.0, 3.5, -2.5, 1.5, *IDENTITY, 2.5]  # all are exact in 32 bits
+NUMBERS = [0.25, -0.125, 0.375, 1.125, 0.875, 1.0, 3.5, -2.5, 1.5, *IDENTITY, 2.5]  # each is exact as a 32-bit float
 
 
 def record(*, magic=b"KSTD", version=1, sequence=7, chip=(0x68, 8), six_done=1, how=1, numbers=NUMBERS):

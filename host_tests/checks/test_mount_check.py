@@ -239,7 +239,7 @@ def test_small_or_short_bends_show_no_forward(yaw_dps, seconds, shown):
 
     * Means over 0.5 s keep 0.974 of the amplitude.
     * The changes of these means over a second have 1.414 times the amplitude.
-    * Smoothing keeps 0.854 of it.
+    * Smoothing keeps 0.854 of this amplitude.
     * The standard deviation of a sine is its amplitude divided by 1.414.
 
     The check also needs 120 changes. A log of 61 s has 118 changes, and a log of 63 s has 122.

@@ -72,7 +72,7 @@ def test_the_display_shows_the_lean_with_this_alignment():
     shown = ~np.isnan(found.lean_sigma_deg)
     assert np.mean(shown) > 0.95
     off = (found.lean_deg - made.truth["lean_deg"])[shown]
-    assert np.sqrt(np.mean(off**2)) < 1.0  # degrees; the goal was 1.5
+    assert np.sqrt(np.mean(off**2)) < 1.0  # rms error in degrees; the goal was 1.5
 
 
 def test_ride_alignment_is_as_good_as_two_poses():

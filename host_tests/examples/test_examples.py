@@ -39,9 +39,9 @@ def test_print_sensor(tmp_path):
     printed, _ = run(tmp_path, "print_sensor.py", 1.5)
     found, *lines = printed.split("\n")
     assert found == "Found an MPU6050"
-    assert len([line for line in lines if line]) == 7  # 0.2 s apart, after 0.2 s of setting up
+    assert len([line for line in lines if line]) == 7  # one line per 0.2 s, after a set-up of 0.2 s
     ax, ay, az, gx, gy, gz, temperature = numbers(lines[0])
-    assert (ax * ax + ay * ay + az * az) ** 0.5 == pytest.approx(1.0, abs=0.1)  # an uncalibrated sensor at rest
+    assert (ax * ax + ay * ay + az * az) ** 0.5 == pytest.approx(1.0, abs=0.1)  # at rest, not calibrated
     assert max(abs(gx), abs(gy), abs(gz)) < 25.0  # including the gyro's bias
     assert temperature == pytest.approx(25.0, abs=0.1)
 

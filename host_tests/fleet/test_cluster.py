@@ -171,7 +171,7 @@ def test_ctrl_c_while_workers_start_is_deferred(tmp_path, after_s):
         assert process.stdout is not None
         assert process.stdout.readline() == "starting\n"
         time.sleep(after_s)
-        os.killpg(process.pid, signal.SIGINT)  # a terminal also sends it to the workers
+        os.killpg(process.pid, signal.SIGINT)  # a terminal also sends Ctrl-C to the workers
         _, trouble = process.communicate(timeout=120)
     assert trouble.count("Traceback") == 1
     assert trouble.endswith("KeyboardInterrupt\n")

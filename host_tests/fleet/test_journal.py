@@ -16,7 +16,7 @@ def result(name="v", message="x"):
 
 
 def test_results_are_found_again_in_the_order_of_their_keys(tmp_path):
-    """The next run recomputes a result that was saved for that. Its latest result counts."""
+    """The next run recomputes a result that was saved with again=True. For each key the latest result counts."""
     path = tmp_path / "journal.jsonl"
     with Journal(path) as journal:
         for name in ("b", "a"):

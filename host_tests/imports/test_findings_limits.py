@@ -109,7 +109,9 @@ def test_whole_numbers_above_20_are_counts():
      (0.1, False, "deg/s"), (0.1 / 57.3, False, "rad/s"), (100.0, False, "mdeg/s"), (1.75, False, "mrad/s")],
 )  # fmt: skip
 def test_a_unit_of_rates_by_their_size(most, moving, unit):
-    """A sensor at rest has a noise of 0.1 deg/s. In motion the 90th percentile of the rates decides."""
+    """At rest the noise shows the unit, because it is about 0.1 deg/s. In motion the 90th percentile of the rates shows
+    the unit.
+    """
     force = calm(1.0)
     if moving:
         force[::2, 0] += 0.2
@@ -166,7 +168,7 @@ def test_a_stated_unit_of_times_must_be_usual(unit, step, fits):
 
 
 def test_groups_of_three_columns_do_not_share_one():
-    """Columns without any number belong to no group. Without names, groups are side by side."""
+    """Columns without any number belong to no group. Columns without names must be side by side to form a group."""
 
     def places(names, **cells):
         columns = [cells.get(name, np.arange(50.0) % 7) for name in names]

@@ -152,11 +152,13 @@ def test_frozen_readings_and_gaps_are_left_out(rides):
     joined = api.join_track(broken, phone_tracks.track(ride))
     assert [notice.code for notice in joined.notices] == ["frozen-readings"]
     assert abs(error_s(joined, 0.5)) < 0.2
-    assert joined.match.correlation > 0.97  # if the frozen readings were used, it would be 0.8
+    assert joined.match.correlation > 0.97  # with the frozen readings, the correlation would be 0.8
 
 
 def test_course_turns_are_scaled_by_the_lean():
-    """The gyro's rate about the bike's up is smaller than the yaw rate. At a lean of 45 degrees it is 0.7 of it."""
+    """The gyro's rate about the bike's up is smaller than the yaw rate. At a lean of 45 degrees it is 0.7 times the yaw
+    rate.
+    """
     log, track = winding(300.0)
     steps = course(track.once_a_second())
     compared = Comparison(motion(log), steps, segments(steps), 0.0, 3.0)

@@ -110,7 +110,7 @@ def test_a_lean_that_is_not_trusted_is_never_a_number(run):
 
 
 def test_the_second_phone_waits_for_the_first(run):
-    """The second phone can connect only after the first has left. The board forgets the requests of the first. It
+    """The second phone can connect only after the first has left. The board forgets the requests of the first phone. It
     disconnects a phone that requests nothing. The display shows which phone is connected."""
     first = [[22.0, "connect", 1], [22.1, "write", "filter", [1, 0, 100]], [26.0, "leave"]]
     second = [[24.0, "connect", 2], [27.5, "connect", 2], [30.0, "write", "rate", [100, 0]], [33.0, "leave"]]
@@ -130,7 +130,7 @@ def test_the_second_phone_waits_for_the_first(run):
 
 
 def test_the_loop_continues_if_the_phone_is_out_of_reach(run):
-    """The queue of an ESP32 is then full. This loses packets and has no other effect."""
+    """While the phone is out of reach, the queue of an ESP32 is full. Packets are lost, but nothing else happens."""
     acts = ASK + [[25.0, "away", True], [29.0, "away", False]]
     plan = {**device_plans.ALIGNED, **LIVE, "board": {"machine": "esp32"}, "phones": [acts]}
     record = run(plan)

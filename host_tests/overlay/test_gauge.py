@@ -1,5 +1,6 @@
-"""The pixels of the gauge: the side of the lean, the maxima, unknown values, transparency. Also the values that it
-gets."""
+"""The pixels of the gauge: the side of the lean, the maxima, unknown values, transparency. Also tests the values that
+the gauge gets.
+"""
 
 import math
 

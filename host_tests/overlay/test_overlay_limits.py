@@ -181,7 +181,7 @@ def test_over_a_video_the_gauge_follows_its_smaller_side(monkeypatch, tmp_path):
 
 @pytest.fixture
 def offset(monkeypatch):
-    """Return a function of what each shift gives: {place: (correlation, evidence)}.
+    """Return a function that finds the offset from the result of each shift, {place: (correlation, evidence)}.
 
     The video has 200 cells of 50 ms. Its readings begin 0.3 s after its first picture."""
 

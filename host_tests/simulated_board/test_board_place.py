@@ -74,7 +74,7 @@ def test_midnight_and_ten_a_second():
 
 
 def test_an_old_position_is_not_returned_as_new():
-    """This holds while only VTG arrives, and after a silence that ends without a fix."""
+    """No position is returned while only VTG arrives, nor after a silence that ends without a fix."""
     with Board(level):
         from kickstand.speed.gps import Gps
 

@@ -366,7 +366,7 @@ def test_positions_are_integrated_from_speed_and_yaw():
     assert lat[-1] == pytest.approx(47.6)
     assert lon[-1] == pytest.approx(8.0 + 0.0089932 / np.cos(np.radians(47.6)), abs=1e-6)
     assert utc_s[[0, 200]].tolist() == [1_779_008_400.0, 1_779_008_401.0]
-    truth["yaw_rate_dps"][0] = 90.0 * 200.0  # a turn to the left in one sample, to the north
+    truth["yaw_rate_dps"][0] = 90.0 * 200.0  # the vehicle turns left to the north within one sample
     lat, lon, _ = files.positions(SimpleNamespace(truth=truth, rate_hz=200.0, time=np.zeros(n)))  # type: ignore[arg-type]
     assert lat[-1] == pytest.approx(47.6089932, abs=1e-6) and lon[-1] == pytest.approx(8.0)
 

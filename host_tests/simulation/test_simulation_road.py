@@ -58,7 +58,7 @@ def test_the_front_wheel_meets_a_bump_first():
     road.add_bumps(slope, [20.0], 0.05, 0.6)
     shaken = road.shaking(chance, distance, np.full(4000, 10.0), slope, Bike(), RATE)
     nose_up, lifted = np.argmax(shaken.pitch > 0.003), np.argmax(shaken.heave > 1.0)
-    assert 0.05 < (lifted - nose_up) / RATE < 0.25  # 1.43 m of wheelbase at 10 m/s
+    assert 0.05 < (lifted - nose_up) / RATE < 0.25  # the wheelbase of 1.43 m takes 0.14 s at 10 m/s
 
 
 def test_lowest_gear_under_the_shift_speed_is_used():
