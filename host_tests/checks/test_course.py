@@ -16,7 +16,7 @@ from kickstand_tools.simulation.files import positions
 
 @functools.cache
 def simulated(profile: str = "street", late_s: float = 0.6) -> Log:
-    """Simulate the log of a board with a gyro bias. It has 50 readings per second and one position per second. The
+    """Simulate the log of a board with a gyro bias. The log has 50 readings per second and one position per second. The
     positions are late by late_s seconds, as from a satellite receiver."""
     made = made_up(profile)
     here = slice(None, None, 4)

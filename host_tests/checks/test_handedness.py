@@ -96,7 +96,7 @@ def test_axes_exchanged_in_one_sensor():
 
 
 def hand(seconds=60.0, seed=0, hz=50):
-    """Simulate a phone that is waved in the hand. It turns by up to 90 degrees and moves by a few decimetres."""
+    """Simulate a phone that is waved in the hand. The phone turns by up to 90 degrees and moves by a few decimetres."""
     chance = np.random.default_rng(seed)
     time = np.arange(0.0, seconds, 1.0 / hz)
     waves = [chance.uniform(0.1, 0.7, (4, 3)), chance.uniform(0.0, 6.3, (4, 3)), chance.normal(0.0, 0.3, (4, 3))]

@@ -22,7 +22,7 @@ THERE = [name for name in estimators.OTHERS if estimators.PACKAGES.get(name) not
 
 
 def leaned(lean_deg: float, roll_s: float = 1.5) -> Samples:
-    """Simulate a bike at rest. It leans from upright to lean_deg within roll_s, and keeps this lean for the same
+    """Simulate a bike at rest. The bike leans from upright to lean_deg within roll_s, and keeps this lean for the same
     time."""
     n = int(roll_s * 200)
     lean = np.radians(np.concatenate((np.linspace(0.0, lean_deg, n), np.full(n, lean_deg))))

@@ -1,4 +1,4 @@
-"""The driver finds faulty axes by their counts. It never reports a good axis."""
+"""The driver finds faulty axes by their counts. A good axis is never reported."""
 
 from array import array
 

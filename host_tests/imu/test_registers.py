@@ -195,7 +195,7 @@ def test_an_unknown_number_is_an_unknown_chip_unless_accepted():
 
 
 def test_a_number_that_reads_differently_each_time_is_an_error():
-    """WHO_AM_I is read as 0x68 and as 0x78. Both are numbers of known chips, and they differ by one bit."""
+    """WHO_AM_I is read as 0x68 and as 0x78. Both numbers belong to known chips, and differ by one bit."""
     from kickstand.imu.mpu6050 import Mpu6050
 
     wires = Wires(0x68)
@@ -215,8 +215,9 @@ def test_a_number_that_reads_differently_each_time_is_an_error():
 
 
 def test_the_simulated_board_models_every_chip_of_the_driver():
-    """Each chip of the driver has its own simulated model. Otherwise it would be tested as an MPU6050. The FIFO of the
-    model may be larger than the part that the driver uses."""
+    """Each chip of the driver has its own simulated model. Without a model of its own, a chip would be tested as an
+    MPU6050. The FIFO of the model may be larger than the part that the driver uses.
+    """
     from kickstand.imu.mpu6050 import CHIPS
 
     assert set(CHIPS) == set(VARIANTS)

@@ -166,8 +166,9 @@ def test_the_axes_across_up():
 
 
 def test_forces_are_integrated_without_their_mean():
-    """A force of 0 and then 0.1 g for 10 s each: the speed falls by 4.9 m/s and rises again. Its integral is
-    -4.9 * 20 / 2."""
+    """A force of 0 and then 0.1 g for 10 s each: the speed falls by 4.9 m/s and rises again. The integral of the speed
+    is -4.9 * 20 / 2.
+    """
     motion = moved(np.tile([0.0, 1.0, 0.0], (400, 1)))
     motion.force_g[:, 0] = np.where(np.arange(400) < 200, 0.0, 0.1)
     sums = compare._double_sums(motion, steady(30, 0.0), 0.0)

@@ -38,7 +38,7 @@ def test_times_are_converted_by_offset_and_drift():
 
 
 def test_up_is_the_force_weighted_by_the_rate():
-    """The weight is limited. So a rate of 40 deg/s has the same weight as 20 deg/s."""
+    """The weight is limited. So a rate of 40 deg/s has the same weight as a rate of 20 deg/s."""
     moved = CellMotion(
         np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), np.array([[0.0, 0.0, 10.0], [0.0, 40.0, 0.0]]),
         np.ones(2, dtype=bool), False, False,
@@ -213,7 +213,7 @@ def steps(n: int, turn_deg: float = 9.0, speed: float = 10.0, bad=()) -> Course:
 
 
 def test_a_tracks_change_of_course_is_over_four_seconds():
-    """The track turns by 9 deg/s at 10 m/s, which is 36 degrees in 4 s. Its lateral force of 0.160 g belongs to a lean
+    """The track turns by 9 deg/s at 10 m/s, which is 36 degrees in 4 s. The lateral force of 0.160 g belongs to a lean
     whose cosine is 0.98741."""
     change, known = match._changes_of_track(steps(30))
     assert change[20] == pytest.approx(36.0 * 0.98741, abs=0.001)

@@ -44,8 +44,9 @@ def test_a_phones_track_is_found_within_a_fifth_of_a_second(rides, profile):
 
 
 def test_track_over_half_of_the_ride_is_found_at_any_offset(rides):
-    """The track may begin hours before the ride. It may also cover only a part of the ride, because the phone was
-    switched on late or off early."""
+    """The track may begin hours before the ride. The track may also cover only a part of the ride, because the phone
+    was switched on late or off early.
+    """
     ride = rides["hills"]
     track = phone_tracks.track(ride, before_s=8 * 3600.0)
     assert abs(error_s(api.join_track(log_of(ride), track), 0.5)) < 0.2

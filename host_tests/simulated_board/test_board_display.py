@@ -1,5 +1,6 @@
-"""Every display driver passes the same tests, on the simulated model of its own display. They also run on
-MicroPython."""
+"""Every display driver passes the same tests, on the simulated model of its own display. The tests also run on
+MicroPython.
+"""
 
 import gc
 import sys
@@ -255,8 +256,8 @@ def test_a_status_that_is_never_on_leaves_no_oled_dark(board, display):
 
 
 def test_no_status_leaves_an_oled_dark():
-    """The driver recognises the two kinds of controller by their status. It sends the supply commands of both kinds to
-    every controller. If it mistakes one kind for the other, the picture is only two columns off.
+    """The driver recognises the two kinds of controller by their status. The driver sends the supply commands of both
+    kinds to every controller. If it mistakes one kind for the other, the picture is only two columns off.
     """
     for kind in OLEDS:
         for identity in range(16):

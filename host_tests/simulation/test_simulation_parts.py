@@ -243,7 +243,7 @@ def test_gears_keep_the_engine_under_its_shift():
 
 def test_vibration_grows_with_the_engine():
     """At 6000 revolutions per minute the vibration has the rms rms_g. At idle the rms is multiplied by
-    0.25 + 0.75 (1250 / 6000)^2. It is at most 0.5 g. The rates vibrate by 15 deg/s per g."""
+    0.25 + 0.75 (1250 / 6000)^2. The vibration is at most 0.5 g. The rates vibrate by 15 deg/s per g."""
     running = np.ones(20_000)
 
     def rms(speed, rms_g, share=1.0):

@@ -44,7 +44,8 @@ def run_tasks(
 ) -> Iterator[Outcome]:
     """Run function(*item) for each item, and yield one outcome per item, in any order.
 
-    The arguments scheduler, workers and timeout_s are those of Cluster. Starts no workers if there are no items.
+    The arguments scheduler, workers and timeout_s have the same meaning as for Cluster. Starts no workers if there are
+    no items.
 
     Yields:
         index: index of the item.

@@ -16,7 +16,8 @@ A sensor ahead of the rear axle is accelerated sideways when a bend begins and e
 same moments, so this acceleration would falsify forward. The coefficient arm takes up this acceleration. The length of
 arm is the distance from the sensor to the rear axle.
 
-A motorcycle leans into bends. Its force stays along its own up, and grows to sqrt(1 + c^2). So for a motorcycle
+A motorcycle leans into bends. The force stays along the motorcycle's own up, and grows to sqrt(1 + c^2). So for a
+motorcycle
 
     f = level sqrt(1 + c^2) + forward a
 
@@ -82,7 +83,8 @@ class Blocks(Table):
 
     square: Sums of products of two terms, shape (m, 4, 4). The road's slope is filtered out, see _without_road().
     product: Sums of products of a term and a component of the force, shape (m, 4, 3), filtered like square.
-    sway: Sway of each block, shape (m, 3, 3). It is divided by its trace, so a rough road counts like a smooth one.
+    sway: Sway of each block, shape (m, 3, 3). The matrix is divided by its trace, so a rough road counts like a smooth
+        road.
     log: Index of each block's log, shape (m).
     t_s: Beginning of each block in its log, shape (m), in s.
     end_s: End of each block in its log, shape (m), in s.
@@ -216,11 +218,11 @@ def handedness(found: Array, varied: Array) -> float:
 def _without_road(log: Intervals) -> tuple[Array, Array]:
     """Return the terms and the force with the slope and camber of the road filtered out.
 
-    Slope and camber stay similar for some hundred metres. There they tilt the measured level, so neighbouring intervals
-    share an error. An ordinary regression would mistake the slope during braking for a part of forward.
+    Slope and camber stay similar for some hundred metres. They tilt the measured level, so neighbouring intervals share
+    an error. An ordinary regression would mistake the slope during braking for a part of forward.
 
-    Therefore a filter follows the road, modelled as a first-order Gauss-Markov process in distance. It predicts each
-    value from the earlier intervals. The function returns the differences from the predictions, divided by their
+    Therefore a filter follows the road, modelled as a first-order Gauss-Markov process in distance. The filter predicts
+    each value from the earlier intervals. The function returns the differences from the predictions, divided by their
     standard deviations. These differences are uncorrelated, so ordinary least squares can be used on them.
     """
     rows = np.hstack((log.terms, log.force))

@@ -7,8 +7,8 @@ A rotation that tilts the sensor shows in gravity. A rotation about the vertical
 in bends, and in the direction in which the vehicle sways on its springs. The sway also shows on a straight road without
 braking.
 
-The variance of a rotation comes from a jackknife over blocks of some seconds. It does not contain errors that last
-longer: slopes of a road and, between two logs, changes of load and temperature. Their variances are added.
+The variance of a rotation comes from a jackknife over blocks of some seconds. This variance does not contain errors
+that last longer: slopes of a road and, between two logs, changes of load and temperature. Their variances are added.
 """
 
 from dataclasses import dataclass
@@ -38,8 +38,8 @@ LEAST_VARIED = 0.2
 # deviation. YAW_PRIOR_DEG is its value at a variation of 1 g^2 s
 YAW_PRIOR_DEG = 0.4
 # SWAY_DEG is the standard deviation, in degrees, of the direction of sway on each side of a moment, caused by the
-# roads. The sway is not used if its standard deviation over both sides is above SWAY_WORST_DEG. It is also not used if
-# it contradicts the braking by more than SWAY_SIGMAS standard deviations
+# roads. The sway is not used if its standard deviation over both sides is above SWAY_WORST_DEG. The sway is also not
+# used if it contradicts the braking by more than SWAY_SIGMAS standard deviations
 SWAY_DEG, SWAY_WORST_DEG, SWAY_SIGMAS = 0.7, 5.0, 3.0
 # A tilt larger than this within a log, in degrees, is reported even if it is gradual. The slopes of roads differ by
 # less

@@ -191,7 +191,7 @@ def _error(period: Period, log: str, reason: str, message: str) -> Row:
 
 
 def _logs(period: Period) -> tuple[list[Log], list[Row]]:
-    """Read the logs. Returns the logs that can be used, and a row of errors for each of the others."""
+    """Read the logs. Returns the logs that can be used, and a row of errors for each other log."""
     logs, errors = [], []
     for path in period.paths:
         reason = UNREADABLE

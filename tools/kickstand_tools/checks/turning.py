@@ -1,6 +1,6 @@
 """Measures how well the rates of a log explain its forces, window by window.
 
-The rates of a window are integrated to a rotation C. It leads from the sensor's axes at each instant to the sensor's
+The rates of a window are integrated to a rotation C. C rotates from the sensor's axes at each instant to the sensor's
 axes at the beginning of the window. In the axes at the beginning, the specific force f (in g) is a constant vector `up`
 plus the acceleration. The acceleration follows from the velocity V, which is given in the sensor's rotating axes:
 

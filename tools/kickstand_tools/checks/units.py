@@ -3,7 +3,7 @@
 A wrong unit of the speed is found later. From one second to the next, the speed changes by the acceleration along the
 vehicle. So the changes of the speed are compared with the specific force that caused them. The mounting of the sensor
 does not matter: forward is the direction in which force and change of speed correlate best. Turns, slopes and a moving
-rider add to the force only. They can make the change of speed seem too small, but never too large.
+rider add to the force only. These effects can make the change of speed seem too small, but never too large.
 """
 
 from dataclasses import dataclass

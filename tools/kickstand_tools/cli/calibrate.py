@@ -66,7 +66,7 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
 @calibrate_command.command(short_help="Align to any vehicle, from driving with braking.")
 @file_argument("logs", "LOG.csv...", nargs=-1, required=True)
 @click.option("--calibration", type=PATH, help="An earlier calibration, by six positions or two poses.")
-@click.option("--vehicle", type=VEHICLES, help="Default: motorcycle with a calibration by two poses, else car.")
+@click.option("--vehicle", type=VEHICLES, help="Default: motorcycle if calibrated by two poses, otherwise car.")
 @click.option("--method", type=click.Choice(["improved", "published"]), default="improved")
 @OUT
 @RIGHT_HANDED

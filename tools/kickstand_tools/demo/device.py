@@ -6,7 +6,7 @@ SPEED: Simulated seconds per second. 0 means as fast as possible.
 DISPLAY: "lcd", "ssd1306" or "sh1106".
 
 Every 50 simulated ms the program prints a line of JSON (see score.State). All other lines of its output are the
-firmware's console. It reads one command per line from standard input:
+firmware's console. The program reads one command per line from standard input:
 
     short, long                         press the button
     left, right, kickstand, upright     steer the bike by hand

@@ -1,6 +1,6 @@
 """Simulates a bike that you steer with keys or in the browser. Runs on CPython and MicroPython.
 
-Its motion follows the same equations as simulation/scripted/script.py.
+The bike's motion follows the same equations as simulation/scripted/script.py.
 """
 
 from math import degrees, pi, radians, sin

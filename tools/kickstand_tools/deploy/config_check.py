@@ -160,7 +160,7 @@ def default_settings() -> "Settings":
 
 
 def unused(path: Path, port: str) -> list[tuple[int, str]]:
-    """Find lines "# NAME = value" whose value is not the default. Their '#' was probably left by mistake.
+    """Find lines "# NAME = value" whose value is not the default. The '#' was probably left in these lines by mistake.
 
     Returns the number and the text of each line. Call this function within posed(). port: the board's sys.platform.
     """

@@ -26,7 +26,7 @@ _HEARD_BYTES = 3000
 ANSWER_S = 10
 _STARTING_S = 3  # a starting board ignores input for up to this time
 _POLL_S = 0.01
-_PROGRAM_S = 60  # longest run time of a program. It is long because an emulated board compiles the modules slowly
+_PROGRAM_S = 60  # longest run time of a program; long, because an emulated board compiles the modules slowly
 _EMULATED = "socket:"  # the name of an emulated board's port starts with this
 _SLOWER = 12  # factor on time limits for an emulated board, which is slow on a busy computer
 _RESTART_S = 2  # time to wait until the board's USB port is back, because the next command may follow at once
@@ -76,7 +76,8 @@ class NotInstalled(Message):
 
 @dataclass(frozen=True)
 class UnfitFirmware(Message):
-    """The firmware on the board lacks a module. It has another version, or an update was interrupted.
+    """The firmware on the board lacks a module. The board has another version of the firmware, or an update was
+    interrupted.
 
     name: Name of the board's port.
     missing: The error about the missing module.

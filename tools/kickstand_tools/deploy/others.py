@@ -1,4 +1,4 @@
-"""Finds another project's main.py, boot.py and config.py on a used board. They are renamed and kept."""
+"""Finds another project's main.py, boot.py and config.py on a used board. These files are renamed and kept."""
 
 import ast
 import hashlib

@@ -41,7 +41,7 @@ class Update:
     These are the steps in their order:
         moves: New paths of files of another project, by their present paths. They are renamed.
         remove: Files to remove, main.py first.
-        remove_folders: Folders to remove. They are empty by then.
+        remove_folders: Folders to remove. Folders to remove, which are empty by then.
         make_folders: Folders to create.
         copy: Contents of the files to copy, by path, main.py last.
 
@@ -138,7 +138,7 @@ def _folders(path: str) -> list[str]:
 def _refuse_in_the_way(wanted: dict[str, bytes], folders: set[str], kept: set[str]) -> None:
     """Raise InputError if MicroPython would import a user's file instead of a wanted file.
 
-    It would import a folder lean/ instead of lean.py, and lean.py instead of lean.mpy.
+    MicroPython imports a folder lean/ instead of lean.py, and lean.py instead of lean.mpy.
     """
     modules = {_module(path) for path in wanted}
     for path in sorted(kept):

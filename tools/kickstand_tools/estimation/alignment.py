@@ -45,9 +45,9 @@ MAX_DEG = np.array([5.0, 5.0, 3.5])  # largest accepted standard errors of pitch
 MOVED_DEG = 8.0  # largest accepted difference between the alignments from the two halves of the ride
 CONSTANT = Hypotheses(*np.array([[1e-5], [1e-5], [1e-4], [0.0], [1.0]]))  # mount and wind do not change during the ride
 
-# The mountings of a phone that its user can name. They check the ride's result, and help if the ride has few bends.
-# A phone's axes, as seen by a person looking at the screen, are: x to the right, y to the top, z out of the screen (W3C
-# Device Orientation; the same on Android and iOS).
+# The mountings of a phone that its user can name. A named mounting checks the ride's result, and helps if the ride has
+# few bends. A phone's axes, as seen by a person looking at the screen, are: x to the right, y to the top, z out of the
+# screen (W3C Device Orientation; the same on Android and iOS).
 X, Y, Z = np.eye(3)
 
 # The rows of each matrix are left, up and forward in the phone's axes. The screen faces the rider, so it faces
@@ -118,8 +118,8 @@ class RideFit:
     Upright is the balanced position on straights. Angles are in degrees.
 
     calibration: the alignment.
-    roll_deg, pitch_deg, yaw_deg: its standard errors about forward, left and up. They come mostly from errors of the
-        sensor that a ride does not show.
+    roll_deg, pitch_deg, yaw_deg: its standard errors about forward, left and up. These errors come mostly from errors
+        of the sensor that a ride does not show.
     halves_deg: roll, pitch and yaw from the second half of the ride minus those from the first half.
     offset_g: bias of the accelerometer along left, up and forward, shape (3). The calibration subtracts it.
     offset_sigma_g: standard errors of offset_g, shape (3).

@@ -14,7 +14,7 @@ from ..signals import Array, Bools, motionless
 from ..signals.leaning import WINDOW_S, Leaning, averaged, leaning_of, speed_in_radians, without_drift
 from .windows import Windows
 
-STILL_S = 1.6  # least length of a standstill; shorter ones look like smooth riding
+STILL_S = 1.6  # least length of a standstill; a shorter standstill looks like smooth riding
 STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # largest standard deviations over STILL_S on a standing bike
 BIAS_RADPS = np.radians(4.0)  # largest bias of the gyro since its calibration; a higher mean rate is a bend
 MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # largest angle between up and the mean force over MOUNTED_S, for a mounted sensor
@@ -31,7 +31,7 @@ MAX_PUSHED = 0.5
 CAR_G, CAR_LEAN = 0.045, np.radians(5.0)  # a car has a larger rms of the force to the side, and a smaller rms of lean
 STUCK_MPS = 0.5  # a log's speed is stuck if it changes by less than this
 MAX_SPEED_FACTOR = 1.8  # largest factor between the log's speed and the speed from the bends
-# The prior of the speed from the bends is USUAL_MPS. It has the weight of bends with the yaw rate USUAL_RADPS.
+# The prior of the speed from the bends is USUAL_MPS. The prior has the weight of bends with the yaw rate USUAL_RADPS.
 USUAL_MPS, USUAL_RADPS = 10.0, 0.14
 
 
@@ -102,7 +102,7 @@ def in_hand(w: Windows) -> tuple[Bools, Bools]:
 
     Returns:
         surely: True where a hand certainly moves the sensor, or the bike has fallen, shape (n).
-        perhaps: the same, and also True in the seconds around these windows, which may not be riding either.
+        perhaps: the same, but also True in the seconds around these windows, because the bike may not be riding there.
     """
     there = ~w.gap
     mean = averaged(w.force * there[:, None], MOUNTED_S)

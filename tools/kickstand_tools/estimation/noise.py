@@ -23,7 +23,7 @@ BIAS_ROOT = np.radians(0.005)  # the gyro's bias if the log has a temperature, i
 # minutes.
 WARMING_ROOT = np.radians(0.01)
 # Noise while readings are missing or a hand holds the sensor: lean and pitch (rad), velocity left, up, forward (m/s).
-# It grows with the square root of the time, by LOST_ROOT in the first second, and never exceeds LOST_MOST.
+# This noise grows with the square root of the time, by LOST_ROOT in the first second, and never exceeds LOST_MOST.
 LOST_ROOT = np.array([np.radians(30.0), np.radians(5.0), 3.0, 1.0, 4.0])
 LOST_MOST = np.array([np.radians(60.0), np.radians(8.0), 20.0, 2.0, 20.0])
 # In a jolt, a sample's rate differs from the window's mean by more than JOLTED_RADPS. The angles are then wrong by
@@ -56,9 +56,9 @@ LASTING_S = {eq.SLIDING: SLIDE_S, eq.CLIMBING: DIVE_S, eq.SLOPING: SLOPE_S, eq.B
 ROUGH = [LEAN, PITCH, LEFT, UP, FORWARD, eq.SLIDING, eq.CLIMBING]
 EXPECTED = np.array([0.38, 0.38, 0.38, 0.38, 0.38, 0.5, 0.5])
 ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
-# A resonating mount causes accelerations that are not the bike's. They are white noise only if they are brief. The
-# residual CLIMBING shows their size and how long they last. It is the upward velocity from integrated forces minus the
-# upward velocity from pitch and speed.
+# A resonating mount causes accelerations that are not the bike's. Such accelerations are white noise only if they are
+# brief. The residual CLIMBING shows their size and how long they last. CLIMBING is the upward velocity from integrated
+# forces minus the upward velocity from pitch and speed.
 #
 # The misfit is a factor on the standard deviation of the velocities. To compute it, take the means of CLIMBING over
 # LASTING_MISFIT_S, and multiply their rms by the root of the number of windows in a mean. Divide the result by
@@ -110,8 +110,8 @@ class Noise:
     def sigma(self) -> Array:
         """Return the standard deviations in each window, shape (n, ROWS).
 
-        The first STATES columns are the process noise over the window. The others are the measurement noise, infinite
-        where there is no measurement.
+        The first STATES columns are the process noise over the window. The other columns are the measurement noise,
+        infinite where there is no measurement.
         """
         w, riding, balanced = self._windows, self.riding, self._is_balanced
         speed, roughness = np.maximum(self.speed, 0.0), self.roughness
@@ -162,7 +162,7 @@ class Noise:
 
         The misfit for the states comes from CLIMBING divided by its standard deviation, which grows with speed. Slow
         rides then get too little weight, but the states become only slightly worse. The misfit for the covariance comes
-        from CLIMBING divided by a constant. It is used after count_own_misfit().
+        from CLIMBING divided by a constant. This second misfit is used after count_own_misfit().
 
         off: residuals, shape (n, ROWS).
         """

@@ -216,7 +216,7 @@ def solve(blocks: Reduced, walks: RandomWalks, weight: Array) -> tuple[Array, Ar
 def posterior_covariance(blocks: Reduced, walks: RandomWalks, weight: Array) -> Array:
     """Compute the covariance of each block's first state, its last state and its parameters.
 
-    It is the mean covariance within the hypotheses plus the covariance between their means.
+    The result is the mean covariance within the hypotheses plus the covariance between their means.
 
     Returns an array of shape (B, s + s + m, s + s + m).
     """

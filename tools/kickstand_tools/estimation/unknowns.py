@@ -1,7 +1,8 @@
 """Defines the unknowns of the estimation: states and parameters.
 
 The states describe the motion at the edges of the windows. The parameters are errors of sensor and bike, and have a
-prior. They are constant within a block of windows, and follow a random walk from block to block (see hypotheses.py).
+prior. The parameters are constant within a block of windows, and follow a random walk from block to block (see
+hypotheses.py).
 """
 
 from dataclasses import dataclass

@@ -2,7 +2,7 @@
 mainly their values.
 
 * Three columns belong together if their names differ only in the axis, or if they are side by side without names.
-* Whenever the sensor is calm, the length of the acceleration is that of gravity, in some unit.
+* Whenever the sensor is calm, the acceleration is as long as gravity in some unit.
 * In the gyro's unit, the rates explain how the direction of gravity turns in the sensor's axes (rate_fit.py).
 * In the time's unit, the number of samples per second is usual.
 
@@ -145,8 +145,9 @@ def find(sheet: Sheet) -> Findings:
 
 
 def _time(sheet: Sheet) -> ColumnFinding | None:
-    """The column of the time, which must increase. Of several such columns, those named like a time are preferred, then
-    the one with the finest steps."""
+    """The column of the time, which must increase. Among several such columns, columns named like a time are preferred,
+    then the column with the finest steps.
+    """
     usable = []
     for place, name in enumerate(sheet.columns):
         named = bool(_TIME.search(plain(name.rpartition(":")[2])))

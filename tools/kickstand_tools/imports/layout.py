@@ -2,8 +2,8 @@
 
 Cells may be separated by commas, semicolons, tabs or blanks, with a decimal point or comma. Any lines may come before
 the rows. Names above the rows are optional, and so is a line of units below the names. The table may also be `label:
-value` texts of a serial monitor, with or without time stamps, in one or several lines per sample. It may have one row
-per event of a sensor, or one file per sensor.
+value` texts of a serial monitor, with or without time stamps, in one or several lines per sample. The table may also
+have one row per event of a sensor, or one file per sensor.
 """
 
 import csv

@@ -173,8 +173,9 @@ def read_table(table: MappedTable, units: Mapping[str, str]) -> AppRecording | N
 
 
 def unknown(files: list[RecordingFile], source: str, table: MappedTable | None = None) -> InputError:
-    """The error for a file of an unknown app. It names the missing columns, the file's columns, and the command to
-    type."""
+    """The error for a file of an unknown app. The error names the missing columns, the file's columns, and the command
+    to type.
+    """
     table = table or table_in(files)
     if table is None:
         shown = next((line for file in files for line in file.first_lines(1)), "")[:60]

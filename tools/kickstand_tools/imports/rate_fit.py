@@ -2,9 +2,9 @@
 
 At rest and in a hand, the direction u of gravity turns in the sensor's axes by du/dt = u x rate. So over a window of
 WINDOW_S, the change of u has two parts: the integral of u x reading, times the unit's factor, and the effect of a
-constant bias. In a vehicle the force is not only gravity. Then the rates explain its turns less well, and the factor
-is too small or not found. All 48 signed permutations of the gyro's axes are tried: exchanged axes are another mistake,
-which is checked later.
+constant bias. In a vehicle the force is not only gravity. Then the rates explain the turns of the force less well, and
+the factor is too small or not found. All 48 signed permutations of the gyro's axes are tried: exchanged axes are
+another mistake, which is checked later.
 """
 
 from collections.abc import Mapping

@@ -65,7 +65,7 @@ class Difference:
 class Agreement:
     """The agreement of rides A and B.
 
-    live: Difference of the displayed leans while both devices show one. None without such a time.
+    live: Difference of the displayed leans while both devices show a lean. None without such a time.
     smoothed: Difference of the smoothed leans.
     t_s: seconds since A's first sample, shape (n).
     The leans at these times are in degrees, shape (n), NaN if unknown.

@@ -32,8 +32,8 @@ _MOST_SIGMA_S = 0.3
 class Match:
     """The time of a track in a ride.
 
-    start_utc_s: the track's time at the ride's first sample, in s since 1970. It is corrected for the receiver's delay,
-        so positions are where the bike is.
+    start_utc_s: the track's time at the ride's first sample, in s since 1970. This time is corrected for the receiver's
+        delay, so positions are where the bike is.
     drift: seconds per second that the ride's clock loses.
     sigma_s: standard deviation of start_utc_s.
     correlation: correlation of the changes of course, 0 to 1.

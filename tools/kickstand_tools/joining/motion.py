@@ -1,4 +1,4 @@
-"""Finds the yaw of a ride from the sensor alone. It needs no calibration, and the sensor may be mounted at any angle.
+"""Finds the yaw of a ride from the sensor alone. This needs no calibration, and the sensor may be mounted at any angle.
 
 Up is the mean direction of the force in bends, because a motorcycle leans until the force points along its own up. The
 rate about up is the yaw rate times the cosine of the lean.
@@ -47,8 +47,9 @@ class CellMotion:
 
     @property
     def up(self) -> Array:
-        """Return the bike's up in the sensor's axes, shape (3). It is exact to a few degrees only, because it includes
-        the accelerometer's bias."""
+        """Return the bike's up in the sensor's axes, shape (3). The direction is exact to a few degrees only, because
+        it includes the accelerometer's bias.
+        """
         turning = np.minimum(np.linalg.norm(self.rate_dps, axis=1), _MOST_DPS)
         up: Array = turning @ self.force_g
         return up / max(float(np.linalg.norm(up)), 1e-9)

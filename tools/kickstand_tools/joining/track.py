@@ -1,7 +1,8 @@
 """The track of a phone or a watch (positions and times), and its course (the direction of each step, if known).
 
 Course and speed are compared with a ride in segments of half a minute. Within a segment, only changes count: the mean
-and the trend are subtracted. This removes the gyro's residual bias, the initial direction of the ride, and hills.
+and the trend are subtracted. Subtracting them removes the gyro's residual bias, the initial direction of the ride, and
+hills.
 """
 
 from dataclasses import dataclass
@@ -37,7 +38,8 @@ class Track(Table):
     name: str
 
     def speeds_mps(self) -> Array:
-        """Return the file's speeds, shape (n). If the file has none, return mean speeds over the neighbouring points.
+        """Return the file's speeds, shape (n). If the file has no speeds, return mean speeds over the neighbouring
+        points.
 
         Such a speed is NaN over a jump or a gap, or if it is not larger than the positions' errors."""
         if np.any(np.isfinite(self.speed_mps)):
@@ -75,7 +77,8 @@ class Course:
     sigma_deg: standard deviation of the course of a good step.
     speed_mps: the step's length divided by its duration.
     good: False for a step that is too slow, a gap or a jump.
-    turn_deg: change of the course from the previous step, positive to the left. It is 0 unless both steps are good.
+    turn_deg: change of the course from the previous step, positive to the left. The change is 0 unless both steps are
+        good.
     """
 
     begin_s: Array

@@ -1,4 +1,6 @@
-"""Draws the wiring of sensor, display and button to a Pico and to an ESP32 as SVG. The pins are those of port.py."""
+"""Draws the wiring of sensor, display and button to a Pico and to an ESP32 as SVG. The firmware's port.py defines the
+pins.
+"""
 
 import runpy
 from typing import NamedTuple

@@ -26,7 +26,7 @@ from .meter_along import MeterAlong, Misfit
 _RESULT_BYTES = struct.calcsize(replay_engine.RESULT)
 
 # A function that runs replay_engine.run() on another Python. Its arguments are the records and the progress function.
-# It returns a context that yields a file with the results, and may raise InputError
+# The function returns a context that yields a file with the results, and may raise InputError
 Engine = Callable[[Iterator[bytes], Progress | None], contextlib.AbstractContextManager[IO[bytes]]]
 
 _SIGMA = replay_engine.COLUMNS.index("lean_sigma_deg")
@@ -189,7 +189,7 @@ def micropython(records: Iterator[bytes], _progress: Progress | None) -> Iterato
 
 
 # Engines on another Python. The engine rp2040, an emulated Pico, is None here, because it is in the package
-# kickstand_emulator. It is found by its entry point in pyproject.toml
+# kickstand_emulator. This engine is found by its entry point in pyproject.toml
 _BY_RECORDS: dict[str, Engine | None] = {"micropython": micropython, "rp2040": None}
 
 

@@ -169,8 +169,8 @@ def _pull_ride(
 ) -> PulledRide:
     """Copy a ride and write its log.
 
-    vehicle: the vehicle from the board's config.py. It is used only if the alignment was measured or refined by
-        driving, because an alignment by two poses is always a motorcycle's.
+    vehicle: the vehicle from the board's config.py. The vehicle is used only if the alignment was measured or refined
+        by driving, because an alignment by two poses is always a motorcycle's.
     """
     ride = PulledRide(number)
     blocks: list[StoredBlock] = []

@@ -1,4 +1,4 @@
-"""Functions on arrays of samples, for all other packages. They use only numpy, neither logs nor files.
+"""Functions on arrays of samples, for all other packages. The functions use only numpy, neither logs nor files.
 
 This module has moving means, standard deviations and integrals, means over cells of time, lag and correlation of two
 signals, rotation vectors and matrices, standstills, and distances. leaning.py relates a motorcycle's lean to its yaw
@@ -90,7 +90,7 @@ def _padded(values: Array, n: int) -> Array:
     return np.concatenate((before, values, after))
 
 
-# Means of samples over cells of time, block by block. They remove vibration and need little memory.
+# Means of samples over cells of time, block by block. Such means remove vibration and need little memory.
 
 
 def cell_numbers(time_s: Array, cell_s: float) -> Ints:
@@ -133,7 +133,7 @@ class EvenCells:
     latest: Array
 
     def merged(self, by: int) -> "EvenCells":
-        """Merge the cells into longer ones.
+        """Merge the cells into longer cells.
 
         The new cells are `by` times as long, and begin at multiples of `by`. `latest` of a new cell is the first value
         in it.
@@ -358,7 +358,7 @@ def rotated(matrix: Array, *vectors: Array) -> tuple[Array, ...]:
 
     matrix: the rows are the new axes, as in vehicle_from_sensor, shape (3, 3).
     vectors: one or more arrays of shape (n, 3).
-    Returns one array of shape (n, 3) for each of them.
+    Returns one array of shape (n, 3) for each of these arrays.
     """
     return tuple(vector @ matrix.T for vector in vectors)
 

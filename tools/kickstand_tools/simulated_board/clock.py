@@ -1,4 +1,4 @@
-"""The board's time in integer microseconds. It advances only when something on the board takes time."""
+"""The board's time in integer microseconds. The time advances only when something on the board takes time."""
 
 import time as _host_time
 from heapq import heappop, heappush
@@ -15,7 +15,9 @@ def _host_us():
 
 
 class PowerOff(BaseException):
-    """Ends the program on the board after a power cut. It is a BaseException, because firmware may catch Exception."""
+    """Ends the program on the board after a power cut. The class is a BaseException, because firmware may catch
+    Exception.
+    """
 
 
 class Reset(BaseException):

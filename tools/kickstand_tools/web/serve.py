@@ -38,8 +38,8 @@ TYPES = {
 class Server(ThreadingHTTPServer):
     """Serves the site, and ignores a browser that disconnects.
 
-    With more than MOST connections the server ends an old one. It ends the oldest that has sent no request, or
-    otherwise the oldest of all.
+    With more than MOST connections the server ends an old connection: the oldest that has sent no request. If all have
+    sent a request, the server ends the oldest of all.
     """
 
     request_queue_size = 128

@@ -126,8 +126,8 @@ class _Whole:
     seconds: duration of the log.
     speeds: time since the first sample in s, and speed in m/s, shape (n, 2).
     places: the positions.
-    utc_s: Universal Time of the first sample; None if unknown. It is the median over the rows, because some values are
-        late.
+    utc_s: Universal Time of the first sample; None if unknown. The median over the rows is used, because some values
+        are late.
     """
 
     start_s: float

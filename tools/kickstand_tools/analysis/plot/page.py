@@ -1,7 +1,7 @@
 """Writes the ride as one HTML page with charts that you can zoom. The page needs no other file.
 
 If the log has positions, a map is beside the charts. If you point at a moment in the map or in a chart, the page marks
-it in both.
+this moment in the map and in the charts.
 """
 
 from importlib.resources import files

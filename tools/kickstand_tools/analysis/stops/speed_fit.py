@@ -52,8 +52,8 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
 
     v is the integrated speed, and a the measured acceleration. The unknowns are the scale error k, the acceleration
     error b (m/s2) and the delay error d (s). Slopes and fork dive that the gyro did not measure cause the error b. The
-    model of b is a random walk backwards in time. It is nearly 0 at standstill, and linear between knots. Its basis
-    functions are hat functions (linear B-splines).
+    model of b is a random walk backwards in time. The error b is nearly 0 at standstill, and linear between knots. Its
+    basis functions are hat functions (linear B-splines).
 
     part: the ride up to a standstill.
     begin: index at which braking begins.

@@ -3,8 +3,8 @@ iOS.
 
 Columns are those of the example logs at http://sensorlog.berndthomas.net. Values come from Core Motion. Accelerations
 are in g, and read -1 along the axis that points up at rest
-(https://developer.apple.com/reference/uikit/uiacceleration). They are the sum of gravity and the user's acceleration,
-which the file also contains. Rates are in rad/s, right-handed.
+(https://developer.apple.com/reference/uikit/uiacceleration). These accelerations are the sum of gravity and the user's
+acceleration, which the file also contains. Rates are in rad/s, right-handed.
 """
 
 import numpy as np

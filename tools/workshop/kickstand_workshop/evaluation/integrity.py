@@ -197,7 +197,7 @@ def device_trace_of(
 ) -> Trace:
     """Run the whole device over any ride. The arguments are those of trace_of().
 
-    The Trace has ten entries per second. Its sigma is NaN, because the display shows none.
+    The Trace has ten entries per second. Its sigma is NaN, because the display shows no sigma.
     """
     ill = _ill(job, readings, rate_hz, calibration)
     end = len(readings) - 1
@@ -267,7 +267,7 @@ def jobs(seeds: int, first_seed: int = 0, seconds: float = 120.0, device: bool =
     """Return the jobs for each seed: rides without a fault on good and bad mounts and roads, and one ride per fault.
 
     device: True runs all rides on the whole device. False runs only rides with a fault of the kind SEEN on the whole
-    device, and the others on the lean meter alone.
+    device, and all other rides on the lean meter alone.
     """
     numbers = range(first_seed, first_seed + seeds)
     conditions: list[tuple[str | None, str | None]] = [(None, None), *[(None, road) for road in CLASSES]]

@@ -1,6 +1,6 @@
 """Reports the results of integrity.py for each fault, as tables for a terminal, data for JSON, and a picture.
 
-The picture is a Stanford diagram, which aviation uses. It shows the error against the claimed accuracy.
+The picture is a Stanford diagram, which aviation uses. The diagram shows the error against the claimed accuracy.
 """
 
 import json

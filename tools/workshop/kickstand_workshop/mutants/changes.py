@@ -1,7 +1,7 @@
 """Makes single changes to a file, with some operators of cosmic-ray and two of our own.
 
-cosmic-ray can replace an operator in the code by eleven others. This module uses only one or two similar operators,
-because the others would find the same missing tests.
+cosmic-ray can replace an operator in the code by eleven other operators. This module uses only one or two similar
+operators, because the other operators would find the same missing tests.
 """
 
 import ast

@@ -53,7 +53,7 @@ async function start() {
   if (said) tell(sentences(said.refused ? [said.refused] : ["Stopped", ...said.notes]));
 }
 
-/** Keep the screen on if the browser can. The browser no longer does so when the page is hidden. */
+/** Keep the screen on if the browser can. The browser lets the screen turn off when the page is hidden. */
 async function stayAwake() {
   awake = await navigator.wakeLock?.request("screen").catch(() => null);
 }
