@@ -205,8 +205,7 @@ def test_the_least_tilted_pose_is_a_sides():
 )
 def test_turns_at_the_end_of_a_range_are_left_out(most, used):
     """A rate of 98.5 to 101 % of 250 deg/s is treated as the end of a range of 250 deg/s. Then all rates over 237.5
-    deg/s are left out.
-    """
+    deg/s are left out."""
     rates = np.zeros((100, 3))
     rates[50] = [0.0, most, 0.0]
     log = Log(np.arange(100) / 100.0, np.tile([0.0, 1.0, 0.0], (100, 1)), rates)

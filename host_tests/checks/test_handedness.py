@@ -82,8 +82,7 @@ def test_the_remark_names_what_fits():
 
 def test_axes_exchanged_in_one_sensor():
     """The log has a speed. 24 of the 47 possible exchanges of axes are tried. At least 23 exchanges must be found, and
-    each result must be the right exchange.
-    """
+    each result must be the right exchange."""
     seen = 0
     log = simulated("street")
     for exchange in EXCHANGES[1::2]:

@@ -253,8 +253,7 @@ def test_a_recorded_car_is_refused(shared_data):
 
 def test_recorded_motorcycle_is_aligned(shared_data):
     """The reference matrix has an error of a few degrees. Forward is from braking between the same two traffic lights,
-    and up is from the first second.
-    """
+    and up is from the first second."""
     log = api.read_log(shared_data / "motorcycle-ride.csv.gz")
     rough = np.array([[0.9869, 0.1612, 0.0060], [-0.0137, 0.0466, 0.9988], [0.1608, -0.9858, 0.0482]])
     found, without = api.fit_ride(log), api.fit_ride(replace(log, speed_mps=np.full(len(log.t_s), np.nan)))

@@ -96,8 +96,7 @@ def test_a_jolt_makes_the_angles_uncertain():
 
 def test_outliers_weigh_less():
     """A residual of the process is an outlier over 4 sigmas. A residual of a measurement is an outlier over 2 sigmas,
-    without the factor for the duration of a disturbance. The bias has no outliers.
-    """
+    without the factor for the duration of a disturbance. The bias has no outliers."""
     noise, sigma = noise_of(windows()), np.ones((20, eq.ROWS))
     found = noise.robust(sigma, np.full((20, eq.ROWS), 4.0))[5]
     assert found[: of.BIAS.start] == pytest.approx(np.full(5, np.sqrt(2.0)))

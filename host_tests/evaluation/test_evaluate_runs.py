@@ -56,8 +56,7 @@ def test_every_estimator_is_scored(swept):
 
 def test_filters_that_trust_the_force_decay_in_a_held_turn(swept):
     """In a long turn the shown lean of such filters decays. Riders complain about this decay, which is the reason for
-    this project.
-    """
+    this project."""
     assert swept.scores["complementary"].slope < 0.5
     assert 0.85 < swept.scores["formula"].slope < 1.1
     assert swept.scores["formula 0.3 s"].rms_deg < 0.5 * swept.scores["formula"].rms_deg

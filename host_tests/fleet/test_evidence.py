@@ -1,6 +1,5 @@
 """The intervals of a drive show the directions level, forward and left. A force of 1 g along each direction is found as
-1 g.
-"""
+1 g."""
 
 import numpy as np
 import pytest

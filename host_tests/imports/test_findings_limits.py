@@ -110,8 +110,7 @@ def test_whole_numbers_above_20_are_counts():
 )  # fmt: skip
 def test_a_unit_of_rates_by_their_size(most, moving, unit):
     """At rest the noise shows the unit, because it is about 0.1 deg/s. In motion the 90th percentile of the rates shows
-    the unit.
-    """
+    the unit."""
     force = calm(1.0)
     if moving:
         force[::2, 0] += 0.2

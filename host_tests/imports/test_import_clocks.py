@@ -77,8 +77,7 @@ def test_a_slower_sensor_is_interpolated_and_gaps_are_not():
 
 def test_a_faster_sensor_is_averaged():
     """The mean over 20 ms around 30 ms contains the samples after 20 ms and up to 40 ms. These are two samples at steps
-    of 10 ms, or four at steps of 5 ms.
-    """
+    of 10 ms, or four at steps of 5 ms."""
     values = np.array([0.0, 1.0, 4.0, 9.0, 16.0, 25.0, 36.0])[:, None] * [1.0, 1.0, 1.0]
     fast = sensor(np.arange(7) * 10.0, values)
     assert join.on_clock(fast, np.array([30 * MS]), 15.0 * MS)[0, 0] == 9.0  # not averaged if 1.5 times as fast

@@ -145,8 +145,7 @@ def test_the_gyros_axes_are_named_before_the_accelerometers():
 )
 def test_samples_at_the_end_of_the_range_clip(given, notice, fault):
     """A notice appears if a tenth of the samples clip. A fault is reported if half of the samples clip in two looks, or
-    if the sensor is shaken.
-    """
+    if the sensor is shaken."""
     judge, watch = AxisJudge(1, 3), Watch()
     watch.look(judge, **given)
     assert words(watch.notice) == notice and watch.fault is None

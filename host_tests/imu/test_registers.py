@@ -216,8 +216,7 @@ def test_a_number_that_reads_differently_each_time_is_an_error():
 
 def test_the_simulated_board_models_every_chip_of_the_driver():
     """Each chip of the driver has its own simulated model. Without a model of its own, a chip would be tested as an
-    MPU6050. The FIFO of the model may be larger than the part that the driver uses.
-    """
+    MPU6050. The FIFO of the model may be larger than the part that the driver uses."""
     from kickstand.imu.mpu6050 import CHIPS
 
     assert set(CHIPS) == set(VARIANTS)

@@ -87,8 +87,7 @@ def test_costs_are_those_at_each_shift(compared):
 
 def test_the_evidence_is_computed_from_the_best_cost(compared):
     """Without drift, the best of the tried shifts has the smallest sum of costs. For the evidence, the 180 steps count
-    as 45 independent steps.
-    """
+    as 45 independent steps."""
     shift_s, drift, evidence = fit._try_shifts(compared, 3.0)
     costs = {by: fit._cost(compared.given, compared.given.turned_deg - compared.turned(3.0 + by)[0]).sum()
              for by in fit._SHIFTS}  # fmt: skip
@@ -107,8 +106,7 @@ def fit_cost(compared, shift_s, drift) -> float:
 
 def test_a_cost_of_one_shift_by_numpy(compared, monkeypatch):
     """A result contains the shift at the ride's first sample. With a drift of 0.0001 and the middle at 145 s, the shift
-    in the middle is 2 * 0.9999 + 0.0145.
-    """
+    in the middle is 2 * 0.9999 + 0.0145."""
     monkeypatch.setattr(fit, "Comparison", lambda *_: compared)
     assert compared.middle_s == pytest.approx((20 + 60 + 110 + 150 + 200 + 240) / 6.0 + 15.0)
     found = fit.TrackFit(2.0, 1e-4, 0.1, 0.9, 20.0, np.array([0.1, 0.2]), 6)
@@ -167,8 +165,7 @@ def test_the_axes_across_up():
 
 def test_forces_are_integrated_without_their_mean():
     """A force of 0 and then 0.1 g for 10 s each: the speed falls by 4.9 m/s and rises again. The integral of the speed
-    is -4.9 * 20 / 2.
-    """
+    is -4.9 * 20 / 2."""
     motion = moved(np.tile([0.0, 1.0, 0.0], (400, 1)))
     motion.force_g[:, 0] = np.where(np.arange(400) < 200, 0.0, 0.1)
     sums = compare._double_sums(motion, steady(30, 0.0), 0.0)

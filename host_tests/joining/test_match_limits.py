@@ -161,8 +161,7 @@ def test_two_logs_need_evidence_and_correlation(clocked):
 
 def test_a_correlation_of_rates_by_hand():
     """Without their means, the two axes have the values -1.5, -0.5, 0.5, 1.5 and -1, 1, 3, -3. The sum of the products
-    is -2, and the sums of the squares are 5 and 20.
-    """
+    is -2, and the sums of the squares are 5 and 20."""
     a = moved(np.zeros((4, 3)))
     one, other = np.array([[1.0], [2.0], [3.0], [4.0]]), np.array([[2.0], [4.0], [6.0], [0.0]])
     product = -1.5 * -1.0 + -0.5 * 1.0 + 0.5 * 3.0 + 1.5 * -3.0
@@ -196,8 +195,7 @@ def test_a_fit_of_clocks_finds_a_shift_of_eight_cells():
 
 def test_leans_are_compared_above_3_mps_only(monkeypatch):
     """Two logs of 100 s, of which the second begins 1 s later. The bike rides at 3.0 m/s until 40 s, and faster until
-    90 s.
-    """
+    90 s."""
     t_s = np.arange(0.0, 100.0, 0.1)
     ride = SimpleNamespace(
         t_s=t_s, lean_deg=np.zeros(1000), lean_sigma_deg=np.ones(1000), notices=[],

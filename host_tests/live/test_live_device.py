@@ -33,8 +33,7 @@ def run(request, tmp_path, capsys):
 
 def test_racechrono_gets_the_requested_packets(run):
     """The phone first denies all packets, and then requests two of them at two rates. The packets have the values of
-    the display. Later it denies all packets again, and then allows all.
-    """
+    the display. Later it denies all packets again, and then allows all."""
     acts = [[20.0, "connect"], [20.1, "write", "filter", [0]], [20.1, "write", "filter", [2, 0, 100, 0, 0, 0, 1]]]
     acts += [[20.2, "write", "filter", [2, 0, 40, 0, 0, 0, 2]], [20.2, "write", "filter", [2, 0, 40, 0, 0, 0, 77]]]
     acts += [[40.0, "write", "filter", [0]], [42.0, "write", "filter", [1, 0, 100]]]

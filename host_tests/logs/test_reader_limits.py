@@ -174,8 +174,7 @@ def marks(readings, step_s=0.01, blocks_of=10**6):
 
 def coarse(digit_g, digit_dps, jump_g=0.0, jump_dps=0.0, equal=80):
     """Return readings in steps of these digits. They change, are equal for 0.8 s, and change again around the same
-    values or around other values.
-    """
+    values or around other values."""
     chance, n = np.random.default_rng(1), 200 + equal
     readings = np.zeros((n, 7))
     readings[:, :3] = digit_g * chance.integers(-2, 3, (n, 3))
@@ -252,8 +251,7 @@ def test_repeated_times_are_spread_over_blocks(size):
 
 def test_a_small_shift_of_the_times_is_no_remark():
     """The recorder takes 300 samples per second and rounds times to milliseconds. The repair moves times by up to 0.6
-    ms.
-    """
+    ms."""
     times = np.round(np.arange(2000) / 300.0, 3)
     blocks, remarks = spread_blocks(times)
     assert not remarks and not blocks[0].own_times
@@ -261,8 +259,7 @@ def test_a_small_shift_of_the_times_is_no_remark():
 
 def test_gaps_and_ticks_are_kept_apart():
     """A step of over 1.5 periods plus a tick is a gap. A new time near the gap is a mean of times on the same side of
-    the gap.
-    """
+    the gap."""
     recorded = np.round(np.arange(200) * 0.0137, 2)
     late = recorded + np.where(np.arange(200) >= 100, 0.5, 0.0)
     plain, apart = even_times.even_times(recorded), even_times.even_times(late)

@@ -1,6 +1,5 @@
 """The pixels of the gauge: the side of the lean, the maxima, unknown values, transparency. Also tests the values that
-the gauge gets.
-"""
+the gauge gets."""
 
 import math
 

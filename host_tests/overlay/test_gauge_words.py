@@ -15,8 +15,7 @@ NAN = math.nan
 @pytest.fixture
 def shown(monkeypatch):
     """Return a function that draws a picture. The function returns {text: colour} and the directions of the arrows,
-    True for right.
-    """
+    True for right."""
     texts, arrows = {}, []
     text, arrow = parts.text, parts.arrow
 

@@ -1,6 +1,5 @@
 """Every display driver passes the same tests, on the simulated model of its own display. The tests also run on
-MicroPython.
-"""
+MicroPython."""
 
 import gc
 import sys
@@ -257,8 +256,7 @@ def test_a_status_that_is_never_on_leaves_no_oled_dark(board, display):
 
 def test_no_status_leaves_an_oled_dark():
     """The driver recognises the two kinds of controller by their status. The driver sends the supply commands of both
-    kinds to every controller. If it mistakes one kind for the other, the picture is only two columns off.
-    """
+    kinds to every controller. If it mistakes one kind for the other, the picture is only two columns off."""
     for kind in OLEDS:
         for identity in range(16):
 

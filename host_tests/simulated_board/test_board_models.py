@@ -292,8 +292,7 @@ def test_a_panel_is_dark_without_its_own_supply(kind, supply, off):
 @pytest.mark.parametrize("kind", ["ssd1306", "sh1106"])
 def test_each_command_takes_its_arguments(kind):
     """After each of these commands and its arguments, the next command is understood. So no command takes too many or
-    too few bytes.
-    """
+    too few bytes."""
     for code in (0x81, 0xA8, 0xD3, 0xD5, 0xD9, 0xDA, 0xDB):
         oled = Oled(Clock(), kind=kind)
         commands(oled, code, 0x12, 0x45)
@@ -467,8 +466,7 @@ def test_a_clock_at_the_sensors_address_counts_in_decimal_digits():
 )
 def test_each_chip_has_commands_of_its_own(kind, counts):
     """Each command has as many arguments as in the data sheet. The other kind of chip ignores the command or does not
-    know it.
-    """
+    know it."""
     for code, count in counts.items():
         oled = Oled(Clock(), kind=kind)
         commands(oled, code, *([0xFF] * count), 0x45)

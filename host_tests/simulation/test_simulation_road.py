@@ -19,8 +19,7 @@ def over(speed: float, roughness: float, seconds: float = 40.0, seed: int = 0) -
 
 def test_the_profile_has_the_standards_density():
     """In ISO 8608, the power density of the height of a class B road is 64e-6 m^3 at 0.1 cycles/m. The power density
-    falls with the square of the spatial frequency.
-    """
+    falls with the square of the spatial frequency."""
     step = 0.02
     slope = road.profile_slope(np.random.default_rng(1), 40000.0, road.CLASS_B)
     n = 2**14

@@ -41,7 +41,7 @@ class Update:
     These are the steps in their order:
         moves: New paths of files of another project, by their present paths. They are renamed.
         remove: Files to remove, main.py first.
-        remove_folders: Folders to remove. Folders to remove, which are empty by then.
+        remove_folders: Folders to remove, which are empty by then.
         make_folders: Folders to create.
         copy: Contents of the files to copy, by path, main.py last.
 

@@ -1,6 +1,5 @@
 """Computes the smoothed lean of a recorded ride. Each lean is computed from all readings of the ride, earlier and
-later.
-"""
+later."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field

@@ -146,8 +146,7 @@ def find(sheet: Sheet) -> Findings:
 
 def _time(sheet: Sheet) -> ColumnFinding | None:
     """The column of the time, which must increase. Among several such columns, columns named like a time are preferred,
-    then the column with the finest steps.
-    """
+    then the column with the finest steps."""
     usable = []
     for place, name in enumerate(sheet.columns):
         named = bool(_TIME.search(plain(name.rpartition(":")[2])))
@@ -365,8 +364,7 @@ def _names(sheet: Sheet, three: _Triple) -> list[str]:
 
 def _first_with_gravity(threes: Sequence[_Triple], seconds: Array | None) -> _Triple | None:
     """The first group whose vectors are as long as gravity in some unit. Without such a group, the first group with a
-    constant length.
-    """
+    constant length."""
     return next(
         (three for three in threes if _has_gravity(three, seconds, near=True)),
         next((three for three in threes if _has_gravity(three, seconds, near=False)), None),

@@ -174,8 +174,7 @@ def read_table(table: MappedTable, units: Mapping[str, str]) -> AppRecording | N
 
 def unknown(files: list[RecordingFile], source: str, table: MappedTable | None = None) -> InputError:
     """The error for a file of an unknown app. The error names the missing columns, the file's columns, and the command
-    to type.
-    """
+    to type."""
     table = table or table_in(files)
     if table is None:
         shown = next((line for file in files for line in file.first_lines(1)), "")[:60]
@@ -286,8 +285,7 @@ def _seconds(time_ns: Nanoseconds) -> Array:
 
 def _check_rates(name: str, seconds: Array, force: Array, rates: Array) -> None:
     """Raise InputError if rates do not fit the turns of gravity: if another unit fits, or if gravity keeps its
-    direction although the rates would turn it.
-    """
+    direction although the rates would turn it."""
     fit = fit_rates(seconds, force, rates)
     shown = float(np.degrees(fit.factor))
     if fit.decides and not 1.0 / _TIMES_OFF < shown < _TIMES_OFF:

@@ -48,8 +48,7 @@ class CellMotion:
     @property
     def up(self) -> Array:
         """Return the bike's up in the sensor's axes, shape (3). The direction is exact to a few degrees only, because
-        it includes the accelerometer's bias.
-        """
+        it includes the accelerometer's bias."""
         turning = np.minimum(np.linalg.norm(self.rate_dps, axis=1), _MOST_DPS)
         up: Array = turning @ self.force_g
         return up / max(float(np.linalg.norm(up)), 1e-9)

@@ -88,8 +88,7 @@ def _gpx(path: Path, progress: Progress | None) -> Iterator[Point]:
 
 def _gpx_speed(point: Any) -> float:
     """The speed of a point, m/s. GPX 1.0 has an element for the speed; in GPX 1.1 the speed is in an extension,
-    Garmin's or another.
-    """
+    Garmin's or another."""
     if point.speed is not None:
         return float(point.speed)
     for extension in point.extensions:

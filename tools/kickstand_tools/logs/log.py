@@ -160,8 +160,7 @@ class Log(Table):
     @property
     def start_utc_s(self) -> float | None:
         """Universal Time at the first sample in s, None if unknown. The median is used, because the receiver sends some
-        times late.
-        """
+        times late."""
         starts = (self.utc_s - self.t_s)[np.isfinite(self.utc_s)]
         return float(np.median(starts)) if len(starts) else None
 

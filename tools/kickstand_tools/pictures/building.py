@@ -31,8 +31,7 @@ def drawings(display: str, shifted: str) -> dict[str, str]:
 
 def shifter(board: wiring.DrawnBoard, display: str) -> str:
     """Draw a display with VCC at 5 V, and the level shifter between its SDA and SCL and a board. display: SVG of the
-    display.
-    """
+    display."""
     pins = wiring.pin_names(board)
     five = pins["5V"]
     page = Drawing(900, 330)

@@ -1,6 +1,5 @@
 """Draws the wiring of sensor, display and button to a Pico and to an ESP32 as SVG. The firmware's port.py defines the
-pins.
-"""
+pins."""
 
 import runpy
 from typing import NamedTuple

@@ -16,8 +16,7 @@ def _host_us():
 
 class PowerOff(BaseException):
     """Ends the program on the board after a power cut. The class is a BaseException, because firmware may catch
-    Exception.
-    """
+    Exception."""
 
 
 class Reset(BaseException):

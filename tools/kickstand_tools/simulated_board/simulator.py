@@ -225,8 +225,7 @@ class Board:
 
     def connect_uart(self, pin, baud, receive):
         """Call receive(bytes) with the bytes that arrive on this pin. The bytes are noise if the GPS receiver sends at
-        another rate.
-        """
+        another rate."""
         if self.gps and pin == self._gps_pin:
             same = baud == self.gps.baud
             self.gps.connect(receive if same else lambda data: receive(bytes([b & 0xE6 for b in data])))

@@ -1,10 +1,9 @@
 """Writes Racelogic's VBO, which Circuit Tools opens and RaceChrono imports.
 
 Sections and standard channels follow
-https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.html. Standard channels have no units, all
-other channels have. Columns and signs follow
-https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and the user guide
-of the VBOX HD Lite:
+https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.html. Standard channels have no units. All
+other channels have units. Columns and signs follow
+https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and the user guide of the VBOX HD Lite:
 
 * time: HHMMSS.SS
 * velocity: km/h
