@@ -89,7 +89,7 @@ def _uses_the_machine(module: ModuleType | None) -> bool:
 @pytest.hookimpl(tryfirst=True)  # before -m selects tests by their markers
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Function]) -> None:
     """Mark the tests that depend on the machine. Put long tests first, because a long test at the end would keep one
-    processor busy while the others idle."""
+    processor busy while the other processors idle."""
     on_machine = {item.path for item in items if _asks(item) or _uses_the_machine(item.module)}
     for item in items:
         if item.path in on_machine:

@@ -137,7 +137,7 @@ def test_two_poses_keep_the_accelerometers_calibration():
 
 
 def moving_log(stretches_s, hz=100.0, size_g=0.5, between_s=1.0) -> Log:
-    """A log that is still for these times, with motion between them."""
+    """Return the log of a sensor that is still for these times and moves between them."""
     chance = np.random.default_rng(1)
     parts = [chance.normal(0.0, size_g, (round(between_s * hz), 6))]
     for seconds in stretches_s:
@@ -186,7 +186,7 @@ def test_a_still_window_has_limits(what, amount, still):
 
 @pytest.mark.parametrize(("before", "found"), [(122, [(10, 110), (135, 260)]), (130, [(10, 119), (140, 260)])])
 def test_no_stretch_extends_over_a_gap(before, found):
-    """Windows begin at every fifth sample. With 130 samples before the gap, the next window begins right after it."""
+    """Windows begin at every fifth sample. With 130 samples before the gap, a new window begins just after the gap."""
     t_s = np.append(np.arange(before) / 100.0, 3.0 + np.arange(270 - before) / 100.0)
     log = Log(t_s, np.tile([0.0, 1.0, 0.0], (270, 1)), np.zeros((270, 3)))
     assert procedure._still_stretches(log) == found
@@ -316,7 +316,7 @@ def test_the_vehicle_follows_from_the_calibration():
 
 
 def test_stops_are_found_in_each_log_of_its_own():
-    """Each log stands for 4 s, so there are two stops. A speed of over 5 s ago is not known any more."""
+    """In each log the vehicle stands for 4 s, so there are two stops. A speed of over 5 s ago is not known any more."""
     seen: list = []
     steps = drive_feed.Steps(lambda *done: seen.append(done), 800)
 

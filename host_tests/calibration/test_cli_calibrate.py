@@ -160,7 +160,7 @@ def test_a_spoilt_pose_is_refused_by_name(tmp_path, six_poses, which):
 
 
 def two_refused(poses, words, *more):
-    """Run `calibrate two` and test that it is refused and keeps the older CAL.json. Return the message."""
+    """Run `calibrate two`. Test that the command refuses the poses and keeps the older CAL.json. Return the message."""
     directory = poses[0].parent
     (directory / "CAL.json").write_text("the one from yesterday\n")
     return command.refused(directory, "calibrate", "two", *poses, *more, "--out", directory / "CAL.json", words=words)

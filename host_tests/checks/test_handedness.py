@@ -39,7 +39,7 @@ def test_all_48_ways_to_exchange_and_reverse_axes(profile, speed):
 
 @pytest.mark.parametrize("profile", PROFILES)
 def test_simulated_rides(profile):
-    """Without a speed, the check misses some wrong logs, but it never reports a correct one."""
+    """Without a speed, the check misses some wrong logs, but it never reports a correct log."""
     log = simulated(profile)
     assert judged(log) == judged(log, speed=False) == ""
     assert (WRONG_WAY in judged(log, gyro=MINUS)) is (profile != "parked")
@@ -152,7 +152,7 @@ def test_recordings(shared_data):
 
 def test_a_bias_is_found_while_fitting():
     """The gyro has a bias of 2.5 deg/s. The phone in the hand is never calm, so the bias cannot be measured in calm
-    seconds. The fit itself must find it."""
+    seconds. The fit itself must find the bias."""
     log = hand(seed=0)
     turning = {}
     for bias in 0.0, 2.5:

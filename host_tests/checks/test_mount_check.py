@@ -210,8 +210,8 @@ def test_of_several_speeds_in_a_second_the_first_counts():
 
 
 def test_seconds_without_a_speed_or_without_samples():
-    """The log has a gap, and the satellites are lost for 40 s. The rest is still enough. Two parts that are days apart
-    are not judged as one ride."""
+    """The log has a gap, and the satellites are lost for 40 s. The rest of the log is still enough. Two parts that are
+    days apart are not judged as one ride."""
     log = jerky(sign=-1.0)
     log.speed_mps[500:900] = np.nan
     assert exchanged(log.part((log.t_s < 100.0) | (log.t_s > 130.0)))

@@ -106,8 +106,8 @@ def test_outliers_weigh_less():
 
 
 def test_roughness_follows_the_residuals():
-    """Residuals of the expected size give a roughness of 1. Residuals of half this size give 0.5. The roughness is
-    kept between 0.1 and 4."""
+    """Residuals of the expected size give a roughness of 1. Residuals of half this size give a roughness of 0.5. The
+    roughness is kept between 0.1 and 4."""
     expected = np.zeros((400, eq.ROWS))
     expected[:, [of.LEAN, of.PITCH, of.LEFT, of.UP, of.FORWARD]], expected[:, [eq.SLIDING, eq.CLIMBING]] = 0.38, 0.5
     for factor, roughness in ((1.0, 1.0), (0.5, 0.5), (0.01, 0.1), (9.0, 4.0)):
@@ -124,8 +124,8 @@ def test_roughness_follows_the_residuals():
 
 
 def test_unbalance_follows_the_force_to_the_side():
-    """A force of 0.011 g changes its sign every 10 s. Means over 3 s keep its size. A constant force counts as no
-    unbalance, so the result is the lowest value."""
+    """A force of 0.011 g changes its sign every 10 s. Means over 3 s keep the size of this force. A constant force
+    counts as no unbalance, so the result is the lowest value."""
     force = 0.011 * np.where(np.arange(2000) // 50 % 2, 1.0, -1.0)
     noise = noise_of(windows(2000))
     noise.estimate_unbalance(force, 3.0)

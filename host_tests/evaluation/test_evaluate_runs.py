@@ -55,8 +55,8 @@ def test_every_estimator_is_scored(swept):
 
 
 def test_filters_that_trust_the_force_decay_in_a_held_turn(swept):
-    """In a long turn the shown lean of such filters decays. Riders complain about this decay, which is the reason for
-    this project."""
+    """In a long turn, the lean of filters that trust the force decays. Riders complain about this decay, which is the
+    reason for this project."""
     assert swept.scores["complementary"].slope < 0.5
     assert 0.85 < swept.scores["formula"].slope < 1.1
     assert swept.scores["formula 0.3 s"].rms_deg < 0.5 * swept.scores["formula"].rms_deg
@@ -222,8 +222,8 @@ def test_simulate_states_both_leans_on_the_stand(tmp_path):
 
 
 def test_a_wheelie_is_not_treated_as_a_faulty_sensor():
-    """The filter's equations do not hold in a wheelie, so its innovations are large. When the filter took them for a
-    fault, it restarted, and the rms error was 4.0 degrees."""
+    """The filter's equations do not hold in a wheelie, so its innovations are large. When the filter treated large
+    innovations as a fault, it restarted, and the rms error was 4.0 degrees."""
     made = ride("wheelie", 2, 120.0)
     shown = replay(runs.as_log(made), runs.calibrated_by_log(made))
     error = (np.asarray(shown.lean_deg) - made.truth["lean_deg"])[made.truth["speed_mps"] > 5.0]

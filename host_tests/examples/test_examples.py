@@ -61,7 +61,7 @@ def test_print_lean(tmp_path):
 
 
 def test_user_page(tmp_path):
-    """The usual pages come before the user's page, and the first one comes again after it."""
+    """The usual pages come before the user's page, and after the user's page the first page comes again."""
     _, frames = run(tmp_path, "user_page.py", 12.0, turn_to=[(4, "own")])
     shown = re.fullmatch(r"Load     (\d\.\d\d) x", frames[-1][0].rstrip())
     assert shown and float(shown[1]) == pytest.approx(1.22, abs=0.05)  # 1 / cos(35 degrees)

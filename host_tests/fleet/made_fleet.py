@@ -40,7 +40,7 @@ def make(directory, troubles=TROUBLES, seed=3, seconds=170.0):
 
 
 def drive(seed, kind="car", seconds=200.0, sensor=None, moved=None, straight=True, rate_hz=50.0, **receiver):
-    """Simulate one drive. Return its Log and its Sensor.
+    """Simulate one drive. Return the drive's Log and its Sensor.
 
     sensor: the sensor to use, or None for a random one.
     moved: (time in s, the mount from this time on), or None.

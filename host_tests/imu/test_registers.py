@@ -233,7 +233,7 @@ def test_the_simulated_board_models_every_chip_of_the_driver():
 )
 def test_how_many_frames_are_read_and_left(frames, read, left):
     """The driver reads at most three frames at a time, or eight to catch up. The MPU6050's FIFO has 1024 bytes, enough
-    for 73 frames. With 72 frames it has not overflowed."""
+    for 73 frames. With 72 frames the FIFO has not overflowed."""
     wires = Wires()
     chip = started(wires)
     wires.waiting = 14 * frames
@@ -298,7 +298,7 @@ def test_readings_that_repeat_for_100_ms_are_frozen(rate_hz, good):
     wires.waiting = 0
     chip.setup()
     wires.waiting = 14
-    assert accepted() == good - 1  # the first reading repeats the last one before the set-up
+    assert accepted() == good - 1  # the first reading repeats the last reading before the set-up
 
 
 @pytest.mark.parametrize(

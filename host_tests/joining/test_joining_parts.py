@@ -153,7 +153,7 @@ def test_a_lean_is_unknown_in_gaps_and_outside_the_log():
 
 def test_a_difference_by_hand():
     """The leans of A and B differ by 3 and -1 degrees alternately. The mean difference is 1 degree, and the rms around
-    it is 2 degrees. The standard deviations of 1.2 and 1.6 degrees combine to 2.0 degrees."""
+    this mean is 2 degrees. The standard deviations of 1.2 and 1.6 degrees combine to 2.0 degrees."""
     n, zeros = 1200, np.zeros(1200)
     other = np.where(np.arange(n) % 2, 3.0, -1.0)
     seen = agreement._difference((zeros, zeros + 1.2), (other, zeros + 1.6))
@@ -306,7 +306,7 @@ def test_the_standard_deviation_of_a_fit_by_hand():
     """The variance of the shift is a sum of three terms.
 
     * Three segments pull by 1, 1 and -2. The sum of the squares is 6. This gives 6 * 3 / 1 * 0.1^2 = 0.18 s2.
-    * The end is 70 s from the middle. With its standard deviation of the drift of 0.01 this gives 0.49 s2.
+    * The end is 70 s from the middle. There a drift with a standard deviation of 0.01 gives 0.49 s2.
     * The receiver's delay has a standard deviation of 0.05 s, which gives 0.0025 s2.
     """
     turned = np.array([[1.0, -1.0], [2.0, 0.0], [0.0, -2.0]])

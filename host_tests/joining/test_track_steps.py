@@ -57,8 +57,8 @@ def test_speeds_without_their_own_are_means_over_four_steps():
 
 
 def test_segments_have_thirty_steps_and_at_least_eight():
-    """The 47 good steps before a bad step give segments of 30 and 17 steps. The 7 good steps after it are too few for
-    a segment. Mean and trend are subtracted from each segment, so a constant bend gives zeros."""
+    """The 47 good steps before a bad step give segments of 30 and 17 steps. The 7 good steps after the bad step are too
+    few for a segment. Mean and trend are subtracted from each segment, so a constant bend gives zeros."""
     n = 55
     good = np.ones(n, dtype=bool)
     good[47] = False

@@ -142,7 +142,7 @@ def test_the_loop_continues_if_the_phone_is_out_of_reach(run):
 
 
 def test_the_menu_switches_live_off(run):
-    """The rider presses to move from the entry "Reset maxima" to the last entry but one."""
+    """The rider presses to move from the entry "Reset maxima" to the entry before the last."""
     presses = device_plans.PRESSES + [[22.0, 1.0]] + [[23.5 + 0.4 * k, 0.15] for k in range(5)] + [[26.0, 1.0]]
     record = run(
         {**device_plans.ALIGNED, **LIVE, "phones": [ASK + [[40.0, "found"], [41.0, "connect"]]], "presses": presses}
@@ -183,7 +183,7 @@ def test_a_board_without_radio_says_so_and_shows_the_lean(run, machine, config, 
 
 
 def test_the_pin_is_required_once_per_phone(run):
-    """The phone stays paired after power-off. After a change of the PIN it must pair again."""
+    """The phone stays paired after power-off. After a change of the PIN the phone must pair again."""
     stranger = [[20.0, "connect", 1], [20.1, "write", "rate", [40, 0]], [20.2, "read", "ride"], [20.3, "read", "board"]]
     stranger += [[20.4, "give_pin", 314159], [20.5, "write", "filter", [1, 0, 40]], [22, "leave"]]
     owner = [[24.0, "connect", 2], [24.1, "give_pin", 271828], [24.2, "write", "rate", [40, 0]], [28.0, "leave"]]

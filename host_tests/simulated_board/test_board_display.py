@@ -313,7 +313,7 @@ def test_each_wiring_of_a_backpack_works():
 
 def test_the_rows_of_a_larger_display_are_blanked():
     """The third and fourth row of a 20x4 display show the memory behind the first two rows. An earlier program may have
-    written there."""
+    written to this memory."""
 
     def run(board):
         board.lcd.ddram[0x10:0x28] = board.lcd.ddram[0x50:0x68] = b"x" * 24

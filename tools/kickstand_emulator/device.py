@@ -23,7 +23,7 @@ class GuestError(Exception):
 
 
 class EmulatedDevice(ABC):
-    """An emulated board. It is off until power_on(). A `with` statement switches it on, and off at its end.
+    """An emulated board. It is off until power_on(). A `with` statement switches the board on, and off at its end.
 
     Times are emulated seconds. The time continues through resets and power cycles.
 
@@ -114,7 +114,8 @@ class EmulatedDevice(ABC):
     def run_until(self, condition: Callable[[], Any], limit_s: float, step_s: float = 0.005) -> Any:
         """Advance the time until condition() is true, and return its value.
 
-        condition() is called every step_s seconds. Raises NotReached if it is not true within limit_s seconds.
+        condition() is called every step_s seconds. Raises NotReached if the condition is not true within limit_s
+        seconds.
         """
         end_s = self.time_s + limit_s
         while not (reached := condition()):

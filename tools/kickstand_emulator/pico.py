@@ -56,7 +56,7 @@ class Pico(EmulatedDevice):
         self._reset()
 
     def run(self, seconds: float, between: Callable[[], None] | None = None) -> None:
-        """Advance the time. After a PowerCut this returns early, and `powered` is False."""
+        """Advance the time. After a PowerCut this method returns early, and `powered` is False."""
         if not self.powered:
             self.chip.sleep(seconds)
             return

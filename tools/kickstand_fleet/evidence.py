@@ -51,9 +51,9 @@ SWING_S = 0.2  # averaging time of the yaw rate at each end of an interval
 # Sway is the mean force over the first time minus the mean force over the second time. The first mean removes noise,
 # the difference removes braking, speeding up and bends
 SWAY_S = 0.05, 0.3
-# Yaw rate at which an interval of a car has half its weight. In a tight turn, a sensor ahead of the rear axle does not
-# move along the vehicle's heading. The sensor's direction of motion differs by an angle: its distance from that axle
-# divided by the turn's radius.
+# Yaw rate at which an interval of a car has half of its usual weight. In a tight turn, a sensor ahead of the rear axle
+# does not move along the vehicle's heading. The sensor's direction of motion differs by an angle: its distance from
+# that axle divided by the turn's radius.
 TIGHT_DPS = 20.0
 
 

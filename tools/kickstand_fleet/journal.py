@@ -65,7 +65,7 @@ class Journal:
             self._file.close()
 
     def _lock(self) -> None:
-        """Lock the file. Raises InputError if another run has locked it."""
+        """Lock the file. Raises InputError if another run has locked the file."""
         with contextlib.suppress(ImportError):  # Windows
             import fcntl
 

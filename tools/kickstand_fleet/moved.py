@@ -1,4 +1,4 @@
-"""Finds mounts that rotated by a few degrees or more, between two logs or during one.
+"""Finds mounts that rotated by a few degrees or more, between two logs or during a log.
 
 The firmware refuses a drive only if the mount moved by some 7 to 30 degrees. This module also finds smaller rotations.
 At every moment in all logs of a mount, it compares the alignment before that moment with the alignment after it.

@@ -1,7 +1,7 @@
 """Converts a ride to the vehicle's axes for plot, report and export, and averages it to a lower sample rate.
 
 The lean of each sample is the firmware's lean or the smoothed lean. numpy computes everything that does not depend on
-earlier samples. A test compares these values with the firmware's.
+earlier samples. A test compares these values with the firmware's values.
 """
 
 from collections.abc import Iterable, Iterator

@@ -128,7 +128,8 @@ class CalibrationFile:
             force: shape (n, 3), in g.
             rate: shape (n, 3), in deg/s.
         """
-        # The firmware's function takes the numbers of one reading. Arrays instead of numbers give it n readings.
+        # The firmware's function takes the numbers of one reading. With arrays instead of numbers, the function
+        # calibrates n readings.
         readings = [*accel_g.T, None, *gyro_dps.T]
         force, rate = [np.zeros(0)] * 3, [np.zeros(0)] * 3
         self.to_firmware().apply(readings, force, rate)

@@ -54,7 +54,8 @@ class Checks:
             self._judge_speed(self._table.cells())
 
     def remarks(self, axes: bool = True, calibration: CalibrationFile | None = None) -> list[Message]:
-        """Return at most one remark about the log's axes, and one if the log contradicts the calibration.
+        """Return at most one remark about the log's axes, and at most one remark that the log contradicts the
+        calibration.
 
         axes: False to skip the checks of the axes.
         calibration: None to skip the check of the calibration.

@@ -174,7 +174,7 @@ def _evened(values: Array) -> Array:
 def _knots(windows: int, cells: int) -> tuple[Array, Array]:
     """Return the functions of an unknown velocity, one per knot, and their derivatives.
 
-    Each function is 1 at its own knot and 0 at the other knots. Between knots it is linear.
+    Each function is 1 at its own knot and 0 at the other knots. Between knots each function is linear.
     """
     time = (np.arange(cells) + 0.5) * CELL_S
     count = round(cells * CELL_S / KNOT_S) + 1

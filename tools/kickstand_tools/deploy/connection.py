@@ -247,7 +247,7 @@ def literal(text: bytes, *shapes: Any) -> Any:
     shapes: the allowed types of the value. Each is a type, or None, or a tuple with the types of a tuple's values.
     Integers must be 0 or larger.
 
-    Raises InputError for other values. Another device at the port may send them.
+    Raises InputError for other values. Another device at the port may send such values.
 
     >>> literal(b"('/rides', 3)", (str, int))
     ('/rides', 3)
@@ -255,7 +255,7 @@ def literal(text: bytes, *shapes: Any) -> Any:
     try:
         value = ast.literal_eval(text.decode().strip())
     except (SyntaxError, ValueError, TypeError, MemoryError, RecursionError):
-        value = literal  # no answer: this stands for a value that matches none of the shapes
+        value = literal  # not a literal, so it matches none of the shapes
     if any(_fits(value, shape) for shape in shapes):
         return value
     shown = ascii(text[:40].decode(errors="replace").strip())

@@ -54,7 +54,7 @@ class Others:
     files: Files and folders of the board, after renaming.
     moves: New path of each file to rename, by its present path.
     config: Content that the user's config.py should have. None if the board has no config.py, or if it is renamed.
-    mended: True if this content differs from the present content.
+    mended: True if the content in `config` differs from the present content.
     """
 
     files: BoardFiles
@@ -72,7 +72,7 @@ class Contents:
     """The contents of a board.
 
     files: Files and folders of the board.
-    texts: Content of those of the files MAIN, BOOT and CONFIG that exist, by path.
+    texts: Contents of the files MAIN, BOOT and CONFIG, as far as they exist, by path.
     """
 
     files: BoardFiles

@@ -16,7 +16,8 @@ from .board_files import BoardFiles, fingerprint
 from .firmware_files import CONFIG, MAIN, MODULE_ENDINGS, PACKAGE, unfinished
 
 FOLDER_BLOCKS = 2
-# Blocks that must stay free. A folder may need more than two, and littlefs replaces a worn block before freeing it
+# Blocks that must stay free. A folder may need more than two blocks, and littlefs replaces a worn block before freeing
+# it
 SPARE_BLOCKS = 4
 _POINTER = 4
 

@@ -215,8 +215,8 @@ def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) ->
 def mounted_windows(log: Log) -> Windows:
     """Return the windows of the part of a log in which the sensor was mounted, along the sensor's axes.
 
-    This part is the longest stretch in which the mean force keeps its direction. Before and after it, a hand held the
-    sensor. Readings beyond MOST_G and MOST_DPS are left out. Raises RefusedInput.
+    This part is the longest stretch in which the mean force keeps its direction. Before and after this part, a hand
+    held the sensor. Readings beyond MOST_G and MOST_DPS are left out. Raises RefusedInput.
     """
     log = log.part(np.all(np.abs(log.accel_g) < MOST_G, axis=1) & np.all(np.abs(log.gyro_dps) < MOST_DPS, axis=1))
     windows = _windows(log)
@@ -243,7 +243,7 @@ def _windows(log: Log, part: Bools | slice = slice(None)) -> Windows:
 
 
 def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | None, notices: list[Message]) -> RideFit:
-    """Return the estimate as a RideFit. Raises RefusedInput if its quality is too low."""
+    """Return the estimate as a RideFit. Raises RefusedInput if the quality of the estimate is too low."""
     halves = np.degrees(found.split())
     if np.max(np.abs(halves)) > MOVED_DEG:
         raise RefusedInput(RideHalves(float(np.max(np.abs(halves)))))

@@ -52,7 +52,8 @@ BACKWARD_MPS = 0.3  # speed below 0, because bikes hardly roll backwards
 OUTLIER = 2.0  # larger residuals of measurements, in standard deviations, are down-weighted (Cauchy)
 LASTING_S = {eq.SLIDING: SLIDE_S, eq.CLIMBING: DIVE_S, eq.SLOPING: SLOPE_S, eq.BALANCED: BALANCE_S, eq.ANY_SPEED: ANY_S}
 
-# The roughness of a ride is the rms of these residuals divided by EXPECTED, their rms in a rough ride.
+# The roughness of a ride is the rms of the residuals in ROUGH, divided by EXPECTED. EXPECTED is the rms of each
+# residual in a rough ride.
 ROUGH = [LEAN, PITCH, LEFT, UP, FORWARD, eq.SLIDING, eq.CLIMBING]
 EXPECTED = np.array([0.38, 0.38, 0.38, 0.38, 0.38, 0.5, 0.5])
 ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
@@ -196,7 +197,7 @@ class Noise:
         """Set the unbalance, which is the factor on the standard deviation of BALANCED. An average ride has an
         unbalance of 1.
 
-        With too few balanced windows it stays 1.
+        With too few balanced windows the unbalance stays 1.
 
         force: the measurement BALANCED, shape (n), in g.
         over_s: BRIEF_S or LONG_S.

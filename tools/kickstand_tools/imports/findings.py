@@ -1,5 +1,5 @@
-"""Finds the time, the accelerometer and the gyro in an unknown table, and their units. It uses the columns' names, and
-mainly their values.
+"""Finds the time, the accelerometer and the gyro in an unknown table, and their units. The names of the columns are
+used, but mainly their values.
 
 * Three columns belong together if their names differ only in the axis, or if they are side by side without names.
 * Whenever the sensor is calm, the acceleration is as long as gravity in some unit.

@@ -307,7 +307,8 @@ def _speed(
 ) -> tuple[int | None, str, list[Message]]:
     """Return the number of the speed's column, its unit, and notices.
 
-    A missing unit is found from the positions. If they do not show it, the speed is left out: the number is None.
+    A missing unit is found from the positions. If the positions do not show the unit, the speed is left out: the number
+    is None.
     """
     place = places.get("speed")
     if place is None:

@@ -111,8 +111,8 @@ def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") ->
 
 
 def _date_ns(text: str) -> int:
-    """Return the nanoseconds since 1970 of a date in ISO 8601. Without a zone it is UTC. A blank before the zone is
-    accepted."""
+    """Return the nanoseconds since 1970 of a date in ISO 8601. A date without a zone is in UTC. A blank before the zone
+    is accepted."""
     try:
         plain = _DAY.sub(lambda day: f"{day[1]}-{int(day[2]):02d}-{int(day[3]):02d}", text.strip())
         plain = _THOUSANDTHS.sub(r"\1.\2", plain)
@@ -125,8 +125,9 @@ def _date_ns(text: str) -> int:
 
 
 def time_unit(cells: Cells, given: str = "") -> str:
-    """Return the unit of times. If it is not given, find it from their size and steps. Dates and clocks return "date or
-    clock"."""
+    """Return the unit of times. If the unit is not given, find it from the size and the steps of the times. Dates and
+    clocks return "date or clock".
+    """
     numbers = numbers_of(cells)
     if np.count_nonzero(np.isfinite(numbers)) <= np.count_nonzero(filled(cells)) // 2:
         return DATES

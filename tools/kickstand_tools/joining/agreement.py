@@ -1,8 +1,8 @@
 """Compares the leans of two devices on one bike, to test a lean meter without a reference.
 
-The comparison does not show errors that both devices share, such as errors of the bike's model. It shows the errors
-that each device has alone: of its sensor, its mount and its calibration. If both devices are equally good, each
-device's error is the difference divided by the square root of two.
+The comparison does not show errors that both devices share, such as errors of the bike's model. The comparison shows
+the errors that each device has alone: of its sensor, its mount and its calibration. If both devices are equally good,
+each device's error is the difference divided by the square root of two.
 """
 
 from collections.abc import Iterator
@@ -207,8 +207,8 @@ def _interpolated(t_s: Array, values: Array, at_s: Array) -> Array:
 
 
 def _lean_while_riding(ride: SmoothedRide | Any, at_s: Array, riding: Bools) -> tuple[Array, Array]:
-    """Return the lean and its standard deviation in degrees, both of shape (n). Both are NaN if one of them is unknown,
-    or the bike is not riding."""
+    """Return the lean and its standard deviation in degrees, both of shape (n). Both are NaN if the lean or the
+    standard deviation is unknown, or the bike is not riding."""
     lean, sigma = (_interpolated(ride.t_s, values, at_s) for values in (ride.lean_deg, ride.lean_sigma_deg))
     known = riding & ~np.isnan(sigma)
     return np.where(known, lean, np.nan), np.where(known, sigma, np.nan)

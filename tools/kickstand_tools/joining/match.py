@@ -141,8 +141,8 @@ def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
 
 
 def _changes_of_ride(motion: CellMotion) -> tuple[Array, Bools]:
-    """Return the same two arrays for the ride: the rotation about its up within _SPAN_S, in degrees, and True where it
-    is known. See _changes_of_track()."""
+    """Return two arrays with a value every _GRID_S: the rotation of the ride about its up within _SPAN_S, in degrees,
+    and True where it is known."""
     at_s, half = np.arange(0.0, motion.seconds, _GRID_S), _SPAN_S / 2.0
     edges_s = np.arange(len(motion.there) + 1) * STEP_S
     turned = np.append(0.0, np.cumsum(motion.rate_dps @ motion.up)) * STEP_S

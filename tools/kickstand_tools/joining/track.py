@@ -63,7 +63,7 @@ class Track(Table):
         return Track(*(values[first] for values in self.columns().values()), name=self.name)
 
     def steps_m(self) -> tuple[Array, Array]:
-        """Return how far each point is east and north of the previous one, in metres, two arrays of shape (n - 1)."""
+        """Return how far each point is east and north of the previous point, in metres, two arrays of shape (n - 1)."""
         return distance_m(self.lat_deg[:-1], self.lon_deg[:-1], self.lat_deg[1:], self.lon_deg[1:])
 
 

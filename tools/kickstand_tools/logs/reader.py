@@ -54,7 +54,7 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None,
         axes: check that rates and accelerations fit each other. This check takes most of the time.
 
     Raises InputError, which names the file and the line of a mistake. Common wrong units (m/s2, milliseconds, km/h)
-    also raise it.
+    also raise InputError.
 
     >>> import io
     >>> log = read_log(io.StringIO("t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\\n0.00,0,1,0,0,0,0\\n0.01,0,1,0,0,0,0\\n"))

@@ -124,7 +124,7 @@ def overlay(
         assert offset_s is not None
         arguments = _laid_over(filmed, begin_s - offset_s, end_s - begin_s, fps, given, round(MARGIN * size))
     with whole_file(out) as temporary:
-        temporary.touch()  # if this fails, the system gives the reason; ffmpeg would not report it
+        temporary.touch()  # if this fails, the system gives the reason; ffmpeg would not report the reason
         write_video(temporary, arguments, pictures(), drawn)
     return Overlaid(count, rate, begin_s, end_s, offset_s, correlation, notices)
 

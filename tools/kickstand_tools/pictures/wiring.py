@@ -135,7 +135,7 @@ def _draw_signals(
 def _default_pins(board: DrawnBoard) -> dict[str, dict[str, str]]:
     """Read the default pins of this board from the firmware's port.py.
 
-    The function installs a simulated board, so do not call it while another one is installed.
+    The function installs a simulated board, so do not call it while another simulated board is installed.
     Returns {module: {pin of the module: name of the board's pin}}.
     """
     with simulator.Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=board.machine):

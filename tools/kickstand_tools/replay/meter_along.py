@@ -101,7 +101,8 @@ class Misfit:
             self.seconds += float(np.sum(np.diff(t_s, prepend=t_s[0])[odd])) or 1e-6
 
     def remarks(self, known: Iterable[Message]) -> list[Message]:
-        """Return the notice about contradicting readings. The list is empty if a notice in `known` explains them."""
+        """Return the notice about contradicting readings. The list is empty if a notice in `known` explains the
+        readings."""
         if not self.seconds or is_explained(known):
             return []
         return [ReadingsMisfit(self.seconds, self.first_s)]

@@ -122,7 +122,7 @@ def replay_blocks(
     """Yield each block of the log with the engine's results, one column per replay_engine.COLUMNS.
 
     Frozen readings are a gap for the engine, and their results are NaN. For a car, lean_sigma_deg is always NaN,
-    because its display shows no lean. At the end, remarks are appended to notices.
+    because a car's display shows no lean. At the end, remarks are appended to notices.
     """
     car = calibration.vehicle == "car"
     whole, stretch = split_stretch(log)
@@ -175,7 +175,8 @@ def _by_records(
 
 @contextlib.contextmanager
 def micropython(records: Iterator[bytes], _progress: Progress | None) -> Iterator[IO[bytes]]:
-    """Replay on MicroPython's unix port. Yields a file with the results. Raises InputError if it is not installed."""
+    """Replay on MicroPython's unix port. Yields a file with the results. Raises InputError if MicroPython is not
+    installed."""
     if not unix_port.available():
         raise InputError("engine micropython has no package for this system: use --engine cpython")
     with tempfile.TemporaryDirectory() as directory:
@@ -194,7 +195,7 @@ _BY_RECORDS: dict[str, Engine | None] = {"micropython": micropython, "rp2040": N
 
 
 def _last_words(traceback: bytes) -> str:
-    """Return the last line of MicroPython's traceback. MicroPython prints it to standard output."""
+    """Return the last line of MicroPython's traceback. MicroPython prints the traceback to standard output."""
     return traceback.decode(errors="replace").strip().rpartition("\n")[2]
 
 

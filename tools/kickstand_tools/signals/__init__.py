@@ -173,7 +173,7 @@ class Cells:
 
         time_s: times of the samples, shape (n), in s.
         means: values to average, shape (n, k).
-        latest: other values, shape (n, j). Each cell keeps the last one of each column that is not NaN.
+        latest: other values, shape (n, j). Each cell keeps the last value of each column that is not NaN.
         """
         if not len(time_s):
             return
@@ -349,7 +349,7 @@ def peaks(values: Array, apart: int, most: int) -> list[int]:
 
 
 # Rotation vectors and rotation matrices. A rotation vector is the axis times the angle in rad. The functions convert
-# any number of them at once, by the exponential map and its inverse. See Sola, "Quaternion kinematics for the
+# any number of rotations at once, by the exponential map and its inverse. See Sola, "Quaternion kinematics for the
 # error-state Kalman filter" (2017), section 2.3.
 
 

@@ -134,7 +134,7 @@ class Clock:
 
 
 class Watchdog:
-    """A watchdog. If it is not fed in time, the call that advances the time raises Reset. clock: a Clock."""
+    """A watchdog. If the watchdog is not fed in time, the call that advances the time raises Reset. clock: a Clock."""
 
     def __init__(self, clock):
         self._clock = clock

@@ -56,10 +56,10 @@ class Button(Contact):
         return self.closed or self._clock.now_us < pulled_us + self.charge_us
 
     def press(self, at_us, for_us):
-        """Press the button at at_us for for_us.
+        """Press the button from the time at_us on, for the duration for_us.
 
-        at_us: None to press now. If a press is still scheduled, the new one begins after it, because a finger cannot
-            press a pressed button.
+        at_us: None to press now. If a press is still scheduled, the new press begins after that press, because a finger
+            cannot press a pressed button.
         """
         if at_us is None:
             at_us = max(self._clock.now_us, self._free_us)

@@ -171,9 +171,9 @@ class Board:
         self.clock.every(to_us(period_s), function)
 
     def press(self, at_s=None, for_s=0.15):
-        """Press the button at at_s for for_s.
+        """Press the button at the time at_s, for the duration for_s.
 
-        at_s: None to press now. If a press is still scheduled, the new one begins after it.
+        at_s: None to press now. If a press is still scheduled, the new press begins after that press.
         """
         self.button.press(None if at_s is None else to_us(at_s), to_us(for_s))
 

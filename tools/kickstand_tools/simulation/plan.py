@@ -95,7 +95,8 @@ class Plan:
         return self.uniform(-self.slope_percent, self.slope_percent)
 
     def add(self, phase: str, seconds: float, speed_mps: float | None = None, **more: float | None) -> None:
-        """Add a leg. The slope at its end is random, unless slope_percent is in more. more: other fields of Leg."""
+        """Add a leg. The slope at the end of the leg is random, unless slope_percent is in more. more: other fields of
+        Leg."""
         if "slope_percent" not in more:
             more["slope_percent"] = self.random_slope()
         self.legs.append(Leg(phase, seconds, speed_mps, **more))  # type: ignore[arg-type]

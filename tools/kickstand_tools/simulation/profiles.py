@@ -213,7 +213,8 @@ def crosswind(plan: Plan) -> Conditions:
 def weight(plan: Plan) -> Conditions:
     """A rider who hangs off in turns, and luggage on one side.
 
-    The rider moves the centre of mass by up to 5 cm, which is 5 degrees of lean. The luggage moves it by 1 to 2 cm.
+    The rider moves the centre of mass by up to 5 cm, which is 5 degrees of lean. The luggage moves the centre of mass
+    by 1 to 2 cm.
     """
     conditions = street(plan)
     beside = plan.side() * plan.uniform(0.01, 0.02)

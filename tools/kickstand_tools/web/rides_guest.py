@@ -251,5 +251,5 @@ def raising(function):
 
 
 def prepare():
-    """Prepare the module. Call it once, before all other functions."""
+    """Prepare the module. Call this function once, before all other functions."""
     np.linalg.inv, np.linalg.solve = raising(np.linalg.inv), raising(np.linalg.solve)

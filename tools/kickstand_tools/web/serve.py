@@ -87,7 +87,7 @@ def server(files: dict[str, bytes], port: int = PORT) -> Server:
     """Return a server for the files of the site. Its port is server_address[1].
 
     files: {path: content}.
-    port: the wanted port. If it is in use, the server uses a free port.
+    port: the wanted port. If this port is in use, the server uses a free port.
     """
 
     class Handler(BaseHTTPRequestHandler):

@@ -180,7 +180,8 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
     time = part.t_s
     acceleration, pitch_rate, yaw_rate = _acceleration(part, rest)
     integrated = integral(time, acceleration)
-    # Integrate the speed backwards from the standstill. Correct it for the sensor, which moves when the bike pitches.
+    # Integrate the speed backwards from the standstill. Correct the speed for the motion of the sensor when the bike
+    # pitches.
     speed = integrated - integrated[-1] + SENSOR_HEIGHT_M * np.radians(pitch_rate)
     smooth = smoothed(acceleration, time, SMOOTH_S)
     begin = _onset(smooth, time, rest)

@@ -19,7 +19,7 @@ class Installer:
         self._real = {}  # the replaced modules; None for a module that did not exist
 
     def install(self, board):
-        """Replace `machine`, `time` and `os` by those of this simulator.Board."""
+        """Replace `machine`, `time` and `os` by the fakes for this simulator.Board."""
         fake_machine.use(board)
         fake_time.use(board.clock, board.clock.now_us)
         self._replace("machine", fake_machine)

@@ -104,7 +104,7 @@ def chassis_lean(balance: Signal, bike: Bike, bank: Signal | float = 0.0, hang: 
 def weave(chance: np.random.Generator, command: RiderCommands, riding_deg: float) -> Signal:
     """Simulate the rider's random changes of the lean, in rad.
 
-    The changes are larger at walking pace, and small while the feet are on the ground. In bends they include
+    The changes are larger at walking pace, and small while the feet are on the ground. In bends the changes include
     corrections of the line.
 
     riding_deg: rms of the changes at speed.

@@ -110,7 +110,7 @@ def yaw_rate_in_balance(lean, lift_mps2, speed_mps):
     """Return the yaw rate that balances a lean, in rad/s about the road's normal. The yaw rate is negative in a right
     turn.
 
-    Below RIDING_MPS the feet help to balance, so the yaw rate is smaller. Below WALKING_MPS it is 0.
+    Below RIDING_MPS the feet help to balance, so the yaw rate is smaller. Below WALKING_MPS the yaw rate is 0.
 
     lean: Lean in rad, positive to the right.
     lift_mps2: Specific force perpendicular to the road.

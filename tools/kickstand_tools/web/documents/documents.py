@@ -77,8 +77,8 @@ def page_of(path: str) -> str:
 def document_files(home: str) -> dict[str, bytes]:
     """Build the pages of all documents, one page with all of them together, and their pictures.
 
-    home: the project's address, or "" if it is unknown. Without it, links to the project's other files and to its
-        issues are left out.
+    home: the project's address, or "" if it is unknown. Without an address, links to the project's other files and to
+        its issues are left out.
     Returns {path in the site: content}.
     """
     root = firmware_path.documents()

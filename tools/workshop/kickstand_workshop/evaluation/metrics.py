@@ -53,7 +53,7 @@ def slope(shown: NDArray, true: NDArray, beyond: float = LEANED_DEG) -> float:
 def lag_ms(shown: NDArray, true: NDArray, rate_hz: float) -> float:
     """Find the delay of the shown roll rate at which it correlates best with the true roll rate.
 
-    The delay is refined by a parabola. Returns it in ms, or NaN if no delay is found.
+    The delay is refined by a parabola. Returns the delay in ms, or NaN if no delay is found.
     """
     width = max(round(_LAG_SMOOTHING_S * rate_hz), 1)
     window = np.full(width, 1.0 / width)
