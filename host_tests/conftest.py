@@ -86,7 +86,7 @@ def _uses_the_machine(module: ModuleType | None) -> bool:
     return False
 
 
-@pytest.hookimpl(tryfirst=True)  # before -m selects tests by their markers
+@pytest.hookimpl(tryfirst=True)  # must run before -m selects tests by their markers
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Function]) -> None:
     """Mark the tests that depend on the machine. Put long tests first, because a long test at the end would keep one
     processor busy while the other processors idle."""

@@ -332,7 +332,7 @@ def test_stops_are_found_in_each_log_of_its_own():
     for seconds, stops in ((6.1, 1), (4.0, 1), (2.9, 0)):
         assert drive_feed.standing([log(seconds)], CalibrationFile(), drive_feed.Steps(None, 1)).stops == stops
     late = drive_feed.standing([log(4.0, (250,))], CalibrationFile(), drive_feed.Steps(None, 1))
-    assert late.stops == 0  # after the speed at 2.5 s, only 1.5 s are left
+    assert late.stops == 0  # only 1.5 s of the log come after its only speed, at 2.5 s
 
 
 def test_a_speed_counts_as_known_for_5_s(monkeypatch):

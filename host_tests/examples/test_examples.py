@@ -73,7 +73,7 @@ def test_user_page(tmp_path):
 def test_tried_it_is_turned_to_after_the_first_turn():
     said = command.works("try", EXAMPLES / "user_page.py").out
     loads = [float(load) for load in re.findall(r"\|Load +(\d\.\d\d) x", said)]
-    assert max(loads) == pytest.approx(1.41, abs=0.08)  # 1 / cos(45 degrees), in the ride's last turn
+    assert max(loads) == pytest.approx(1.41, abs=0.08)  # the load is 1 / cos(45 degrees) in the ride's last turn
 
 
 @pytest.mark.parametrize("engine", [[], ["--cpython"]], ids=["micropython", "cpython"])

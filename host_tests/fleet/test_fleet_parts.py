@@ -22,7 +22,7 @@ from support import command
 
 UP = (0.0, 1.0, 0.0)
 GAP_S = GAP_US * 1e-6
-MOUNT = turn_of(50.0, (1.0, 2.0, 3.0))  # from the sensor's axes to left, up, forward
+MOUNT = turn_of(50.0, (1.0, 2.0, 3.0))  # rotation from the sensor's axes to left, up, forward
 
 
 def coefficients(left_g=1.0):

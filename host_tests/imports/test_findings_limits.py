@@ -196,7 +196,7 @@ def test_wanted_names_may_be_in_any_line():
     assert layout._grid_below(lines, ["t", "az"]) == layout.Grid(2, 3, ",", False, 4)
     assert layout._grid_below(lines, ["t", "b"]) is None is layout._grid_below(lines, [])
     assert layout._grid_below(["t;b", "x", "y"], ["t", "b"]) == layout.Grid(0, 1, ";", False, 2)
-    assert layout._grid_below(["x", "t,b"], ["t"]) is None  # below the last line there are no rows
+    assert layout._grid_below(["x", "t,b"], ["t"]) is None  # the names are in the last line, so no rows follow
     wide = layout._grid_below(["t,a,b,c,d", "1,2,3,4", "1,2,3,4"], ["t", "d"])
     assert wide is not None and wide.width == 5
 

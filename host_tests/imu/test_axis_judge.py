@@ -9,7 +9,7 @@ from kickstand.imu.axis_judge import AxisJudge
 
 ENDS, CLIPPED, GYRO_CLIPPED, DIFFER, SHAKEN, SEEN = 5, 6, 7, 8, 11, 19
 HIGH, WRAPPED = 0x10000, 0x20000
-GOOD = 0b1111 | HIGH  # four values, with odd and even ones, and a changed high byte
+GOOD = 0b1111 | HIGH  # notes of a good axis: four values, odd and even, and a changed high byte
 
 
 def notes(**changed) -> list[int]:

@@ -219,7 +219,7 @@ def test_a_tracks_change_of_course_is_over_four_seconds():
     assert change[20] == pytest.approx(36.0 * 0.98741, abs=0.001)
     assert len(change) == 60 and np.flatnonzero(known)[[0, -1]].tolist() == [4, 56]  # the cells from 2 to 28 s
     known = match._changes_of_track(steps(30, bad=[15]))[1]  # the bad step is from 15 to 16 s
-    assert known[25] and not known[27:36].any() and known[37]  # at 12.5 and 18.5 s the 4 s do not contain the bad step
+    assert known[25] and not known[27:36].any() and known[37]  # the 4 s around 12.5 and 18.5 s exclude the bad step
 
 
 def test_a_rides_change_of_course_is_over_four_seconds():

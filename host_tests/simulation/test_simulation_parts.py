@@ -31,7 +31,7 @@ def test_integral_and_derivative_of_a_line():
 def test_smoothing_and_noise_have_their_size():
     step = np.where(np.arange(4000) < 2000, 0.0, 1.0)
     found = signals.smoothed(step, 0.1, 1000.0)
-    assert found[1900] == pytest.approx(0.1587, abs=0.003)  # one sigma before the step
+    assert found[1900] == pytest.approx(0.1587, abs=0.003)  # the normal distribution at one sigma before the step
     assert found[[0, -1]] == pytest.approx([0.0, 1.0], abs=1e-6)
     noise = signals.band_noise(np.random.default_rng(1), 20_000, 1.0, 5.0, 200.0)
     power = np.abs(np.fft.rfft(noise)) ** 2

@@ -189,7 +189,7 @@ class Cluster:
             if status == "finished":
                 try:
                     result = future.result()
-                except Exception:  # its worker died before the result was fetched
+                except Exception:  # the task's worker died before the result was fetched
                     suspects.append(index)
                 else:
                     yield index, result, "", ""

@@ -101,7 +101,7 @@ class Turning:
 
     def _fit(self, rate: Array, turn: Array, turned: Array, velocity: tuple[Array, Array]) -> "_Fit":
         values, changes = (part[..., None, None] for part in velocity)
-        parts = turn @ (cross_matrix(rate) * values + np.eye(3) * changes)  # (k, w, n, 3, 3)
+        parts = turn @ (cross_matrix(rate) * values + np.eye(3) * changes)  # shape (k, w, n, 3, 3)
         along = _evened(np.concatenate(list(parts), axis=-1) / STANDARD_GRAVITY)
         moved = _evened(turned)
         square = np.einsum("wnij,wnik->wjk", along, along)

@@ -143,7 +143,7 @@ class Noise:
 
     def robust(self, sigma: Array, off: Array) -> Array:
         """Return `sigma`, enlarged where a residual in `off` is an outlier (Cauchy). All have the shape (n, ROWS)."""
-        limit = OUTLIER / self._lasting  # in standard deviations without the factor for the duration of a disturbance
+        limit = OUTLIER / self._lasting  # OUTLIER does not include the factor for the duration of a disturbance
         limit[:, : BIAS.start], limit[:, BIAS] = JOLT, np.inf
         return sigma * np.hypot(1.0, off / sigma / limit)
 

@@ -106,7 +106,7 @@ def read_sheet(file: RecordingFile, header: int = 0, skipped: int = 0) -> Sheet:
         raise InputError(f"{file.name}: no rows under the names of the columns: was anything recorded?")
     columns = names_in(lines[header])
     while columns and not columns[-1]:
-        columns.pop()  # all lines end in a separator
+        columns.pop()  # empty names at the end come from lines that end in a separator
     text, separator = lines[-1], separator_of(lines[header])
     if separator != "," and _DECIMAL_COMMA.search(text[:20000]):
         text = decimal_points(text)

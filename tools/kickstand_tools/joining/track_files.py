@@ -51,7 +51,7 @@ def read_track(path: Path | str, progress: Progress | None = None) -> Track:
         raise
     except OSError as error:
         raise InputError(f"{path} cannot be read: {cause(error)}") from error
-    except Exception as error:  # for damaged files, the libraries raise many kinds of errors
+    except Exception as error:  # the libraries raise many kinds of errors for damaged files
         raise InputError(f"{path} is damaged, or in another format than its name says: {_words(error)}") from error
     table = np.array(points, dtype=float).reshape(-1, 4)
     on_earth = (np.abs(table[:, 1]) <= 90.0) & (np.abs(table[:, 2]) <= 180.0)

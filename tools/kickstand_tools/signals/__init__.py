@@ -445,6 +445,6 @@ def distance_m(lat: Array, lon: Array, next_lat: Array, next_lon: Array) -> tupl
         east: metres to the east, shape (n).
         north: metres to the north, shape (n).
     """
-    apart_deg = (next_lon - lon + 180.0) % 360.0 - 180.0  # also across the meridian of 180 degrees
+    apart_deg = (next_lon - lon + 180.0) % 360.0 - 180.0  # correct also across the meridian of 180 degrees
     east = np.radians(apart_deg) * np.cos(np.radians(lat)) * EARTH_M
     return east, np.radians(next_lat - lat) * EARTH_M

@@ -6,7 +6,7 @@ from heapq import heappop, heappush
 # Saved, because under MicroPython Board.install() later replaces `time`
 _host_ns, _host_sleep = _host_time.time_ns, _host_time.sleep
 
-NEVER_US = 1 << 60  # later than the end of any run
+NEVER_US = 1 << 60  # a time later than the end of any run
 _PACE_STEP_US = 5000  # time between two comparisons of a paced clock with the host's clock
 
 

@@ -25,7 +25,7 @@ DATA_RDY, FIFO_OFLOW = 0x01, 0x10  # INT_STATUS
 
 START_UP_US = 90_000  # start-up time after power-on and reset; the data sheet's worst case is 100 ms
 WAKE_US = 30_000  # time from sleep to the first sample, the gyro's start-up time (PS 6.1)
-GYRO_LSB_PER_DPS = (131.0, 65.5, 32.8, 16.4)  # for each range in bits 4 and 3 of GYRO_CONFIG
+GYRO_LSB_PER_DPS = (131.0, 65.5, 32.8, 16.4)  # one per range, which bits 4 and 3 of GYRO_CONFIG select
 DLPF_DELAY_US = (980, 1900, 2800, 4800, 8300, 13400, 18600, 980)  # delay of the gyro's low-pass, by DLPF_CFG
 
 ACCEL_TRIMS, GYRO_TRIMS = (13, 17, 22), (9, 14, 11)  # factory trim codes of x, y, z (RM pp. 9 to 11)

@@ -93,7 +93,7 @@ class Device:
             else:
                 board.faults.restore("open")
         elif value:
-            board.faults.restore("open")  # only one save is cut
+            board.faults.restore("open")  # the supply is cut in one save only
             self.powered = True
         elif self.powered:
             board.clock.power_off()

@@ -37,7 +37,7 @@ class Installer:
             self._replace("time", fake_time)
             self._replace("os", fake_os)
         else:
-            from . import cpython  # it imports modules that MicroPython does not have
+            from . import cpython  # cpython.py imports modules that MicroPython does not have
 
             cpython.supplement()
             for real, fake in _ADDED_TO:

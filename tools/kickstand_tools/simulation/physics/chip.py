@@ -75,7 +75,7 @@ class Chip:
         Offsets and biases are uniformly distributed within the data sheet's limits. Scale and cross-axis sensitivity
         are normally distributed, with the limit at two standard deviations. For a change of temperature of 45 to 60 C,
         the data sheet allows drifts of 35 to 60 mg for the accelerometer and 20 deg/s for the gyro. An ordinary sensor
-        has a third of the accelerometer's drift and a fifth of the gyro's.
+        has a third of the accelerometer's drift and a fifth of the gyro's drift.
         """
 
         def near_one(scale: float, cross: float) -> NDArray[np.float64]:
