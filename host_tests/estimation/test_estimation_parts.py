@@ -233,8 +233,9 @@ def test_a_bike_without_changes_stands_still():
 
 
 def test_lean_and_speed_of_a_steady_bend():
-    """The bike leans by 0.5 rad to the left at 15 m/s, so its yaw rate is 0.357 rad/s. The force shows the speed. A
-    prior speed of 10 m/s has the weight of a yaw rate of 0.14 rad/s."""
+    """The bike leans by 0.5 rad to the left at 15 m/s, so its yaw rate is 0.357 rad/s. The speed is found from the
+    force. A prior speed of 10 m/s has the weight of a yaw rate of 0.14 rad/s.
+    """
     yaw = G * np.tan(0.5) / 15.0
     made = windows(600, force=(0.0, 1.0 / np.cos(0.5), 0.0), rate=(-yaw * np.sin(0.5), yaw * np.cos(0.5), 0.0))
     still = np.zeros(600, dtype=bool)

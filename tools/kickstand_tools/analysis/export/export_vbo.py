@@ -57,7 +57,7 @@ def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
 
     blocks: should have positions in as many rows as possible.
     """
-    first = next(blocks)  # shows which channels the log has; a missing channel is NaN in all blocks
+    first = next(blocks)  # the first block shows which channels the log has; a missing channel is NaN in all blocks
     other = [column for column in OTHER if not np.all(np.isnan(getattr(first, column[2])))]
     lean = "lean-angle in degrees, > 0 to the right; " if OTHER[0] in other else ""
     satellites = f"satellites {_SATELLITES} stands for a position, 0 for none"

@@ -1,9 +1,9 @@
 """Detects standstills, for the stops of a ride.
 
 The limits are relative to the shaking of the ride. In simulated rides, these limits find all of the standing time. The
-fixed limits of signals.motionless, in deg/s and g, find only 54 to 92 %. Relative limits are worse only if an idling
-engine shakes as much as the road. Then relative limits find 17 to 41 % of the standing time, and fixed limits find 91
-%.
+fixed limits of signals.motionless, in deg/s and g, find only 54 to 92 % of this time. Relative limits are worse only if
+an idling engine shakes as much as the road. Then relative limits find 17 to 41 % of the standing time, and fixed limits
+find 91 %.
 """
 
 import numpy as np
