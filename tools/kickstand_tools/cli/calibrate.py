@@ -37,8 +37,8 @@ def six(poses: tuple[Path, ...], out: Path) -> None:
     """Measure the sensor's errors from six still poses, each side up once, in any order.
 
     One log of the whole procedure calibrates accelerometer and gyro. Lay the sensor still for three seconds on each
-    side, and once slanted. The turns between the poses calibrate the gyro. Six logs of one pose each give only offset
-    and slope of the accelerometer. A seventh log, of a slanted pose, checks them.
+    side, and once at a slant. The turns between the poses calibrate the gyro. Six logs of one pose each give only
+    offset and slope of the accelerometer. A seventh log, of a slanted pose, checks them.
     """
     check_output(out, list(poses))
     found = fit_procedure(poses[0]) if len(poses) == 1 else fit_six_positions(poses)

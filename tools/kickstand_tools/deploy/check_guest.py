@@ -1,6 +1,6 @@
 """The functions that `kickstand check` runs on the board, one after the other.
 
-check.py sends the source code of these functions to the board. The functions only measure. Their results are numbers
+check.py sends the source code of these functions to the board. The functions only measure. The functions return numbers
 and texts, which the board prints with repr(). check_limits.py judges the results.
 
 The argument `parts` is the result of begin(). Times are in ms unless a name says otherwise.

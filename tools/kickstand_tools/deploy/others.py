@@ -152,8 +152,9 @@ def _settings_named(content: bytes) -> int:
 
 
 def _does_something(content: bytes) -> bool:
-    """True if the file contains more than comments and strings. The boot.py that MicroPython puts on an ESP32 does not
-    contain more."""
+    """True if the file contains more than comments and strings. The boot.py that MicroPython puts on an ESP32 contains
+    only comments and strings.
+    """
     try:
         body = ast.parse(content).body
     except (SyntaxError, ValueError, RecursionError, MemoryError):

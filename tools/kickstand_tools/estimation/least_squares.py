@@ -91,7 +91,7 @@ class Estimate:
     def split(self) -> Array:
         """Estimate a change of the misalignment in the middle of the ride.
 
-        Returns the misalignment in the second half minus that in the first half, shape (3), in rad.
+        Returns the misalignment in the second half minus the misalignment in the first half, shape (3), in rad.
         """
         walks = self._likely.random_walks(self.prior, self.parameters)
         middle = len(self.parameters) // 2

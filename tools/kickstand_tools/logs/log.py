@@ -204,7 +204,7 @@ class Block(Table):
     done: int  # bytes read of the file before unpacking; for a log in memory, number of samples
     lines: list[str] = field(default_factory=list)  # the rows as CSV, empty for a log in memory
     names: tuple[str, ...] = ()  # names of the columns in lines
-    own_times: bool = True  # False if even_times.py changed the times, so they differ from the times in lines
+    own_times: bool = True  # False if even_times.py changed the times, so they differ from the times in `lines`
 
     def rows(self) -> Iterator[FirmwareRow]:
         """Yield the samples for a replay by the firmware's modules. See firmware_rows()."""

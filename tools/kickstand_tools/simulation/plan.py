@@ -57,7 +57,7 @@ class Plan:
         self._seconds = 0.0
         self._until = max(seconds - _CLOSING_S, 20.0)
         self.slope_percent = 3.0  # largest slope of random_slope()
-        self.roll_dps = 60.0  # mean roll rate of the fastest change of lean. The peak roll rate is nearly twice as high
+        self.roll_dps = 60.0  # mean roll rate of the fastest change of lean; the peak is nearly twice the mean
 
     @property
     def going_on(self) -> bool:

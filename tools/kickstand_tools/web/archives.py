@@ -91,7 +91,9 @@ def install_archive() -> bytes:
 
 
 def firmware() -> bytes:
-    """Pack the firmware for riders whose browser cannot connect to a board. These riders copy it with mpremote."""
+    """Pack the firmware for riders whose browser cannot connect to a board. These riders copy the firmware with
+    mpremote.
+    """
     return zipped({f"kickstand-firmware{path}": source.read_bytes() for path, source in firmware_files().items()})
 
 

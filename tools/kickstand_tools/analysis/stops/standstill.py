@@ -17,8 +17,8 @@ STALE_S = 3.0  # largest age in s of a speed that is used
 # of the shaking while moving.
 QUIET_S = 1.0
 QUIET_SHARE = 0.15  # the share for the rates of pitch and yaw
-# The share for the vertical force. After a stop the fork shakes less than this. Smooth roads and idling engines shake
-# more.
+# The share for the vertical force. After a stop the fork shakes less than this. Smooth roads and idling engines cause
+# more shaking.
 QUIET_UP_SHARE = 0.2
 RIDING_PERCENTILE = 90.0  # this percentile of the shaking comes from a moving vehicle, even with long pauses
 # Limits of the road's shaking. Shaking faster than ENGINE_S is the engine's. Changes slower than BEND_S are bends and

@@ -18,7 +18,7 @@ _COUNTS = 32768.0
 _GYRO_COUNTS = 32750.0  # counts at the end of a range, from the data sheet's 65.5 counts per deg/s at 500 deg/s
 _ACCEL_NOISE_G = 400e-6 * np.sqrt(RATE_HZ / 2)  # rms of a conversion, from 400 ug/sqrt(Hz)
 _GYRO_NOISE_DPS = 0.005 * np.sqrt(RATE_HZ / 2)
-_CROSS_AXIS = 0.02  # sensitivity of an axis to its neighbours
+_CROSS_AXIS = 0.02  # sensitivity of an axis to motion along another axis
 GYRO_DPS_PER_G = 0.1  # sensitivity to linear acceleration
 CALIBRATED_C = 25.0
 

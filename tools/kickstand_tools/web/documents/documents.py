@@ -11,7 +11,7 @@ from .markdown import Document, Heading, converted
 
 FOLDER = "docs/"  # in the site
 ALL = "all.html"
-_BETWEEN = "--"  # between a document's name and an anchor in it, on the page with all documents
+_BETWEEN = "--"  # separates a document's name from an anchor, on the page with all documents
 _TEMPLATE = Path(__file__).with_name("document.html")
 # The documents in reading order: (title of the group, paths in the project)
 GROUPS = (
