@@ -45,7 +45,7 @@ def _compiled_once(source: Path, architecture: str = "armv6m") -> bytes:
     return _compiled_before(source, source.read_bytes(), architecture)
 
 
-bytecode.cross_compiled = _compiled_once  # replaced before any module imports it by name
+bytecode.cross_compiled = _compiled_once  # replaced before any module imports the function by name
 
 ROOT = Path(__file__).resolve().parent.parent
 # Features that depend on the machine: fixtures, markers, and modules that use programs, boards or pages.
@@ -86,10 +86,10 @@ def _uses_the_machine(module: ModuleType | None) -> bool:
     return False
 
 
-@pytest.hookimpl(tryfirst=True)  # before -m selects tests by their markers
+@pytest.hookimpl(tryfirst=True)  # must run before -m selects tests by their markers
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Function]) -> None:
     """Mark the tests that depend on the machine. Put long tests first, because a long test at the end would keep one
-    processor busy while the others idle."""
+    processor busy while the other processors idle."""
     on_machine = {item.path for item in items if _asks(item) or _uses_the_machine(item.module)}
     for item in items:
         if item.path in on_machine:
@@ -134,7 +134,9 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 def _why_skipped(reason: str) -> str:
-    """Return the cause of a skip for the summary line. If the reason names a missing thing, it is "for want of" it."""
+    """Return the cause of a skip for the summary line. If the reason names a missing thing X, the cause is "for want of
+    X".
+    """
     missing = re.match(r"no (.+?)(?: for this system)?(?:: |$)|needs (.+)|could not import '([\w.]+)'", reason)
     return "for want of " + next(filter(None, missing.groups())) if missing else f"because {reason}"
 

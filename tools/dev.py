@@ -24,7 +24,7 @@ LOG = os.path.join(VENV, "install.log")
 OLDEST = (3, 11)
 EXTRAS = ("", "test", "mutants")  # extras of pyproject.toml; each contains the earlier ones
 REPORT_S = 5  # time between two lines of progress while installing
-COMPILE = "from kickstand_emulator import native; native.build()"  # the emulated Pico is then twice as fast
+COMPILE = "from kickstand_emulator import native; native.build()"  # compiled, the emulated Pico is twice as fast
 
 
 class SetupStopped(Exception):
@@ -50,13 +50,13 @@ def main(arguments):
 def test(arguments):
     """Run ruff, ruff format, pytest and pyright, each even if an earlier one has failed. Returns 0 if all succeed,
     otherwise 1."""
-    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # otherwise each process started by a test compiles its imports
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # if set, each process that a test starts compiles its imports
     compiling = subprocess.Popen([PYTHON, "-c", COMPILE], cwd=ROOT)
     # pyright runs beside the other checks, because it uses only one processor for a minute
     pyright = subprocess.Popen(
         [PYTHON, "-m", "pyright"], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8"
     )
-    processes = str((os.cpu_count() or 1) + 1)  # one more than the processors, because tests of pages often wait
+    processes = str((os.cpu_count() or 1) + 1)  # one process more than processors, because tests of pages often wait
     failed = []
     for tool, command in (
         ("ruff", ("-m", "ruff", "check", ".")),

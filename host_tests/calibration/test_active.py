@@ -90,8 +90,8 @@ def test_save_replaces_and_refine_corrects(made):
 
 
 def test_the_trim_is_saved_once_a_minute_at_most(made):
-    """The trim is saved seldom, because each write wears the flash. It is never saved in the first minute. If there is
-    no new trim after a minute, the first new one after that is saved."""
+    """The trim is saved seldom, because each write wears the flash. The trim is never saved in the first minute. If
+    there is no new trim after a minute, the next new trim is saved."""
     active, meter, _ = made
     active.chip_started(Chip())
     active.save(aligned())

@@ -106,7 +106,7 @@ def test_the_free_pose_is_the_one_further_from_its_axis():
             with pytest.raises(InputError, match=r"side \+z exists twice \(e and g\)"):
                 poses._sides([*named, pose("g", slanted(deg))])
     with pytest.raises(InputError, match="exists twice"):
-        poses._sides([*tilted, pose("g", slanted(24.4))])  # under 3 degrees more than the side pose
+        poses._sides([*tilted, pose("g", slanted(24.4))])  # tilted under 3 degrees more than the side pose
     assert poses._sides([*tilted, pose("g", slanted(24.6))])[1] is not None
     with pytest.raises(InputError, match=r"side -z is missing, and side \+z is there 2 times"):
         poses._sides([*named[:5], pose("g", slanted(25.0))])
@@ -137,7 +137,7 @@ def test_two_poses_keep_the_accelerometers_calibration():
 
 
 def moving_log(stretches_s, hz=100.0, size_g=0.5, between_s=1.0) -> Log:
-    """A log that is still for these times, with motion between them."""
+    """Return the log of a sensor that is still for these times and moves between them."""
     chance = np.random.default_rng(1)
     parts = [chance.normal(0.0, size_g, (round(between_s * hz), 6))]
     for seconds in stretches_s:
@@ -152,7 +152,7 @@ def moving_log(stretches_s, hz=100.0, size_g=0.5, between_s=1.0) -> Log:
 def test_stillness_lasts_a_second_between_margins():
     found = procedure._still_stretches(moving_log([1.15, 1.35, 3.0]))
     assert [last - first for first, last in found] == pytest.approx([115, 280], abs=6)
-    assert found[0][0] == pytest.approx(325, abs=6)  # 1 + 1.15 + 1 s, and a margin of 0.1 s
+    assert found[0][0] == pytest.approx(325, abs=6)  # begins after 1 + 1.15 + 1 s and a margin of 0.1 s
     with pytest.raises(InputError, match="too short for the six positions"):
         procedure._still_stretches(Log(np.arange(40) / 100.0, np.zeros((40, 3)), np.zeros((40, 3))))
 
@@ -186,7 +186,7 @@ def test_a_still_window_has_limits(what, amount, still):
 
 @pytest.mark.parametrize(("before", "found"), [(122, [(10, 110), (135, 260)]), (130, [(10, 119), (140, 260)])])
 def test_no_stretch_extends_over_a_gap(before, found):
-    """Windows begin at every fifth sample. With 130 samples before the gap, the next window begins right after it."""
+    """Windows begin at every fifth sample. With 130 samples before the gap, a new window begins just after the gap."""
     t_s = np.append(np.arange(before) / 100.0, 3.0 + np.arange(270 - before) / 100.0)
     log = Log(t_s, np.tile([0.0, 1.0, 0.0], (270, 1)), np.zeros((270, 3)))
     assert procedure._still_stretches(log) == found
@@ -204,7 +204,8 @@ def test_the_least_tilted_pose_is_a_sides():
     ("most", "used"), [(240.0, True), (246.0, True), (246.3, False), (252.4, False), (252.6, True)]
 )
 def test_turns_at_the_end_of_a_range_are_left_out(most, used):
-    """98.5 to 101 % of 250 deg/s are at the end of the range. Then rates over 237.5 deg/s are too quick."""
+    """A rate of 98.5 to 101 % of 250 deg/s is treated as the end of a range of 250 deg/s. Then all rates over 237.5
+    deg/s are left out."""
     rates = np.zeros((100, 3))
     rates[50] = [0.0, most, 0.0]
     log = Log(np.arange(100) / 100.0, np.tile([0.0, 1.0, 0.0], (100, 1)), rates)
@@ -315,7 +316,7 @@ def test_the_vehicle_follows_from_the_calibration():
 
 
 def test_stops_are_found_in_each_log_of_its_own():
-    """Each log stands for 4 s, so there are two stops. A speed of over 5 s ago is not known any more."""
+    """In each log the vehicle stands for 4 s, so there are two stops. A speed of over 5 s ago is not known any more."""
     seen: list = []
     steps = drive_feed.Steps(lambda *done: seen.append(done), 800)
 
@@ -331,11 +332,11 @@ def test_stops_are_found_in_each_log_of_its_own():
     for seconds, stops in ((6.1, 1), (4.0, 1), (2.9, 0)):
         assert drive_feed.standing([log(seconds)], CalibrationFile(), drive_feed.Steps(None, 1)).stops == stops
     late = drive_feed.standing([log(4.0, (250,))], CalibrationFile(), drive_feed.Steps(None, 1))
-    assert late.stops == 0  # after the speed at 2.5 s, only 1.5 s are left
+    assert late.stops == 0  # only 1.5 s of the log come after its only speed, at 2.5 s
 
 
 def test_a_speed_counts_as_known_for_5_s(monkeypatch):
-    """Each bin lasts 100 ms. After the speed in the first bin, 50 more bins are known."""
+    """Each bin lasts 100 ms. After the speed in the first bin, the speed is known in 50 more bins."""
     seen: list = []
     monkeypatch.setattr(drive_feed.StandingVertical, "update", lambda _, force, rate, mps, s: seen.append((mps, s)))
     speed = np.full(801, np.nan)

@@ -77,7 +77,7 @@ def test_six_without_a_free_pose_says_what_is_unproven(tmp_path, six_poses):
 @pytest.mark.parametrize(("seed", "side"), [(0, "left"), (1, "right")])
 def test_six_and_two_find_the_mounting_to_0_3_degrees(tmp_path, six_poses, free_pose, seed, side):
     rng = np.random.default_rng(seed)
-    mounting = random_rotation(rng)  # the rotation from the sensor's axes to the vehicle's
+    mounting = random_rotation(rng)  # rotation from the sensor's axes to the vehicle's axes
     stand, upright = (reads(mounting.T @ leaned(lean)) for lean in (-12.0 if side == "left" else 12.0, 0.0))
     poses = two_poses(tmp_path, stand, upright, BIAS)
     command.works("calibrate", "six", *six_poses, free_pose, "--out", tmp_path / "SIX.json")
@@ -160,7 +160,7 @@ def test_a_spoilt_pose_is_refused_by_name(tmp_path, six_poses, which):
 
 
 def two_refused(poses, words, *more):
-    """Run `calibrate two` and test that it is refused and keeps the older CAL.json. Return the message."""
+    """Run `calibrate two`. Test that the command refuses the poses and keeps the older CAL.json. Return the message."""
     directory = poses[0].parent
     (directory / "CAL.json").write_text("the one from yesterday\n")
     return command.refused(directory, "calibrate", "two", *poses, *more, "--out", directory / "CAL.json", words=words)

@@ -12,8 +12,8 @@ class Chip:
 
 
 def taker():
-    """Return a PoseTaker for 100 samples per second. It needs 50 still samples, then averages 300 samples, and gives up
-    after 1000 samples."""
+    """Return a PoseTaker for 100 samples per second. The PoseTaker needs 50 still samples, then averages 300 samples,
+    and gives up after 1000 samples."""
     return PoseTaker(Chip, 100, 3.0)
 
 

@@ -95,7 +95,7 @@ def test_samples_of_a_pose_that_is_spoilt_count_after_all():
         turn.end()
         return np.degrees(turn.angle())
 
-    assert turned(spoilt=True) == pytest.approx(10.0, abs=0.01)  # 20 deg/s for half a second
+    assert turned(spoilt=True) == pytest.approx(10.0, abs=0.01)  # a rate of 20 deg/s for half a second
     assert turned(spoilt=False) == pytest.approx(8.0, abs=0.01)
 
 
@@ -174,7 +174,8 @@ def test_the_fit_is_numpys_and_so_is_its_covariance():
 
 
 def test_micropython_finds_the_same():
-    """MicroPython gets the same poses and turns, and computes the fit step by step. All its results are compared."""
+    """MicroPython gets the same poses and turns, and computes the fit step by step. All its results are compared with
+    CPython's."""
     fit = fitted()
     script = (
         "from array import array\nfrom kickstand.calibration.sensor_fit import SensorFit\n"

@@ -38,8 +38,8 @@ def problem_of(rows, **settings):
 @pytest.mark.parametrize("axis", [0, 1, 2, 4, 5, 6])
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_a_knock_about_or_along_any_axis_spoils_the_pose(axis, sign):
-    """A single sample that differs too much from the first one spoils the pose. It changes the mean too little to be
-    noticed by the other limits."""
+    """A single sample that differs too much from the first one spoils the pose. The sample changes the mean too little
+    to be noticed by the other limits."""
     peak = 0.08 * 8192 if axis < 3 else 5.0 * 65.5
     for at in (1, 50, 99):
         for share, code in ((0.8, None), (1.2, "moved")):

@@ -52,7 +52,7 @@ def test_the_largest_trim_that_the_filter_finds_is_loaded_again(store, sign):
 
 
 IDENTITY = [1, 0, 0, 0, 1, 0, 0, 0, 1]
-NUMBERS = [0.25, -0.125, 0.375, 1.125, 0.875, 1.0, 3.5, -2.5, 1.5, *IDENTITY, 2.5]  # all are exact in 32 bits
+NUMBERS = [0.25, -0.125, 0.375, 1.125, 0.875, 1.0, 3.5, -2.5, 1.5, *IDENTITY, 2.5]  # each is exact as a 32-bit float
 
 
 def record(*, magic=b"KSTD", version=1, sequence=7, chip=(0x68, 8), six_done=1, how=1, numbers=NUMBERS):
@@ -228,7 +228,8 @@ def test_a_flash_that_loses_writes_is_reported(store, tmp_path, monkeypatch):
 
 
 def test_a_trim_may_be_stored_beside_a_foreign_record(store, tmp_path):
-    """A foreign record is from another chip, or is empty after a power cut. A trim may be saved in spite of it."""
+    """A foreign record is from another chip, or is empty after a power cut. A trim may be saved in spite of such a
+    record."""
     store.save(calibration(1))
     store.save(calibration(2))
     other = Store(0x70, 8, str(tmp_path))

@@ -39,7 +39,7 @@ def test_all_48_ways_to_exchange_and_reverse_axes(profile, speed):
 
 @pytest.mark.parametrize("profile", PROFILES)
 def test_simulated_rides(profile):
-    """Without a speed, the check misses some wrong logs, but it never reports a correct one."""
+    """Without a speed, the check misses some wrong logs, but it never reports a correct log."""
     log = simulated(profile)
     assert judged(log) == judged(log, speed=False) == ""
     assert (WRONG_WAY in judged(log, gyro=MINUS)) is (profile != "parked")
@@ -81,8 +81,8 @@ def test_the_remark_names_what_fits():
 
 
 def test_axes_exchanged_in_one_sensor():
-    """The log has a speed. 24 of the 47 possible exchanges of axes are tried. At least 23 must be found, and each one
-    found must be the right one."""
+    """The log has a speed. 24 of the 47 possible exchanges of axes are tried. At least 23 exchanges must be found, and
+    each result must be the right exchange."""
     seen = 0
     log = simulated("street")
     for exchange in EXCHANGES[1::2]:
@@ -95,7 +95,7 @@ def test_axes_exchanged_in_one_sensor():
 
 
 def hand(seconds=60.0, seed=0, hz=50):
-    """Simulate a phone that is waved in the hand. It turns by up to 90 degrees and moves by a few decimetres."""
+    """Simulate a phone that is waved in the hand. The phone turns by up to 90 degrees and moves by a few decimetres."""
     chance = np.random.default_rng(seed)
     time = np.arange(0.0, seconds, 1.0 / hz)
     waves = [chance.uniform(0.1, 0.7, (4, 3)), chance.uniform(0.0, 6.3, (4, 3)), chance.normal(0.0, 0.3, (4, 3))]
@@ -152,7 +152,7 @@ def test_recordings(shared_data):
 
 def test_a_bias_is_found_while_fitting():
     """The gyro has a bias of 2.5 deg/s. The phone in the hand is never calm, so the bias cannot be measured in calm
-    seconds. The fit itself must find it."""
+    seconds. The fit itself must find the bias."""
     log = hand(seed=0)
     turning = {}
     for bias in 0.0, 2.5:

@@ -210,8 +210,8 @@ def test_of_several_speeds_in_a_second_the_first_counts():
 
 
 def test_seconds_without_a_speed_or_without_samples():
-    """The log has a gap, and the satellites are lost for 40 s. The rest is still enough. Two parts that are days apart
-    are not judged as one ride."""
+    """The log has a gap, and the satellites are lost for 40 s. The rest of the log is still enough. Two parts that are
+    days apart are not judged as one ride."""
     log = jerky(sign=-1.0)
     log.speed_mps[500:900] = np.nan
     assert exchanged(log.part((log.t_s < 100.0) | (log.t_s > 130.0)))
@@ -239,7 +239,7 @@ def test_small_or_short_bends_show_no_forward(yaw_dps, seconds, shown):
 
     * Means over 0.5 s keep 0.974 of the amplitude.
     * The changes of these means over a second have 1.414 times the amplitude.
-    * Smoothing keeps 0.854 of it.
+    * Smoothing keeps 0.854 of this amplitude.
     * The standard deviation of a sine is its amplitude divided by 1.414.
 
     The check also needs 120 changes. A log of 61 s has 118 changes, and a log of 63 s has 122.

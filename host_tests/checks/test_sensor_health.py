@@ -105,7 +105,7 @@ def test_sound_sensors_are_not_called_ill(street):
 
 
 def test_rounding_and_a_standstill_are_no_dead_axis():
-    """A log whose readings have few digits gets no remark. An ideal log without noise gets none either."""
+    """A log whose readings have few digits gets no remark. An ideal log without noise gets no remark either."""
     time = np.arange(4000) / 100.0
     turn = rotation_matrix(np.array([0.3, 0.1, 0.2]))
     force = np.round(np.tile(turn[1], (4000, 1)) + 0.002 * np.random.default_rng(1).normal(size=(4000, 3)), 2)

@@ -1,4 +1,4 @@
-"""Every reader of a log refuses a speed that is in another unit than m/s. It never refuses a speed in m/s."""
+"""Every reader of a log refuses a speed that is in another unit than m/s. No reader refuses a speed in m/s."""
 
 import functools
 

@@ -1,6 +1,6 @@
 """Test `kickstand calibrate ride`: the alignment of a motorcycle from a ride without poses, and refusals.
 
-In the simulated rides the sensor is mounted at random. It has the errors that its data sheet allows.
+In the simulated rides the sensor is mounted at random. The sensor has the errors that its data sheet allows.
 """
 
 import functools
@@ -72,7 +72,7 @@ def test_the_display_shows_the_lean_with_this_alignment():
     shown = ~np.isnan(found.lean_sigma_deg)
     assert np.mean(shown) > 0.95
     off = (found.lean_deg - made.truth["lean_deg"])[shown]
-    assert np.sqrt(np.mean(off**2)) < 1.0  # degrees; the goal was 1.5
+    assert np.sqrt(np.mean(off**2)) < 1.0  # rms error in degrees; the goal was 1.5
 
 
 def test_ride_alignment_is_as_good_as_two_poses():
@@ -87,8 +87,8 @@ def test_ride_alignment_is_as_good_as_two_poses():
 
 
 def test_the_offset_across_the_bike_is_found():
-    """The accelerometer has an additional offset of 50 mg across the bike. Half of it would be 1.4 degrees of roll. The
-    fit must find the offset to within 20 mg."""
+    """The accelerometer has an additional offset of 50 mg across the bike. Half of this offset would be 1.4 degrees of
+    roll. The fit must find the offset to within 20 mg."""
     made = simulated()
     log = log_of(made)
     across = made.vehicle_from_sensor[0]
@@ -252,8 +252,8 @@ def test_a_recorded_car_is_refused(shared_data):
 
 
 def test_recorded_motorcycle_is_aligned(shared_data):
-    """The reference matrix has an error of a few degrees. Its forward is from braking between the same two traffic
-    lights, and its up is from the first second."""
+    """The reference matrix has an error of a few degrees. Forward is from braking between the same two traffic lights,
+    and up is from the first second."""
     log = api.read_log(shared_data / "motorcycle-ride.csv.gz")
     rough = np.array([[0.9869, 0.1612, 0.0060], [-0.0137, 0.0466, 0.9988], [0.1608, -0.9858, 0.0482]])
     found, without = api.fit_ride(log), api.fit_ride(replace(log, speed_mps=np.full(len(log.t_s), np.nan)))

@@ -127,8 +127,8 @@ def test_a_measured_gyro_is_not_estimated_again():
 
 
 def test_the_upright_pose_gives_the_sum_of_rotation_and_offset():
-    """The upright pose cannot distinguish an offset of the accelerometer from a tilt. If their sum is right, the force
-    at rest is right too."""
+    """The upright pose cannot distinguish an offset of the accelerometer from a tilt. If the sum of offset and tilt is
+    right, the force at rest is right too."""
     prior, p = Prior.of_pose(six_done=False), np.zeros(PARAMETERS)
     p[of.ROTATION.stop - 1] = p[of.OFFSET.start] = 0.03  # rotation and offset to the side
     p[of.ROTATION.start], p[of.OFFSET.stop - 1] = 0.02, -0.02  # rotation and offset forward

@@ -95,8 +95,8 @@ def test_a_jolt_makes_the_angles_uncertain():
 
 
 def test_outliers_weigh_less():
-    """An error of the process is an outlier over 4 sigmas. An error of a measurement is one over 2 sigmas of the error
-    itself. The bias has no outliers."""
+    """A residual of the process is an outlier over 4 sigmas. A residual of a measurement is an outlier over 2 sigmas,
+    without the factor for the duration of a disturbance. The bias has no outliers."""
     noise, sigma = noise_of(windows()), np.ones((20, eq.ROWS))
     found = noise.robust(sigma, np.full((20, eq.ROWS), 4.0))[5]
     assert found[: of.BIAS.start] == pytest.approx(np.full(5, np.sqrt(2.0)))
@@ -106,8 +106,8 @@ def test_outliers_weigh_less():
 
 
 def test_roughness_follows_the_residuals():
-    """Residuals of the expected size give a roughness of 1. Residuals of half this size give 0.5. The roughness is
-    kept between 0.1 and 4."""
+    """Residuals of the expected size give a roughness of 1. Residuals of half this size give a roughness of 0.5. The
+    roughness is kept between 0.1 and 4."""
     expected = np.zeros((400, eq.ROWS))
     expected[:, [of.LEAN, of.PITCH, of.LEFT, of.UP, of.FORWARD]], expected[:, [eq.SLIDING, eq.CLIMBING]] = 0.38, 0.5
     for factor, roughness in ((1.0, 1.0), (0.5, 0.5), (0.01, 0.1), (9.0, 4.0)):
@@ -124,8 +124,8 @@ def test_roughness_follows_the_residuals():
 
 
 def test_unbalance_follows_the_force_to_the_side():
-    """A force of 0.011 g changes its sign every 10 s. Means over 3 s keep its size. A constant force counts as no
-    unbalance, so the result is the lowest value."""
+    """A force of 0.011 g changes its sign every 10 s. Means over 3 s keep the size of this force. A constant force
+    counts as no unbalance, so the result is the lowest value."""
     force = 0.011 * np.where(np.arange(2000) // 50 % 2, 1.0, -1.0)
     noise = noise_of(windows(2000))
     noise.estimate_unbalance(force, 3.0)
@@ -233,8 +233,9 @@ def test_a_bike_without_changes_stands_still():
 
 
 def test_lean_and_speed_of_a_steady_bend():
-    """The bike leans by 0.5 rad to the left at 15 m/s, so its yaw rate is 0.357 rad/s. The force shows the speed. A
-    prior speed of 10 m/s has the weight of a yaw rate of 0.14 rad/s."""
+    """The bike leans by 0.5 rad to the left at 15 m/s, so its yaw rate is 0.357 rad/s. The speed is found from the
+    force. A prior speed of 10 m/s has the weight of a yaw rate of 0.14 rad/s.
+    """
     yaw = G * np.tan(0.5) / 15.0
     made = windows(600, force=(0.0, 1.0 / np.cos(0.5), 0.0), rate=(-yaw * np.sin(0.5), yaw * np.cos(0.5), 0.0))
     still = np.zeros(600, dtype=bool)

@@ -47,7 +47,7 @@ def error(ride):
     return smooth(ride.log, ride.calibration).lean_deg - ride.lean_deg
 
 
-# Each ride has a special feature. The rides in NIGHTLY are similar to others, so only the nightly run uses them.
+# Each ride has a special feature. The rides in NIGHTLY are similar to other rides, so only the nightly run uses them.
 NIGHTLY = "banked", "warming up"
 NAMES = [pytest.param(name, marks=pytest.mark.nightly) if name in NIGHTLY else name for name in RIDES]
 
@@ -90,8 +90,8 @@ def test_good_mounts_and_roads_are_not_doubted():
 
 
 def test_side_force_of_tyres_grows_with_the_force_up():
-    """The side force of wide tyres grows with the force along the bike's up. When the smoother did not know this, bends
-    with unequal leans shifted the lean of the whole ride by 0.44 degrees. The display's error is smaller."""
+    """The side force of wide tyres grows with the force along the bike's up. When the smoother ignored this force,
+    bends with unequal leans shifted the lean of the whole ride by 0.44 degrees. The display's error is smaller."""
     ride = simulated("sweeper", 304, 200.0)
     assert rms(error(ride)[ride.riding]) < 0.2
 

@@ -14,7 +14,7 @@ TIME = np.arange(N) / RATE
 
 
 def truth() -> dict[str, np.ndarray]:
-    """Return the truth of a ride. It leans by up to 35 degrees in the first 80 % and then goes straight ahead."""
+    """Return the truth of a ride. The bike leans by up to 35 degrees in the first 80 % and then goes straight ahead."""
     lean = 35.0 * np.sin(2.0 * np.pi * 0.13 * TIME) * np.sin(2.0 * np.pi * 0.031 * TIME)
     lean[int(0.8 * N) :] = 0.0
     return {

@@ -22,7 +22,7 @@ THERE = [name for name in estimators.OTHERS if estimators.PACKAGES.get(name) not
 
 
 def leaned(lean_deg: float, roll_s: float = 1.5) -> Samples:
-    """Simulate a bike at rest. It leans from upright to lean_deg within roll_s, and keeps this lean for the same
+    """Simulate a bike at rest. The bike leans from upright to lean_deg within roll_s, and keeps this lean for the same
     time."""
     n = int(roll_s * 200)
     lean = np.radians(np.concatenate((np.linspace(0.0, lean_deg, n), np.full(n, lean_deg))))
@@ -55,8 +55,8 @@ def test_every_estimator_is_scored(swept):
 
 
 def test_filters_that_trust_the_force_decay_in_a_held_turn(swept):
-    """In a long turn the shown lean of such filters decays. Riders complain about this; it is the reason for this
-    project."""
+    """In a long turn, the lean of filters that trust the force decays. Riders complain about this decay, which is the
+    reason for this project."""
     assert swept.scores["complementary"].slope < 0.5
     assert 0.85 < swept.scores["formula"].slope < 1.1
     assert swept.scores["formula 0.3 s"].rms_deg < 0.5 * swept.scores["formula"].rms_deg
@@ -89,7 +89,7 @@ def test_the_calibration_is_from_the_poses_alone(calibrated):
     assert np.any(calibration.gyro_sigma) == (calibrated is runs.calibrated_by_log)
     matrix = calibration.vehicle_from_sensor
     turned = np.degrees(np.arccos((np.trace(matrix @ made.vehicle_from_sensor.T) - 1.0) / 2.0))
-    assert turned < 1.5  # caused by the slope of the ground and the rider's hand
+    assert turned < 1.5  # the slope of the ground and the rider's hand cause this error
     assert calibration.accel_slope == pytest.approx([1.0] * 3, abs=0.002)
     assert calibration.six_done and calibration.aligned
 
@@ -215,15 +215,15 @@ def test_simulate_states_both_leans_on_the_stand(tmp_path):
     made = [tmp_path / name for name in ("KICKSTAND.csv", "UPRIGHT.csv")]
     found = works("calibrate", "two", *made, "--out", tmp_path / "C.json").out
     tilt = re.search(r"([\d.]+) degrees from the kickstand", found)
-    assert tilt and float(tilt[1]) == pytest.approx(-pose, abs=0.8)  # inexact without the six positions
+    assert tilt and float(tilt[1]) == pytest.approx(-pose, abs=0.8)  # inexact, because the six positions are not used
     truth = (tmp_path / "TRUTH.csv").read_text().splitlines()[1]
     assert float(truth.split(",")[1]) == pytest.approx(begin, abs=0.05)
     assert abs(pose - begin) > 1.0
 
 
 def test_a_wheelie_is_not_treated_as_a_faulty_sensor():
-    """The filter's equations do not hold in a wheelie, so its innovations are large. When the filter took them for a
-    fault, it restarted, and the rms error was 4.0 degrees."""
+    """The filter's equations do not hold in a wheelie, so its innovations are large. When the filter treated large
+    innovations as a fault, it restarted, and the rms error was 4.0 degrees."""
     made = ride("wheelie", 2, 120.0)
     shown = replay(runs.as_log(made), runs.calibrated_by_log(made))
     error = (np.asarray(shown.lean_deg) - made.truth["lean_deg"])[made.truth["speed_mps"] > 5.0]

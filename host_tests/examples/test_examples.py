@@ -39,9 +39,9 @@ def test_print_sensor(tmp_path):
     printed, _ = run(tmp_path, "print_sensor.py", 1.5)
     found, *lines = printed.split("\n")
     assert found == "Found an MPU6050"
-    assert len([line for line in lines if line]) == 7  # 0.2 s apart, after 0.2 s of setting up
+    assert len([line for line in lines if line]) == 7  # one line per 0.2 s, after a set-up of 0.2 s
     ax, ay, az, gx, gy, gz, temperature = numbers(lines[0])
-    assert (ax * ax + ay * ay + az * az) ** 0.5 == pytest.approx(1.0, abs=0.1)  # an uncalibrated sensor at rest
+    assert (ax * ax + ay * ay + az * az) ** 0.5 == pytest.approx(1.0, abs=0.1)  # at rest, not calibrated
     assert max(abs(gx), abs(gy), abs(gz)) < 25.0  # including the gyro's bias
     assert temperature == pytest.approx(25.0, abs=0.1)
 
@@ -61,7 +61,7 @@ def test_print_lean(tmp_path):
 
 
 def test_user_page(tmp_path):
-    """The usual pages come before the user's page, and the first one comes again after it."""
+    """The usual pages come before the user's page, and after the user's page the first page comes again."""
     _, frames = run(tmp_path, "user_page.py", 12.0, turn_to=[(4, "own")])
     shown = re.fullmatch(r"Load     (\d\.\d\d) x", frames[-1][0].rstrip())
     assert shown and float(shown[1]) == pytest.approx(1.22, abs=0.05)  # 1 / cos(35 degrees)
@@ -73,7 +73,7 @@ def test_user_page(tmp_path):
 def test_tried_it_is_turned_to_after_the_first_turn():
     said = command.works("try", EXAMPLES / "user_page.py").out
     loads = [float(load) for load in re.findall(r"\|Load +(\d\.\d\d) x", said)]
-    assert max(loads) == pytest.approx(1.41, abs=0.08)  # 1 / cos(45 degrees), in the ride's last turn
+    assert max(loads) == pytest.approx(1.41, abs=0.08)  # the load is 1 / cos(45 degrees) in the ride's last turn
 
 
 @pytest.mark.parametrize("engine", [[], ["--cpython"]], ids=["micropython", "cpython"])

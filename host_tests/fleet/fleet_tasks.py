@@ -1,5 +1,5 @@
-"""Tasks for the workers of a fleet. Some of the tasks fail. They are in a module of their own, because workers must
-import them."""
+"""Tasks for the workers of a fleet. Some of the tasks fail. The tasks are in a module of their own, because workers
+must import them."""
 
 import os
 import time

@@ -40,7 +40,7 @@ def make(directory, troubles=TROUBLES, seed=3, seconds=170.0):
 
 
 def drive(seed, kind="car", seconds=200.0, sensor=None, moved=None, straight=True, rate_hz=50.0, **receiver):
-    """Simulate one drive. Return its Log and its Sensor.
+    """Simulate one drive. Return the drive's Log and its Sensor.
 
     sensor: the sensor to use, or None for a random one.
     moved: (time in s, the mount from this time on), or None.
@@ -65,7 +65,7 @@ def yaw_deg(found, true):
 
 
 def worked_on(directory, *logs):
-    """Write these logs as those of one car, and return the fleet's result for them."""
+    """Write these logs as the logs of one car, and return the fleet's result for this car."""
     paths = tuple(str(directory / f"{k}.csv") for k in range(1, 1 + len(logs)))
     for path, log in zip(paths, logs):
         write_log(path, log)

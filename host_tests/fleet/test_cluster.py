@@ -163,7 +163,7 @@ if __name__ == "__main__":
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="Ctrl-C comes at once on this system")
 @pytest.mark.parametrize("after_s", [0.6, 1.6])
 def test_ctrl_c_while_workers_start_is_deferred(tmp_path, after_s):
-    """Ctrl-C waits until the workers have started. Otherwise they would print pages of errors."""
+    """Ctrl-C takes effect only after the workers have started, because starting workers would print pages of errors."""
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
     command, pipe = [sys.executable, str(program)], subprocess.PIPE
@@ -171,7 +171,7 @@ def test_ctrl_c_while_workers_start_is_deferred(tmp_path, after_s):
         assert process.stdout is not None
         assert process.stdout.readline() == "starting\n"
         time.sleep(after_s)
-        os.killpg(process.pid, signal.SIGINT)  # a terminal also sends it to the workers
+        os.killpg(process.pid, signal.SIGINT)  # a terminal also sends Ctrl-C to the workers
         _, trouble = process.communicate(timeout=120)
     assert trouble.count("Traceback") == 1
     assert trouble.endswith("KeyboardInterrupt\n")

@@ -1,4 +1,4 @@
-"""The intervals of a drive show the directions level, forward and left. A force of 1 g along each of them is found as
+"""The intervals of a drive show the directions level, forward and left. A force of 1 g along each direction is found as
 1 g."""
 
 import numpy as np

@@ -22,7 +22,7 @@ from support import command
 
 UP = (0.0, 1.0, 0.0)
 GAP_S = GAP_US * 1e-6
-MOUNT = turn_of(50.0, (1.0, 2.0, 3.0))  # from the sensor's axes to left, up, forward
+MOUNT = turn_of(50.0, (1.0, 2.0, 3.0))  # rotation from the sensor's axes to left, up, forward
 
 
 def coefficients(left_g=1.0):
@@ -99,8 +99,8 @@ def yawed(degrees):
 
 
 def test_the_mean_of_two_alignments_is_weighted_by_variance():
-    """Both methods use the same braking, so half of their errors are common. The mean is less exact than it would be
-    otherwise."""
+    """Both methods use the same braking, so half of their errors are common. So the mean is less exact than with
+    independent errors."""
     sensor = forward.SENSOR_DEG**2
     frame, variance = forward._mean(yawed(1.0), 1.0, yawed(0.0), float(np.sqrt(1.0 - sensor)))
     assert frame == pytest.approx(yawed(0.5), abs=1e-6)

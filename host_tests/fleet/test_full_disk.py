@@ -51,8 +51,8 @@ def finished(directory, keys):
         return sum(key in journal for key in keys)
 
 
-# On the smallest disk there is no room for a picture. On the largest there is room for all rows, but not for the last
-# table.
+# On the smallest disk there is no room for a picture. On the largest disk there is room for all rows, but not for the
+# last table.
 @pytest.mark.parametrize("kb", [8, 48, 80])
 def test_disk_of_any_size_loses_no_finished_row(disk, results, alone, monkeypatch, kb):
     known, periods = results

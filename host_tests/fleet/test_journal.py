@@ -16,7 +16,7 @@ def result(name="v", message="x"):
 
 
 def test_results_are_found_again_in_the_order_of_their_keys(tmp_path):
-    """The next run recomputes a result that was saved for that. Its latest result counts."""
+    """The next run recomputes a result that was saved with again=True. For each key the latest result counts."""
     path = tmp_path / "journal.jsonl"
     with Journal(path) as journal:
         for name in ("b", "a"):
@@ -74,8 +74,8 @@ def test_two_runs_do_not_share_a_journal(tmp_path):
 
 
 def test_removed_journal_is_replaced_and_locked_again(tmp_path, monkeypatch):
-    """A run locks the journal and removes it at its end. A second run may have opened the journal just before. It must
-    then create and lock a new one."""
+    """A run locks the journal and removes it at its end. A second run may have opened the journal just before. Then the
+    second run must create and lock a new journal."""
     fcntl = pytest.importorskip("fcntl", reason="files are not locked on this system")
     path = tmp_path / "journal.jsonl"
     locks, lock = [], fcntl.flock

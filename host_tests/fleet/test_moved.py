@@ -1,5 +1,5 @@
-"""Small rotations of a mount are found. The swaying of the car's body also shows them. The tests use simulated and
-recorded drives."""
+"""Small rotations of a mount are found. The swaying of the car's body also shows these rotations. The tests use
+simulated and recorded drives."""
 
 import copy
 

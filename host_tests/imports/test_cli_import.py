@@ -77,7 +77,7 @@ def test_export_in_vehicle_axes_needs_no_alignment(tmp_path):
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_mutated_export_gives_a_log_or_one_line(tmp_path):
-    """The result of an import is a readable log or one line. It is never a traceback or a numpy warning."""
+    """The result of an import is a readable log or a message of one line, never a traceback or a numpy warning."""
     ride = riding().every(8).every(1, 100)
     exports = [app_exports.racebox(ride), app_exports.vbo(ride), app_exports.aim(ride), app_exports.sensorlog(ride)]
     exports += [app_exports.racechrono(ride), app_exports.sensor_kinetics(ride)["Ride_accm.csv"]]

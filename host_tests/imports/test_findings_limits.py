@@ -109,7 +109,8 @@ def test_whole_numbers_above_20_are_counts():
      (0.1, False, "deg/s"), (0.1 / 57.3, False, "rad/s"), (100.0, False, "mdeg/s"), (1.75, False, "mrad/s")],
 )  # fmt: skip
 def test_a_unit_of_rates_by_their_size(most, moving, unit):
-    """A sensor at rest has a noise of 0.1 deg/s. In motion the 90th percentile of the rates decides."""
+    """At rest the noise shows the unit, because it is about 0.1 deg/s. In motion the 90th percentile of the rates shows
+    the unit."""
     force = calm(1.0)
     if moving:
         force[::2, 0] += 0.2
@@ -166,7 +167,7 @@ def test_a_stated_unit_of_times_must_be_usual(unit, step, fits):
 
 
 def test_groups_of_three_columns_do_not_share_one():
-    """Columns without any number belong to no group. Without names, groups are side by side."""
+    """Columns without any number belong to no group. Columns without names must be side by side to form a group."""
 
     def places(names, **cells):
         columns = [cells.get(name, np.arange(50.0) % 7) for name in names]
@@ -195,7 +196,7 @@ def test_wanted_names_may_be_in_any_line():
     assert layout._grid_below(lines, ["t", "az"]) == layout.Grid(2, 3, ",", False, 4)
     assert layout._grid_below(lines, ["t", "b"]) is None is layout._grid_below(lines, [])
     assert layout._grid_below(["t;b", "x", "y"], ["t", "b"]) == layout.Grid(0, 1, ";", False, 2)
-    assert layout._grid_below(["x", "t,b"], ["t"]) is None  # below the last line there are no rows
+    assert layout._grid_below(["x", "t,b"], ["t"]) is None  # the names are in the last line, so no rows follow
     wide = layout._grid_below(["t,a,b,c,d", "1,2,3,4", "1,2,3,4"], ["t", "d"])
     assert wide is not None and wide.width == 5
 

@@ -36,7 +36,7 @@ def test_a_single_wrong_time_is_damaged():
     assert damaged(0, 600, 20, 30) == [1] and damaged(600, 1200, 50, 1300) == [2]
     assert damaged(511, 10, 20, 30) == [0] and damaged(509, 10, 20, 30) == []
     assert damaged(1000, 1010, 1020, 519) == [3] and damaged(1000, 1010, 1020, 521) == []
-    assert damaged(0, 2000, 1001, 1011) == []  # the times around it are a second apart
+    assert damaged(0, 2000, 1001, 1011) == []  # not judged, because the times around it are a second apart
 
 
 def test_late_samples_are_sorted_up_to_half_a_second():
@@ -76,10 +76,11 @@ def test_a_slower_sensor_is_interpolated_and_gaps_are_not():
 
 
 def test_a_faster_sensor_is_averaged():
-    """20 ms around 30 ms have the samples after 20 ms up to 40 ms, two of 10 ms each or four of 5 ms."""
+    """The mean over 20 ms around 30 ms contains the samples after 20 ms and up to 40 ms. These are two samples at steps
+    of 10 ms, or four at steps of 5 ms."""
     values = np.array([0.0, 1.0, 4.0, 9.0, 16.0, 25.0, 36.0])[:, None] * [1.0, 1.0, 1.0]
     fast = sensor(np.arange(7) * 10.0, values)
-    assert join.on_clock(fast, np.array([30 * MS]), 15.0 * MS)[0, 0] == 9.0  # 1.5 times as fast is not averaged
+    assert join.on_clock(fast, np.array([30 * MS]), 15.0 * MS)[0, 0] == 9.0  # not averaged if 1.5 times as fast
     assert join._averaged(fast, 20.0 * MS)[:, 0] == pytest.approx([0.5, 2.5, 6.5, 12.5, 20.5, 30.5, 36.0])
     assert (
         join.on_clock(fast, np.array([30 * MS]), 15.2 * MS)[0, 0]
@@ -107,7 +108,7 @@ def joined(accel, gyro, **more):
 
 
 def test_sensors_are_joined_and_lost_rows_counted():
-    """The gyro lasts from 20 to 1000 ms, so two samples have no rate. No sensor can read 401 g."""
+    """The gyro's readings last from 20 to 1000 ms, so two samples have no rate. No sensor can read 401 g."""
     accel = sensor(np.arange(0.0, 1010.0, 10.0))
     accel.values[50] = [0.0, 401.0, 0.0]
     accel.damaged, steady = 3, sensor(np.arange(20.0, 1010.0, 10.0), np.tile([1.0, 2.0, 3.0], (99, 1)), "gyro")

@@ -14,7 +14,7 @@ MS = 10**6
 
 
 def sensor(name: str, t_s: np.ndarray, column: np.ndarray | None = None) -> RecordedSensor:
-    """Return a sensor with three axes. Their values are the column, or else the time, multiplied by 1, 2 and 3."""
+    """Return a sensor with three axes, whose values are the column (default: the time) multiplied by 1, 2 and 3."""
     values = t_s if column is None else column
     return RecordedSensor(name, np.rint(t_s * 1e9).astype(np.int64), np.outer(values, [1.0, 2.0, 3.0]))
 

@@ -54,7 +54,8 @@ def test_labels_before_the_values():
 
 
 def test_labels_of_under_half_of_the_rows_are_left_out():
-    """Of five rows, two or three have the label u. Of a label of half of the rows, only a minority is there."""
+    """The label u is in two or three of five rows, and then in two of four rows. It becomes a column only in a majority
+    of rows."""
     full, short = "t: {0} x: 2 y: 3 z: 4 u: 5", "t: {0} x: 2 y: 3 z: 4"
     for count, there in ((2, False), (3, True)):
         text = "\n".join((full if k < count else short).format(k) for k in range(5)) + "\n"

@@ -62,7 +62,8 @@ def test_acceleration_without_gravity_is_completed_or_refused(tmp_path, app):
 
 
 def test_a_table_without_gravity_is_refused(tmp_path):
-    """The column names do not say whether gravity is included. The size of the accelerations shows that it is not."""
+    """The column names do not say whether gravity is included. The size of the accelerations shows that gravity is
+    missing."""
     ride = riding().every(4)
     rows = np.column_stack((ride.t_s, ride.phone_g - ride.gravity_g, ride.phone_rad)).tolist()
     (tmp_path / "log.csv").write_text(app_exports.lines(list("tabcpqr"), rows))

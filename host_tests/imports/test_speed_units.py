@@ -1,4 +1,4 @@
-"""Tests the unit of the speed in the export of each app. It is the unit in the file, or an assumed unit."""
+"""Tests the unit of the speed in the export of each app. The unit is the unit in the file, or an assumed unit."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The driver finds faulty axes by their counts. It never reports a good axis."""
+"""The driver finds faulty axes by their counts. A good axis is never reported."""
 
 from array import array
 
@@ -151,8 +151,8 @@ def test_single_samples_at_the_end_of_the_range_are_no_fault():
 
 @pytest.mark.parametrize(("accel_range", "said"), [(0, 0), (1, 0), (2, 2), (3, 2)])
 def test_hard_vibration_clips_unless_the_range_is_small(accel_range, said):
-    """For three seconds the vibration reaches half of the range, even after the low-pass. In a range of 8 or 16 g this
-    means that it clips before the low-pass. In smaller ranges bends may clip too, so no fault is reported."""
+    """For three seconds the vibration reaches half of the range, even after the low-pass. In a range of 8 or 16 g, such
+    a vibration clips before the low-pass. In smaller ranges bends may clip too, so no fault is reported."""
     samples = ride(8)
     samples[400:1000, 1] += 17000 * np.sin(np.arange(600) * 2.2)
     assert [words for _, words in judged(samples, accel_range=accel_range)] == ["Accel", None][:said]

@@ -9,7 +9,7 @@ from kickstand.imu.axis_judge import AxisJudge
 
 ENDS, CLIPPED, GYRO_CLIPPED, DIFFER, SHAKEN, SEEN = 5, 6, 7, 8, 11, 19
 HIGH, WRAPPED = 0x10000, 0x20000
-GOOD = 0b1111 | HIGH  # four values, with odd and even ones, and a changed high byte
+GOOD = 0b1111 | HIGH  # notes of a good axis: four values, odd and even, and a changed high byte
 
 
 def notes(**changed) -> list[int]:
@@ -47,7 +47,7 @@ def words(notice):
 
 
 def after(count, gyro_range=1, dlpf=3, **changed):
-    """Return the fault after so many equal looks."""
+    """Return the fault after this number of equal looks."""
     judge, watch = AxisJudge(gyro_range, dlpf), Watch()
     for _ in range(count):
         watch.look(judge, **changed)
@@ -144,8 +144,8 @@ def test_the_gyros_axes_are_named_before_the_accelerometers():
     ],
 )
 def test_samples_at_the_end_of_the_range_clip(given, notice, fault):
-    """If a tenth of the samples clip, there is a notice. If half of them clip in two looks, or the sensor is shaken, it
-    is a fault."""
+    """A notice appears if a tenth of the samples clip. A fault is reported if half of the samples clip in two looks, or
+    if the sensor is shaken."""
     judge, watch = AxisJudge(1, 3), Watch()
     watch.look(judge, **given)
     assert words(watch.notice) == notice and watch.fault is None

@@ -81,8 +81,8 @@ def test_presses(board, held_s, events):
 
 
 def test_ctrl_c_stops_the_watchdog(board, monkeypatch, capsys, tmp_path):
-    """After Ctrl-C nothing feeds the watchdog. If it were not stopped, it could reset the board while files are being
-    copied, and the installation would be incomplete."""
+    """After Ctrl-C nothing feeds the watchdog. A watchdog that keeps running could reset the board while files are
+    being copied, and the installation would be incomplete."""
     from kickstand import app, start
 
     monkeypatch.chdir(tmp_path)

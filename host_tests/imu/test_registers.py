@@ -94,7 +94,7 @@ def test_setup_writes_the_values_of_the_register_map(time):
     reset, awake, configured, *_ = wires.times_us
     assert awake - reset >= 100_000  # longest duration of a reset (p. 41)
     assert configured - awake >= 30_000  # start-up time of the gyro (PS-MPU-6000A, 6.1)
-    assert wires.times_us[6] - wires.times_us[5] >= 4 * 4800  # four times the delay of the slowest usual low-pass
+    assert wires.times_us[6] - wires.times_us[5] >= 4 * 4800  # the wait for the slowest usual low-pass
     assert wires.times_us[-1] - reset < 200_000
 
 
@@ -195,7 +195,7 @@ def test_an_unknown_number_is_an_unknown_chip_unless_accepted():
 
 
 def test_a_number_that_reads_differently_each_time_is_an_error():
-    """WHO_AM_I is read as 0x68 and as 0x78. Both are numbers of known chips, and they differ by one bit."""
+    """WHO_AM_I is read as 0x68 and as 0x78. Both numbers belong to known chips, and differ by one bit."""
     from kickstand.imu.mpu6050 import Mpu6050
 
     wires = Wires(0x68)
@@ -215,8 +215,8 @@ def test_a_number_that_reads_differently_each_time_is_an_error():
 
 
 def test_the_simulated_board_models_every_chip_of_the_driver():
-    """Each chip of the driver has its own simulated model. Otherwise it would be tested as an MPU6050. The FIFO of the
-    model may be larger than the part that the driver uses."""
+    """Each chip of the driver has its own simulated model. Without a model of its own, a chip would be tested as an
+    MPU6050. The FIFO of the model may be larger than the part that the driver uses."""
     from kickstand.imu.mpu6050 import CHIPS
 
     assert set(CHIPS) == set(VARIANTS)
@@ -233,7 +233,7 @@ def test_the_simulated_board_models_every_chip_of_the_driver():
 )
 def test_how_many_frames_are_read_and_left(frames, read, left):
     """The driver reads at most three frames at a time, or eight to catch up. The MPU6050's FIFO has 1024 bytes, enough
-    for 73 frames. With 72 frames it has not overflowed."""
+    for 73 frames. With 72 frames the FIFO has not overflowed."""
     wires = Wires()
     chip = started(wires)
     wires.waiting = 14 * frames
@@ -250,7 +250,7 @@ def test_a_fifo_that_may_have_overflowed_is_emptied(who_am_i, most):
     chip = started(wires)
     wires.waiting = 14 * most
     assert chip.fetch() == 8
-    wires.waiting = (1024 if who_am_i == 0x68 else 512) - 14  # there is still room for one frame
+    wires.waiting = (1024 if who_am_i == 0x68 else 512) - 14  # the FIFO still has room for one frame
     assert (chip.fetch(), chip.overflows) == (0, 0)
     wires.waiting = 14
     assert chip.fetch() == 1
@@ -298,7 +298,7 @@ def test_readings_that_repeat_for_100_ms_are_frozen(rate_hz, good):
     wires.waiting = 0
     chip.setup()
     wires.waiting = 14
-    assert accepted() == good - 1  # the first reading repeats the last one before the set-up
+    assert accepted() == good - 1  # the first reading repeats the last reading before the set-up
 
 
 @pytest.mark.parametrize(
@@ -307,7 +307,7 @@ def test_readings_that_repeat_for_100_ms_are_frozen(rate_hz, good):
         (0x68, "MPU6050", 36.53, 340.0),  # from RM-MPU-6000A p. 30
         (MPU6500, "MPU6500", 21.0, 333.87),  # MPU-6500 register map p. 33, with the sensitivity of the data sheet
         (0x71, "MPU9250", 21.0, 333.87),
-        (0x98, "ICM20689", 25.0, 326.8),  # from table 3 of the data sheet
+        (0x98, "ICM20689", 25.0, 326.8),  # values from table 3 of the data sheet
         (MPU6886, "MPU6886", 25.0, 326.8),
     ],
 )

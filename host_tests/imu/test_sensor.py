@@ -108,7 +108,8 @@ def test_a_new_chip_is_at_fault_until_its_first_sample(board):
 
 
 def test_a_chip_that_is_prepared_starts_with_the_first_fetch(board):
-    """The chip was prepared earlier, but its FIFO starts only with the first fetch. It contains no older samples."""
+    """The chip was prepared earlier, but its FIFO starts only with the first fetch. So the FIFO contains no older
+    samples."""
     sensor, chip = made(board)
     for now_ms in range(0, 1000, 15):
         sensor.prepare(now_ms)
@@ -235,8 +236,8 @@ def test_a_check_that_is_lost_counts_as_a_lost_transfer(board):
 
 
 def test_nothing_is_judged_after_a_lost_transfer(board):
-    """After a lost transfer the restart of the FIFO may be incomplete. It is completed after the next successful
-    transfer, and only then is the chip judged again."""
+    """After a lost transfer the restart of the FIFO may be incomplete. The restart is completed after the next
+    successful transfer, and only then is the chip judged again."""
     sensor, chip, now_ms = running(board)
     chip.waiting, chip.states = [OSError(5)], [False, False]
     sensor.fetch(now_ms + 10)

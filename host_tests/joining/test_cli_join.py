@@ -62,7 +62,7 @@ def test_each_point_is_in_the_nearest_row(tmp_path, log, ride, track):
 def test_nearest_row_may_be_before_or_after():
     time_us, at_us = np.arange(0, 50_000, 5000), np.array([-1, 0, 2400, 2600, 12_400, 44_000, 45_000, 45_001])
     rows, points = joined._nearest(time_us, at_us)
-    assert rows.tolist() == [0, 1, 2, 9]  # if two points belong to the same row, the later one is kept
+    assert rows.tolist() == [0, 1, 2, 9]  # if two points belong to the same row, the later point is kept
     assert points.tolist() == [2, 3, 4, 6]
     gap_us = np.array([0, 1_000_000, 1_005_000])
     assert joined._nearest(gap_us, np.array([100_000, 500_000, 900_000]))[1].tolist() == [0, 2]
@@ -94,7 +94,7 @@ def test_own_speed_of_the_log_is_kept(tmp_path, ride, track):
 
 
 def test_columns_without_values_are_replaced(tmp_path, log, track):
-    """The log is like one from `kickstand import`: its first row has a UTC time, and its speed column is empty."""
+    """The log is like a log from `kickstand import`: its first row has a UTC time, and its speed column is empty."""
     head, *rows = log.read_text().splitlines()
     rows = [f"{rows[0]},,1.5", *[row + ",," for row in rows[1:]]]
     log.write_text("\n".join([head + ",speed_mps,utc_s", *rows]) + "\n")

@@ -29,7 +29,9 @@ def made_segments(begins_s, steps=30) -> Segments:
 
 
 def test_small_errors_weigh_as_half_a_sigma():
-    """The least usual error is 0.5, so an error of 0.1 has e = 0.2: 4 * 1.25 / (1 + 0.04 / 4)."""
+    """Errors are divided by their usual size, but at least by 0.5. So an error of 0.1 becomes e = 0.2. Its weight is 4
+    * 1.25 / (1 + 0.04 / 4).
+    """
     assert fit._robust_weights(np.full((1, 3), 0.1), np.ones((1, 3))) == pytest.approx(np.full((1, 3), 5.0 / 1.01))
 
 
@@ -84,7 +86,8 @@ def test_costs_are_those_at_each_shift(compared):
 
 
 def test_the_evidence_is_computed_from_the_best_cost(compared):
-    """Without drift the best of the tried shifts has the least sum of costs; 180 steps count as 45."""
+    """Without drift, the best of the tried shifts has the smallest sum of costs. For the evidence, the 180 steps count
+    as 45 independent steps."""
     shift_s, drift, evidence = fit._try_shifts(compared, 3.0)
     costs = {by: fit._cost(compared.given, compared.given.turned_deg - compared.turned(3.0 + by)[0]).sum()
              for by in fit._SHIFTS}  # fmt: skip
@@ -102,8 +105,8 @@ def fit_cost(compared, shift_s, drift) -> float:
 
 
 def test_a_cost_of_one_shift_by_numpy(compared, monkeypatch):
-    """The result's shift is that at the ride's first sample. With a drift of 0.01 and the middle at 140 s, the shift in
-    the middle is 2 * 0.99 + 1.4."""
+    """A result contains the shift at the ride's first sample. With a drift of 0.0001 and the middle at 145 s, the shift
+    in the middle is 2 * 0.9999 + 0.0145."""
     monkeypatch.setattr(fit, "Comparison", lambda *_: compared)
     assert compared.middle_s == pytest.approx((20 + 60 + 110 + 150 + 200 + 240) / 6.0 + 15.0)
     found = fit.TrackFit(2.0, 1e-4, 0.1, 0.9, 20.0, np.array([0.1, 0.2]), 6)
@@ -130,7 +133,7 @@ def test_a_fit_needs_two_segments_in_common():
 
 
 def test_a_yaw_is_the_rate_over_the_cosine_of_the_lean():
-    """Within a step, the integral of 10 deg/s about up at 20 m/s: the sine of the lean is 20 * 0.17453 / 9.80665."""
+    """The rate about up is 10 deg/s. At 20 m/s the sine of the lean is therefore 20 * 0.17453 / 9.80665."""
     rates = np.zeros((1000, 3))
     rates[500:, 1] = 10.0
     for speed, sine in ((20.0, 20.0 * np.radians(10.0) / 9.80665), (100.0, 0.87)):
@@ -153,7 +156,7 @@ def test_the_speed_is_that_of_the_track_at_the_shift():
 
 
 def test_the_axes_across_up():
-    """For an up along y, the axes across it are -z and -x. For an up along x, the smallest element is y: z and -y."""
+    """If up is along y, the two axes across it are -z and -x. If up is along x, the two axes are z and -y."""
     rates = np.tile([1.0, 2.0, 4.0], (400, 1))
     for up, axes in (((0.0, 1.0, 0.0), (2.0, -4.0, -1.0)), ((1.0, 0.0, 0.0), (1.0, 4.0, -2.0))):
         sums = compare._double_sums(moved(rates, up), steady(30, 0.0), 0.0)
@@ -161,8 +164,8 @@ def test_the_axes_across_up():
 
 
 def test_forces_are_integrated_without_their_mean():
-    """A force of 0 and then 0.1 g for 10 s each: the speed falls by 4.9 m/s and rises again. Its integral is
-    -4.9 * 20 / 2."""
+    """A force of 0 and then 0.1 g for 10 s each: the speed falls by 4.9 m/s and rises again. The integral of the speed
+    is -4.9 * 20 / 2."""
     motion = moved(np.tile([0.0, 1.0, 0.0], (400, 1)))
     motion.force_g[:, 0] = np.where(np.arange(400) < 200, 0.0, 0.1)
     sums = compare._double_sums(motion, steady(30, 0.0), 0.0)
@@ -170,7 +173,7 @@ def test_forces_are_integrated_without_their_mean():
 
 
 def test_a_drift_moves_segments_apart():
-    """A drift of 0.01 about the middle at 35 s moves the segment at 15 s by -0.2 s, and that at 55 s by 0.2 s."""
+    """A drift of 0.01 about the middle at 35 s moves the segment at 15 s by -0.2 s and the segment at 55 s by 0.2 s."""
     at_s = np.arange(2000) * STEP_S
     motion = moved(np.outer(np.sin(at_s), [0.0, 1.0, 0.0]))
     compared = compare.Comparison(motion, steady(100, 0.0), made_segments([10.0, 50.0], 10), 0.0, 2.0)

@@ -38,7 +38,7 @@ def test_times_are_converted_by_offset_and_drift():
 
 
 def test_up_is_the_force_weighted_by_the_rate():
-    """The weight is limited. So a rate of 40 deg/s has the same weight as 20 deg/s."""
+    """The weight is limited. So a rate of 40 deg/s has the same weight as a rate of 20 deg/s."""
     moved = CellMotion(
         np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), np.array([[0.0, 0.0, 10.0], [0.0, 40.0, 0.0]]),
         np.ones(2, dtype=bool), False, False,
@@ -153,7 +153,7 @@ def test_a_lean_is_unknown_in_gaps_and_outside_the_log():
 
 def test_a_difference_by_hand():
     """The leans of A and B differ by 3 and -1 degrees alternately. The mean difference is 1 degree, and the rms around
-    it is 2 degrees. The standard deviations of 1.2 and 1.6 degrees combine to 2.0 degrees."""
+    this mean is 2 degrees. The standard deviations of 1.2 and 1.6 degrees combine to 2.0 degrees."""
     n, zeros = 1200, np.zeros(1200)
     other = np.where(np.arange(n) % 2, 3.0, -1.0)
     seen = agreement._difference((zeros, zeros + 1.2), (other, zeros + 1.6))
@@ -213,13 +213,13 @@ def steps(n: int, turn_deg: float = 9.0, speed: float = 10.0, bad=()) -> Course:
 
 
 def test_a_tracks_change_of_course_is_over_four_seconds():
-    """The track turns by 9 deg/s at 10 m/s, which is 36 degrees in 4 s. Its lateral force of 0.160 g belongs to a lean
+    """The track turns by 9 deg/s at 10 m/s, which is 36 degrees in 4 s. The lateral force of 0.160 g belongs to a lean
     whose cosine is 0.98741."""
     change, known = match._changes_of_track(steps(30))
     assert change[20] == pytest.approx(36.0 * 0.98741, abs=0.001)
     assert len(change) == 60 and np.flatnonzero(known)[[0, -1]].tolist() == [4, 56]  # the cells from 2 to 28 s
     known = match._changes_of_track(steps(30, bad=[15]))[1]  # the bad step is from 15 to 16 s
-    assert known[25] and not known[27:36].any() and known[37]  # at 12.5 and 18.5 s the 4 s do not contain the bad step
+    assert known[25] and not known[27:36].any() and known[37]  # the 4 s around 12.5 and 18.5 s exclude the bad step
 
 
 def test_a_rides_change_of_course_is_over_four_seconds():
@@ -306,7 +306,7 @@ def test_the_standard_deviation_of_a_fit_by_hand():
     """The variance of the shift is a sum of three terms.
 
     * Three segments pull by 1, 1 and -2. The sum of the squares is 6. This gives 6 * 3 / 1 * 0.1^2 = 0.18 s2.
-    * The end is 70 s from the middle. With its standard deviation of the drift of 0.01 this gives 0.49 s2.
+    * The end is 70 s from the middle. There a drift with a standard deviation of 0.01 gives 0.49 s2.
     * The receiver's delay has a standard deviation of 0.05 s, which gives 0.0025 s2.
     """
     turned = np.array([[1.0, -1.0], [2.0, 0.0], [0.0, -2.0]])

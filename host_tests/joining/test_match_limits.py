@@ -30,7 +30,7 @@ def found_fit(shift_s=10.0, evidence=50.0, **others) -> fit.TrackFit:
 
 @pytest.fixture
 def matched(monkeypatch):
-    """Return a function. It returns the Match, or the refusal, of a track for given fits."""
+    """Return a function that returns the Match, or the refusal, of a track for given fits."""
     track = Track(1000.0 + np.arange(100.0), np.zeros(100), np.arange(100.0) * 1e-4, np.full(100, 9.0), "t")
     motion = moved(np.zeros((1600, 3)))
 
@@ -71,7 +71,7 @@ def test_the_evidence_and_correlation_that_a_match_needs(matched):
 def test_another_shift_needs_six_less_evidence(matched):
     assert matched(found_fit(40.0, 44.1), found_fit()).startswith("the track fits at two times, 30 s apart")
     assert matched(found_fit(40.0, 44.0), found_fit()).start_utc_s == 1010.0
-    assert matched(found_fit(16.0, 49.0), found_fit()).start_utc_s == 1010.0  # the same shift, but for 6 s
+    assert matched(found_fit(16.0, 49.0), found_fit()).start_utc_s == 1010.0  # still the same shift 6 s away
     assert matched(found_fit(3.9, 49.0), found_fit()).startswith("the track fits at two times, 6 s apart")
 
 
@@ -160,8 +160,8 @@ def test_two_logs_need_evidence_and_correlation(clocked):
 
 
 def test_a_correlation_of_rates_by_hand():
-    """One axis has 1, 2, 3, 4 and the other 2, 4, 6, 0: without their means the product is 0 - (-1.5 * -1 ...) = -2,
-    and the squares are 5 and 20."""
+    """Without their means, the two axes have the values -1.5, -0.5, 0.5, 1.5 and -1, 1, 3, -3. The sum of the products
+    is -2, and the sums of the squares are 5 and 20."""
     a = moved(np.zeros((4, 3)))
     one, other = np.array([[1.0], [2.0], [3.0], [4.0]]), np.array([[2.0], [4.0], [6.0], [0.0]])
     product = -1.5 * -1.0 + -0.5 * 1.0 + 0.5 * 3.0 + 1.5 * -3.0
@@ -179,7 +179,7 @@ def test_clocks_use_a_sum_and_an_interpolation_by_hand():
 
 
 def test_a_fit_of_clocks_finds_a_shift_of_eight_cells():
-    """A shift of 0.4 s is found from no shift. The rates of B have an error of 0.5 deg/s."""
+    """The search begins at a shift of 0, and finds the shift of 0.4 s. The rates of B have an error of 0.5 deg/s."""
     at_s = np.arange(3000) * STEP_S
     rates = np.column_stack([20.0 * np.sin(at_s * rate + rate) for rate in (0.7, 0.9, 1.3)])
     late = np.column_stack([20.0 * np.sin((at_s + 0.4) * rate + rate) for rate in (0.7, 0.9, 1.3)])
@@ -194,7 +194,8 @@ def test_a_fit_of_clocks_finds_a_shift_of_eight_cells():
 
 
 def test_leans_are_compared_above_3_mps_only(monkeypatch):
-    """Two logs of 100 s; the second one is 1 s later. It rides at 3.0 m/s until 40 s, and faster until 90 s."""
+    """Two logs of 100 s, of which the second begins 1 s later. The bike rides at 3.0 m/s until 40 s, and faster until
+    90 s."""
     t_s = np.arange(0.0, 100.0, 0.1)
     ride = SimpleNamespace(
         t_s=t_s, lean_deg=np.zeros(1000), lean_sigma_deg=np.ones(1000), notices=[],

@@ -44,8 +44,8 @@ def test_a_phones_track_is_found_within_a_fifth_of_a_second(rides, profile):
 
 
 def test_track_over_half_of_the_ride_is_found_at_any_offset(rides):
-    """The track may begin hours before the ride. It may also cover only a part of the ride, because the phone was
-    switched on late or off early."""
+    """The track may begin hours before the ride. The track may also cover only a part of the ride, because the phone
+    was switched on late or off early."""
     ride = rides["hills"]
     track = phone_tracks.track(ride, before_s=8 * 3600.0)
     assert abs(error_s(api.join_track(log_of(ride), track), 0.5)) < 0.2
@@ -152,11 +152,12 @@ def test_frozen_readings_and_gaps_are_left_out(rides):
     joined = api.join_track(broken, phone_tracks.track(ride))
     assert [notice.code for notice in joined.notices] == ["frozen-readings"]
     assert abs(error_s(joined, 0.5)) < 0.2
-    assert joined.match.correlation > 0.97  # if the frozen readings were used, it would be 0.8
+    assert joined.match.correlation > 0.97  # with the frozen readings, the correlation would be 0.8
 
 
 def test_course_turns_are_scaled_by_the_lean():
-    """The gyro's rate about the bike's up is smaller than the yaw rate. At a lean of 45 degrees it is 0.7 of it."""
+    """The gyro's rate about the bike's up is smaller than the yaw rate. At a lean of 45 degrees it is 0.7 times the yaw
+    rate."""
     log, track = winding(300.0)
     steps = course(track.once_a_second())
     compared = Comparison(motion(log), steps, segments(steps), 0.0, 3.0)

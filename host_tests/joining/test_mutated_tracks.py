@@ -1,4 +1,4 @@
-"""Tracks and calibrations are damaged in many ways. Each one is read, or refused in one line."""
+"""Tracks and calibrations are damaged in many ways. Each file is read, or refused in one line."""
 
 import json
 import random

@@ -32,8 +32,8 @@ def run(request, tmp_path, capsys):
 
 
 def test_racechrono_gets_the_requested_packets(run):
-    """The phone first denies all packets, and then requests two of them at two rates. Their values are those of the
-    display. Later it denies all packets again, and then allows all."""
+    """The phone first denies all packets, and then requests two of them at two rates. The packets have the values of
+    the display. Later it denies all packets again, and then allows all."""
     acts = [[20.0, "connect"], [20.1, "write", "filter", [0]], [20.1, "write", "filter", [2, 0, 100, 0, 0, 0, 1]]]
     acts += [[20.2, "write", "filter", [2, 0, 40, 0, 0, 0, 2]], [20.2, "write", "filter", [2, 0, 40, 0, 0, 0, 77]]]
     acts += [[40.0, "write", "filter", [0]], [42.0, "write", "filter", [1, 0, 100]]]
@@ -110,7 +110,7 @@ def test_a_lean_that_is_not_trusted_is_never_a_number(run):
 
 
 def test_the_second_phone_waits_for_the_first(run):
-    """The second phone can connect only after the first has left. The board forgets the requests of the first. It
+    """The second phone can connect only after the first has left. The board forgets the requests of the first phone. It
     disconnects a phone that requests nothing. The display shows which phone is connected."""
     first = [[22.0, "connect", 1], [22.1, "write", "filter", [1, 0, 100]], [26.0, "leave"]]
     second = [[24.0, "connect", 2], [27.5, "connect", 2], [30.0, "write", "rate", [100, 0]], [33.0, "leave"]]
@@ -130,7 +130,7 @@ def test_the_second_phone_waits_for_the_first(run):
 
 
 def test_the_loop_continues_if_the_phone_is_out_of_reach(run):
-    """The queue of an ESP32 is then full. This loses packets and has no other effect."""
+    """While the phone is out of reach, the queue of an ESP32 is full. Packets are lost, but nothing else happens."""
     acts = ASK + [[25.0, "away", True], [29.0, "away", False]]
     plan = {**device_plans.ALIGNED, **LIVE, "board": {"machine": "esp32"}, "phones": [acts]}
     record = run(plan)
@@ -142,7 +142,7 @@ def test_the_loop_continues_if_the_phone_is_out_of_reach(run):
 
 
 def test_the_menu_switches_live_off(run):
-    """The rider presses to move from the entry "Reset maxima" to the last entry but one."""
+    """The rider presses to move from the entry "Reset maxima" to the entry before the last."""
     presses = device_plans.PRESSES + [[22.0, 1.0]] + [[23.5 + 0.4 * k, 0.15] for k in range(5)] + [[26.0, 1.0]]
     record = run(
         {**device_plans.ALIGNED, **LIVE, "phones": [ASK + [[40.0, "found"], [41.0, "connect"]]], "presses": presses}
@@ -183,7 +183,7 @@ def test_a_board_without_radio_says_so_and_shows_the_lean(run, machine, config, 
 
 
 def test_the_pin_is_required_once_per_phone(run):
-    """The phone stays paired after power-off. After a change of the PIN it must pair again."""
+    """The phone stays paired after power-off. After a change of the PIN the phone must pair again."""
     stranger = [[20.0, "connect", 1], [20.1, "write", "rate", [40, 0]], [20.2, "read", "ride"], [20.3, "read", "board"]]
     stranger += [[20.4, "give_pin", 314159], [20.5, "write", "filter", [1, 0, 40]], [22, "leave"]]
     owner = [[24.0, "connect", 2], [24.1, "give_pin", 271828], [24.2, "write", "rate", [40, 0]], [28.0, "leave"]]

@@ -104,7 +104,7 @@ def run(board, radio):
         for _ in range(110):
             app.turn()
             board.clock.advance(10_000)
-        assert radio.found is not None  # the next phone can find it
+        assert radio.found is not None  # the next phone can find the board
         assert phone.connect() and phone.write("rate", b"\x28\x00")
         for _ in range(50):
             app.turn()

@@ -30,7 +30,7 @@ LIMITS = {
 }
 
 
-@pytest.mark.parametrize("quoted", [False, True])  # one reader reads columns at once, the other reads cells
+@pytest.mark.parametrize("quoted", [False, True])  # one reader reads whole columns, the other reads single cells
 @pytest.mark.parametrize("name", LIMITS)
 def test_values_out_of_range_are_refused(name, quoted):
     limit, unit = LIMITS[name]

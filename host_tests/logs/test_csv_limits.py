@@ -42,7 +42,7 @@ def test_rows_are_converted_in_blocks(monkeypatch):
     sizes = []
     monkeypatch.setattr(csv_reader, "_typed", lambda cells: sizes.append(len(cells)) or np.zeros(len(cells)))
     csv_reader.columns_of([["1"] * 40] * 5, 40)
-    assert sizes == [2] * 40 + [2] * 40 + [1] * 40  # 20 * 4 // 40
+    assert sizes == [2] * 40 + [2] * 40 + [1] * 40  # a part has 20 * ROWS cells, so 80 // 40 rows
 
 
 def test_the_first_row_may_be_wider_than_the_names():
@@ -53,7 +53,7 @@ def test_the_first_row_may_be_wider_than_the_names():
 def test_texts_of_a_table_are_limited(monkeypatch):
     monkeypatch.setattr(csv_reader, "ROWS", 2)
     monkeypatch.setattr(csv_reader, "MOST_TEXTS", 4)
-    assert len(csv_reader.columns_of([["x"]] * 6, 1)[0]) == 6  # noticed at the next block
+    assert len(csv_reader.columns_of([["x"]] * 6, 1)[0]) == 6  # the limit is checked only at the next block
     with pytest.raises(InputError, match="over 30 million cells, or 0 million of text"):
         csv_reader.columns_of([["x"]] * 7, 1)
 

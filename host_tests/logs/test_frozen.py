@@ -180,7 +180,7 @@ def test_ten_equal_readings_are_frozen_across_blocks(count, marked, block):
 @pytest.mark.parametrize(("near_s", "marked"), [(0.2, True), (0.4, False)])
 def test_the_adjacent_half_second_shows_if_rounding_hid_noise(near_s, marked):
     """Readings are rounded to 0.01 g. A mean within 0.025 g of the equal readings counts as near. In the half second
-    before them some readings are 0.1 g off, so its mean is 0.06 g or 0.02 g off."""
+    before the equal readings, some readings are 0.1 g off, so the mean of this half second is 0.06 g or 0.02 g off."""
     readings = np.round(np.tile(REST, (400, 1)), 2)
     readings[:, 3:] = 0.0
     readings[:100, 0] += 0.1

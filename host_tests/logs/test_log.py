@@ -58,7 +58,7 @@ def test_the_chips_order_and_the_names_of_the_columns():
         ({"speed_mps": [1.0]}, r"speed_mps has the shape \(1,\), it must be \(2,\)"),
         ({"t_s": [0.0, 0.0]}, "must increase"),
         ({"t_s": [1.0, 0.5]}, "must increase"),
-        ({"t_s": [0.0, 4e-7]}, "must increase"),  # both times are in the same microsecond
+        ({"t_s": [0.0, 4e-7]}, "must increase"),  # both times round to the same microsecond
     ],
 )
 def test_arrays_that_do_not_fit_are_refused(changed, words):

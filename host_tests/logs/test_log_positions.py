@@ -1,4 +1,4 @@
-"""The positions and the Universal Time in a log are read, cut, repaired and written as the other columns are."""
+"""The positions and the Universal Time in a log are read, cut, repaired and written like the other columns."""
 
 import io
 from collections.abc import Iterable

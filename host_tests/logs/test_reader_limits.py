@@ -63,7 +63,7 @@ def test_a_stretch_is_cut_from_blocks():
 
     found = list(Stretch("a", 0.1, 0.3).cut(given()))
     assert [one.time_us.tolist() for one in found] == [[0], [100_000, 200_000]] and found[1].start_s == 0.1
-    assert len(taken) == 3  # the block after the end is not used, and none after it is read
+    assert len(taken) == 3  # the block after the end is read but not used, and no later block is read
     assert [one.time_us.tolist() for one in Stretch("a", 0.6).cut(iter(blocks))] == [[0]]
     with pytest.raises(InputError, match=r"the log is 0\.6 s long"):
         list(Stretch("a", 0.7).cut(iter(blocks)))
@@ -173,7 +173,8 @@ def marks(readings, step_s=0.01, blocks_of=10**6):
 
 
 def coarse(digit_g, digit_dps, jump_g=0.0, jump_dps=0.0, equal=80):
-    """Readings with these last digits change, are equal for 0.8 s, and continue at the same values or at others."""
+    """Return readings in steps of these digits. They change, are equal for 0.8 s, and change again around the same
+    values or around other values."""
     chance, n = np.random.default_rng(1), 200 + equal
     readings = np.zeros((n, 7))
     readings[:, :3] = digit_g * chance.integers(-2, 3, (n, 3))
@@ -199,7 +200,7 @@ def test_the_temperature_does_not_count():
     found = marks(readings)[0]
     assert np.flatnonzero(found).tolist() == list(range(101, 180))
     readings[140, 3] = 1e9
-    readings[140, 6] = 1e-10  # a change of the last bits is a change
+    readings[140, 6] = 1e-10  # the smallest change of a reading counts as a change
     assert not marks(readings)[0].any()
     assert frozen.FrozenFinder().notices() == []
 
@@ -238,7 +239,7 @@ def test_even_blocks_are_not_changed():
 
 @pytest.mark.parametrize("size", [700, 5000, 9000])
 def test_repeated_times_are_spread_over_blocks(size):
-    """Every two samples have the same time. The result has even steps of 5 ms, for any size of the blocks."""
+    """Each time is repeated once. The result has even steps of 5 ms, for any size of the blocks."""
     times = np.repeat(np.arange(4500) / 100.0, 2)
     blocks, remarks = spread_blocks(times, size)
     time_us = np.concatenate([one.time_us for one in blocks])
@@ -249,14 +250,16 @@ def test_repeated_times_are_spread_over_blocks(size):
 
 
 def test_a_small_shift_of_the_times_is_no_remark():
-    """Times of 300 per second in whole milliseconds move by up to 0.6 ms."""
+    """The recorder takes 300 samples per second and rounds times to milliseconds. The repair moves times by up to 0.6
+    ms."""
     times = np.round(np.arange(2000) / 300.0, 3)
     blocks, remarks = spread_blocks(times)
     assert not remarks and not blocks[0].own_times
 
 
 def test_gaps_and_ticks_are_kept_apart():
-    """A step of over 1.5 periods plus a tick is a gap. The times before and after it are means of their own side."""
+    """A step of over 1.5 periods plus a tick is a gap. A new time near the gap is a mean of times on the same side of
+    the gap."""
     recorded = np.round(np.arange(200) * 0.0137, 2)
     late = recorded + np.where(np.arange(200) >= 100, 0.5, 0.0)
     plain, apart = even_times.even_times(recorded), even_times.even_times(late)

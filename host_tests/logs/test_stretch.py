@@ -94,7 +94,7 @@ def test_replay_and_report_accept_a_stretch(tmp_path):
     data = json.loads(command.works("report", ride, "--from", "18", "--to", "26", "--json").out)
     assert data["duration_s"] == 8.0
     assert data["stops"] == []
-    assert 18.0 <= data["max_right_deg"]["time_s"] <= 26.0  # times are those of the whole ride
+    assert 18.0 <= data["max_right_deg"]["time_s"] <= 26.0  # times count from the start of the whole ride
 
 
 @pytest.mark.parametrize("name", ["replay", "smooth", "export"])

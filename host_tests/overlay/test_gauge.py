@@ -1,5 +1,5 @@
-"""The pixels of the gauge: the side of the lean, the maxima, unknown values, transparency. Also the values that it
-gets."""
+"""The pixels of the gauge: the side of the lean, the maxima, unknown values, transparency. Also tests the values that
+the gauge gets."""
 
 import math
 
@@ -44,7 +44,7 @@ def test_lean_fills_its_side_of_the_dial(gauge, lean):
 
 
 def test_the_bike_leans_to_that_side(gauge):
-    """The rider's head is on the side of the lean. The test finds it by the white pixels between the tyre and the
+    """The rider's head is on the side of the lean. The test finds the head by the white pixels between the tyre and the
     dial."""
     rows, middle = slice(round(0.25 * gauge.height), round(0.5 * gauge.height)), round(0.6 * gauge.height)
     for lean in (-35.0, 35.0):

@@ -14,8 +14,8 @@ NAN = math.nan
 
 @pytest.fixture
 def shown(monkeypatch):
-    """Return a function that draws a picture. It returns {text: colour} and the directions of the arrows, True for
-    right."""
+    """Return a function that draws a picture. The function returns {text: colour} and the directions of the arrows,
+    True for right."""
     texts, arrows = {}, []
     text, arrow = parts.text, parts.arrow
 

@@ -41,7 +41,7 @@ def test_a_lean_is_shown_up_to_a_gap_of_200_ms():
 def test_a_speed_is_shown_up_to_3_s_apart():
     t_s = np.arange(0.0, 8.0, 0.5)
     speed = np.full(16, NAN)
-    speed[[0, 6, 13]] = 10.0, 16.0, 20.0  # at 0, 3 and 6.5 s
+    speed[[0, 6, 13]] = 10.0, 16.0, 20.0  # speeds at 0, 3 and 6.5 s
     values = seen(t_s, None, speed).at(np.array([0.0, 1.5, 3.0, 5.0]))
     assert values.speed_mps == pytest.approx([10.0, 13.0, NAN, NAN], nan_ok=True)
     speed[3:] = NAN
@@ -181,7 +181,7 @@ def test_over_a_video_the_gauge_follows_its_smaller_side(monkeypatch, tmp_path):
 
 @pytest.fixture
 def offset(monkeypatch):
-    """Return a function of what each shift gives: {place: (correlation, evidence)}.
+    """Return a function that finds the offset from the result of each shift, {place: (correlation, evidence)}.
 
     The video has 200 cells of 50 ms. Its readings begin 0.3 s after its first picture."""
 

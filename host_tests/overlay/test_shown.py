@@ -54,7 +54,7 @@ def test_brief_or_untrusted_lean_is_no_maximum(ride, monkeypatch):
 
 
 def test_contradicted_calibration_is_reported_by_overlay(ride):
-    """Every command with a calibration reports it, too."""
+    """Like every command with a calibration, `overlay` reports a contradicted calibration."""
     calibration = api.read_calibration(ride.with_name("RIDE.cal.json"))
     backward = replace(calibration, vehicle_from_sensor=np.diag([-1.0, 1.0, -1.0]))
     for given, codes in ((calibration, []), (backward, ["forward-exchanged"])):

@@ -188,7 +188,7 @@ def test_standstill_is_where_nothing_changes(shaking, speed, expected):
 
 
 def test_leaning_shows_forward_speed_handedness_and_unit():
-    """The function finds them from bends at 15 m/s, also in rotated axes."""
+    """Forward, speed, handedness and unit are found from bends at 15 m/s, also in rotated axes."""
     time = np.arange(0.0, 120.0, 0.2)
     lean, roll_rate = 0.4 * np.sin(1.1 * time), 0.44 * np.cos(1.1 * time)
     yaw = -STANDARD_GRAVITY * np.tan(lean) / 15.0

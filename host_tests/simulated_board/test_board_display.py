@@ -1,4 +1,4 @@
-"""Every display driver passes the same tests, on the simulated model of its own display. They also run on
+"""Every display driver passes the same tests, on the simulated model of its own display. The tests also run on
 MicroPython."""
 
 import gc
@@ -28,7 +28,7 @@ def open_display(board, hz=None, kind="auto", wiring=1):
 
 
 def turns(board, display, count, after=lambda: None):
-    """Run this many turns of the loop. Return the duration of the longest one in us."""
+    """Run this many turns of the loop. Return the duration of the longest turn in us."""
     from time import sleep_us, ticks_diff, ticks_ms, ticks_us  # type: ignore[attr-defined]
 
     longest = 0
@@ -255,8 +255,8 @@ def test_a_status_that_is_never_on_leaves_no_oled_dark(board, display):
 
 
 def test_no_status_leaves_an_oled_dark():
-    """The driver recognises the two controllers by their status. It sends the supply commands of both to each one. If
-    it takes one for the other, the picture is only two columns off."""
+    """The driver recognises the two kinds of controller by their status. The driver sends the supply commands of both
+    kinds to every controller. If it mistakes one kind for the other, the picture is only two columns off."""
     for kind in OLEDS:
         for identity in range(16):
 
@@ -313,7 +313,7 @@ def test_each_wiring_of_a_backpack_works():
 
 def test_the_rows_of_a_larger_display_are_blanked():
     """The third and fourth row of a 20x4 display show the memory behind the first two rows. An earlier program may have
-    written there."""
+    written to this memory."""
 
     def run(board):
         board.lcd.ddram[0x10:0x28] = board.lcd.ddram[0x50:0x68] = b"x" * 24

@@ -13,7 +13,7 @@ def numbered(t_s):
 
 
 def filling(who_am_i=0x68, fifo_en=0x78):
-    """Return a chip at 1 kHz. Its FIFO was just emptied and enabled."""
+    """Return a chip at 1 kHz. The chip's FIFO was just emptied and enabled."""
     clock, chip = awake(numbered, who_am_i, div=0, dlpf=1)
     write(chip, 0x38, 0x11)
     write(chip, 0x23, fifo_en)

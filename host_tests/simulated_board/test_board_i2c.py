@@ -31,7 +31,8 @@ def test_a_missing_chip_gives_an_error():
 
 
 def transfer_us(board, i2c, count, error_number):
-    """Return the duration of a burst of `count` bytes. It must end with this error, or without an error for None."""
+    """Return the duration of a burst of `count` bytes. The burst must end with this error, or without an error for
+    None."""
     start = board.clock.now_us
     error = raised(i2c.readfrom_mem_into, 0x68, 0x3B, bytearray(count))
     assert (error.args[0] if error else None) == error_number, error
@@ -92,8 +93,8 @@ def edges_in_a_transfer(machine, pulses_per_s):
 
 
 def test_interrupts_of_an_esp32_wait_for_the_end_of_a_transfer():
-    """During a transfer, an ESP32 keeps at most eight interrupts. Their handlers run after the transfer, and see the
-    pin's level at that time. On a Pico the handlers run at once."""
+    """During a transfer, an ESP32 keeps at most eight interrupts. The handlers of these interrupts run after the
+    transfer, and see the pin's level at that time. On a Pico the handlers run at once."""
     assert edges_in_a_transfer("pico", 300)[0] in (5, 6, 7)
     during, after = edges_in_a_transfer("esp32", 300)
     assert during == 0 and len(after) in (5, 6, 7) and len(set(after)) == 1

@@ -32,7 +32,7 @@ def sensor_bus(freq=400_000):
 
 
 def outcomes(i2c, count=4, address=SENSOR):
-    """Return "" or the number of the error of each of some transfers."""
+    """Return the number of the error of each transfer, or "" for a transfer without an error."""
     found = []
     for _ in range(count):
         error = raised(i2c.readfrom_mem, address, 0x75, 1)
@@ -188,7 +188,7 @@ def connected(pairs=False, secret=None, **config):
     radio.irq, radio.config, radio.active = irq, config, True
     uuid = fake_bluetooth.UUID
     handles = radio.register([(uuid(0x180F), [(uuid(1), 0x02 | 0x08), (uuid(2), 0x02 | 0x0200)])])
-    assert not radio.connect(phone)  # it does not advertise yet
+    assert not radio.connect(phone)  # the radio does not advertise yet
     radio.found = b"advertised"
     assert radio.connect(phone) and not radio.connect(Phone())
     return radio, phone, told, handles[0]
@@ -291,7 +291,8 @@ def test_a_panel_is_dark_without_its_own_supply(kind, supply, off):
 
 @pytest.mark.parametrize("kind", ["ssd1306", "sh1106"])
 def test_each_command_takes_its_arguments(kind):
-    """A command after each of the others is understood, so none takes too many or too few bytes."""
+    """After each of these commands and its arguments, the next command is understood. So no command takes too many or
+    too few bytes."""
     for code in (0x81, 0xA8, 0xD3, 0xD5, 0xD9, 0xDA, 0xDB):
         oled = Oled(Clock(), kind=kind)
         commands(oled, code, 0x12, 0x45)
@@ -464,7 +465,8 @@ def test_a_clock_at_the_sensors_address_counts_in_decimal_digits():
     ],
 )
 def test_each_chip_has_commands_of_its_own(kind, counts):
-    """The numbers of their arguments are those of the data sheets. The other chip ignores or does not know them."""
+    """Each command has as many arguments as in the data sheet. The other kind of chip ignores the command or does not
+    know it."""
     for code, count in counts.items():
         oled = Oled(Clock(), kind=kind)
         commands(oled, code, *([0xFF] * count), 0x45)
@@ -502,7 +504,7 @@ def test_the_real_modules_are_restored():
 
 @pytest.mark.parametrize("end", [(9, 3), (3, 9), (9, 9), (0, 5), (5, 0)])
 def test_a_line_is_the_same_in_every_direction(end):
-    """Mirroring a line at the picture's middle gives the line to the mirrored end."""
+    """A line that is mirrored at the picture's middle equals the line that is drawn to the mirrored end."""
     width, height = end
 
     def pixels(x1, y1, x2, y2):

@@ -74,7 +74,7 @@ def test_midnight_and_ten_a_second():
 
 
 def test_an_old_position_is_not_returned_as_new():
-    """This holds while only VTG arrives, and after a silence that ends without a fix."""
+    """No position is returned while only VTG arrives, nor after a silence that ends without a fix."""
     with Board(level):
         from kickstand.speed.gps import Gps
 
@@ -83,11 +83,11 @@ def test_an_old_position_is_not_returned_as_new():
         assert gps.place(1000) is not None
         assert gps.place(1010) is None
         gps._uart = Listing(sentence("GPVTG,84.4,T,,M,19.438,N,36.0,K,A").encode())
-        assert gps.poll(5000) is not None  # no RMC for 4 s
+        assert gps.poll(5000) is not None  # there was no RMC for 4 s
         assert gps.place(5000) is None
         gps._uart = Listing(rmc(time="120005.00").encode())
         assert [gps.poll(ms) is None for ms in (5990, 6000)] == [True, False]
-        for ms in (7000, 8000, 9000, 10000):  # then only VTG, whose speed is used if RMC is 3 s old
+        for ms in (7000, 8000, 9000, 10000):  # then only VTG arrives, whose speed is used if RMC is 3 s old
             gps._uart = Listing(sentence("GPVTG,84.4,T,,M,19.438,N,36.0,K,A").encode())
             assert (gps.poll(ms) is None) == (ms < 9000), ms
             assert gps.place(ms) is None, ms

@@ -479,7 +479,7 @@ def test_a_receiver_stays_silent_for_days():
 
 
 def test_a_wheel_that_stood_for_days_turns_again():
-    """This includes a wheel that has never turned."""
+    """The test also tries a wheel that has never turned before."""
 
     class Line:
         IRQ_FALLING = IRQ_RISING = 0

@@ -42,7 +42,7 @@ def test_the_rates_of_a_hand_turn_gravity_to_the_next_pose(before, after, degree
 
 def test_a_low_pass_of_second_order_at_its_own_frequency():
     """The gain is 1 at 0 Hz. At the natural frequency the gain is 1 / (2 damping), and the delay a quarter of a period.
-    Far above, the gain falls with the square of the frequency."""
+    Far above this frequency, the gain falls with the square of the frequency."""
     rate_hz, t_s = 1000.0, np.arange(4000) / 1000.0
     inner = slice(1000, 3000)
     assert second_order(np.ones(4000), 10.0, 0.7, rate_hz)[inner] == pytest.approx(np.ones(2000), abs=1e-6)

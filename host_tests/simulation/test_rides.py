@@ -121,7 +121,7 @@ def test_rates_by_hand_follow_from_the_motion():
     seen = np.array(seen)
     roll_rate, acceleration = (np.gradient(seen[:, i], dt) for i in (6, 7))
     assert np.ptp(seen[:, 6]) > 20
-    # except at the moments of a new command
+    # a new command causes a jump, so 1 % of the samples may differ
     assert np.quantile(np.abs(roll_rate - seen[:, 5]), 0.99) < 0.5
     assert np.quantile(np.abs(acceleration / STANDARD_GRAVITY - seen[:, 2]), 0.99) < 0.005
     assert np.ptp(seen[:, 2]) > 0.25

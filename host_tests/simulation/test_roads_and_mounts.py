@@ -35,7 +35,7 @@ def test_each_road_class_is_twice_as_rough(rides):
     off = rides("C").truth["lean_deg"] - rides().truth["lean_deg"]
     assert 0.1 < np.sqrt(np.mean(off**2)) < 2.0
     forces = [bands_of(*in_vehicle(rides(road)), 200.0)[QUANTITIES[0]] for road in CLASSES]
-    bands = np.array([force[3] for force in forces])  # 1 to 3 Hz, where the springs resonate
+    bands = np.array([force[3] for force in forces])  # the band of 1 to 3 Hz, in which the springs resonate
     assert np.all((bands[1:] / bands[:-1] > 1.7) & (bands[1:] / bands[:-1] < 2.2))
 
 

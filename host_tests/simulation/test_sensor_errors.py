@@ -1,4 +1,4 @@
-"""The simulated sensor's errors and mountings, and the same readings on both Pythons."""
+"""Tests the simulated sensor's errors and mountings. CPython and MicroPython get the same readings."""
 
 import json
 

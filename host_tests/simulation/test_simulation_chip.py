@@ -92,7 +92,7 @@ def test_errors_and_temperature_reach_the_reading():
     mean = read(chip, force, np.zeros((N, 3)), temp_c=35.0).mean(axis=0)
     assert mean[:3] == pytest.approx([0.05, 0.0, 1.03], abs=5e-4)
     assert mean[3] == pytest.approx(35.0, abs=0.01)
-    assert mean[4:] == pytest.approx([1.0, 12.0, 0.1], abs=0.01)  # 0.1 deg/s per g on z
+    assert mean[4:] == pytest.approx([1.0, 12.0, 0.1], abs=0.01)  # gyro z reads 0.1 deg/s per g
 
 
 def test_bias_drifts_at_random():

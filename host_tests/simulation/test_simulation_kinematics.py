@@ -43,9 +43,9 @@ def attitude(motion: Motion) -> np.ndarray:
         return made
 
     heading = integral(motion.yaw_rate, motion.rate_hz)
-    # forward along east, left along north, up: as columns in the order left, up, forward
+    # At heading 0, forward is east and left is north. The columns are left, up and forward
     start = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    # about the vehicle's left axis, nose up is negative; leaning right turns left towards up
+    # nose up is a negative rotation about left, and leaning to the right turns the left axis towards up
     return about(2, heading) @ start @ about(0, -motion.pitch) @ about(2, motion.lean)
 
 

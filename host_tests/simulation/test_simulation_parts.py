@@ -31,7 +31,7 @@ def test_integral_and_derivative_of_a_line():
 def test_smoothing_and_noise_have_their_size():
     step = np.where(np.arange(4000) < 2000, 0.0, 1.0)
     found = signals.smoothed(step, 0.1, 1000.0)
-    assert found[1900] == pytest.approx(0.1587, abs=0.003)  # one sigma before the step
+    assert found[1900] == pytest.approx(0.1587, abs=0.003)  # the normal distribution at one sigma before the step
     assert found[[0, -1]] == pytest.approx([0.0, 1.0], abs=1e-6)
     noise = signals.band_noise(np.random.default_rng(1), 20_000, 1.0, 5.0, 200.0)
     power = np.abs(np.fft.rfft(noise)) ** 2
@@ -243,7 +243,7 @@ def test_gears_keep_the_engine_under_its_shift():
 
 def test_vibration_grows_with_the_engine():
     """At 6000 revolutions per minute the vibration has the rms rms_g. At idle the rms is multiplied by
-    0.25 + 0.75 (1250 / 6000)^2. It is at most 0.5 g. The rates vibrate by 15 deg/s per g."""
+    0.25 + 0.75 (1250 / 6000)^2. The vibration is at most 0.5 g. The rates vibrate by 15 deg/s per g."""
     running = np.ones(20_000)
 
     def rms(speed, rms_g, share=1.0):
@@ -366,7 +366,7 @@ def test_positions_are_integrated_from_speed_and_yaw():
     assert lat[-1] == pytest.approx(47.6)
     assert lon[-1] == pytest.approx(8.0 + 0.0089932 / np.cos(np.radians(47.6)), abs=1e-6)
     assert utc_s[[0, 200]].tolist() == [1_779_008_400.0, 1_779_008_401.0]
-    truth["yaw_rate_dps"][0] = 90.0 * 200.0  # a turn to the left in one sample, to the north
+    truth["yaw_rate_dps"][0] = 90.0 * 200.0  # the vehicle turns left to the north within one sample
     lat, lon, _ = files.positions(SimpleNamespace(truth=truth, rate_hz=200.0, time=np.zeros(n)))  # type: ignore[arg-type]
     assert lat[-1] == pytest.approx(47.6089932, abs=1e-6) and lon[-1] == pytest.approx(8.0)
 

@@ -18,8 +18,8 @@ def over(speed: float, roughness: float, seconds: float = 40.0, seed: int = 0) -
 
 
 def test_the_profile_has_the_standards_density():
-    """In ISO 8608, the power density of the height of a class B road is 64e-6 m^3 at 0.1 cycles/m. It falls with the
-    square of the spatial frequency."""
+    """In ISO 8608, the power density of the height of a class B road is 64e-6 m^3 at 0.1 cycles/m. The power density
+    falls with the square of the spatial frequency."""
     step = 0.02
     slope = road.profile_slope(np.random.default_rng(1), 40000.0, road.CLASS_B)
     n = 2**14
@@ -58,7 +58,7 @@ def test_the_front_wheel_meets_a_bump_first():
     road.add_bumps(slope, [20.0], 0.05, 0.6)
     shaken = road.shaking(chance, distance, np.full(4000, 10.0), slope, Bike(), RATE)
     nose_up, lifted = np.argmax(shaken.pitch > 0.003), np.argmax(shaken.heave > 1.0)
-    assert 0.05 < (lifted - nose_up) / RATE < 0.25  # 1.43 m of wheelbase at 10 m/s
+    assert 0.05 < (lifted - nose_up) / RATE < 0.25  # the wheelbase of 1.43 m takes 0.14 s at 10 m/s
 
 
 def test_lowest_gear_under_the_shift_speed_is_used():

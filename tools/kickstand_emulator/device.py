@@ -23,19 +23,19 @@ class GuestError(Exception):
 
 
 class EmulatedDevice(ABC):
-    """An emulated board. It is off until power_on(). A `with` statement switches it on, and off at its end.
+    """An emulated board. It is off until power_on(). A `with` statement switches the board on, and off at its end.
 
-    Times are emulated seconds. They continue through resets and power cycles.
+    Times are emulated seconds. The time continues through resets and power cycles.
 
     The subclasses take these arguments:
         world: The board's motion, as for simulator.Board. None means that the board lies level and at rest.
-        files: The content of its flash, see flash_image.py.
+        files: The content of the board's flash, see flash_image.py.
         fitted: Other arguments of simulator.Board.
 
     NAME: Name of the board.
     FLASH: Location of the file system in its flash.
     MPY: Version of the bytecode that the board accepts, see bytecode.py.
-    SINK: Code for the board. It defines a class Sink, whose write() passes bytes to the function given to listen().
+    SINK: Code for the board that defines a class Sink. Sink.write() passes bytes to the function given to listen().
     """
 
     NAME: str
@@ -86,7 +86,7 @@ class EmulatedDevice(ABC):
     @property
     @abstractmethod
     def reading(self) -> bool:
-        """True while the sensor is sending."""
+        """True while the sensor sends data over I2C."""
 
     @abstractmethod
     def reset(self) -> None:
@@ -114,7 +114,8 @@ class EmulatedDevice(ABC):
     def run_until(self, condition: Callable[[], Any], limit_s: float, step_s: float = 0.005) -> Any:
         """Advance the time until condition() is true, and return its value.
 
-        condition() is called every step_s seconds. Raises NotReached if it is not true within limit_s seconds.
+        condition() is called every step_s seconds. Raises NotReached if the condition is not true within limit_s
+        seconds.
         """
         end_s = self.time_s + limit_s
         while not (reached := condition()):

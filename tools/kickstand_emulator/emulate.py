@@ -57,7 +57,7 @@ def device_class(chip: str) -> Kind:
 
 
 class ScriptedBike:
-    """The demo's ride. It begins when the display switches on, because then the firmware has started."""
+    """The demo's ride. The ride begins when the display switches on, because the firmware has then started."""
 
     def __init__(self) -> None:
         self._ride = Ride(SCRIPT)

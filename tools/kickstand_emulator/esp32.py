@@ -109,7 +109,7 @@ class Sink:
 
     @property
     def reading(self) -> bool:
-        """True while the sensor is sending."""
+        """True while the sensor sends data over I2C."""
         return self.board.sensor_bus.open and self._sends[0]
 
     def reset(self) -> None:

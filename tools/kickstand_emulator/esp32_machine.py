@@ -11,7 +11,7 @@ The emulated time is counted in instructions, and advances only after the messag
 make the emulation depend on the host:
 
 1. The main loop may run timers while only one processor has had its turn, or set the clock forward before both
-   processors sleep. So _hold_main_loop() makes the main loop wait until both sleep.
+   processors sleep. So _hold_main_loop() makes the main loop wait until both processors sleep.
 2. One timer of the scheduler begins at one of two moments, by chance. So _calm_timers() postpones this timer forever.
 3. The main loop executes a reset of one processor while the other processor continues. So _guard() delays a reset to
    the next full millisecond, and the processors wait for the reset. _on_reset() makes the reset wait until the
@@ -40,7 +40,7 @@ _PINS = 40
 _VIRTUAL = 1  # QEMU_CLOCK_VIRTUAL
 _NEVER = 1 << 62
 _GUARD_NS = 1_000_000
-_SHORTEST_S, _LONGEST_S = 5e-5, 1e-3  # times between two checks whether the processors sleep
+_SHORTEST_S, _LONGEST_S = 5e-5, 1e-3  # time between two checks whether the processors sleep
 
 _PIN_CALL = c.CFUNCTYPE(None, c.c_int, c.c_int)
 _I2C_CALL = c.CFUNCTYPE(c.c_int, c.c_uint8, c.c_uint8, c.c_uint16)
@@ -232,7 +232,7 @@ class Machine:
 
     def _begun(self) -> None:
         """Prepare the emulation. QEMU calls this in the processors' thread, before the first instruction."""
-        # Keep one thread state of Python. Otherwise each call from QEMU would create one, which is slow
+        # Keep one thread state of Python. Otherwise each call from QEMU would create a thread state, which is slow
         c.pythonapi.PyGILState_Ensure()
         self._state = os.open(f"/proc/self/task/{threading.get_native_id()}/stat", os.O_RDONLY)
         self._calm_timers()

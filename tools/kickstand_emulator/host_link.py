@@ -1,7 +1,7 @@
 """Adds registers through which code on the emulated Pico exchanges bytes with the host.
 
-The real chip does not have these registers. They are faster than the console, on which every byte costs the Pico time.
-GUEST is the code for the Pico.
+The real chip does not have these registers. The registers are faster than the console, on which every byte costs the
+Pico time. GUEST is the code for the Pico.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from rp2040py.peripherals.peripheral import BasePeripheral
 
 from .chip import EmulatedChip
 
-_PLACE = 0x40068  # address of the registers, shifted right by 12 bits. It is reserved on the real chip
+_PLACE = 0x40068  # address of the registers, shifted right by 12 bits. This address is reserved on the real chip
 _COUNT, _FILL, _TAKE = 0x0, 0x4, 0x8
 
 GUEST = """

@@ -75,12 +75,12 @@ class TimedI2C(RPI2C):
         return super().read_uint32(offset)
 
     def write_uint32(self, offset: int, value: int) -> None:
-        """Write a register. If it disables the controller during a transfer, the controller releases the wires."""
+        """Write a register. A write that disables the controller during a transfer releases the wires."""
         if offset == IC_ENABLE and not value & ENABLE and self._busy and self._state != I2CState.STOP:
             self.let_go()
         super().write_uint32(offset, value)
 
-    # Interrupts. If TX_EMPTY_CTRL is set, the end of a byte raises TX_EMPTY. An abort raises it too
+    # Interrupts. If TX_EMPTY_CTRL is set, the end of a byte raises TX_EMPTY. An abort raises TX_EMPTY too
 
     def _set_interrupts(self, mask: int) -> None:
         if mask == R_TX_EMPTY and self._busy and self.control & TX_EMPTY_CTRL:

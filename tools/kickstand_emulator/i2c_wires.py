@@ -1,7 +1,7 @@
 """Connects the I2C devices to GPIO pins, bit by bit.
 
-rp2040py emulates only the I2C controllers, but software also drives the pins directly. MicroPython does so for SoftI2C
-and for writes of length 0, as in I2C.scan(). The firmware does so to free a stuck bus.
+rp2040py emulates only the I2C controllers, but software also drives the pins directly. MicroPython drives the pins for
+SoftI2C and for writes of length 0, as in I2C.scan(). The firmware drives them to free a stuck bus.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ class Wires:
         self.release()
 
     def release(self) -> None:
-        """Note that the chip drives neither pin, for example after its reset."""
+        """Record that the chip drives neither pin, for example after its reset."""
         self._driven_sda = self._driven_scl = 1
         self._pull = 0  # 1 while a device pulls SDA low
         self._mode = _IDLE
@@ -36,7 +36,7 @@ class Wires:
         self.show()
 
     def driven(self, sda: int, scl: int) -> None:
-        """Note the levels that the chip drives. 0 pulls a wire low, and 1 releases it."""
+        """Record the levels that the chip drives. 0 pulls a wire low, and 1 releases it."""
         if scl != self._driven_scl:
             self._driven_scl = scl
             self._bus.set_scl(scl)

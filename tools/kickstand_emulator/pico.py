@@ -56,7 +56,7 @@ class Pico(EmulatedDevice):
         self._reset()
 
     def run(self, seconds: float, between: Callable[[], None] | None = None) -> None:
-        """Advance the time. After a PowerCut this returns early, and `powered` is False."""
+        """Advance the time. After a PowerCut this method returns early, and `powered` is False."""
         if not self.powered:
             self.chip.sleep(seconds)
             return
@@ -67,7 +67,7 @@ class Pico(EmulatedDevice):
 
     @property
     def reading(self) -> bool:
-        """True while the sensor is sending."""
+        """True while the sensor sends data over I2C."""
         return self.chip.controllers[0].reading()
 
     def reset(self) -> None:

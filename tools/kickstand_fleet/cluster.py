@@ -44,7 +44,8 @@ def run_tasks(
 ) -> Iterator[Outcome]:
     """Run function(*item) for each item, and yield one outcome per item, in any order.
 
-    The arguments scheduler, workers and timeout_s are those of Cluster. Starts no workers if there are no items.
+    The arguments scheduler, workers and timeout_s have the same meaning as for Cluster. Starts no workers if there are
+    no items.
 
     Yields:
         index: index of the item.
@@ -188,7 +189,7 @@ class Cluster:
             if status == "finished":
                 try:
                     result = future.result()
-                except Exception:  # its worker died before the result was fetched
+                except Exception:  # the task's worker died before the result was fetched
                     suspects.append(index)
                 else:
                     yield index, result, "", ""
@@ -238,12 +239,13 @@ class Cluster:
 def _without_interrupts() -> Iterator[None]:
     """A context that defers Ctrl-C to its end. Processes started in this context never receive Ctrl-C.
 
-    Without this context, an interrupt while Dask starts or connects would make it print pages of errors.
+    Without this context, an interrupt while Dask starts or connects would make Dask print pages of errors.
     """
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
-    # Start Python's resource tracker now. If Python started it with the first process, it would unblock Ctrl-C
+    # Start Python's resource tracker now. If Python started the tracker with the first process, the tracker would
+    # unblock Ctrl-C
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:

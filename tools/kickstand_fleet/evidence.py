@@ -1,7 +1,7 @@
 """Collects the normal equations of a regression that finds the sensor's alignment, in blocks of some seconds.
 
 As in the firmware's ForwardRegression, the regression explains the mean force f between two consecutive speeds of the
-log. Such a stretch is an interval. In a car, in the sensor's own axes:
+log. The time between these two speeds is called an interval. In a car, in the sensor's own axes:
 
     f = level + forward a + left c + arm w
 
@@ -10,13 +10,14 @@ log. Such a stretch is an interval. In a car, in the sensor's own axes:
     w = d(yaw rate)/dt          change of the yaw rate
 
 level, forward, left and arm are vectors, the coefficients. Unlike the firmware, this regression also uses bends. In a
-car, bends show left as well as braking shows forward.
+car, bends show which way is left, just as braking shows which way is forward.
 
 A sensor ahead of the rear axle is accelerated sideways when a bend begins and ends. Drivers brake and speed up at the
-same moments, so this acceleration would falsify forward. The coefficient arm absorbs it. Its length is the distance
-from the sensor to the rear axle.
+same moments, so this acceleration would falsify forward. The coefficient arm takes up this acceleration. The length of
+arm is the distance from the sensor to the rear axle.
 
-A motorcycle leans into bends. Its force stays along its own up, and grows to sqrt(1 + c^2). So for a motorcycle
+A motorcycle leans into bends. The force stays along the motorcycle's own up, and grows to sqrt(1 + c^2). So for a
+motorcycle
 
     f = level sqrt(1 + c^2) + forward a
 
@@ -38,8 +39,8 @@ from kickstand_tools.signals import STANDING_MPS, Array, moving_mean, runs
 
 INTERVAL_S = 0.9  # shortest time between two speeds that are used
 MOVING_MPS = 2.0
-# Weight of a second at a standstill, compared with a second of driving. It is small, because a long stop shows the
-# slope of the road at one place only, like a short stop
+# Weight of a second at a standstill, compared with a second of driving. The weight is small, because even a long stop
+# shows the slope of the road at one place only
 STANDING_WEIGHT = 0.3
 LEVEL_S = 20.0  # the mean force over this time is roughly vertical. The rate about this direction is the yaw rate
 BLOCK_S = 8.0
@@ -50,9 +51,9 @@ SWING_S = 0.2  # averaging time of the yaw rate at each end of an interval
 # Sway is the mean force over the first time minus the mean force over the second time. The first mean removes noise,
 # the difference removes braking, speeding up and bends
 SWAY_S = 0.05, 0.3
-# Yaw rate at which an interval of a car has half its weight. In a tight turn, a sensor ahead of the rear axle does not
-# move along the vehicle's heading. The angle between both is the sensor's distance from that axle divided by the
-# turn's radius.
+# Yaw rate at which an interval of a car has half of its usual weight. In a tight turn, a sensor ahead of the rear axle
+# does not move along the vehicle's heading. The sensor's direction of motion differs by an angle: its distance from
+# that axle divided by the turn's radius.
 TIGHT_DPS = 20.0
 
 
@@ -82,7 +83,8 @@ class Blocks(Table):
 
     square: Sums of products of two terms, shape (m, 4, 4). The road's slope is filtered out, see _without_road().
     product: Sums of products of a term and a component of the force, shape (m, 4, 3), filtered like square.
-    sway: Sway of each block, shape (m, 3, 3). It is divided by its trace, so a rough road counts like a smooth one.
+    sway: Sway of each block, shape (m, 3, 3). The matrix is divided by its trace, so a rough road counts like a smooth
+        road.
     log: Index of each block's log, shape (m).
     t_s: Beginning of each block in its log, shape (m), in s.
     end_s: End of each block in its log, shape (m), in s.
@@ -216,11 +218,11 @@ def handedness(found: Array, varied: Array) -> float:
 def _without_road(log: Intervals) -> tuple[Array, Array]:
     """Return the terms and the force with the slope and camber of the road filtered out.
 
-    Slope and camber stay similar for some hundred metres. There they tilt the measured level, so neighbouring intervals
-    share an error. An ordinary regression would mistake the slope during braking for a part of forward.
+    Slope and camber stay similar for some hundred metres. They tilt the measured level, so neighbouring intervals share
+    an error. An ordinary regression would mistake the slope during braking for a part of forward.
 
-    Therefore a filter follows the road, modelled as a first-order Gauss-Markov process in distance. It predicts each
-    value from the earlier intervals. The function returns the differences from the predictions, divided by their
+    Therefore a filter follows the road, modelled as a first-order Gauss-Markov process in distance. The filter predicts
+    each value from the earlier intervals. The function returns the differences from the predictions, divided by their
     standard deviations. These differences are uncorrelated, so ordinary least squares can be used on them.
     """
     rows = np.hstack((log.terms, log.force))

@@ -24,7 +24,7 @@ _LONGEST = 100
 
 
 def file_stem(readable: str, *exact: str) -> str:
-    """Return a unique file name without its ending. It is the same in every run.
+    """Return a unique file name without its ending. The name is the same in every run.
 
     readable: Text that begins the name. Characters that a file system does not allow are encoded.
     exact: Texts that identify the file. The name ends with a hash of them.
@@ -162,7 +162,7 @@ def listed(parent: str) -> dict[str, str]:
 def _in_store(path: str, what: str) -> Iterator[tuple[Any, str]]:
     """A context that yields the file system of a remote path, and the path within that file system.
 
-    It turns any error of the libraries into an InputError.
+    The context turns any error of the libraries into an InputError.
 
     path: the remote path. what: the past participle of the attempted action, for the message.
     """

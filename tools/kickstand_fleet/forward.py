@@ -23,7 +23,7 @@ CORRELATION = 0.5  # correlation between the errors of the two methods, which us
 APART_SIGMAS = 2.0
 # Number of coefficients of evidence.py that are fitted: level, forward and left. The fourth coefficient, arm, is useful
 # only to compare parts of a drive. When it was fitted to whole drives, forward was wrong by 2 degrees in one of three
-# recorded drives. Without it, the error was at most 0.6 degrees in all three.
+# recorded drives. Without arm, the error was at most 0.6 degrees in all three drives.
 _TERMS = 3
 _LEAST_BLOCKS = 4
 
@@ -35,7 +35,7 @@ class Forward:
     frame: Rotation from sensor to vehicle axes, shape (3, 3). Its rows are left, up, forward.
     sigma_deg: Standard error of forward about up.
     attitude_deg: Standard error of the whole rotation.
-    halves_deg: Angle between the forwards of the two halves of the driving.
+    halves_deg: Angle between forward from the first half of the driving and forward from the second half.
     """
 
     frame: Array

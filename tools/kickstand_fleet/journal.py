@@ -55,7 +55,7 @@ class Journal:
         return self
 
     def _open(self) -> None:
-        """Open the file and lock it. Open it again if another run has removed it between the two steps."""
+        """Open the file and lock it. Reopen the file if another run removed it before it was locked."""
         while True:
             self._file = open(os.open(self._path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666), "r+b")
             self._lock()
@@ -65,7 +65,7 @@ class Journal:
             self._file.close()
 
     def _lock(self) -> None:
-        """Lock the file. Raises InputError if another run has locked it."""
+        """Lock the file. Raises InputError if another run has locked the file."""
         with contextlib.suppress(ImportError):  # Windows
             import fcntl
 
@@ -125,7 +125,7 @@ class Journal:
         return InputError(f"{self._path} cannot be written: {cause(error)}; {KEPT}")
 
     def _note(self, line: bytes) -> bool:
-        """Note the position of a line's result. Returns False for a damaged line."""
+        """Record the position of a line's result. Returns False for a damaged line."""
         if not (line.endswith(b"\n") and (entry := _entry(line))):
             return False
         key, again, _ = entry

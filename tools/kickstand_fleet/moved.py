@@ -1,4 +1,4 @@
-"""Finds mounts that rotated by a few degrees or more, between two logs or during one.
+"""Finds mounts that rotated by a few degrees or more, between two logs or during a log.
 
 The firmware refuses a drive only if the mount moved by some 7 to 30 degrees. This module also finds smaller rotations.
 At every moment in all logs of a mount, it compares the alignment before that moment with the alignment after it.
@@ -7,8 +7,8 @@ A rotation that tilts the sensor shows in gravity. A rotation about the vertical
 in bends, and in the direction in which the vehicle sways on its springs. The sway also shows on a straight road without
 braking.
 
-The variance of a rotation comes from a jackknife over blocks of some seconds. It does not contain errors that last
-longer: slopes of a road and, between two logs, changes of load and temperature. Their variances are added.
+The variance of a rotation comes from a jackknife over blocks of some seconds. This variance does not contain errors
+that last longer: slopes of a road and, between two logs, changes of load and temperature. Their variances are added.
 """
 
 from dataclasses import dataclass
@@ -38,10 +38,11 @@ LEAST_VARIED = 0.2
 # deviation. YAW_PRIOR_DEG is its value at a variation of 1 g^2 s
 YAW_PRIOR_DEG = 0.4
 # SWAY_DEG is the standard deviation, in degrees, of the direction of sway on each side of a moment, caused by the
-# roads. The sway is not used if its standard deviation over both sides is above SWAY_WORST_DEG. It is also not used if
-# it contradicts the braking by more than SWAY_SIGMAS standard deviations
+# roads. The sway is not used if its standard deviation over both sides is above SWAY_WORST_DEG. The sway is also not
+# used if it contradicts the braking by more than SWAY_SIGMAS standard deviations
 SWAY_DEG, SWAY_WORST_DEG, SWAY_SIGMAS = 0.7, 5.0, 3.0
-# A larger tilt within a log, in degrees, need not be sudden. The slopes of roads differ by less
+# A tilt larger than this within a log, in degrees, is reported even if it is gradual. The slopes of roads differ by
+# less
 SURELY_DEG = 8.0
 TILT_DEG = 2.2  # a rotation with a smaller tilt counts as a rotation about the vertical
 # To find a jump, the vertical during the STEP_S before a moment is compared with the vertical during the STEP_S after

@@ -39,7 +39,7 @@ _REPORTED = (CutLine, CutGzip, NulEnd, FrozenReadings, AxisDead, GyroSaturated, 
 # Refusals of the firmware whose cause may be a move of the mount
 _SUSPECTS = (MOVED, "parts-differ", "uncertain")
 _PLOTTED = 160  # largest number of intervals in a picture
-_AGAINST = -0.5  # limit of evidence.handedness(): if it is lower, the gyro or the axes are mirrored
+_AGAINST = -0.5  # if evidence.handedness() is below this, the gyro or the axes are mirrored
 
 Row = dict[str, Any]
 
@@ -191,7 +191,7 @@ def _error(period: Period, log: str, reason: str, message: str) -> Row:
 
 
 def _logs(period: Period) -> tuple[list[Log], list[Row]]:
-    """Read the logs. Returns the logs that can be used, and a row of errors for each of the others."""
+    """Read the logs. Returns the logs that can be used, and a row of errors for each other log."""
     logs, errors = [], []
     for path in period.paths:
         reason = UNREADABLE
@@ -235,7 +235,7 @@ def _alignment(
 
 
 def _mirrored(driven: list[evidence.Intervals]) -> bool:
-    """Detect mirrored axes: in bends, the force points to the side opposite to the one that the yaw rate predicts."""
+    """Detect mirrored axes. With mirrored axes, the yaw rate in bends predicts the force on the wrong side."""
     whole = evidence.blocks(driven)
     if not len(whole.log):
         return False

@@ -30,10 +30,10 @@ _WRITE_S, _SHARE = 15.0, 20.0
 
 @dataclass
 class FleetRun:
-    """The numbers of a run.
+    """The numbers of results in a run, and their summary.
 
     vehicles: Number of results, one for each mount of each vehicle.
-    new: Number of results that this run computed. The others were computed earlier.
+    new: Number of results that this run computed. An earlier run computed the other results.
     damaged: Number of earlier results that could not be read and are recomputed.
     seen: Summary of all results.
     """

@@ -70,7 +70,8 @@ class Glance:
         self.below: str | None = None
         self.worst: list[Row] = []
         self.moved: list[tuple[Row, str]] = []
-        # Rows of the table of vehicles, each with its decelerations. True: rows of aligned vehicles. False: all others
+        # Rows of the table of vehicles, each with the decelerations of the vehicle. Key True has the aligned vehicles,
+        # key False all other vehicles
         self._rows: dict[bool, list[tuple[Row, list[float]]]] = {False: [], True: []}
 
     def add(self, result: PeriodResult) -> None:

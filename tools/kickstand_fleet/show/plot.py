@@ -18,7 +18,7 @@ def file_name(vehicle: str, mount: str) -> str:
 
 
 def write_plot(path: str, result: PeriodResult) -> None:
-    """Write the picture of a result that has one. Raises InputError."""
+    """Write the picture of a result, if this result has a picture. Raises InputError."""
     write_bytes(path, draw(result).encode())
 
 

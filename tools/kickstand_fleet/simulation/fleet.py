@@ -114,7 +114,7 @@ def make_fleet(
             made.append(vehicle)
             if progress:
                 progress(k + 1, len(troubles))
-        kinds = {"motorcycle": "motorcycle", "car": "car", "bus": "car"}  # a manifest knows only two kinds
+        kinds = {"motorcycle": "motorcycle", "car": "car", "bus": "car"}  # a manifest has no kind "bus"
         rows = [(v.name, path.relative_to(directory), kinds[v.kind]) for v in made for path in v.paths]
         write_table(directory / "MANIFEST.csv", ("vehicle", "path", "kind"), rows)
         write_table(directory / "TRUTH.csv", (*_COLUMNS, *MATRIX), (list(_truth(v)) for v in made))

@@ -68,7 +68,7 @@ def random_route(
     width = max(2, round(_SMOOTH_S * rate_hz))
     speed = moving_mean(np.interp(time, knots[:, 0], knots[:, 1]), width)
     place = np.searchsorted(knots[:, 0], time, side="right").clip(1, len(knots) - 1)
-    lateral = moving_mean(knots[place, 2], 2 * width)  # the knot at the end of each leg holds its lateral acceleration
+    lateral = moving_mean(knots[place, 2], 2 * width)  # a leg's last knot has the leg's acceleration
     yaw_rate = np.where(speed > 0.3, lateral / np.maximum(speed, 1.5), 0.0)
     distance = np.cumsum(speed) / rate_hz
     return Route(
@@ -84,8 +84,8 @@ def random_route(
 class _Legs:
     """Collects the legs of a route.
 
-    knots: One tuple per leg. It contains the time and the speed at the end of the leg, and the lateral acceleration
-        during the leg.
+    knots: One tuple per leg. The tuple contains the time and the speed at the end of the leg, and the lateral
+        acceleration during the leg.
     """
 
     def __init__(self, chance: np.random.Generator, handling: Handling) -> None:

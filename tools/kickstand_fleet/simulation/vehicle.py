@@ -42,7 +42,7 @@ class Receiver:
 
     every_s: Time between two values.
     late_s: Delay of each value.
-    factor: Factor on each value. It is 3.6 for a receiver that wrongly sends km/h.
+    factor: Factor on each value. The factor is 3.6 for a receiver that wrongly sends km/h.
     until_s: Time of the last value.
     """
 

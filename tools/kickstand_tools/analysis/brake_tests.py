@@ -13,7 +13,7 @@ from .stops.brake_test import RATE_S, Stop, find_stops
 def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
     """Find every stop of a log from over 10 km/h, and measure it by UN Regulation No. 13 (see find_stops).
 
-    The firmware's lean filter takes most of the time. It runs only for motorcycles, because a car has no lean.
+    The firmware's lean filter takes most of the time. The filter runs only for motorcycles, because a car has no lean.
 
     calibration: must be aligned.
     Raises InputError.

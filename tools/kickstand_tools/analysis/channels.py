@@ -1,7 +1,7 @@
 """Converts a ride to the vehicle's axes for plot, report and export, and averages it to a lower sample rate.
 
 The lean of each sample is the firmware's lean or the smoothed lean. numpy computes everything that does not depend on
-earlier samples. A test compares these values with the firmware's.
+earlier samples. A test compares these values with the firmware's values.
 """
 
 from collections.abc import Iterable, Iterator
@@ -180,7 +180,7 @@ def downsampled(blocks: Iterable[Channels], step_s: float, rounded: bool = False
 
 
 def rounded_to(t_s: Array, step_s: float) -> Array:
-    """Round times to multiples of step_s. Each stretch of downsampled(..., rounded=True) has a different result."""
+    """Round times to multiples of step_s. Two stretches of downsampled(..., rounded=True) never get the same time."""
     return _stretches(t_s, step_s, True) * step_s
 
 

@@ -17,7 +17,7 @@ from .summary import Peak
 if TYPE_CHECKING:
     from rich.console import Group
 
-COSTS_DEG = 0.25  # smallest error of the lean for which the report names a remedy; the display cannot show smaller ones
+COSTS_DEG = 0.25  # the report names a remedy for larger errors of the lean only; the display cannot show smaller errors
 GRAVITY_G = 0.02  # largest accepted difference of the force at rest from 1 g, as in the check of the six positions
 RIDDEN_S = 10.0  # shortest riding time for a report; a shorter time means that the bike was only pushed around
 STOPS_TITLE = "Stops"

@@ -75,7 +75,7 @@ class Summary:
         t = block.t_s
         self._begin_s = t[0] if not self.samples else self._begin_s
         step = np.diff(t, prepend=self._begin_s + self.duration_s)
-        longest_s = max(LOST_US / 1e6, 4.0 * float(np.median(step)))  # at a low sample rate, all steps are long
+        longest_s = max(LOST_US / 1e6, 4.0 * float(np.median(step)))  # at a low sample rate, long steps are no gaps
         self.missing_s += float(np.sum(step[step > longest_s]))
         step = np.where(step * 1e6 > GAP_US, 0.0, step)  # readings were missing
         self.samples += len(t)

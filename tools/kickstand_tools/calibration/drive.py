@@ -111,7 +111,7 @@ def fit_drive(
     calibration: an earlier calibration with offset and slope and, for a motorcycle, the alignment from two poses.
     vehicle: "motorcycle" or "car". None: a motorcycle if `calibration` is aligned and not a car's, otherwise a car.
     method: "improved", or "published" for ViriCiti's published method.
-    progress: called with (done, total). Each sample counts twice, because it is read twice.
+    progress: called with (done, total). Each sample counts twice, because the logs are read twice.
     on_event: called with each DriveEvent as it happens, even if the drive is refused later.
     Raises InputError. Raises its subclass RefusedInput, with a Message, if the drive does not determine the sensor's
     mounting.
@@ -154,7 +154,7 @@ def fit_logs(
     watch = DriveWatch(alignment, on_event)
     feed(alignment, logs, before, steps, watch)
     matrix = array("f", [0.0] * 9)
-    # The bias from `standing` is a calibrated rate. The calibration file needs it as a reading.
+    # The bias from `standing` is a calibrated rate. The calibration file needs the bias as a reading.
     bias = before.gyro_bias_dps + np.linalg.solve(before.gyro_matrix, alignment.standing.bias)
     refusal, result = None, before
     try:

@@ -57,7 +57,7 @@ def drive_bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterat
     """Split the samples of a log into the shortest bins that last at least length_us.
 
     The last bin before a gap or before the end of the log may be shorter. If length_us is 0, each bin has one sample,
-    but the first bin of each stretch has two.
+    but the first bin of each stretch has two samples.
     """
     time_us = log.time_us
     step_us = np.diff(time_us, prepend=time_us[0])

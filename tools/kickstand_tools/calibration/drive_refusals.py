@@ -27,7 +27,7 @@ class MountMoved(Message):
     """The mount has moved.
 
     how: a key of _MOVED.
-    angle_deg: angle by which it moved; None if unknown.
+    angle_deg: angle by which the mount moved; None if unknown.
     """
 
     how: str

@@ -32,8 +32,8 @@ MOST_BYTES = 1_000_000  # largest accepted file; Kickstand's own files are a tho
 MAX_DELAY_S = 0.05  # largest accepted delay of a chip's low-pass filter; the slowest filter has 33 ms
 _NEUTRAL = {"accel_matrix": np.eye(3), "gyro_matrix": np.eye(3), "gyro_sigma": np.zeros((3, 3))}
 _MATRICES = tuple(_NEUTRAL)  # names in the order of the firmware's Calibration.matrices()
-# Largest error of a rotation matrix. It accepts a matrix that was copied with three or four decimals, which is exact to
-# 0.1 degrees.
+# Largest error of a rotation matrix. A matrix that was copied with three or four decimals is accepted, because it is
+# exact to 0.1 degrees.
 ROTATION_TOLERANCE = 2e-3
 
 BY_RIDE = "remove the calibration and let the ride show how the sensor sits"
@@ -90,7 +90,7 @@ class CalibrationFile:
             setattr(self, name, np.reshape(np.array(getattr(self, name), dtype=float), (3, 3)))
 
     def __eq__(self, other: object) -> bool:
-        """True if both would be written to equal files."""
+        """True if both calibrations would be written to equal files."""
         return isinstance(other, CalibrationFile) and self.as_json() == other.as_json()
 
     def parameters(self) -> list[float]:
@@ -128,7 +128,8 @@ class CalibrationFile:
             force: shape (n, 3), in g.
             rate: shape (n, 3), in deg/s.
         """
-        # The firmware's function takes the numbers of one reading. Arrays instead of numbers give it n readings.
+        # The firmware's function takes the numbers of one reading. With arrays instead of numbers, the function
+        # calibrates n readings.
         readings = [*accel_g.T, None, *gyro_dps.T]
         force, rate = [np.zeros(0)] * 3, [np.zeros(0)] * 3
         self.to_firmware().apply(readings, force, rate)

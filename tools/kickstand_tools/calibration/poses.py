@@ -124,8 +124,8 @@ class SixPositions:
 def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
     """Find offset (g) and slope of each axis from six still poses, each side up once, in any order.
 
-    The equations are (16)-(20) of Nicolae's paper, section 4. They are solved such that each calibrated reading is 1 g
-    long, even if an axis does not point exactly up. The gyro's bias is the median of the poses.
+    The equations are (16)-(20) of Nicolae's paper, section 4. The solution makes each calibrated reading 1 g long, even
+    if an axis does not point exactly up. The gyro's bias is the median of the poses.
 
     poses: six logs, or seven with a slanted pose that checks the result. See read_log for the kinds of log.
     Raises InputError. Raises its subclass RefusedInput, with a Message, if the firmware refuses a pose or the result.
@@ -158,7 +158,7 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
 
 
 def wrong_number(captures: int) -> InputError:
-    """Return the error for a wrong number of captures."""
+    """Return the error for a wrong number of logs of poses."""
     return InputError(
         f"{captures} captures given: six are needed, one for each side up, or seven with a free pose; or one log of "
         "the whole procedure"

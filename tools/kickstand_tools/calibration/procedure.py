@@ -121,7 +121,8 @@ def _still_stretches(log: Log) -> list[tuple[int, int]]:
 def _pose(log: Log, first: int, last: int) -> Pose:
     """Average these samples.
 
-    If the sensor tilts a little, as when a hand puts it down slowly, average the middle half or else the last half.
+    The sensor may still tilt a little, for example while a hand puts it down slowly. Then average only the middle half
+    of the samples. If the sensor tilts in the middle half too, average only the last half.
     """
     name = f"{log.name}, {log.t_s[first]:.1f} to {log.t_s[last - 1]:.1f} s"
     quarter = (last - first) // 4

@@ -4,8 +4,8 @@ The alignment is R = R2 R1, two rotations by Rodrigues' formula. R1 rotates the 
 to up. R2 rotates the mean force of the braking events, levelled by R1, to backward. A braking event counts if the
 directions of its levelled force spread little.
 
-The vertical from the stops is slightly tilted. This causes a yaw error of about 3 to 4 degrees, and more braking events
-do not reduce it. The firmware's DriveAlignment does not have this error.
+The vertical from the stops is slightly tilted. This tilt causes a yaw error of about 3 to 4 degrees, and more braking
+events do not reduce it. The firmware's DriveAlignment does not have this error.
 """
 
 from array import array
@@ -24,7 +24,7 @@ MAX_DISPERSION = 0.02  # largest circular dispersion of a braking event: a sprea
 MIN_LEVEL_G = 0.03  # least levelled force; a smaller force has a random direction
 BRAKING_MPS2 = -1.0  # an interval with more deceleration than this belongs to a braking event
 MEAN_US = 100_000  # forces are averaged over this time
-LOSS_MPS = 1.5  # least reduction of the speed in a braking event; a smaller one is noise
+LOSS_MPS = 1.5  # least reduction of the speed in a braking event; a smaller reduction is noise
 MIN_EVENTS = 3
 UP = np.array([0.0, 1.0, 0.0])
 BACKWARD = np.array([0.0, 0.0, -1.0])
@@ -39,7 +39,7 @@ def rotation_between(a: Array, b: Array, axis: int) -> Array:
     Near c = -1 the quotient has no significant digits left. Therefore, if c < 0, a half turn D about a coordinate axis
     is applied first: R = Rodrigues(D a, b) D. The half turn makes c > 0.
 
-    axis: coordinate axis of the half turn, 0, 1 or 2. It must be perpendicular to b.
+    axis: coordinate axis of the half turn, 0, 1 or 2. The axis must be perpendicular to b.
     """
     half_turn = np.eye(3)
     if a @ b < 0.0:
@@ -106,7 +106,7 @@ class PublishedAlignment:
     def quality_deg(self) -> float:
         """Standard error of the mean direction of the accepted braking events; 180 for fewer than two events.
 
-        It does not include the error of a wrong vertical.
+        The standard error does not include the error of a wrong vertical.
         """
         n = self.counted
         return float(np.degrees(np.sqrt(circular_dispersion(self._means) / n))) if n > 1 else 180.0

@@ -8,7 +8,7 @@ rates give the rate about left, the yaw rate and the lean. This shows two mistak
 * All rates have the opposite sign, or all axes are left-handed. The rate about left then has the opposite sign, but the
   product keeps its sign.
 
-Logs of a parked vehicle are never judged, nor logs of a car, because it does not lean.
+Logs of a parked vehicle are never judged. Logs of a car are never judged either, because a car does not lean.
 """
 
 from dataclasses import dataclass
@@ -26,11 +26,11 @@ MOVES_S, MOVES = 1.6, 0.1
 # The gyro has the opposite sign if Leaning.share is under AGAINST and differs from 0 by over SURE standard deviations.
 # With the opposite sign, the share was -1.6 to -1.0.
 AGAINST, SURE = -0.5, 5.0
-# The calmest seconds are the share CALMEST of all seconds, but at least LEAST seconds. A standard deviation CALM_G of
-# the force counts as much as the argument calm_rate of calm_rates().
+# The calmest seconds are the share CALMEST of all seconds, but at least LEAST seconds. In calm_rates(), the standard
+# deviation CALM_G of the force counts as much as the standard deviation calm_rate of the rates.
 CALMEST, LEAST, CALM_G = 0.2, 3, 0.02
 # The gyro's bias is known if the share AGREE of the calmest seconds is within KNOWN_DPS. Otherwise the FEW calmest
-# seconds are tried. In a ride that is mostly one long, steady bend, they are a standstill.
+# seconds are tried. In a ride that is mostly one long, steady bend, these few seconds are a standstill.
 AGREE, FEW, KNOWN_DPS = 0.8, 5, 3.0
 
 

@@ -27,9 +27,9 @@ from .cells import CELL_S, LogCells
 from .turning import Turning
 
 WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # short windows are used if the log has no long window without a gap
-MOST_WINDOWS = 16  # number of judged windows, those with the largest rates
-CALM_DPS = 2.0  # the argument calm_rate of calm_rates(), in deg/s
-TRIED = 6  # number of exchanges that are fitted; they are the best ones before velocity and bias are fitted
+MOST_WINDOWS = 16  # number of windows that are judged: the windows with the largest rates
+CALM_DPS = 2.0  # value of calm_rate for calm_rates(), in deg/s
+TRIED = 6  # number of exchanges whose velocity and bias are fitted; chosen by their residual before the fit
 
 # An exchange must reduce the mean square of the residual force (g2) by this factor. In correct logs, simulated and
 # recorded, the factor is at most 1.1 for every exchange. If the gyro has the opposite sign, the factor is 1.7 to 470.
@@ -160,9 +160,9 @@ def _windows(known: Bools, seconds: float) -> Ints:
 def _bias(cells: LogCells) -> Array | None:
     """Return the gyro's bias, shape (3), in deg/s; None if it is unknown.
 
-    It is the median of the gyro's readings in the calmest seconds, in which the bike mostly rides straight. If their
-    rates differ too much, the bias is 0, because a phone subtracts its bias. If the log's mean rate is too large for a
-    bias of 0, the bias is unknown.
+    The bias is the median of the gyro's readings in the calmest seconds, in which the bike mostly rides straight. If
+    their rates differ too much, the bias is 0, because a phone subtracts its bias. If the log's mean rate is too large
+    for a bias of 0, the bias is unknown.
     """
     seconds = _windows(cells.known, 1.0)
     if not len(seconds):

@@ -17,7 +17,7 @@ from .handedness import handedness
 from .units import speed_unit
 
 _LIMITS = np.array(3 * [MOST_G] + [np.inf] + 3 * [MOST_DPS])  # limits of readings; a log made in Python may exceed them
-_AGAIN_S = 20.0  # the unit of the speed is checked again after each such part of the log
+_AGAIN_S = 20.0  # the unit of the speed is checked again each time this much of the log was read
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,8 @@ class Checks:
             self._judge_speed(self._table.cells())
 
     def remarks(self, axes: bool = True, calibration: CalibrationFile | None = None) -> list[Message]:
-        """Return at most one remark about the log's axes, and one if the log contradicts the calibration.
+        """Return at most one remark about the log's axes, and at most one remark that the log contradicts the
+        calibration.
 
         axes: False to skip the checks of the axes.
         calibration: None to skip the check of the calibration.

@@ -1,7 +1,7 @@
 """Checks that a calibration fits the mount of a ride. Force, rates and speed show where up and forward are.
 
-* The force shows up. On a balanced bike, the force while riding points along the bike's own up axis. In a car it nearly
-  does.
+* The force shows up. On a balanced bike, the force while riding points along the bike's own up axis. In a car the force
+  nearly points along up.
 * The speed shows forward. Braking and speeding up in a straight line change the force along the forward axis. So this
   force correlates with the changes of the log's speed.
 * The bends of a motorcycle show forward without a speed. A bike that leans further to the right also yaws faster to the
@@ -25,17 +25,17 @@ from .cells import CELL_S, LogCells
 
 MEAN_S = 0.5  # means over this time are used to judge up and the bends
 UP_DEG, FORWARD_DEG = 15.0, 20.0  # if up or forward differs by more, the calibration belongs to another mount
-# If the two poses were swapped, "up" is the up axis of the bike on the kickstand. It then leans by up to this angle.
+# If the two poses were swapped, "up" is the up axis of the bike on the kickstand. That axis leans by up to LEANED_DEG.
 LEANED_DEG = 25.0
 BACKWARD_DEG = 150.0  # if forward differs by more than this, forward and backward are exchanged
 TURNING_DPS, TURNING_S = 5.0, 10.0  # up is judged if the rates are over TURNING_DPS for at least TURNING_S in all
 STRAIGHT_DPS = 8.0  # the speed shows forward where the rates are under this
-# least number of changes of speed from second to second, and their least standard deviation
+# forward_by_speed() needs this many changes of speed from second to second, with this standard deviation
 SPEEDS, SPEED_MPS = 20, 0.5
 LATE_S = (0, 1, 2)  # delays of the speed that are tried
-BENDS, BENDS_DPS = 120, 1.0  # least number of means, and least standard deviation of the changes of their yaw rate
-# Forward is certain if its correlation is over SURE_SPEED (by the speed) or SURE_BENDS (by the bends). Correct
-# calibrations have over 0.85 and 0.6.
+BENDS, BENDS_DPS = 120, 1.0  # least number of means for forward_by_bends(), and least spread of their yaw rate
+# Forward is certain if its correlation is over SURE_SPEED (by the speed) or SURE_BENDS (by the bends). With a correct
+# calibration, the correlation is over 0.85 by the speed and over 0.6 by the bends.
 SURE_SPEED, SURE_BENDS = 0.8, 0.55
 # Forward is certainly reversed if the force along forward has a lower correlation than this with all changes of speed.
 # A correct calibration has over 0.8, even on slopes of 12 %.
@@ -191,8 +191,8 @@ def of_calibration(found: CalibrationFile, before: CalibrationFile | None = None
     the user is asked. An x axis that points down gives no notice, because a phone can lie on its side.
 
     found: the calibration with the new alignment.
-    before: the earlier calibration, whose offset and slope are used. A notice says so if it belongs to another
-        mount.
+    before: the earlier calibration, whose offset and slope are used. If the earlier calibration belongs to another
+        mount, a notice says so.
     """
     notices: list[Message] = []
     up = found.vehicle_from_sensor[1]

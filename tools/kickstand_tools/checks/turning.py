@@ -1,6 +1,6 @@
 """Measures how well the rates of a log explain its forces, window by window.
 
-The rates of a window are integrated to a rotation C. It leads from the sensor's axes at each instant to the sensor's
+The rates of a window are integrated to a rotation C. C rotates from the sensor's axes at each instant to the sensor's
 axes at the beginning of the window. In the axes at the beginning, the specific force f (in g) is a constant vector `up`
 plus the acceleration. The acceleration follows from the velocity V, which is given in the sensor's rotating axes:
 
@@ -21,8 +21,8 @@ from .cells import CELL_S
 KNOT_S = 5.0  # time between the knots of an unknown velocity
 EVENED = 10  # number of cells over which the rotated forces are averaged, to remove vibration
 FORCE_G = 0.1  # standard deviation of the noise of these means
-# Standard deviations of the prior. VELOCITY_MPS is that of an unknown velocity. DIRECTION is that of each component of
-# the constant direction. BIAS_DPS is that of the correction of the gyro's bias.
+# Standard deviations of the prior. VELOCITY_MPS is for an unknown velocity. DIRECTION is for each component of the
+# constant direction. BIAS_DPS is for the correction of the gyro's bias.
 VELOCITY_MPS, DIRECTION, BIAS_DPS = 20.0, 1.0, 3.0
 BIAS_STEPS, MOST_DPS = 2, 5.0  # number of steps that correct the bias, and largest change in one step
 LATE_S = (0.0, 0.5, 1.0, 1.5)  # delays of the speed that are tried, because a satellite receiver's speed is late
@@ -65,7 +65,7 @@ class Turning:
             turn = _turn(sign * np.radians(self._rate - self._bias))
             both = np.einsum("wnij,wnk->wijk", turn, self._force) / turn.shape[1]
             right = np.linalg.det(exchanges) * sign > 0.0
-            # To rotate the gyro's readings is the same as to rotate the forces by the inverse.
+            # Rotating the gyro's readings has the same effect as rotating the forces by the inverse rotation.
             up = np.einsum("wijk,qkj->qwi", both, sign * exchanges[right])
             left[right] = sizes - np.mean(np.sum(up**2, axis=2), axis=1)
         return left
@@ -101,7 +101,7 @@ class Turning:
 
     def _fit(self, rate: Array, turn: Array, turned: Array, velocity: tuple[Array, Array]) -> "_Fit":
         values, changes = (part[..., None, None] for part in velocity)
-        parts = turn @ (cross_matrix(rate) * values + np.eye(3) * changes)  # (k, w, n, 3, 3)
+        parts = turn @ (cross_matrix(rate) * values + np.eye(3) * changes)  # shape (k, w, n, 3, 3)
         along = _evened(np.concatenate(list(parts), axis=-1) / STANDARD_GRAVITY)
         moved = _evened(turned)
         square = np.einsum("wnij,wnik->wjk", along, along)
@@ -174,7 +174,7 @@ def _evened(values: Array) -> Array:
 def _knots(windows: int, cells: int) -> tuple[Array, Array]:
     """Return the functions of an unknown velocity, one per knot, and their derivatives.
 
-    Each function is 1 at its own knot and 0 at the other knots. Between knots it is linear.
+    Each function is 1 at its own knot and 0 at the other knots. Between knots each function is linear.
     """
     time = (np.arange(cells) + 0.5) * CELL_S
     count = round(cells * CELL_S / KNOT_S) + 1

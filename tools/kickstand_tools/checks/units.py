@@ -3,7 +3,7 @@
 A wrong unit of the speed is found later. From one second to the next, the speed changes by the acceleration along the
 vehicle. So the changes of the speed are compared with the specific force that caused them. The mounting of the sensor
 does not matter: forward is the direction in which force and change of speed correlate best. Turns, slopes and a moving
-rider add to the force only. They can make the change of speed seem too small, but never too large.
+rider add to the force only. These effects can make the change of speed seem too small, but never too large.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from ..common.messages import Message, Remedy
 from ..signals import Array, Ints, best_lag
 from .cells import LogCells
 
-LEAST_G = 0.4  # if the median force is smaller, gravity is missing; even a pose with an offset of 0.6 g has more
+LEAST_G = 0.4  # gravity is missing if the median force is smaller than this; an offset of 0.6 g leaves more
 MPS2_G = 5.0, 20.0  # a median force between these is in m/s2; larger values are not readings, and are left out later
 MILLISECONDS_US = 4e6  # samples this far apart have times in ms that were read as s, at 250 samples per second or fewer
 # Largest ratio of the logged change of speed to the change that the force explains. Speeds in knots give 1.94, and

@@ -1,7 +1,7 @@
 """Commands that other packages add to `kickstand`, by entry points of the group "kickstand.commands".
 
-The name of an entry point is the command's name. Its object is a click.Command. For example, in the other package's
-pyproject.toml:
+The name of an entry point is the command's name. The entry point's object is a click.Command. For example, in the other
+package's pyproject.toml:
 
     [project.entry-points."kickstand.commands"]
     laps = "my_package.laps:laps_command"

@@ -37,8 +37,8 @@ def six(poses: tuple[Path, ...], out: Path) -> None:
     """Measure the sensor's errors from six still poses, each side up once, in any order.
 
     One log of the whole procedure calibrates accelerometer and gyro. Lay the sensor still for three seconds on each
-    side, and once slanted. The turns between the poses calibrate the gyro. Six logs of one pose each give only offset
-    and slope of the accelerometer. A seventh log, of a slanted pose, checks them.
+    side, and once at a slant. The turns between the poses calibrate the gyro. Six logs of one pose each give only
+    offset and slope of the accelerometer. A seventh log, of a slanted pose, checks them.
     """
     check_output(out, list(poses))
     found = fit_procedure(poses[0]) if len(poses) == 1 else fit_six_positions(poses)
@@ -46,15 +46,15 @@ def six(poses: tuple[Path, ...], out: Path) -> None:
     _write(out, found.calibration)
 
 
-@calibrate_command.command(short_help="Align to the bike, from a pose on the kickstand and one upright.")
+@calibrate_command.command(short_help="Align to the bike, from a pose on the kickstand and an upright pose.")
 @file_argument("kickstand", "KICKSTAND.csv")
 @file_argument("upright", "UPRIGHT.csv")
-@click.option("--calibration", type=PATH, help="The result of `kickstand calibrate six`, to build on.")
+@click.option("--calibration", type=PATH, help="The result of `kickstand calibrate six`, which is extended.")
 @click.option("--side", type=click.Choice(["left", "right"]), default="left", help="The side of the kickstand.")
 @OUT
 @RIGHT_HANDED
 def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out: Path) -> None:
-    """Find how the sensor is mounted on the bike, from a pose on the kickstand and one upright."""
+    """Find how the sensor is mounted on the bike, from a pose on the kickstand and an upright pose."""
     check_output(out, [kickstand, upright])
     before = read_calibration(calibration) if calibration else None
     found = fit_two_positions(kickstand, upright, before, side)
@@ -65,8 +65,8 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
 
 @calibrate_command.command(short_help="Align to any vehicle, from driving with braking.")
 @file_argument("logs", "LOG.csv...", nargs=-1, required=True)
-@click.option("--calibration", type=PATH, help="An earlier calibration: six positions, a motorcycle's two poses.")
-@click.option("--vehicle", type=VEHICLES, help="Default: motorcycle with a calibration by two poses, else car.")
+@click.option("--calibration", type=PATH, help="An earlier calibration, by six positions or two poses.")
+@click.option("--vehicle", type=VEHICLES, help="Default: motorcycle if calibrated by two poses, otherwise car.")
 @click.option("--method", type=click.Choice(["improved", "published"]), default="improved")
 @OUT
 @RIGHT_HANDED

@@ -66,7 +66,7 @@ OUT = out_option("The file to write.")
 OUT_LOG = out_option("The log to write, packed if it ends in .gz.")
 OUT_DIRECTORY = out_option("The directory to write to.")
 RIDE = file_argument("ride", "RIDE.csv")
-CALIBRATION = click.option("--calibration", type=PATH, help="A CAL.json. Default: the one beside the ride.")
+CALIBRATION = click.option("--calibration", type=PATH, help="A CAL.json. Default: the file beside the ride.")
 
 
 def from_to(start: str, end: str) -> Command:

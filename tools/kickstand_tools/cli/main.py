@@ -16,8 +16,8 @@ import click
 from ..common.errors import DISTRIBUTION, InputError, cause, printable
 from . import added
 
-# Each command with its module and its line of help. The module contains the function NAME_command. It is imported only
-# when the command runs, because most modules import numpy, and this takes long
+# Each command with its module and its line of help. The module contains the function NAME_command. The module is
+# imported only when the command runs, because most modules import numpy, which takes long
 COMMANDS = {
     "calibrate": (".calibrate", "Compute a calibration from recorded poses or drives."),
     "check": (".board", "Measure a board and everything wired to it, in two minutes."),

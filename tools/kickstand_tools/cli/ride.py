@@ -114,8 +114,8 @@ def join_command(ride: Path, track: Path, out: Path) -> None:
 @click.command()
 @common.file_argument("a", "A.csv")
 @common.file_argument("b", "B.csv")
-@click.option("--calibration-a", type=common.PATH, help="The CAL.json of A. Default: the one beside A.")
-@click.option("--calibration-b", type=common.PATH, help="The CAL.json of B. Default: the one beside B.")
+@click.option("--calibration-a", type=common.PATH, help="The CAL.json of A. Default: the file beside A.")
+@click.option("--calibration-b", type=common.PATH, help="The CAL.json of B. Default: the file beside B.")
 @click.option("--plot", "picture", type=common.PATH, metavar="FILE.png", help="Draw both leans and their difference.")
 @common.JSON
 @common.RIGHT_HANDED
@@ -293,8 +293,8 @@ def overlay_command(
 def _from_export(source: Path, calibration: Path | None) -> tuple[Imported, CalibrationFile] | None:
     """Import an app's export or a table, and find its calibration.
 
-    The calibration is the file of the option --calibration, or the one beside the source. Without a file, the recording
-    is aligned by its bends, and a line on standard error says so.
+    The calibration is the file of the option --calibration, or the file beside the source. Without a file, the
+    recording is aligned by its bends, and a line on standard error says so.
 
     Returns the imported recording and its calibration. Returns None for other files, such as a log.
     """
@@ -343,7 +343,7 @@ def _log_of(source: Path, calibration: Path | None, out: Path) -> tuple[Path | L
 
 
 def _overview(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> Overview:
-    """Return the overview of a ride from _opened(). Print all its notices, first those of the import."""
+    """Return the overview of a ride from _opened(). Print all its notices, first the notices of the import."""
     opened, imported = _opened(source, calibration, live, **stretch)
     with Bar("reading") as bar:
         seen = overview(opened, bar.reach)

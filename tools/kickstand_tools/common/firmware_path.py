@@ -27,7 +27,8 @@ def config() -> Path:
     """Return the path of the user's config.py.
 
     In a checkout as the current directory, this is the checkout's file. For tools that were installed as a package, it
-    is config.py in the current directory, if there is one. Otherwise it is the file that belongs to these tools.
+    is config.py in the current directory, if there is one. Without such a file, it is the config.py that belongs to
+    these tools.
     """
     here = Path("firmware").resolve()
     if (here / "kickstand").is_dir() and (here / "config.py").is_file():

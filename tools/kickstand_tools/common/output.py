@@ -33,7 +33,7 @@ def _resolved(path: Path) -> Path:
     """Return the path without symbolic links. Raises InputError if the links form a circle."""
     try:
         return path.resolve()
-    except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle, before Python 3.13
+    except (OSError, RuntimeError) as error:  # before Python 3.13, links in a circle raise RuntimeError
         raise InputError(f"{path} cannot be followed: its links form a circle: give --out another place") from error
 
 

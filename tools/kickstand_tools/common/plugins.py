@@ -10,13 +10,13 @@ from typing import Any
 from .errors import DISTRIBUTION, InputError
 
 ENGINES = "kickstand.engines"  # see replay.Engine
-SIMULATIONS = "kickstand.simulations"  # functions like simulation.files.simulate, for more than one ride
+SIMULATIONS = "kickstand.simulations"  # functions like simulation.files.simulate that simulate several rides
 
 
 def entry_points(group: str) -> dict[str, EntryPoint]:
     """Return the entry points of a group, by name.
 
-    If several have the same name, this project's entry point is used, or else the first.
+    If several have the same name, this project's entry point is used. If none is this project's, the first is used.
     """
     found: dict[str, EntryPoint] = {}
     for distribution in distributions():

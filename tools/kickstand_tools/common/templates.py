@@ -1,7 +1,7 @@
 """Makes HTML, CSS and SVG from Jinja templates.
 
-A template is a file beside the module that fills it. A template includes another by its path in kickstand_tools:
-`{% include "common/theme.css" %}`.
+A template is a file beside the module that fills it. A template includes another template by its path in
+kickstand_tools: `{% include "common/theme.css" %}`.
 """
 
 import base64

@@ -85,7 +85,7 @@ def demo(hand: bool = False, cpython: bool = False, display: str = "lcd", user: 
     if hand and not watched:
         raise InputError("you steer the bike with keys: run kickstand demo --hand in a terminal")
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # for a terminal that cannot show block characters
+        sys.stdout.reconfigure(errors="replace")  # needed by terminals that cannot show block characters
     engine = "CPython" if cpython or not unix_port.available() else "MicroPython"
     if not cpython and engine == "CPython":
         print("No MicroPython package for this system: the same firmware runs on CPython instead.")

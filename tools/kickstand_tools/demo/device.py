@@ -6,7 +6,7 @@ SPEED: Simulated seconds per second. 0 means as fast as possible.
 DISPLAY: "lcd", "ssd1306" or "sh1106".
 
 Every 50 simulated ms the program prints a line of JSON (see score.State). All other lines of its output are the
-firmware's console. It reads one command per line from standard input:
+firmware's console. The program reads one command per line from standard input:
 
     short, long                         press the button
     left, right, kickstand, upright     steer the bike by hand
@@ -138,7 +138,7 @@ class Demo:
         """Switch the board on, and restart it after every reset, until the time is over or "quit" arrives."""
         self.board.install()
         from kickstand.start import main  # after install(), which replaces `machine` and `time`
-        from kickstand.ui.page_ring import MOTORCYCLE  # the pages of user.py come after these
+        from kickstand.ui.page_ring import MOTORCYCLE  # the pages of user.py come after these pages
 
         if not self._steer and "user.py" in os.listdir():
             for k in range(len(MOTORCYCLE)):

@@ -52,7 +52,7 @@ class DeviceProcess:
             text=True,
             encoding="utf-8",
             errors="replace",
-            start_new_session=True,  # so Ctrl-C reaches only this process
+            start_new_session=True,  # so that Ctrl-C does not reach the device's process
         )
         threading.Thread(target=self._read, daemon=True).start()
 

@@ -1,6 +1,6 @@
 """Simulates a bike that you steer with keys or in the browser. Runs on CPython and MicroPython.
 
-Its motion follows the same equations as simulation/scripted/script.py.
+The bike's motion follows the same equations as simulation/scripted/script.py.
 """
 
 from math import degrees, pi, radians, sin
@@ -48,7 +48,7 @@ class HandBike:
     def command(self, name):
         """Carry out a command.
 
-        "left" and "right" set off. If the bike is riding already, they lean it by 5 degrees more to that side.
+        "left" and "right" make a standing bike set off. They lean a riding bike 5 degrees further to that side.
         "upright" and "kickstand" stop the bike in this pose.
         """
         if name in ("kickstand", "upright"):
@@ -65,7 +65,7 @@ class HandBike:
         self._lean_wish = 0.0
 
     def ride(self, speed_mps):
-        """Set off, or change the speed. speed_mps must be over script.RIDING_MPS. The bike does not lean below it."""
+        """Set off, or change the speed. speed_mps must be over script.RIDING_MPS. A slower bike does not lean."""
         self._pose = "riding"
         self._cruise = speed_mps
 

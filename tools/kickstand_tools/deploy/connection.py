@@ -26,7 +26,7 @@ _HEARD_BYTES = 3000
 ANSWER_S = 10
 _STARTING_S = 3  # a starting board ignores input for up to this time
 _POLL_S = 0.01
-_PROGRAM_S = 60  # longest run time of a program. It is long because an emulated board compiles the modules slowly
+_PROGRAM_S = 60  # longest run time of a program; long, because an emulated board compiles the modules slowly
 _EMULATED = "socket:"  # the name of an emulated board's port starts with this
 _SLOWER = 12  # factor on time limits for an emulated board, which is slow on a busy computer
 _RESTART_S = 2  # time to wait until the board's USB port is back, because the next command may follow at once
@@ -76,7 +76,8 @@ class NotInstalled(Message):
 
 @dataclass(frozen=True)
 class UnfitFirmware(Message):
-    """The firmware on the board lacks a module. It has another version, or an update was interrupted.
+    """The firmware on the board lacks a module. The board has another version of the firmware, or an update was
+    interrupted.
 
     name: Name of the board's port.
     missing: The error about the missing module.
@@ -246,7 +247,7 @@ def literal(text: bytes, *shapes: Any) -> Any:
     shapes: the allowed types of the value. Each is a type, or None, or a tuple with the types of a tuple's values.
     Integers must be 0 or larger.
 
-    Raises InputError for other values. Another device at the port may send them.
+    Raises InputError for other values. Another device at the port may send such values.
 
     >>> literal(b"('/rides', 3)", (str, int))
     ('/rides', 3)
@@ -254,7 +255,7 @@ def literal(text: bytes, *shapes: Any) -> Any:
     try:
         value = ast.literal_eval(text.decode().strip())
     except (SyntaxError, ValueError, TypeError, MemoryError, RecursionError):
-        value = literal  # this function matches none of the shapes
+        value = literal  # not a literal, so it matches none of the shapes
     if any(_fits(value, shape) for shape in shapes):
         return value
     shown = ascii(text[:40].decode(errors="replace").strip())

@@ -31,7 +31,8 @@ def firmware_files() -> dict[str, Path]:
 def contents(mpy: int | None, compiler: bytecode.Compiler | None = None) -> dict[str, bytes]:
     """Return {path on the board: content}, in the order of firmware_files().
 
-    mpy: The board's sys.implementation._mpy. The package is compiled to .mpy files for it. None keeps the .py files.
+    mpy: The board's sys.implementation._mpy. The package is compiled to .mpy files for this board. None keeps the .py
+        files.
     compiler: See bytecode.compiled().
 
     main.py and config.py are always .py files, because MicroPython does not start a main.mpy, and users edit config.py.

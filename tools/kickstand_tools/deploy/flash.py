@@ -123,7 +123,7 @@ def prepare(
 
     wanted: The files that the board should have, see contents().
     replace_config: Also replace the user's config.py.
-    there: Files of other projects on the board. None if they were not searched.
+    there: Files of other projects on the board. None if such files were not searched.
 
     Raises InputError if a file is in the way, or if the board has too little room.
     """
@@ -138,8 +138,8 @@ def prepare(
 def install(transport: SerialTransport, update: Update, progress: Progress | None = None) -> InstallResult:
     """Carry out an update.
 
-    main.py is removed first. It gets its name again only after all files are verified. So after an interruption, the
-    board starts nothing and can be flashed again. It never runs a mixture of versions.
+    main.py is removed first. The new main.py gets its name only after all files are verified. So after an interruption,
+    the board starts nothing and can be flashed again. The board never runs a mixture of versions.
 
     Raises InputError if a file reads back differently, and OSError or TransportError if the connection fails.
     """

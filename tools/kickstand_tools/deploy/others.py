@@ -1,4 +1,4 @@
-"""Finds another project's main.py, boot.py and config.py on a used board. They are renamed and kept."""
+"""Finds another project's main.py, boot.py and config.py on a used board. These files are renamed and kept."""
 
 import ast
 import hashlib
@@ -54,7 +54,7 @@ class Others:
     files: Files and folders of the board, after renaming.
     moves: New path of each file to rename, by its present path.
     config: Content that the user's config.py should have. None if the board has no config.py, or if it is renamed.
-    mended: True if this content differs from the present content.
+    mended: True if the content in `config` differs from the present content.
     """
 
     files: BoardFiles
@@ -72,7 +72,7 @@ class Contents:
     """The contents of a board.
 
     files: Files and folders of the board.
-    texts: Content of those of the files MAIN, BOOT and CONFIG that exist, by path.
+    texts: Contents of the files MAIN, BOOT and CONFIG, as far as they exist, by path.
     """
 
     files: BoardFiles
@@ -152,8 +152,9 @@ def _settings_named(content: bytes) -> int:
 
 
 def _does_something(content: bytes) -> bool:
-    """True if the file contains more than comments and strings. The boot.py that MicroPython puts on an ESP32 does not
-    contain more."""
+    """True if the file contains more than comments and strings. The boot.py that MicroPython puts on an ESP32 contains
+    only comments and strings.
+    """
     try:
         body = ast.parse(content).body
     except (SyntaxError, ValueError, RecursionError, MemoryError):

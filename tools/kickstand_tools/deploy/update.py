@@ -16,7 +16,8 @@ from .board_files import BoardFiles, fingerprint
 from .firmware_files import CONFIG, MAIN, MODULE_ENDINGS, PACKAGE, unfinished
 
 FOLDER_BLOCKS = 2
-# Blocks that must stay free. A folder may need more than two, and littlefs replaces a worn block before freeing it
+# Blocks that must stay free. A folder may need more than two blocks, and littlefs replaces a worn block before freeing
+# it
 SPARE_BLOCKS = 4
 _POINTER = 4
 
@@ -41,7 +42,7 @@ class Update:
     These are the steps in their order:
         moves: New paths of files of another project, by their present paths. They are renamed.
         remove: Files to remove, main.py first.
-        remove_folders: Folders to remove. They are empty by then.
+        remove_folders: Folders to remove, which are empty by then.
         make_folders: Folders to create.
         copy: Contents of the files to copy, by path, main.py last.
 
@@ -138,7 +139,7 @@ def _folders(path: str) -> list[str]:
 def _refuse_in_the_way(wanted: dict[str, bytes], folders: set[str], kept: set[str]) -> None:
     """Raise InputError if MicroPython would import a user's file instead of a wanted file.
 
-    It would import a folder lean/ instead of lean.py, and lean.py instead of lean.mpy.
+    MicroPython imports a folder lean/ instead of lean.py, and lean.py instead of lean.mpy.
     """
     modules = {_module(path) for path in wanted}
     for path in sorted(kept):

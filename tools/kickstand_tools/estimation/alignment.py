@@ -34,8 +34,8 @@ from .windows import WINDOW_S, Windows, windows_of
 SLOWEST_HZ = 20.0  # least sample rate
 LONGEST_S = 1800.0  # the longest part of a ride that is used; a longer part does not improve the result
 # Standard deviations of the prior
-ROTATION_SIGMA = 10.0  # rad: misalignment, so large because the misalignment is unknown
-AXES_SIGMA = 0.012  # ratio: scale and cross-axis errors of the accelerometer
+ROTATION_SIGMA = 10.0  # misalignment, in rad; large, because nothing is known about it
+AXES_SIGMA = 0.012  # scale and cross-axis errors of the accelerometer, as a ratio
 BESIDE_SIGMA_G = 0.005  # force to the side on straights, caused by luggage or camber
 UNSETTLED = np.radians(0.5)  # if the last step changed an angle by more than this, the estimate has not converged
 # An estimated error of the sensor over ODD_SIGMAS standard deviations of its prior enlarges the standard errors. An
@@ -45,9 +45,9 @@ MAX_DEG = np.array([5.0, 5.0, 3.5])  # largest accepted standard errors of pitch
 MOVED_DEG = 8.0  # largest accepted difference between the alignments from the two halves of the ride
 CONSTANT = Hypotheses(*np.array([[1e-5], [1e-5], [1e-4], [0.0], [1.0]]))  # mount and wind do not change during the ride
 
-# The mountings of a phone that its user can name. They check the ride's result, and help if the ride has few bends.
-# A phone's axes, as seen by a person looking at the screen, are: x to the right, y to the top, z out of the screen (W3C
-# Device Orientation; the same on Android and iOS).
+# The mountings of a phone that its user can name. A named mounting checks the ride's result, and helps if the ride has
+# few bends. A phone's axes, as seen by a person looking at the screen, are: x to the right, y to the top, z out of the
+# screen (W3C Device Orientation; the same on Android and iOS).
 X, Y, Z = np.eye(3)
 
 # The rows of each matrix are left, up and forward in the phone's axes. The screen faces the rider, so it faces
@@ -118,8 +118,8 @@ class RideFit:
     Upright is the balanced position on straights. Angles are in degrees.
 
     calibration: the alignment.
-    roll_deg, pitch_deg, yaw_deg: its standard errors about forward, left and up. They come mostly from errors of the
-        sensor that a ride does not show.
+    roll_deg, pitch_deg, yaw_deg: its standard errors about forward, left and up. These errors come mostly from errors
+        of the sensor that a ride does not show.
     halves_deg: roll, pitch and yaw from the second half of the ride minus those from the first half.
     offset_g: bias of the accelerometer along left, up and forward, shape (3). The calibration subtracts it.
     offset_sigma_g: standard errors of offset_g, shape (3).
@@ -215,8 +215,8 @@ def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) ->
 def mounted_windows(log: Log) -> Windows:
     """Return the windows of the part of a log in which the sensor was mounted, along the sensor's axes.
 
-    This part is the longest stretch in which the mean force keeps its direction. Before and after it, a hand held the
-    sensor. Readings beyond MOST_G and MOST_DPS are left out. Raises RefusedInput.
+    This part is the longest stretch in which the mean force keeps its direction. Before and after this part, a hand
+    held the sensor. Readings beyond MOST_G and MOST_DPS are left out. Raises RefusedInput.
     """
     log = log.part(np.all(np.abs(log.accel_g) < MOST_G, axis=1) & np.all(np.abs(log.gyro_dps) < MOST_DPS, axis=1))
     windows = _windows(log)
@@ -228,7 +228,7 @@ def mounted_windows(log: Log) -> Windows:
     if not len(mounted):
         raise RefusedInput(RideShort(0.0, MIN_RIDING_S))
     begin, end = mounted[np.argmax(np.diff(mounted, axis=1))]
-    margin = round(MOUNTED_S / WINDOW_S)  # a mean this many windows from the edge contains only the ride
+    margin = round(MOUNTED_S / WINDOW_S)  # number of windows from the edge after which a mean contains only the ride
     first = windows.edges[begin + margin * (begin > 0)]
     last = windows.edges[end - margin * (end < len(windows))]
     return _windows(log, (log.t_s >= first) & (log.t_s < min(last, first + LONGEST_S)))
@@ -243,7 +243,7 @@ def _windows(log: Log, part: Bools | slice = slice(None)) -> Windows:
 
 
 def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | None, notices: list[Message]) -> RideFit:
-    """Return the estimate as a RideFit. Raises RefusedInput if its quality is too low."""
+    """Return the estimate as a RideFit. Raises RefusedInput if the quality of the estimate is too low."""
     halves = np.degrees(found.split())
     if np.max(np.abs(halves)) > MOVED_DEG:
         raise RefusedInput(RideHalves(float(np.max(np.abs(halves)))))

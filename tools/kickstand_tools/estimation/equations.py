@@ -9,10 +9,11 @@ in level axes, minus 1 g upwards.
     p = (w_x sin t + w_y cos t) / cos q        t' = w_z - p sin q        q' = w_y sin t - w_x cos t
     l' = a_l - p v        v' = a_f + p l        u' = a_u
 
-The firmware's kickstand.lean.bike_model has the same equations, and assumes no motion sideways or up. Here, "no motion"
-is a measurement of the velocity, with noise. A velocity is wrong only briefly, but every bump causes errors of
-acceleration. The wheels' velocity is the sensor's velocity minus the rates times the sensor's position (rigid body).
-The measurements are differences that should be 0:
+The firmware's kickstand.lean.bike_model has the same equations, and assumes no motion sideways or up. Here, "no motion
+sideways or up" is a measurement of the velocity, with noise. It would be worse to measure the acceleration. The
+velocity differs from 0 only briefly, but the acceleration differs from 0 at every bump. The wheels' velocity is the
+sensor's velocity minus the rates times the sensor's position (rigid body). The measurements are differences that should
+be 0:
 
     SLIDING         the wheels' velocity sideways, because wheels do not slide
     CLIMBING        the wheels' velocity up minus the part due to the chassis' pitch. The chassis points along the road,
@@ -39,7 +40,7 @@ SLIDING, CLIMBING, SLOPING, BALANCED, ANY_SPEED, MEASURED_SPEED = range(STATES, 
 RESTING, RESTING_RATE, BACKWARD = slice(14, 17), slice(17, 20), 20
 ROWS = 21
 USUAL_MPS = 15.0  # mean of the speed's prior
-STRAIGHT = 0.1  # rad: a road is cambered up to this lean, and banked in bends with more lean
+STRAIGHT = 0.1  # in rad: at smaller leans a road is cambered, at larger leans it is banked
 STEP = 1e-6  # step of the finite differences, in the units of the unknowns
 
 
@@ -113,8 +114,8 @@ def _corrected(readings: Array, p: Array, errors: slice) -> Array:
     x, y, z = readings
     a, b, c = p[of.ROTATION]
     e = p[errors]
-    # Second order is needed. To first order, a yaw of 7 degrees would lengthen the readings by 0.8 %, like a scale
-    # error.
+    # Second order is needed. To first order, a rotation also lengthens the readings, like a scale error: by 0.8 % for a
+    # yaw of 7 degrees.
     u, v, w = 0.5 * (b * z - c * y), 0.5 * (c * x - a * z), 0.5 * (a * y - b * x)
     return np.array(
         (

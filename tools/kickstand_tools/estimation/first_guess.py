@@ -14,12 +14,12 @@ from ..signals import Array, Bools, motionless
 from ..signals.leaning import WINDOW_S, Leaning, averaged, leaning_of, speed_in_radians, without_drift
 from .windows import Windows
 
-STILL_S = 1.6  # least length of a standstill; shorter ones look like smooth riding
+STILL_S = 1.6  # least length of a standstill; a shorter standstill looks like smooth riding
 STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # largest standard deviations over STILL_S on a standing bike
 BIAS_RADPS = np.radians(4.0)  # largest bias of the gyro since its calibration; a higher mean rate is a bend
-MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # largest angle of a mounted sensor's mean force over MOUNTED_S from up
-BETWEEN_S = 20.0  # between two movements in a hand, a shorter time also counts as in the hand
-SURELY_S = 4.0  # a movement longer than this is certainly in a hand; a shorter one may be riding or a fall
+MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # largest angle between up and the mean force over MOUNTED_S, for a mounted sensor
+BETWEEN_S = 20.0  # a shorter time between two movements in a hand also counts as time in the hand
+SURELY_S = 4.0  # a movement longer than this is certainly in a hand; a shorter movement may be riding or a fall
 SLOW_S = 4.0  # changes of lean slower than this are computed from the yaw rate, faster changes from the roll rate
 TURNS_S = 40.0  # the speed is computed from the bends within this time
 CALM_S = 1.0  # length of the calm stretches that show the gyro's bias if the ride has no standstill
@@ -30,8 +30,8 @@ MIN_LIKENESS = 0.5  # least correlation between leaning and turning; bikes have 
 MAX_PUSHED = 0.5
 CAR_G, CAR_LEAN = 0.045, np.radians(5.0)  # a car has a larger rms of the force to the side, and a smaller rms of lean
 STUCK_MPS = 0.5  # a log's speed is stuck if it changes by less than this
-MAX_SPEED_FACTOR = 1.8  # largest ratio of the log's speed to the speed from the bends, or the reverse
-# The prior of the speed from the bends is USUAL_MPS. It has the weight of bends with the yaw rate USUAL_RADPS.
+MAX_SPEED_FACTOR = 1.8  # largest factor between the log's speed and the speed from the bends
+# The prior of the speed from the bends is USUAL_MPS. The prior has the weight of bends with the yaw rate USUAL_RADPS.
 USUAL_MPS, USUAL_RADPS = 10.0, 0.14
 
 
@@ -102,7 +102,7 @@ def in_hand(w: Windows) -> tuple[Bools, Bools]:
 
     Returns:
         surely: True where a hand certainly moves the sensor, or the bike has fallen, shape (n).
-        perhaps: the same, and also True in the seconds around these windows, which may not be riding either.
+        perhaps: the same, but also True in the seconds around these windows, because the bike may not be riding there.
     """
     there = ~w.gap
     mean = averaged(w.force * there[:, None], MOUNTED_S)

@@ -2,8 +2,9 @@
 
 On straights, a bike seems to lean if the sensor's mount has yielded, or if wind pushes the bike to the side for
 minutes. A hypothesis combines a mount with a strength of the wind. Its posterior weight follows from its prior
-probability and from the likelihood of the readings. If the readings do not distinguish two hypotheses, the result lies
-between both. The standard deviation of the result then grows with the difference between the two.
+probability and from the likelihood of the readings. If the readings do not distinguish two hypotheses, the result is
+between the results of the two hypotheses. The standard deviation of the result then grows with the difference between
+them.
 """
 
 from dataclasses import dataclass
@@ -17,14 +18,14 @@ from .unknowns import BESIDE, OFFSET, PARAMETERS, ROTATION, Prior
 ROLL = ROTATION.stop - 1
 BLOCK_S = 10.0  # duration of a block of windows; the random walk makes one step per block
 # Standard deviations of the process noise
-FIRM, YIELDING = np.radians([0.05, 0.11])  # rad: rotation of the mount from block to block
+FIRM, YIELDING = np.radians([0.05, 0.11])  # rotation of the mount from block to block, in rad
 CALM_G, WIND_G, STORM_G = 0.00052, 0.01047, 0.03142  # force to the side, which lasts for PUSHED_S
 PUSHED_S = 120.0
 # The other parameters change from block to block too, because a sensor warms up. Each change is a share of the standard
 # deviation of the parameter's prior.
 DRIFT = np.full(PARAMETERS, 1e-4)
 DRIFT[OFFSET] = 0.15, 0.05, 0.05
-# g: additional change of OFFSET per block. After its six positions, a sensor may warm up and change by 0.03 g within
+# Additional change of OFFSET per block, in g. After its six positions, a sensor may warm up and change by 0.03 g within
 # minutes.
 DRIFT_G = 0.0015
 # Minus twice the logarithm of the prior probability. A light lasting wind is common, but its readings look like those

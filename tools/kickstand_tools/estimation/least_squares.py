@@ -25,8 +25,8 @@ WEIGHING_ROUNDS = 2  # number of steps that recompute the weights of the hypothe
 # The unbalance of a ride on roads with camber. A changing camber unbalances the bike, so a ride with a smaller
 # unbalance was on roads with less camber.
 CAMBERED = 0.5
-MAX_LEAN = 0.5  # rad: largest change of an angle in one step; the equations are not linear over a larger change
-MAX_PITCH = 1.2  # rad: largest pitch, as in the firmware
+MAX_LEAN = 0.5  # largest change of an angle in one step, in rad; the equations are not linear over a larger change
+MAX_PITCH = 1.2  # largest pitch, in rad, as in the firmware
 START = np.array([1.0, 0.3, 1.0, 1.0, 20.0, 0.03, 0.03, 0.03])  # standard deviations of the first state's prior
 # A steady ride on a straight may look like a standstill for up to BRIEF windows. Then a residual within AROUND windows
 # is over CONTRADICTED standard deviations. At real standstills, all these residuals are under 2 standard deviations.
@@ -91,7 +91,7 @@ class Estimate:
     def split(self) -> Array:
         """Estimate a change of the misalignment in the middle of the ride.
 
-        Returns the misalignment in the second half minus that in the first half, shape (3), in rad.
+        Returns the misalignment in the second half minus the misalignment in the first half, shape (3), in rad.
         """
         walks = self._likely.random_walks(self.prior, self.parameters)
         middle = len(self.parameters) // 2
@@ -142,8 +142,8 @@ class Estimate:
     def _use_own_noise(self) -> None:
         """Set the noise from this ride's residuals.
 
-        Only the covariance uses this noise. The states are kept. They were estimated with the larger noise of a rough
-        ride, because it gives less weight to lasting errors that the model lacks.
+        Only the covariance uses this noise. The states are kept. The states were estimated with the larger noise of a
+        rough ride. That noise gives less weight to lasting errors that the model lacks.
         """
         off = self._residuals()
         self.noise.count_own_misfit()

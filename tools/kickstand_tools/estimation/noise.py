@@ -1,7 +1,7 @@
 """Defines the process noise and the measurement noise of equations.py, with all their parameters. The random walk of
 the mount and of the sensor's errors is in hypotheses.py.
 
-Each line has the form: symbol = default # unit: meaning. All values are standard deviations. A disturbance that lasts
+Each line has the form: symbol = default # meaning, unit. All values are standard deviations. A disturbance that lasts
 for tau seconds appears in many windows of T seconds. Measurements that share an error are not independent. Therefore
 the variance in each window is sigma^2 2 tau / T.
 """
@@ -16,19 +16,20 @@ from .unknowns import BIAS, FORWARD, LEAN, LEFT, PITCH, UP
 from .windows import Windows
 
 # Process noise, per square root of a second
-ANGLE_ROOT = np.radians(0.2)  # rad: lean and pitch, due to vibration of the gyro
-VELOCITY_ROOT = (0.05, 0.05, 0.10)  # m/s: velocity left, up, forward, due to vibration of the accelerometer
-BIAS_ROOT = np.radians(0.005)  # rad/s: the gyro's bias if the log has a temperature
-# rad/s: the gyro's bias without a temperature. The bias of a gyro that warms up changes by 0.6 deg/s in five minutes.
+ANGLE_ROOT = np.radians(0.2)  # lean and pitch, due to vibration of the gyro, in rad
+VELOCITY_ROOT = (0.05, 0.05, 0.10)  # velocity left, up, forward, due to vibration of the accelerometer, in m/s
+BIAS_ROOT = np.radians(0.005)  # the gyro's bias if the log has a temperature, in rad/s
+# The gyro's bias if the log has no temperature, in rad/s. The bias of a gyro that warms up changes by 0.6 deg/s in five
+# minutes.
 WARMING_ROOT = np.radians(0.01)
 # Noise while readings are missing or a hand holds the sensor: lean and pitch (rad), velocity left, up, forward (m/s).
-# It grows with the square root of the time, by LOST_ROOT in the first second, and never exceeds LOST_MOST.
+# This noise grows with the square root of the time, by LOST_ROOT in the first second, and never exceeds LOST_MOST.
 LOST_ROOT = np.array([np.radians(30.0), np.radians(5.0), 3.0, 1.0, 4.0])
 LOST_MOST = np.array([np.radians(60.0), np.radians(8.0), 20.0, 2.0, 20.0])
 # In a jolt, a sample's rate differs from the window's mean by more than JOLTED_RADPS. The angles are then wrong by
 # JOLTED_S times the excess.
 JOLTED_RADPS, JOLTED_S = np.radians(150.0), 0.06
-JOLT = 4.0  # standard deviations: a larger residual of the process model is a jolt, and is down-weighted (Cauchy)
+JOLT = 4.0  # a larger residual of the process model, in standard deviations, is a jolt and is down-weighted (Cauchy)
 
 # Measurement noise. Each name that ends in _S is the time that such an error lasts.
 # The sideways velocity of the wheels has a constant part, and a part in proportion to speed x tan(lean).
@@ -44,20 +45,21 @@ BALANCE_G, BALANCE_S = 0.011, 3.0  # force to the side, due to wind, camber and 
 BALANCE_LEANED_G, BALANCE_ROLLING = 0.045, 0.05
 BALANCE_MIN_MPS = 4.0  # least speed of a balanced bike; at lower speeds, steering and feet also balance it
 ANY_MPS, ANY_S = 20.0, 60.0  # difference of the speed from USUAL_MPS, for a ride in which nothing else shows the speed
-SPEED_MPS = 1.0  # the log's speed, measured once per second, because a receiver's error lasts for some seconds
+SPEED_MPS = 1.0  # the log's speed, if there is one per second; a receiver's error lasts for some seconds
 REST_MPS, REST_RADPS = 0.05, np.radians(0.15)  # velocity and rates of a bike that stands
-HAND_MPS = 0.5  # velocity in a window of a sensor that a hand moves
+HAND_MPS = 0.5  # velocity in a window in which a hand moves the sensor
 BACKWARD_MPS = 0.3  # speed below 0, because bikes hardly roll backwards
-OUTLIER = 2.0  # standard deviations: larger residuals of measurements are down-weighted (Cauchy)
+OUTLIER = 2.0  # larger residuals of measurements, in standard deviations, are down-weighted (Cauchy)
 LASTING_S = {eq.SLIDING: SLIDE_S, eq.CLIMBING: DIVE_S, eq.SLOPING: SLOPE_S, eq.BALANCED: BALANCE_S, eq.ANY_SPEED: ANY_S}
 
-# The roughness of a ride is the rms of these residuals divided by EXPECTED, their rms in a rough ride.
+# The roughness of a ride is the rms of the residuals in ROUGH, divided by EXPECTED. EXPECTED is the rms of each
+# residual in a rough ride.
 ROUGH = [LEAN, PITCH, LEFT, UP, FORWARD, eq.SLIDING, eq.CLIMBING]
 EXPECTED = np.array([0.38, 0.38, 0.38, 0.38, 0.38, 0.5, 0.5])
 ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
-# A resonating mount causes accelerations that are not the bike's. They are white noise only if they are brief. The
-# residual CLIMBING shows their size and how long they last. It is the upward velocity from integrated forces minus the
-# upward velocity from pitch and speed.
+# A resonating mount causes accelerations that are not the bike's. Such accelerations are white noise only if they are
+# brief. The residual CLIMBING shows their size and how long they last. CLIMBING is the upward velocity from integrated
+# forces minus the upward velocity from pitch and speed.
 #
 # The misfit is a factor on the standard deviation of the velocities. To compute it, take the means of CLIMBING over
 # LASTING_MISFIT_S, and multiply their rms by the root of the number of windows in a mean. Divide the result by
@@ -109,8 +111,8 @@ class Noise:
     def sigma(self) -> Array:
         """Return the standard deviations in each window, shape (n, ROWS).
 
-        The first STATES columns are the process noise over the window. The others are the measurement noise, infinite
-        where there is no measurement.
+        The first STATES columns are the process noise over the window. The other columns are the measurement noise,
+        infinite where there is no measurement.
         """
         w, riding, balanced = self._windows, self.riding, self._is_balanced
         speed, roughness = np.maximum(self.speed, 0.0), self.roughness
@@ -141,7 +143,7 @@ class Noise:
 
     def robust(self, sigma: Array, off: Array) -> Array:
         """Return `sigma`, enlarged where a residual in `off` is an outlier (Cauchy). All have the shape (n, ROWS)."""
-        limit = OUTLIER / self._lasting  # in standard deviations without the factor for the duration of a disturbance
+        limit = OUTLIER / self._lasting  # OUTLIER does not include the factor for the duration of a disturbance
         limit[:, : BIAS.start], limit[:, BIAS] = JOLT, np.inf
         return sigma * np.hypot(1.0, off / sigma / limit)
 
@@ -161,7 +163,7 @@ class Noise:
 
         The misfit for the states comes from CLIMBING divided by its standard deviation, which grows with speed. Slow
         rides then get too little weight, but the states become only slightly worse. The misfit for the covariance comes
-        from CLIMBING divided by a constant. It is used after count_own_misfit().
+        from CLIMBING divided by a constant. This second misfit is used after count_own_misfit().
 
         off: residuals, shape (n, ROWS).
         """
@@ -192,9 +194,10 @@ class Noise:
         return np.clip(found, 1.0, MOST_MISFIT)
 
     def estimate_unbalance(self, force: Array, over_s: float) -> None:
-        """Set the unbalance, which is the factor on the standard deviation of BALANCED. An average ride has 1.
+        """Set the unbalance, which is the factor on the standard deviation of BALANCED. An average ride has an
+        unbalance of 1.
 
-        With too few balanced windows it stays 1.
+        With too few balanced windows the unbalance stays 1.
 
         force: the measurement BALANCED, shape (n), in g.
         over_s: BRIEF_S or LONG_S.

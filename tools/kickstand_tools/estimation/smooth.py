@@ -1,4 +1,5 @@
-"""Computes the smoothed lean of a recorded ride. Each lean uses all readings, earlier and later ones."""
+"""Computes the smoothed lean of a recorded ride. Each lean is computed from all readings of the ride, earlier and
+later."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -57,7 +58,7 @@ class SensorOdd(Message):
 
 @dataclass(frozen=True)
 class NotTheBikes(Message):
-    """The accelerations are not a bike's. percent: the share of the riding in which they are not."""
+    """The accelerations are not a bike's. percent: the share of the riding time with such accelerations."""
 
     percent: float
 
@@ -169,7 +170,7 @@ def smooth_blocks(
 ) -> Iterator[tuple[Block, Array | None]]:
     """Yield each segment of the log with its values.
 
-    The values have the shape (n, COLUMNS). They are None if the segment has too few samples per second.
+    The values have the shape (n, COLUMNS). The values are None if the segment has too few samples per second.
 
     notices, lines: see read_blocks().
     Raises InputError.

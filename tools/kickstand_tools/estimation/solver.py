@@ -118,7 +118,7 @@ def covariances(reduced: Reduced, joint: Array) -> Array:
     Returns an array of shape (B, K, s + s, s + s + m).
     """
     s, width = reduced.s, joint.shape[1]
-    ends = np.r_[:s, 2 * s : 3 * s]  # two neighbouring links have three states; these are the rows of the outer two
+    ends = np.r_[:s, 2 * s : 3 * s]  # rows of the two outer states; two neighbouring links have three states
     all_but_inner = np.r_[ends, 3 * s : width + s]
     found, common = joint[:, None, : 2 * s], joint[:, None, 2 * s :]
     for gain, own in zip(reversed(reduced.gains), reversed(reduced.covariances), strict=True):
@@ -216,7 +216,7 @@ def solve(blocks: Reduced, walks: RandomWalks, weight: Array) -> tuple[Array, Ar
 def posterior_covariance(blocks: Reduced, walks: RandomWalks, weight: Array) -> Array:
     """Compute the covariance of each block's first state, its last state and its parameters.
 
-    It is the mean covariance within the hypotheses plus the covariance between their means.
+    The result is the mean covariance within the hypotheses plus the covariance between their means.
 
     Returns an array of shape (B, s + s + m, s + s + m).
     """

@@ -1,7 +1,8 @@
 """Defines the unknowns of the estimation: states and parameters.
 
 The states describe the motion at the edges of the windows. The parameters are errors of sensor and bike, and have a
-prior. They are constant within a block of windows, and follow a random walk from block to block (see hypotheses.py).
+prior. The parameters are constant within a block of windows, and follow a random walk from block to block (see
+hypotheses.py).
 """
 
 from dataclasses import dataclass
@@ -14,17 +15,18 @@ from ..signals import Array, Ints
 LEAN, PITCH, LEFT, UP, FORWARD, BIAS = 0, 1, 2, 3, 4, slice(5, 8)
 STATES = 8
 
-ROTATION = slice(0, 3)  # rad: misalignment of the sensor about left, up, forward
-GYRO = slice(3, 12)  # ratio: scale and cross-axis errors of the gyro, a 3 x 3 matrix
-ACCEL = slice(12, 21)  # ratio: scale and cross-axis errors of the accelerometer, a 3 x 3 matrix
-OFFSET = slice(21, 24)  # g: bias of the accelerometer
-HEIGHT, AHEAD = 24, 25  # m: the sensor's height above the roll axis, and its distance in front of the rear wheel
-# ratio: force to the side / (sin(lean) force up). A leaning bike's tyres touch the road beside their middle.
+ROTATION = slice(0, 3)  # misalignment of the sensor about left, up, forward, in rad
+GYRO = slice(3, 12)  # scale and cross-axis errors of the gyro, a 3 x 3 matrix of ratios
+ACCEL = slice(12, 21)  # scale and cross-axis errors of the accelerometer, a 3 x 3 matrix of ratios
+OFFSET = slice(21, 24)  # bias of the accelerometer, in g
+HEIGHT, AHEAD = 24, 25  # the sensor's height above the roll axis, and its distance in front of the rear wheel, in m
+# Force to the side, divided by sin(lean) and by the force up. A leaning bike's tyres touch the road beside their
+# middle.
 TYRES = 26
-BESIDE = 27  # g: lasting level force to the side, due to wind; see hypotheses.py
-DELAY = 28  # s: delay of the log's speed
-DIVE = 29  # rad per g: pitch of the nose in braking; it is the share in (8) of the firmware's kickstand.lean.dive
-# g: force to the side on straights. A cambered road touches the tyres beside their middle.
+BESIDE = 27  # lasting level force to the side, due to wind, in g; see hypotheses.py
+DELAY = 28  # delay of the log's speed, in s
+DIVE = 29  # pitch of the nose in braking, in rad per g; called share in (8) of the firmware's kickstand.lean.dive
+# Force to the side on straights, in g. A cambered road touches the tyres beside their middle.
 CAMBER = 30
 # Temperature coefficients of the accelerometer's bias (g per C) and of the gyro's bias (rad/s per C): see Windows.warm
 OFFSET_PER_C, BIAS_PER_C = slice(31, 34), slice(34, 37)
@@ -39,7 +41,7 @@ SIGMA[ROTATION], SIGMA[GYRO] = np.radians([1.5, 5.0, 2.0]), 0.012
 SIGMA[OFFSET], SIGMA[UP_SCALE] = (0.001, 0.003, 0.003), 0.004
 # Usual values. The data sheet allows three times these values.
 SIGMA[OFFSET_PER_C], SIGMA[BIAS_PER_C] = 0.0003, np.radians(0.06)
-# ratio: change of the gyro's errors with temperature since the six positions, as in the firmware
+# Change of the gyro's errors with temperature since the six positions, as a ratio, as in the firmware
 GYRO_DRIFT = 0.002
 # Standard deviations of OFFSET and UP_SCALE without the six positions
 WITHOUT_SIX_G, WITHOUT_SIX_SCALE = 0.04, 0.015

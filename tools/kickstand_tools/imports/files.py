@@ -65,7 +65,7 @@ def read_files(source: Path | str) -> list[RecordingFile]:
 
 
 def _bounded(path: Path) -> Iterator[tuple[str, bytes]]:
-    """Yield _contents(). Raises InputError if they are too large."""
+    """Yield _contents(). Raises InputError if the contents are too large."""
     size = 0
     for name, content in _contents(path):
         size += len(content)

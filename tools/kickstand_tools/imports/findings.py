@@ -1,8 +1,8 @@
-"""Finds the time, the accelerometer and the gyro in an unknown table, and their units. It uses the columns' names, and
-mainly their values.
+"""Finds the time, the accelerometer and the gyro in an unknown table, and their units. The names of the columns are
+used, but mainly their values.
 
 * Three columns belong together if their names differ only in the axis, or if they are side by side without names.
-* Whenever the sensor is calm, the length of the acceleration is that of gravity, in some unit.
+* Whenever the sensor is calm, the acceleration is as long as gravity in some unit.
 * In the gyro's unit, the rates explain how the direction of gravity turns in the sensor's axes (rate_fit.py).
 * In the time's unit, the number of samples per second is usual.
 
@@ -51,9 +51,10 @@ _CLOCK = re.compile(r"\s*(\d{4}-\d\d-\d\d.)?\d{1,2}:\d\d")
 _COUNTER = re.compile(r"^(no|nr|n|i|index|count|counter|record|sample|frame|id|row)$")
 CALM_S = 0.5  # length of the moving window in which the motion is measured to find calm samples
 CALMEST = 0.2  # share of the samples that count as calm
-NEAR = 1.3  # largest factor between a calm length and gravity in a unit; clones and rough rides differ by up to this
+NEAR = 1.3  # largest factor between a calm acceleration and gravity, reached by clones of the chip and on rough rides
 NOISE_DPS = 0.1  # standard deviation of a gyro at rest
-# Share: the length of the mean acceleration over the mean length of accelerations. Without gravity it is smaller.
+# Length of the mean acceleration, divided by the mean length of the accelerations. Without gravity the ratio is smaller
+# than this.
 LINEAR = 0.35
 _SLOWEST_S, _QUICKEST_S = 1.0, 1e-4  # limits of the time between samples
 
@@ -144,8 +145,8 @@ def find(sheet: Sheet) -> Findings:
 
 
 def _time(sheet: Sheet) -> ColumnFinding | None:
-    """The column of the time, which must increase. Of several such columns, those named like a time are preferred, then
-    the one with the finest steps."""
+    """The column of the time, which must increase. Among several such columns, columns named like a time are preferred,
+    then the column with the finest steps."""
     usable = []
     for place, name in enumerate(sheet.columns):
         named = bool(_TIME.search(plain(name.rpartition(":")[2])))
@@ -362,8 +363,8 @@ def _names(sheet: Sheet, three: _Triple) -> list[str]:
 
 
 def _first_with_gravity(threes: Sequence[_Triple], seconds: Array | None) -> _Triple | None:
-    """The first group whose length is that of gravity in some unit; otherwise the first group with a constant
-    length."""
+    """The first group whose vectors are as long as gravity in some unit. Without such a group, the first group with a
+    constant length."""
     return next(
         (three for three in threes if _has_gravity(three, seconds, near=True)),
         next((three for three in threes if _has_gravity(three, seconds, near=False)), None),

@@ -261,8 +261,8 @@ def _note_sign(recording: AppRecording, sign: str) -> None:
 
 
 def _stretch(log: Log, start_s: float | None, end_s: float | None) -> Log:
-    """Return the log from start_s to end_s. Both count from the recording's own start; negative times count back from
-    its end."""
+    """Return the log from start_s to end_s. Both times count from the recording's own start. Negative times count back
+    from its end."""
     since_us = np.rint((log.start_s + log.t_s) * 1e6)
     last_s = float(since_us[-1]) / 1e6
     start_s, end_s = (s if s is None or s >= 0.0 else max(0.0, s + last_s) for s in (start_s, end_s))

@@ -14,7 +14,7 @@ from ..logs.log import Log
 from ..signals import Array, Bools, Ints
 from .recording import AppRecording, ReceiverTrack, RecordedSensor
 
-MOST_MPS = 200.0  # largest speed, and largest degrees of a position
+MOST_MPS = 200.0  # largest speed, and largest latitude or longitude in degrees
 GAP_NS = LOST_US * 1000  # no interpolation between samples that are further apart
 FASTER = 1.5  # a gyro with over FASTER times the accelerometer's rate is averaged over each accelerometer sample
 MANY = 0.02  # a larger share of readings over MOST_G or MOST_DPS means another unit, not damaged cells
@@ -42,7 +42,7 @@ def join(recording: AppRecording, name: str) -> tuple[Log, int]:
         raise InputError(f"{name}: its readings are past any sensor's, {_most(accel.values, rates)}: check their units")
     there &= ~past
     lost = int(np.count_nonzero(past)) + len(recording.accel.time_ns) - len(accel.time_ns)
-    # not the sum, because the same rows may contain both sensors
+    # The larger number is used, not the sum, because the same rows may contain both sensors
     lost += max(recording.accel.damaged, recording.gyro.damaged)
     if np.count_nonzero(there) < 2:
         raise InputError(f"{name}: accelerometer and gyro have no time in common: were they recorded together?")

@@ -2,8 +2,8 @@
 
 Cells may be separated by commas, semicolons, tabs or blanks, with a decimal point or comma. Any lines may come before
 the rows. Names above the rows are optional, and so is a line of units below the names. The table may also be `label:
-value` texts of a serial monitor, with or without time stamps, in one or several lines per sample. It may have one row
-per event of a sensor, or one file per sensor.
+value` texts of a serial monitor, with or without time stamps, in one or several lines per sample. The table may also
+have one row per event of a sensor, or one file per sensor.
 """
 
 import csv
@@ -22,7 +22,7 @@ from .recording import Sheet, decimal_points
 from .units import ACCELERATIONS, RATES, SPEEDS, TIMES, unit
 
 LOOKED_AT = 400  # lines used to find the layout
-SEPARATORS = "\t;, "  # if two of them split the same lines into the same number of cells, the first is used
+SEPARATORS = "\t;, "  # if two separators split the same lines into the same number of cells, the first is used
 FEWEST_CELLS = 4  # least count of numbers in a row of a table of sensors: a time and three axes
 MOST_KINDS = 20  # largest number of names of sensors or events in one column
 EVENT = ":"  # separates a sensor's name from a column's name

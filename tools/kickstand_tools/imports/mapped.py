@@ -173,8 +173,8 @@ def read_table(table: MappedTable, units: Mapping[str, str]) -> AppRecording | N
 
 
 def unknown(files: list[RecordingFile], source: str, table: MappedTable | None = None) -> InputError:
-    """The error for a file of an unknown app. It names the missing columns, the file's columns, and the command to
-    type."""
+    """The error for a file of an unknown app. The error names the missing columns, the file's columns, and the command
+    to type."""
     table = table or table_in(files)
     if table is None:
         shown = next((line for file in files for line in file.first_lines(1)), "")[:60]
@@ -284,8 +284,8 @@ def _seconds(time_ns: Nanoseconds) -> Array:
 
 
 def _check_rates(name: str, seconds: Array, force: Array, rates: Array) -> None:
-    """Raise InputError if rates do not fit the turns of gravity. Either another unit fits, or gravity's direction is
-    constant although the rates would turn it."""
+    """Raise InputError if rates do not fit the turns of gravity: if another unit fits, or if gravity keeps its
+    direction although the rates would turn it."""
     fit = fit_rates(seconds, force, rates)
     shown = float(np.degrees(fit.factor))
     if fit.decides and not 1.0 / _TIMES_OFF < shown < _TIMES_OFF:
@@ -307,7 +307,8 @@ def _speed(
 ) -> tuple[int | None, str, list[Message]]:
     """Return the number of the speed's column, its unit, and notices.
 
-    A missing unit is found from the positions. If they do not show it, the speed is left out: the number is None.
+    A missing unit is found from the positions. If the positions do not show the unit, the speed is left out: the number
+    is None.
     """
     place = places.get("speed")
     if place is None:

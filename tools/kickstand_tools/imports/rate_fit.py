@@ -2,9 +2,9 @@
 
 At rest and in a hand, the direction u of gravity turns in the sensor's axes by du/dt = u x rate. So over a window of
 WINDOW_S, the change of u has two parts: the integral of u x reading, times the unit's factor, and the effect of a
-constant bias. In a vehicle the force is not only gravity. Then the rates explain its turns less well, and the factor
-is too small or not found. All 48 signed permutations of the gyro's axes are tried: exchanged axes are another mistake,
-which is checked later.
+constant bias. In a vehicle the force is not only gravity. Then the rates explain the turns of the force less well, and
+the factor is too small or not found. All 48 signed permutations of the gyro's axes are tried: exchanged axes are
+another mistake, which is checked later.
 """
 
 from collections.abc import Mapping
@@ -16,9 +16,9 @@ from ..checks.handedness import EXCHANGES
 from ..signals import Array
 
 CELL_S = 0.05  # readings are averaged over cells of this length
-MOST_CELLS = 12_000  # ten minutes are enough for a unit
+MOST_CELLS = 12_000  # ten minutes are enough to find a unit
 WINDOW_S = 0.4
-LEAST_TURN = 0.03  # rad, rms: with a smaller turn of gravity in the windows, no unit is found
+LEAST_TURN = 0.03  # smallest turn of gravity in the windows from which a unit is found, in rad rms
 STRAIGHT = 0.25  # the force in a cell counts as gravity if its length is this close to the median
 EXPLAINED = 0.5  # the rates must explain at least this share of the variance of gravity's turns
 # with this share, units that differ by a factor of 2 can be distinguished, as the ranges of raw counts do

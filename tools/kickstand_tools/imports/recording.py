@@ -15,10 +15,10 @@ from ..signals import Array, Bools
 from .files import RecordingFile
 from .units import ACCELERATIONS, NO_TIME, RATES, REPEATED, SPEEDS, Nanoseconds, factor, times_ns
 
-LONG = 6  # characters: a common beginning of several names is not repeated from this length on
+LONG = 6  # a common beginning of several names is not repeated if it has at least this many characters
 _DECIMAL_COMMA = re.compile(r"(?:^|[;\t\"])\s*[+-]?\d+,\d")
 SECOND_NS = 10**9
-_ABSURD = 1e6  # g or deg/s: a larger value is a damaged cell
+_ABSURD = 1e6  # in g or deg/s; a larger value is a damaged cell
 
 
 @dataclass
@@ -45,8 +45,8 @@ class Sheet:
     def axes(self, *names: str | tuple[str, ...]) -> tuple[list[int], list[str]]:
         """Return place() of each name, and the names of missing columns.
 
-        A name may be a tuple of alternatives. Then the first existing one counts; if all are missing, the first name is
-        returned as missing."""
+        A name may be a tuple of alternatives. Then the first name that exists counts. If all alternatives are missing,
+        the first is returned as missing."""
         each = [name if isinstance(name, tuple) else (name,) for name in names]
         found = {one[0]: self.place(*one) for one in each}
         places = [place for place in found.values() if place is not None]
@@ -106,7 +106,7 @@ def read_sheet(file: RecordingFile, header: int = 0, skipped: int = 0) -> Sheet:
         raise InputError(f"{file.name}: no rows under the names of the columns: was anything recorded?")
     columns = names_in(lines[header])
     while columns and not columns[-1]:
-        columns.pop()  # all lines end in a separator
+        columns.pop()  # empty names at the end come from lines that end in a separator
     text, separator = lines[-1], separator_of(lines[header])
     if separator != "," and _DECIMAL_COMMA.search(text[:20000]):
         text = decimal_points(text)

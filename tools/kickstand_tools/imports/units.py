@@ -46,7 +46,7 @@ Nanoseconds = Ints
 NO_TIME = np.iinfo(np.int64).min  # value for a cell without a time
 REPEATED = NO_TIME + 1  # value for a row that repeats the sample of an earlier row
 DATES = "date or clock"
-EPOCH_NS = 10**17  # 1973; larger times count from 1970
+EPOCH_NS = 10**17  # March 1973; a larger time counts from 1970
 DAY_NS = 86400 * 10**9
 _LATEST_NS = 4.0e18  # the year 2096; twice this value still fits into 64 bits
 _WRAP = 2**32  # micros() of a microcontroller restarts from 0 after 71.6 minutes, millis() after 49.7 days
@@ -111,8 +111,8 @@ def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") ->
 
 
 def _date_ns(text: str) -> int:
-    """Return the nanoseconds since 1970 of a date in ISO 8601. Without a zone it is UTC. A blank before the zone is
-    accepted."""
+    """Return the nanoseconds since 1970 of a date in ISO 8601. A date without a zone is in UTC. A blank before the zone
+    is accepted."""
     try:
         plain = _DAY.sub(lambda day: f"{day[1]}-{int(day[2]):02d}-{int(day[3]):02d}", text.strip())
         plain = _THOUSANDTHS.sub(r"\1.\2", plain)
@@ -125,8 +125,9 @@ def _date_ns(text: str) -> int:
 
 
 def time_unit(cells: Cells, given: str = "") -> str:
-    """Return the unit of times. If it is not given, find it from their size and steps. Dates and clocks return "date or
-    clock"."""
+    """Return the unit of times. If the unit is not given, find it from the size and the steps of the times. Dates and
+    clocks return "date or clock".
+    """
     numbers = numbers_of(cells)
     if np.count_nonzero(np.isfinite(numbers)) <= np.count_nonzero(filled(cells)) // 2:
         return DATES
@@ -186,7 +187,7 @@ def _guessed(values: Array) -> str:
     size = float(np.median(np.abs(good)))
     steps = np.diff(good)
     step = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
-    # with larger steps, it is a clock of microseconds that has run for minutes
+    # with steps of 100 or more, the clock counts microseconds and has run for minutes
     if size > 1e8 and size < 1e10 and step < 100.0:
         return "s"
     for name, from_1970 in (("ns", 1e17), ("us", 1e14), ("ms", 1e11)):

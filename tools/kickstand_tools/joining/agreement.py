@@ -1,8 +1,8 @@
 """Compares the leans of two devices on one bike, to test a lean meter without a reference.
 
-The comparison does not show errors that both devices share, such as errors of the bike's model. It shows the separate
-errors of each device, of its sensor, its mount and its calibration. If both devices are equally good, the error of each
-is the difference divided by the square root of two.
+The comparison does not show errors that both devices share, such as errors of the bike's model. The comparison shows
+the errors that each device has alone: of its sensor, its mount and its calibration. If both devices are equally good,
+each device's error is the difference divided by the square root of two.
 """
 
 from collections.abc import Iterator
@@ -65,7 +65,7 @@ class Difference:
 class Agreement:
     """The agreement of rides A and B.
 
-    live: Difference of the displayed leans while both devices show one. None without such a time.
+    live: Difference of the displayed leans while both devices show a lean. None without such a time.
     smoothed: Difference of the smoothed leans.
     t_s: seconds since A's first sample, shape (n).
     The leans at these times are in degrees, shape (n), NaN if unknown.
@@ -176,7 +176,7 @@ def check_picture(path: Path) -> None:
 
 
 def draw(path: Path, found: Agreement) -> None:
-    """Write a PNG with the leans of both over time, and their difference."""
+    """Write a PNG with the leans of both devices over time, and the difference of the leans."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import MultipleLocator
 
@@ -207,8 +207,8 @@ def _interpolated(t_s: Array, values: Array, at_s: Array) -> Array:
 
 
 def _lean_while_riding(ride: SmoothedRide | Any, at_s: Array, riding: Bools) -> tuple[Array, Array]:
-    """Return the lean and its standard deviation in degrees, both of shape (n). Both are NaN if one of them is unknown,
-    or the bike is not riding."""
+    """Return the lean and its standard deviation in degrees, both of shape (n). Both are NaN if the lean or the
+    standard deviation is unknown, or the bike is not riding."""
     lean, sigma = (_interpolated(ride.t_s, values, at_s) for values in (ride.lean_deg, ride.lean_sigma_deg))
     known = riding & ~np.isnan(sigma)
     return np.where(known, lean, np.nan), np.where(known, sigma, np.nan)

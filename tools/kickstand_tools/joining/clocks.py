@@ -20,7 +20,7 @@ _SMOOTH = 5  # rates are averaged over this many cells, to find their derivative
 _MOST_DPS = 60.0  # higher rates are due to jolts, and are limited to this
 _APART_S, _CANDIDATES = 3.0, 6
 _INDEPENDENT_S = 1.0  # rates that are further apart in time are treated as independent
-_LEAST_CORRELATION = 0.8  # least correlation of the rates: two sensors on one bike have over 0.9
+_LEAST_CORRELATION = 0.8  # least correlation of the rates: two sensors on one bike have a correlation over 0.9
 _MOST_APART_DEG = 15.0  # largest contradiction between the calibrations, which are exact to a few degrees
 _ROUNDS = 8
 
@@ -122,7 +122,8 @@ def _fitted(a: CellMotion, b: CellMotion, of_a: Array, of_b: Array, later_s: flo
         normal[1, 1] += float(np.mean(weight @ error**2)) / len(error) / USUAL_DRIFT**2
         step = np.linalg.solve(normal, gradient) if k > 0 else np.array([gradient[0] / max(normal[0, 0], 1e-9), 0.0])
         step[0] = np.clip(step[0], -0.5, 0.5)
-        # The step changes the shift in the middle of the compared part. From this, compute the shift at the start
+        # The step changes the shift in the middle of the compared part. From this change, compute the shift at the
+        # start
         drift, middle = drift + step[1], at_s[both].mean()
         later_s += step[0] - step[1] * (middle - later_s)
     if abs(drift) > MOST_DRIFT:

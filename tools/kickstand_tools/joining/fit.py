@@ -17,10 +17,10 @@ AROUND_S = 6.0  # largest distance from the rough shift, including the drift at 
 _TRIED_S = 0.1  # step between the tried shifts
 _SHIFTS = np.arange(-AROUND_S, AROUND_S + _TRIED_S / 2.0, _TRIED_S)
 _DRIFTS = np.arange(-300e-6, 301e-6, 20e-6)
-USUAL_DRIFT = 100e-6  # prior of the drift between two crystals, one of them hot, 1 sigma
-_USUAL_TILT = 0.05  # prior of the tilt of up due to an accelerometer's offset, 1 sigma, rad
+USUAL_DRIFT = 100e-6  # standard deviation of the drift between a hot and a cold crystal (prior)
+_USUAL_TILT = 0.05  # standard deviation of the tilt of up by an accelerometer's offset, in rad (prior)
 _PRIOR = 1.0 / np.array([np.inf, USUAL_DRIFT, _USUAL_TILT, _USUAL_TILT, np.inf, np.inf, np.inf]) ** 2
-_SAME_TRACK_S = 0.05  # 1 sigma of the shift; receivers smooth more in bends than on straights
+_SAME_TRACK_S = 0.05  # least standard deviation of the shift; receivers smooth more in bends than on straights
 _FREEDOM = 4.0  # degrees of freedom of Student's distribution, which down-weights errors over two sigma
 # least error divided by its sigma. With a better receiver the error is no smaller, because of the gyro's scale factor
 _LEAST_ERROR = 0.5
@@ -36,9 +36,9 @@ class TrackFit:
 
     shift_s: the track's time at the ride's first sample, in s since the track's first point.
     drift: seconds per second that the ride's clock loses.
-    sigma_s: standard deviation of a track point's time in the ride, at the end of the ride where it is larger.
+    sigma_s: standard deviation of a track point's time in the ride, for the end of the ride with the larger one.
     correlation: correlation of the courses' changes.
-    evidence: natural logarithm of a ratio: the courses' likelihood with the ride's yaw over the one without it.
+    evidence: logarithm of the courses' likelihood with the ride's yaw, minus its logarithm without the ride's yaw.
     tilt: tilt of the ride's up about two axes, in rad, shape (2).
     segments: number of compared segments.
     """
@@ -53,7 +53,7 @@ class TrackFit:
 
 
 def fitted(motion: CellMotion, course: Course, segments: Segments, rough_s: float) -> TrackFit | None:
-    """The best fit within AROUND_S of a rough shift. None if ride and track hardly overlap there."""
+    """The best fit within AROUND_S of a rough shift. None if ride and track hardly overlap at these shifts."""
     compared = Comparison(motion, course, segments, rough_s, AROUND_S + 1.0)
     if len(compared.given.begin_s) < _FEWEST:
         return None
@@ -62,7 +62,8 @@ def fitted(motion: CellMotion, course: Course, segments: Segments, rough_s: floa
 
 
 def cost_of_one_shift(motion: CellMotion, course: Course, segments: Segments, fit: TrackFit) -> float:
-    """Return by how much the cost per segment falls if each segment gets its own shift, in units of an error's cost.
+    """Return by how much the cost per segment falls if each segment gets its own shift. The unit is the mean cost of
+    one error.
 
     The result is under 2 if the track belongs to the ride, and over 4 for the same road at another time.
     """

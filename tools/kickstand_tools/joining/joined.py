@@ -44,7 +44,7 @@ class Joined:
 
 
 def join_track(ride: Source, track: Path | str | Track, progress: Progress | None = None) -> Joined:
-    """Find the time of a phone's or watch's track in a ride, from the yaw and the acceleration of both.
+    """Find the time of a phone's or watch's track in a ride, from the yaw and the acceleration of ride and track.
 
     ride: see read_log; it needs neither a calibration nor a speed. track: a .gpx or .fit file. The clocks of ride and
     track may differ by any time, and drift. progress: called with (done, total) of the ride's bytes. Raises InputError

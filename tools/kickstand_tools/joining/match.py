@@ -32,8 +32,8 @@ _MOST_SIGMA_S = 0.3
 class Match:
     """The time of a track in a ride.
 
-    start_utc_s: the track's time at the ride's first sample, in s since 1970. It is corrected for the receiver's delay,
-        so positions are where the bike is.
+    start_utc_s: the track's time at the ride's first sample, in s since 1970. This time is corrected for the receiver's
+        delay, so positions are where the bike is.
     drift: seconds per second that the ride's clock loses.
     sigma_s: standard deviation of start_utc_s.
     correlation: correlation of the changes of course, 0 to 1.
@@ -141,8 +141,8 @@ def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
 
 
 def _changes_of_ride(motion: CellMotion) -> tuple[Array, Bools]:
-    """Like _changes_of_track() for the ride: the rotation about its up within _SPAN_S, degrees, and True where it is
-    known."""
+    """Return two arrays with a value every _GRID_S: the rotation of the ride about its up within _SPAN_S, in degrees,
+    and True where it is known."""
     at_s, half = np.arange(0.0, motion.seconds, _GRID_S), _SPAN_S / 2.0
     edges_s = np.arange(len(motion.there) + 1) * STEP_S
     turned = np.append(0.0, np.cumsum(motion.rate_dps @ motion.up)) * STEP_S

@@ -1,4 +1,4 @@
-"""Finds the yaw of a ride from the sensor alone. It needs no calibration, and the sensor may be mounted at any angle.
+"""Finds the yaw of a ride from the sensor alone. This needs no calibration, and the sensor may be mounted at any angle.
 
 Up is the mean direction of the force in bends, because a motorcycle leans until the force points along its own up. The
 rate about up is the yaw rate times the cosine of the lean.
@@ -15,7 +15,7 @@ from ..logs.source import Progress, name_of
 from ..signals import Array, Bools, Cells
 
 STEP_S = 0.05
-_MOST_DPS = 20.0  # higher rates do not increase a cell's weight in the direction of up
+_MOST_DPS = 20.0  # a cell with a higher rate gets no more weight when up is computed
 _LONGEST_S = 100 * 3600.0  # longest ride; memory limits it
 
 
@@ -47,8 +47,8 @@ class CellMotion:
 
     @property
     def up(self) -> Array:
-        """Return the bike's up in the sensor's axes, shape (3). It is exact to a few degrees only, because it includes
-        the accelerometer's bias."""
+        """Return the bike's up in the sensor's axes, shape (3). The direction is exact to a few degrees only, because
+        it includes the accelerometer's bias."""
         turning = np.minimum(np.linalg.norm(self.rate_dps, axis=1), _MOST_DPS)
         up: Array = turning @ self.force_g
         return up / max(float(np.linalg.norm(up)), 1e-9)

@@ -1,7 +1,8 @@
 """The track of a phone or a watch (positions and times), and its course (the direction of each step, if known).
 
 Course and speed are compared with a ride in segments of half a minute. Within a segment, only changes count: the mean
-and the trend are subtracted. This removes the gyro's residual bias, the initial direction of the ride, and hills.
+and the trend are subtracted. Subtracting them removes the gyro's residual bias, the initial direction of the ride, and
+hills.
 """
 
 from dataclasses import dataclass
@@ -11,11 +12,11 @@ import numpy as np
 from ..logs.log import Table
 from ..signals import Array, Bools, distance_m, stretches
 
-LONGEST_S = 6.0  # longest time between two points of a course, as watches write them on straights
+LONGEST_S = 6.0  # longest time between two points of a course; watches write points this far apart on straights
 SLOWEST_MPS = 2.5  # in slower steps, the errors of the positions dominate
 FASTEST_MPS = 100.0  # a faster step is a jump of the receiver's position
-STEP_ERROR_M = 1.0  # 1 sigma of a step across its direction, as of phones' receivers from second to second
-COURSE_ERROR_DEG = 4.0  # 1 sigma of other errors: the gyro's scale factor, and the smoothing of positions
+STEP_ERROR_M = 1.0  # standard deviation of a step across its direction, for a phone's receiver and one second
+COURSE_ERROR_DEG = 4.0  # standard deviation of other errors, due to the gyro's scale factor and smoothed positions
 _OFTEN_S = 0.7
 _AROUND = 2  # number of points on each side from which a speed is computed
 STEPS = 30  # largest number of steps in a segment
@@ -37,7 +38,8 @@ class Track(Table):
     name: str
 
     def speeds_mps(self) -> Array:
-        """Return the file's speeds, shape (n). If the file has none, return mean speeds over the neighbouring points.
+        """Return the file's speeds, shape (n). If the file has no speeds, return mean speeds over the neighbouring
+        points.
 
         Such a speed is NaN over a jump or a gap, or if it is not larger than the positions' errors."""
         if np.any(np.isfinite(self.speed_mps)):
@@ -61,7 +63,7 @@ class Track(Table):
         return Track(*(values[first] for values in self.columns().values()), name=self.name)
 
     def steps_m(self) -> tuple[Array, Array]:
-        """Return how far each point is east and north of the previous one, in metres, two arrays of shape (n - 1)."""
+        """Return how far each point is east and north of the previous point, in metres, two arrays of shape (n - 1)."""
         return distance_m(self.lat_deg[:-1], self.lon_deg[:-1], self.lat_deg[1:], self.lon_deg[1:])
 
 
@@ -75,7 +77,8 @@ class Course:
     sigma_deg: standard deviation of the course of a good step.
     speed_mps: the step's length divided by its duration.
     good: False for a step that is too slow, a gap or a jump.
-    turn_deg: change of the course from the previous step, positive to the left. It is 0 unless both steps are good.
+    turn_deg: change of the course from the previous step, positive to the left. The change is 0 unless both steps are
+        good.
     """
 
     begin_s: Array

@@ -51,7 +51,7 @@ def read_track(path: Path | str, progress: Progress | None = None) -> Track:
         raise
     except OSError as error:
         raise InputError(f"{path} cannot be read: {cause(error)}") from error
-    except Exception as error:  # for damaged files, the libraries raise many kinds of errors
+    except Exception as error:  # the libraries raise many kinds of errors for damaged files
         raise InputError(f"{path} is damaged, or in another format than its name says: {_words(error)}") from error
     table = np.array(points, dtype=float).reshape(-1, 4)
     on_earth = (np.abs(table[:, 1]) <= 90.0) & (np.abs(table[:, 2]) <= 180.0)
@@ -87,8 +87,8 @@ def _gpx(path: Path, progress: Progress | None) -> Iterator[Point]:
 
 
 def _gpx_speed(point: Any) -> float:
-    """The speed of a point, m/s. GPX 1.0 has an element for the speed; in GPX 1.1 it is in an extension of Garmin's or
-    others."""
+    """The speed of a point, m/s. GPX 1.0 has an element for the speed; in GPX 1.1 the speed is in an extension,
+    Garmin's or another."""
     if point.speed is not None:
         return float(point.speed)
     for extension in point.extensions:

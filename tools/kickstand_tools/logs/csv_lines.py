@@ -77,7 +77,7 @@ def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, least_
     most: largest number of digits of an integer.
     least_rows: smallest number of rows of the result.
 
-    The first row of the result stays empty. It is for the sign.
+    The first row of the result stays empty, because it is for the sign.
     """
     places = max(most, digits + 1)
     letters = np.zeros((max(places + 2, least_rows), len(number)), dtype=np.uint8)

@@ -1,9 +1,9 @@
 """Makes the times of a log even again if the recorder rounded them.
 
 A sensor takes samples at even intervals. However, some recorders round times to hundredths or thousandths of a second.
-Others write the same time for several samples that they received together. Then the recorded steps are uneven, and
-some are 0. This module replaces each time by the mean of the recorded times around it. The change is limited to about
-half a tick of the recorder's clock.
+Other recorders write the same time for several samples that they received together. Then the recorded steps are uneven,
+and some are 0. This module replaces each time by the mean of the recorded times around it. The change is limited to
+about half a tick of the recorder's clock.
 """
 
 from collections.abc import Callable, Iterator
@@ -17,7 +17,7 @@ from ..common.messages import Message
 from ..signals import Array, Ints, window_means
 from .log import Block
 
-COARSE = 0.05  # times with a smaller tick are not changed; a share of the time between samples
+COARSE = 0.05  # share of the time between samples; times with a smaller tick are not changed
 # If more than this share of the times repeats the previous time, the recorder writes one time for several samples
 OFTEN = 0.05
 # If at least this share of the steps is equal, the times are already even, and only some samples are missing
@@ -33,7 +33,7 @@ CROWD = 50
 # Largest change of a time, in ticks. Rounding explains half a tick. The rest is a margin for the ends of the log, where
 # the mean is less exact.
 ALLOWED = 0.6
-SHORTEST_S = 2e-6  # shortest step, in s. It stays over 0 if times are rounded to microseconds
+SHORTEST_S = 2e-6  # shortest step, in s, which stays over 0 if times are rounded to microseconds
 CONTEXT = 2000  # number of samples before and after a block that are used to compute its times
 REPORTED_S = 0.002  # smallest change of a time, in s, that is reported in a notice
 
@@ -118,7 +118,7 @@ def _one_step(between_us: Ints) -> bool:
 def _spread_repeated(recorded: Array, starts: Ints, counts: Ints, period_s: float) -> Array:
     """Spread samples with the same time evenly.
 
-    They are spread up to the next recorded time, but with steps of at most one usual sample period.
+    The samples are spread up to the next recorded time, but with steps of at most one usual sample period.
 
     starts: index of the first sample of each recorded time.
     counts: number of samples with each recorded time.

@@ -5,8 +5,8 @@ sensor from sample to sample, even at rest. If all six axes stay the same to the
 not measured.
 
 In a log with few digits, rounding may hide the noise of a vehicle at rest. In such a log, equal readings are compared
-with the readings before and after them. They are kept if the values on one side are about the same. They are left out
-if the values jump on both sides.
+with the readings before and after them. The equal readings are kept if the values on one side are about the same. They
+are left out if the values jump on both sides.
 """
 
 from dataclasses import dataclass

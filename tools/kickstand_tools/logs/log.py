@@ -55,7 +55,7 @@ def float_schema(units: Mapping[str, str], fine: Container[str], about: dict[str
     """The schema of a Parquet file.
 
     units: the unit of each column, by the column's name.
-    fine: names of the columns that are 64-bit floats. All others are 32-bit floats.
+    fine: names of the columns that are 64-bit floats. All other columns are 32-bit floats.
     about: the file's metadata.
     """
     import pyarrow
@@ -159,7 +159,7 @@ class Log(Table):
 
     @property
     def start_utc_s(self) -> float | None:
-        """Universal Time at the first sample in s, None if unknown. It is a median, because the receiver sends some
+        """Universal Time at the first sample in s, None if unknown. The median is used, because the receiver sends some
         times late."""
         starts = (self.utc_s - self.t_s)[np.isfinite(self.utc_s)]
         return float(np.median(starts)) if len(starts) else None
@@ -204,7 +204,7 @@ class Block(Table):
     done: int  # bytes read of the file before unpacking; for a log in memory, number of samples
     lines: list[str] = field(default_factory=list)  # the rows as CSV, empty for a log in memory
     names: tuple[str, ...] = ()  # names of the columns in lines
-    own_times: bool = True  # False if even_times.py changed the times, so they differ from the times in lines
+    own_times: bool = True  # False if even_times.py changed the times, so they differ from the times in `lines`
 
     def rows(self) -> Iterator[FirmwareRow]:
         """Yield the samples for a replay by the firmware's modules. See firmware_rows()."""
@@ -246,8 +246,8 @@ class Stretch:
         sample. None means the log's start or end.
 
     A Stretch can be used like a log. If it is read as a log, its times count from the first sample of the stretch.
-    Functions that compute the lean read the whole log, because the lean depends on earlier readings. They return only
-    the samples of the stretch, with times that count from the start of the whole log.
+    Functions that compute the lean read the whole log, because the lean depends on earlier readings. These functions
+    return only the samples of the stretch, with times that count from the start of the whole log.
 
     >>> import numpy as np
     >>> from kickstand_tools.api import Log, read_log
@@ -302,7 +302,8 @@ class Stretch:
 
 
 def within(stretch: Stretch | None, block: Block, values: Array) -> Iterator[tuple[Block, Array]]:
-    """Yield the rows of a block that are in the stretch, and the values of these rows. Yield nothing if there are none.
+    """Yield the rows of a block that are in the stretch, and the values of these rows. Yield nothing if the block has
+    no such rows.
 
     stretch: None selects all rows.
     block: a block of the whole log.

@@ -26,7 +26,7 @@ from .source import File, Progress, chunks, name_of, total_bytes
 BLOCK_BYTES = 1 << 20  # bytes of text per block, about 15000 samples
 BLOCK_SAMPLES = 60_000  # samples per block of a log in memory
 MOST_SAMPLES = 10_000_000  # most samples of a log: 14 hours at 200 Hz, which use 1 GB of memory
-_READINGS = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")  # in the order of Block.readings
+_READINGS = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")  # columns in the order of Block.readings
 
 Source = File | Log | Stretch  # everything that can be read as a log
 
@@ -51,10 +51,10 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None,
         source: a path (of a gzip file if it ends in .gz), an open file of text or bytes, a Log, or a Stretch of these.
         minimum: least number of samples.
         progress: called with the number of bytes read and the size of the file.
-        axes: check that rates and accelerations fit each other. This takes most of the time.
+        axes: check that rates and accelerations fit each other. This check takes most of the time.
 
     Raises InputError, which names the file and the line of a mistake. Common wrong units (m/s2, milliseconds, km/h)
-    also raise it.
+    also raise InputError.
 
     >>> import io
     >>> log = read_log(io.StringIO("t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\\n0.00,0,1,0,0,0,0\\n0.01,0,1,0,0,0,0\\n"))
@@ -92,7 +92,7 @@ def read_blocks(
     Args:
         source, minimum, progress, axes: see read_log().
         notices: after the last block, notices about the log and its contradictions to `calibration` are appended.
-        lines: also keep the rows as CSV. They use most of a block's memory.
+        lines: also keep the rows as CSV. The rows use most of a block's memory.
     """
     name, count = name_of(source), 0
     remarks: list[Message] = []
@@ -287,8 +287,8 @@ def _last_marked(parts: Iterator[tuple[bytes, int]]) -> Iterator[tuple[bytes, in
 def _without_cut_line(text: bytes, names: list[str], places: dict[str, int]) -> tuple[bytes, bytes]:
     """Remove the last line of a log if it was cut.
 
-    The last line was cut if it has fewer cells than the log has columns. If it has no line end, two more signs count.
-    Either it cannot be read, or its last number has fewer decimals than the last number of the previous line.
+    The last line was cut if it has fewer cells than the log has columns. A last line without a line end was also cut in
+    two other cases: it cannot be read, or its last number has fewer decimals than the last number of the previous line.
 
     Returns:
         text: the text without the cut line.

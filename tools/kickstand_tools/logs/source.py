@@ -164,7 +164,7 @@ def _data(file: Any, size: int, remarks: list[Message] | None) -> Iterator[bytes
 
 
 def _with_line_feeds(text: bytes) -> bytes:
-    if b"\r" not in text:  # searching for one byte is fifty times as fast as searching for two
+    if b"\r" not in text:  # searching for one byte is fifty times as fast as searching for two bytes
         return text
     text = text.replace(b"\r\n", b"\n")
     return text if b"\n" in text else text.replace(b"\r", b"\n")

@@ -14,8 +14,8 @@ from .parts import ACCENT, DIM, PANEL, WHITE
 MOST_DEG = 60.0  # lean at each end of the dial
 MOST_G = 1.2  # force at the edge of the circle of forces
 SHARE = 0.3  # usual height of the gauge as a share of the video's height
-# For a small video the gauge is higher, because its text must be legible. It then has LEGIBLE_PX pixels, but at most
-# MOST_SHARE of the video's height
+# For a small video the gauge is higher, because its text must be legible. Such a gauge has LEGIBLE_PX pixels, but at
+# most MOST_SHARE of the video's height
 LEGIBLE_PX, MOST_SHARE = 216.0, 0.45
 UPRIGHT_DEG = 0.5  # largest lean that counts as upright
 _WIDTH = 1.72  # width of the gauge divided by its height

@@ -76,7 +76,7 @@ def overlay(
         video: a video of the ride. None writes a clip.
         offset_s: the ride's time at the video's first picture, in s since the ride's first sample. It is negative if
             the video begins before the ride. None finds it from the gyro of a GoPro.
-        fps: pictures per second. None takes the video's, or 30 for a clip.
+        fps: pictures per second. None uses the video's rate, or 30 for a clip.
         from_s, to_s: limits of the part of the ride, see Stretch.
         height: height in pixels of the video that a clip is for. None means 1080.
         mph: True to show the speed in miles per hour.
@@ -124,7 +124,7 @@ def overlay(
         assert offset_s is not None
         arguments = _laid_over(filmed, begin_s - offset_s, end_s - begin_s, fps, given, round(MARGIN * size))
     with whole_file(out) as temporary:
-        temporary.touch()  # if this fails, the system gives the reason; ffmpeg would not report it
+        temporary.touch()  # if this fails, the system gives the reason; ffmpeg would not report the reason
         write_video(temporary, arguments, pictures(), drawn)
     return Overlaid(count, rate, begin_s, end_s, offset_s, correlation, notices)
 

@@ -77,7 +77,8 @@ def shown(ride: Ride, progress: Progress | None = None, notices: list[Message] |
 
 
 def _maximum(t_s: Array, lean: Array) -> Array:
-    """Find the largest lean up to each moment that lasted at least HELD_S, shape (n). It is 0 if there is none."""
+    """Find the largest lean up to each moment that lasted at least HELD_S, shape (n). The result is 0 without such a
+    lean."""
     count = round(HELD_S / float(np.median(np.diff(t_s)))) + 1
     value = np.where(np.isfinite(lean), lean, 0.0)
     padded = np.append(np.zeros(count - 1), value)

@@ -32,7 +32,7 @@ class Video:
 
 
 def ffmpeg() -> str:
-    """The path of the program ffmpeg. Raises InputError if it is not installed."""
+    """The path of the program ffmpeg. Raises InputError if ffmpeg is not installed."""
     try:
         import imageio_ffmpeg
         import PIL  # noqa: F401  the gauge needs Pillow
@@ -114,7 +114,7 @@ def write_video(
         pictures: written to ffmpeg's standard input.
         each: called after every picture.
 
-    Raises InputError with ffmpeg's last line of text if it fails.
+    Raises InputError with ffmpeg's last line of text if ffmpeg fails.
     """
     with tempfile.TemporaryFile() as words:
         command = [ffmpeg(), "-hide_banner", "-loglevel", "error", "-y", *arguments, f"file:{out}"]
@@ -130,7 +130,7 @@ def write_video(
             except BrokenPipeError:
                 pass  # ffmpeg has stopped, and prints the reason
             process.wait()
-        except BaseException:  # also Ctrl-C: ffmpeg must not continue to write
+        except BaseException:  # also after Ctrl-C, because ffmpeg must not continue to write
             process.kill()
             process.wait()
             raise

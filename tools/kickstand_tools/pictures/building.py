@@ -30,7 +30,8 @@ def drawings(display: str, shifted: str) -> dict[str, str]:
 
 
 def shifter(board: wiring.DrawnBoard, display: str) -> str:
-    """Draw a 5 V display at a board. A level shifter is in SDA and SCL, and VCC is at 5 V. display: its SVG."""
+    """Draw a display with VCC at 5 V, and the level shifter between its SDA and SCL and a board. display: SVG of the
+    display."""
     pins = wiring.pin_names(board)
     five = pins["5V"]
     page = Drawing(900, 330)
@@ -133,7 +134,7 @@ def _lay(page: Drawing, x: float, y: float, axes: tuple[Vector, Vector, Vector])
         return _seen(x, y, (place[0], place[1] - 50 + lowest, place[2]))
 
     for which in range(3):
-        side = 1.0 if sum(axes[which]) > 0 else -1.0  # the viewer sees it from the right, from above and from the front
+        side = 1.0 if sum(axes[which]) > 0 else -1.0  # seen from the right, from above and from the front
         along, across = [k for k in range(3) if k != which]
         corners = []
         for one, other in ((-1, -1), (1, -1), (1, 1), (-1, 1)):

@@ -4,7 +4,7 @@ from markupsafe import Markup
 
 from ..common.svg import drawing, element, path
 
-RED, BLACK, BLUE, AMBER = "#d1302a", "#2b2b2b", "#2460d8", "#d99000"  # wires: supply, ground, SDA, SCL
+RED, BLACK, BLUE, AMBER = "#d1302a", "#2b2b2b", "#2460d8", "#d99000"  # wires for supply, ground, SDA and SCL
 _FONT = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif"
 _MIRRORED = {"start": "end", "end": "start", "middle": "middle"}
 

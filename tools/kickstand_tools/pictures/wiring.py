@@ -1,4 +1,5 @@
-"""Draws the wiring of sensor, display and button to a Pico and to an ESP32 as SVG. The pins are those of port.py."""
+"""Draws the wiring of sensor, display and button to a Pico and to an ESP32 as SVG. The firmware's port.py defines the
+pins."""
 
 import runpy
 from typing import NamedTuple
@@ -91,11 +92,11 @@ def draw(board: DrawnBoard, display: str) -> str:
     _draw_ground(page, _pin_y(ground))
     sensor = _draw_signals(page, board, pins["sensor"], _SENSOR_PINS_Y[:2], _CHANNELS)
     screen = _draw_signals(page, board, pins["display"], _DISPLAY_PINS_Y[1:], _CHANNELS[::-1])
-    if grounds[-1] > max(row["display"]):  # a ground near the button's pin, above it
+    if grounds[-1] > max(row["display"]):  # a ground pin is further up than the button's pin
         used_near.add(grounds[-1])
         page.wire(BLACK, (_RIGHT, _pin_y(grounds[-1])), (_MODULE_LEFT, _BUTTON_PINS_Y[0]))
         _draw_signals(page, board, pins["button"], _BUTTON_PINS_Y[1:], _CHANNELS)
-    else:  # a ground on the other side, led around the board
+    else:  # the ground wire starts on the other side and leads around the board
         ground = board.far.index("GND")
         used_far.add(ground)
         _draw_signals(page, board, pins["button"], _BUTTON_PINS_Y[:1], _CHANNELS)
@@ -134,7 +135,7 @@ def _draw_signals(
 def _default_pins(board: DrawnBoard) -> dict[str, dict[str, str]]:
     """Read the default pins of this board from the firmware's port.py.
 
-    The function installs a simulated board, so do not call it while another one is installed.
+    The function installs a simulated board, so do not call it while another simulated board is installed.
     Returns {module: {pin of the module: name of the board's pin}}.
     """
     with simulator.Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=board.machine):

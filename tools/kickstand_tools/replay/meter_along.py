@@ -1,7 +1,8 @@
 """Replays blocks of a log on this Python, and computes Nicolae's formula on arrays.
 
-numpy computes all values that do not depend on earlier samples, for a whole block at once. So a log of an hour at
-200 Hz takes 4.0 s instead of 7.2 s with Replay.step(). A test compares the results of both.
+numpy computes all values that do not depend on earlier samples, for a whole block at once. So a log of an hour at 200
+Hz takes 4.0 s instead of 7.2 s with Replay.step(). A test compares the results of this module with those of
+Replay.step().
 """
 
 from collections.abc import Iterable, Iterator
@@ -100,7 +101,8 @@ class Misfit:
             self.seconds += float(np.sum(np.diff(t_s, prepend=t_s[0])[odd])) or 1e-6
 
     def remarks(self, known: Iterable[Message]) -> list[Message]:
-        """Return the notice about contradicting readings. The list is empty if a notice in `known` explains them."""
+        """Return the notice about contradicting readings. The list is empty if a notice in `known` explains the
+        readings."""
         if not self.seconds or is_explained(known):
             return []
         return [ReadingsMisfit(self.seconds, self.first_s)]

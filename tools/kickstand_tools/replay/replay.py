@@ -26,7 +26,7 @@ from .meter_along import MeterAlong, Misfit
 _RESULT_BYTES = struct.calcsize(replay_engine.RESULT)
 
 # A function that runs replay_engine.run() on another Python. Its arguments are the records and the progress function.
-# It returns a context that yields a file with the results, and may raise InputError
+# The function returns a context that yields a file with the results, and may raise InputError
 Engine = Callable[[Iterator[bytes], Progress | None], contextlib.AbstractContextManager[IO[bytes]]]
 
 _SIGMA = replay_engine.COLUMNS.index("lean_sigma_deg")
@@ -122,7 +122,7 @@ def replay_blocks(
     """Yield each block of the log with the engine's results, one column per replay_engine.COLUMNS.
 
     Frozen readings are a gap for the engine, and their results are NaN. For a car, lean_sigma_deg is always NaN,
-    because its display shows no lean. At the end, remarks are appended to notices.
+    because a car's display shows no lean. At the end, remarks are appended to notices.
     """
     car = calibration.vehicle == "car"
     whole, stretch = split_stretch(log)
@@ -175,7 +175,8 @@ def _by_records(
 
 @contextlib.contextmanager
 def micropython(records: Iterator[bytes], _progress: Progress | None) -> Iterator[IO[bytes]]:
-    """Replay on MicroPython's unix port. Yields a file with the results. Raises InputError if it is not installed."""
+    """Replay on MicroPython's unix port. Yields a file with the results. Raises InputError if MicroPython is not
+    installed."""
     if not unix_port.available():
         raise InputError("engine micropython has no package for this system: use --engine cpython")
     with tempfile.TemporaryDirectory() as directory:
@@ -189,12 +190,12 @@ def micropython(records: Iterator[bytes], _progress: Progress | None) -> Iterato
 
 
 # Engines on another Python. The engine rp2040, an emulated Pico, is None here, because it is in the package
-# kickstand_emulator. It is found by its entry point in pyproject.toml
+# kickstand_emulator. This engine is found by its entry point in pyproject.toml
 _BY_RECORDS: dict[str, Engine | None] = {"micropython": micropython, "rp2040": None}
 
 
 def _last_words(traceback: bytes) -> str:
-    """Return the last line of MicroPython's traceback. MicroPython prints it to standard output."""
+    """Return the last line of MicroPython's traceback. MicroPython prints the traceback to standard output."""
     return traceback.decode(errors="replace").strip().rpartition("\n")[2]
 
 
@@ -205,5 +206,5 @@ def _records(blocks: Iterable[Block], calibration: CalibrationFile) -> Iterator[
     )
     for block in blocks:
         for time_us, reading, speed in block.measured.rows():
-            given = speed if speed >= 0.0 else replay_engine.NO_SPEED  # NaN is not >= 0
+            given = speed if speed >= 0.0 else replay_engine.NO_SPEED  # NaN is not >= 0 either
             yield struct.pack(replay_engine.RECORD, time_us, *reading, given)

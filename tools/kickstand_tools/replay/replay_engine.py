@@ -42,7 +42,7 @@ NO_SPEED = -1.0  # negative instead of NaN, because the module struct on a board
 
 
 class ReplayMeter(LeanMeter):
-    """The firmware's meter for single readings in g and deg/s. On a board it processes sums of counts."""
+    """The firmware's meter for single readings in g and deg/s. On a board the meter processes sums of counts."""
 
     def use(self, calibration, posed=False):
         """Use a calibration (see LeanMeter.use())."""
@@ -90,7 +90,7 @@ class Replay:
     calibration: The firmware's Calibration, for readings in g and deg/s.
     delay_s: Delay of the gyro's low-pass.
     leans: False for a car.
-    since_us: Time of the sample before the first one, or None.
+    since_us: Time of the sample before the first sample, or None.
     """
 
     def __init__(self, calibration, delay_s=DELAY_S, leans=True, since_us=None):
@@ -121,7 +121,7 @@ class Replay:
         return next(self.follow(((time_us, force, rate, speed_mps),)))
 
     def step(self, time_us, reading, speed_mps=NO_SPEED):
-        """Process a sample, and return the values of COLUMNS. The arguments are those of take()."""
+        """Process a sample, and return the values of COLUMNS. The arguments are the same as for take()."""
         meter = self.take(time_us, reading, speed_mps)
         force, rate = meter.force, meter.rate
         return (

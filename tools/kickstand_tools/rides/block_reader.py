@@ -48,7 +48,7 @@ class StoredTurn:
     time_us: time of the turn's last sample.
     n: number of samples.
     sums: sums of the counts of these samples, in the order ax ay az gx gy gz.
-    speed_mps, place: speed and position that arrived in this turn, None without one.
+    speed_mps, place: speed and position that arrived in this turn, None if none arrived.
     """
 
     time_us: int
@@ -66,7 +66,7 @@ class StoredBlock:
     centidegrees: temperature in 0.01 C.
     delay_tenths_ms: delay of the gyro's low-pass in 0.1 ms, 0 if the firmware did not store it.
     body: the calibration's bytes.
-    vehicle: from the board's config.py, "" if unknown. Blocks do not contain it.
+    vehicle: from the board's config.py, "" if unknown. Blocks do not contain the vehicle.
     """
 
     ride: int
@@ -135,7 +135,7 @@ def read(content: bytes) -> tuple[list[StoredBlock], list[str]]:
 
 
 def parse(data: bytes) -> StoredBlock:
-    """Parse one block. Raises BadBlock if it is not complete and valid."""
+    """Parse one block. Raises BadBlock if the block is not complete and valid."""
     if not data.startswith(block_format.MAGIC[: len(data)]):
         raise BadBlock("not of a ride")
     if len(data) < _START + _TAIL_LENGTH:

@@ -77,7 +77,7 @@ class PulledRide:
     log: the written file, with its calibration beside it, or None if the ride cannot be read.
     seconds, readings: duration of the log and its number of readings.
     problems: one line per fault.
-    whole: True if everything was copied. An end lost in a power cut does not count.
+    whole: True if everything was copied. An end that the board itself lost in a power cut does not count as missing.
     deleted: True if the ride was removed from the board.
     """
 
@@ -169,8 +169,8 @@ def _pull_ride(
 ) -> PulledRide:
     """Copy a ride and write its log.
 
-    vehicle: the vehicle from the board's config.py. It is used only if the alignment was measured or refined by
-        driving, because an alignment by two poses is always a motorcycle's.
+    vehicle: the vehicle from the board's config.py. The vehicle is used only if the alignment was measured or refined
+        by driving, because an alignment by two poses is always a motorcycle's.
     """
     ride = PulledRide(number)
     blocks: list[StoredBlock] = []

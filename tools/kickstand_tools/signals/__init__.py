@@ -1,4 +1,4 @@
-"""Functions on arrays of samples, for all other packages. They use only numpy, neither logs nor files.
+"""Functions on arrays of samples, for all other packages. The functions use only numpy, neither logs nor files.
 
 This module has moving means, standard deviations and integrals, means over cells of time, lag and correlation of two
 signals, rotation vectors and matrices, standstills, and distances. leaning.py relates a motorcycle's lean to its yaw
@@ -90,7 +90,7 @@ def _padded(values: Array, n: int) -> Array:
     return np.concatenate((before, values, after))
 
 
-# Means of samples over cells of time, block by block. They remove vibration and need little memory.
+# Means of samples over cells of time, block by block. Such means remove vibration and need little memory.
 
 
 def cell_numbers(time_s: Array, cell_s: float) -> Ints:
@@ -133,7 +133,7 @@ class EvenCells:
     latest: Array
 
     def merged(self, by: int) -> "EvenCells":
-        """Merge the cells into longer ones.
+        """Merge the cells into longer cells.
 
         The new cells are `by` times as long, and begin at multiples of `by`. `latest` of a new cell is the first value
         in it.
@@ -173,7 +173,7 @@ class Cells:
 
         time_s: times of the samples, shape (n), in s.
         means: values to average, shape (n, k).
-        latest: other values, shape (n, j). Each cell keeps the last one of each column that is not NaN.
+        latest: other values, shape (n, j). Each cell keeps the last value of each column that is not NaN.
         """
         if not len(time_s):
             return
@@ -349,7 +349,7 @@ def peaks(values: Array, apart: int, most: int) -> list[int]:
 
 
 # Rotation vectors and rotation matrices. A rotation vector is the axis times the angle in rad. The functions convert
-# any number of them at once, by the exponential map and its inverse. See Sola, "Quaternion kinematics for the
+# any number of rotations at once, by the exponential map and its inverse. See Sola, "Quaternion kinematics for the
 # error-state Kalman filter" (2017), section 2.3.
 
 
@@ -358,7 +358,7 @@ def rotated(matrix: Array, *vectors: Array) -> tuple[Array, ...]:
 
     matrix: the rows are the new axes, as in vehicle_from_sensor, shape (3, 3).
     vectors: one or more arrays of shape (n, 3).
-    Returns one array of shape (n, 3) for each of them.
+    Returns one array of shape (n, 3) for each of these arrays.
     """
     return tuple(vector @ matrix.T for vector in vectors)
 
@@ -436,7 +436,8 @@ EARTH_M = 6_371_000.0
 
 
 def distance_m(lat: Array, lon: Array, next_lat: Array, next_lon: Array) -> tuple[Array, Array]:
-    """Compute the distance from each position to the next one. It is exact enough for up to some kilometres.
+    """Compute the distance from each position to the next one. The result is exact enough for distances of up to some
+    kilometres.
 
     lat, lon: positions, shape (n), in degrees.
     next_lat, next_lon: next positions, shape (n), in degrees.
@@ -444,6 +445,6 @@ def distance_m(lat: Array, lon: Array, next_lat: Array, next_lon: Array) -> tupl
         east: metres to the east, shape (n).
         north: metres to the north, shape (n).
     """
-    apart_deg = (next_lon - lon + 180.0) % 360.0 - 180.0  # also across the meridian of 180 degrees
+    apart_deg = (next_lon - lon + 180.0) % 360.0 - 180.0  # correct also across the meridian of 180 degrees
     east = np.radians(apart_deg) * np.cos(np.radians(lat)) * EARTH_M
     return east, np.radians(next_lat - lat) * EARTH_M

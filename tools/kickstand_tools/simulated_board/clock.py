@@ -1,4 +1,4 @@
-"""The board's time in integer microseconds. It advances only when something on the board takes time."""
+"""The board's time in integer microseconds. The time advances only when something on the board takes time."""
 
 import time as _host_time
 from heapq import heappop, heappush
@@ -6,7 +6,7 @@ from heapq import heappop, heappush
 # Saved, because under MicroPython Board.install() later replaces `time`
 _host_ns, _host_sleep = _host_time.time_ns, _host_time.sleep
 
-NEVER_US = 1 << 60  # later than the end of any run
+NEVER_US = 1 << 60  # a time later than the end of any run
 _PACE_STEP_US = 5000  # time between two comparisons of a paced clock with the host's clock
 
 
@@ -15,7 +15,8 @@ def _host_us():
 
 
 class PowerOff(BaseException):
-    """Ends the program on the board after a power cut. It is a BaseException, because firmware may catch Exception."""
+    """Ends the program on the board after a power cut. The class is a BaseException, because firmware may catch
+    Exception."""
 
 
 class Reset(BaseException):
@@ -133,7 +134,7 @@ class Clock:
 
 
 class Watchdog:
-    """A watchdog. If it is not fed in time, the call that advances the time raises Reset. clock: a Clock."""
+    """A watchdog. If the watchdog is not fed in time, the call that advances the time raises Reset. clock: a Clock."""
 
     def __init__(self, clock):
         self._clock = clock

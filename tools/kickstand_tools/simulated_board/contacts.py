@@ -56,10 +56,10 @@ class Button(Contact):
         return self.closed or self._clock.now_us < pulled_us + self.charge_us
 
     def press(self, at_us, for_us):
-        """Press the button at at_us for for_us.
+        """Press the button from the time at_us on, for the duration for_us.
 
-        at_us: None to press now. If a press is still scheduled, the new one begins after it, because a finger cannot
-            press a pressed button.
+        at_us: None to press now. If a press is still scheduled, the new press begins after that press, because a finger
+            cannot press a pressed button.
         """
         if at_us is None:
             at_us = max(self._clock.now_us, self._free_us)
@@ -85,7 +85,7 @@ class Wheel(Contact):
     speed: function speed(t_s) that returns the speed of the vehicle in m/s.
     bounce_us: time for which the contact bounces at each edge. 0 for no bouncing.
     until_s: time at which its wire breaks.
-    noise_hz: pulses per second that a neighbouring cable induces. They replace the wheel's pulses. 0 for none.
+    noise_hz: pulses per second that a neighbouring cable induces. These pulses replace the wheel's pulses. 0 for none.
     """
 
     def __init__(self, clock, speed, pulses_per_metre=0.5, bounce_us=0, until_s=1e9):
@@ -104,7 +104,7 @@ class Wheel(Contact):
         speed = self._speed(now_us / 1e6)
         rate = speed * self._pulses_per_metre / 1e6 if speed > _CREEP_MPS else 0.0  # pulses per us
         if self.noise_hz:
-            rate = self.noise_hz / 1e6 if self._edge else 0.0  # without a listener, save the time
+            rate = self.noise_hz / 1e6 if self._edge else 0.0  # skipped if nobody listens, to save time
         self._turned += rate * (now_us - self._look_us)
         self._look_us = now_us
         if self._turned >= 0.999:

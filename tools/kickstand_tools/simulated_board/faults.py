@@ -16,7 +16,7 @@ _STALL_S = 0.5  # time-out of print() if the host reads nothing (shared/tinyusb/
 
 
 class Faults:
-    """The faults of one board. Each method adds a fault to the script. Several may act at the same time."""
+    """The faults of one board. Each method adds a fault to the script. Several faults may act at the same time."""
 
     def __init__(self, board):
         self._board = board
@@ -82,11 +82,11 @@ class Faults:
         self._override(at_s, for_s, 0xFF)
 
     def unplug_sensor(self, at_s, for_s=None):
-        """Disconnect the sensor for for_s. None: until the end. When reconnected, it starts as after power-on."""
+        """Disconnect the sensor for for_s. None: until the end. The reconnected sensor starts as after power-on."""
         self._between(at_s, for_s, self._board.remove_sensor, self._board.fit_sensor)
 
     def unplug_lcd(self, at_s, for_s=None):
-        """Disconnect the display for for_s. None: until the end. When reconnected, it starts as after power-on."""
+        """Disconnect the display for for_s. None: until the end. The reconnected display starts as after power-on."""
         self._between(at_s, for_s, self._board.remove_lcd, self._board.fit_lcd)
 
     def lcd_slip(self, at_s):

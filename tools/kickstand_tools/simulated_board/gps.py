@@ -2,7 +2,7 @@
 
 _KNOTS = 3600.0 / 1852.0
 _PIECE = 8  # number of bytes that are delivered at once
-_START_S = 12 * 3600 - 20  # UTC time of day, s, when the board's clock is 0, on 21 November 2026
+_START_S = 12 * 3600 - 20  # the board's clock is 0 at this time of day, in s UTC, on 21 November 2026
 _HOME = 48.1173, 11.5166667  # degrees north and east
 
 

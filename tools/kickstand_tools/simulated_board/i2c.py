@@ -178,7 +178,7 @@ class Bus:
         return self._level(self._driven_scl, self.scl_wire, pulled_up)
 
     def sda_level(self, pulled_up=False):
-        """Return the level of SDA. It is 0 if the controller or a device pulls it low, otherwise 1.
+        """Return the level of SDA. The level is 0 if the controller or a device pulls SDA low, otherwise 1.
 
         pulled_up: see scl_level().
         """

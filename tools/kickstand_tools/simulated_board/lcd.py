@@ -100,7 +100,7 @@ class Lcd:
         return [[self.ddram[start + place] for place in places] for start in (0x00, 0x40)]
 
     def text(self):
-        """Return two strings of the 16 visible characters. They are blank while the display is off."""
+        """Return two strings of the 16 visible characters. The strings are blank while the display is off."""
         lines = ["".join([self._character(code) for code in line]) for line in self.codes()]
         if not self.on:
             lines = [" " * COLUMNS, " " * COLUMNS]

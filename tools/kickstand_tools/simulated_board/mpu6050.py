@@ -1,8 +1,9 @@
 """Models the registers of the InvenSense MPU6050 and of other chips sold under its name.
 
 Sources: RM-MPU-6000A rev 4.2, PS-MPU-6000A rev 3.4; MPU-6500 RM rev 2.1; ICM-20689 and MPU-6886 data sheets. If these
-are ambiguous, the model is strict: a status bit appears only if INT_ENABLE enables it, and writes during start-up are
-lost. The low-pass only delays, because world() returns filtered values. Only the MPU6050 has a self-test here. Not
+documents are ambiguous, the model is strict: a status bit appears only if INT_ENABLE enables it, and writes during
+start-up are lost. The low-pass only delays, because world() returns filtered values. Of the modelled chips, only the
+MPU6050 has a self-test. Not
 modelled: DMP, auxiliary I2C.
 """
 
@@ -24,7 +25,7 @@ DATA_RDY, FIFO_OFLOW = 0x01, 0x10  # INT_STATUS
 
 START_UP_US = 90_000  # start-up time after power-on and reset; the data sheet's worst case is 100 ms
 WAKE_US = 30_000  # time from sleep to the first sample, the gyro's start-up time (PS 6.1)
-GYRO_LSB_PER_DPS = (131.0, 65.5, 32.8, 16.4)  # by range, GYRO_CONFIG bits 4 and 3
+GYRO_LSB_PER_DPS = (131.0, 65.5, 32.8, 16.4)  # one per range, which bits 4 and 3 of GYRO_CONFIG select
 DLPF_DELAY_US = (980, 1900, 2800, 4800, 8300, 13400, 18600, 980)  # delay of the gyro's low-pass, by DLPF_CFG
 
 ACCEL_TRIMS, GYRO_TRIMS = (13, 17, 22), (9, 14, 11)  # factory trim codes of x, y, z (RM pp. 9 to 11)

@@ -21,7 +21,7 @@ _OWN_ARGUMENTS = {
     "ssd1306": {0x20: 1, 0x21: 2, 0x22: 2, 0x8D: 1, 0x26: 6, 0x27: 6, 0x29: 5, 0x2A: 5, 0xA3: 2},
     "sh1106": {0xAD: 1},
 }
-_SWITCHES = {0xA0: "_flipped_columns", 0xA4: "_all_on", 0xA6: "inverted", 0xAE: "on"}  # bit 0 switches them on
+_SWITCHES = {0xA0: "_flipped_columns", 0xA4: "_all_on", 0xA6: "inverted", 0xAE: "on"}  # bit 0 means on
 _OFF = 0x40  # bit of the status while the display is off
 
 
@@ -30,7 +30,7 @@ class Oled:
 
     kind: "ssd1306" or "sh1106".
     identity: low half of the status.
-    alternate: True if rows alternate, as on a panel of 64 rows. On a panel of 32 rows they are in sequence.
+    alternate: True if rows alternate, as on a panel of 64 rows. On a panel of 32 rows, the rows are in sequence.
     on: True if switched on.
     pumped: True if the pixels have their voltage.
     inverted, contrast, start_line: settings.

@@ -29,7 +29,8 @@ _TALL = {
 def lines(oled):
     """Return two strings of 16 characters.
 
-    They are blank if the display is dark. They contain "?" if it does not show a page of the firmware. oled: an Oled.
+    The strings are blank if the display is dark. They contain "?" if the display does not show a page of the firmware.
+    oled: an Oled.
     """
     if not oled.backlight:
         return [_BLANK, _BLANK]

@@ -1,7 +1,7 @@
 """Models the board's Bluetooth LE radio and its connection to one phone, in plain Python, on the board's clock.
 
-A phone is any object with the methods heard(handle, data) and dropped(). It calls connect(), disconnect(), write(),
-read() and give_pin() of the radio.
+A phone is any object with the methods heard(handle, data) and dropped(). A phone calls connect(), disconnect(),
+write(), read() and give_pin() of the radio.
 """
 
 from .clock import to_us

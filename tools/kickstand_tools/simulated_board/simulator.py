@@ -171,9 +171,9 @@ class Board:
         self.clock.every(to_us(period_s), function)
 
     def press(self, at_s=None, for_s=0.15):
-        """Press the button at at_s for for_s.
+        """Press the button at the time at_s, for the duration for_s.
 
-        at_s: None to press now. If a press is still scheduled, the new one begins after it.
+        at_s: None to press now. If a press is still scheduled, the new press begins after that press.
         """
         self.button.press(None if at_s is None else to_us(at_s), to_us(for_s))
 
@@ -224,7 +224,7 @@ class Board:
     # Called by the fake `machine`
 
     def connect_uart(self, pin, baud, receive):
-        """Call receive(bytes) with the bytes that arrive on this pin. They are noise if the GPS receiver sends at
+        """Call receive(bytes) with the bytes that arrive on this pin. The bytes are noise if the GPS receiver sends at
         another rate."""
         if self.gps and pin == self._gps_pin:
             same = baud == self.gps.baud

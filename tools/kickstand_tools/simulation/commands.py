@@ -16,7 +16,8 @@ class Leg:
     phase: Name of the rider's action.
     seconds: Duration of the leg.
     speed_mps: Speed at the end of the leg. The acceleration is constant.
-    lean_deg: Lean of the centre of mass, positive to the right. It is reached within roll_s of the start, then held.
+    lean_deg: Lean of the centre of mass, positive to the right. This lean is reached within roll_s of the start, then
+        held.
     roll_s: Time for the change of lean.
     slope_percent: Slope of the road at the end of the leg.
     hang_m: Offset of the centre of mass to the right of the bike's plane.
@@ -116,7 +117,7 @@ def _fill_in(legs: list[Leg], name: str) -> list[float]:
 
 
 def _slope(distance: Signal, ends: Signal, percent: list[float]) -> Signal:
-    """Compute the road's slope at each sample, in rad. It changes smoothly between the ends of legs.
+    """Compute the road's slope at each sample, in rad. The slope changes smoothly between the ends of legs.
 
     The slope depends on the distance, so it stays constant while the bike stands.
 

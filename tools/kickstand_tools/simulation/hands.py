@@ -41,7 +41,7 @@ def procedure(
     Returns the readings in the form of Chip.read(), shape (n, 7).
     """
     hand = hand or Hand()
-    attitude = _turn_between(ups[0], np.array([0.0, 0.0, 1.0]))  # rotation from the sensor's axes to the world's, z up
+    attitude = _turn_between(ups[0], np.array([0.0, 0.0, 1.0]))  # rotation from sensor to world axes, with z up
     forces, rates = [], []
 
     def hold() -> None:

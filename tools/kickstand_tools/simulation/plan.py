@@ -57,7 +57,7 @@ class Plan:
         self._seconds = 0.0
         self._until = max(seconds - _CLOSING_S, 20.0)
         self.slope_percent = 3.0  # largest slope of random_slope()
-        self.roll_dps = 60.0  # mean roll rate of the fastest change of lean. The peak roll rate is nearly twice as high
+        self.roll_dps = 60.0  # mean roll rate of the fastest change of lean; the peak is nearly twice the mean
 
     @property
     def going_on(self) -> bool:
@@ -95,7 +95,8 @@ class Plan:
         return self.uniform(-self.slope_percent, self.slope_percent)
 
     def add(self, phase: str, seconds: float, speed_mps: float | None = None, **more: float | None) -> None:
-        """Add a leg. The slope at its end is random, unless slope_percent is in more. more: other fields of Leg."""
+        """Add a leg. The slope at the end of the leg is random, unless slope_percent is in more. more: other fields of
+        Leg."""
         if "slope_percent" not in more:
             more["slope_percent"] = self.random_slope()
         self.legs.append(Leg(phase, seconds, speed_mps, **more))  # type: ignore[arg-type]

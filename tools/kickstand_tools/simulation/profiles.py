@@ -1,6 +1,6 @@
 """Defines the profiles, which are kinds of ride: ordinary rides, and hard rides with one extreme condition each.
 
-A profile is a function. It adds the legs of a ride to a plan, and returns the conditions of the ride.
+A profile is a function that adds the legs of a ride to a plan, and returns the conditions of the ride.
 """
 
 from collections.abc import Callable
@@ -213,7 +213,8 @@ def crosswind(plan: Plan) -> Conditions:
 def weight(plan: Plan) -> Conditions:
     """A rider who hangs off in turns, and luggage on one side.
 
-    The rider moves the centre of mass by up to 5 cm, which is 5 degrees of lean. The luggage moves it by 1 to 2 cm.
+    The rider moves the centre of mass by up to 5 cm, which is 5 degrees of lean. The luggage moves the centre of mass
+    by 1 to 2 cm.
     """
     conditions = street(plan)
     beside = plan.side() * plan.uniform(0.01, 0.02)
@@ -260,7 +261,7 @@ def corners(plan: Plan) -> Conditions:
 
 
 def vibration(plan: Plan) -> Conditions:
-    """0.5 g of engine vibration at 6000/min. Its second order, 200 Hz, aliases to nearly 0 Hz."""
+    """0.5 g of engine vibration at 6000/min. The vibration's second order, 200 Hz, aliases to nearly 0 Hz."""
     conditions = street(plan)
     conditions.engine_rms_g = 0.5
     conditions.shift_rpm = 6600.0
@@ -315,6 +316,6 @@ PROFILES = MAIN | {profile.__name__: profile for profile in _HARD}
 
 
 def check_profile(name: str) -> None:
-    """Raise InputError if there is no such profile."""
+    """Raise InputError for an unknown profile."""
     if name not in PROFILES:
         raise InputError(f"no profile {name}: there are {', '.join(PROFILES)}")

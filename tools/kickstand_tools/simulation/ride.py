@@ -191,7 +191,7 @@ def _motion(
 ) -> tuple[Motion, Shaking]:
     n, rate = len(command.time), command.rate_hz
     command.crosswind += conditions.gust_mps2 * band_noise(chance, n, 0.05, 0.5, rate)
-    # A rider who moves around makes the bike lean only while it rides
+    # A rider who moves around makes the bike lean only while the bike moves
     command.hang += conditions.sway_m * band_noise(chance, n, 0.02, 0.3, rate) * smoothstep(command.speed / 5.0)
     rolled = roll(command, bike, weave(chance, command, conditions.unrest_deg))
     surface = profile_slope(chance, float(command.distance[-1]) + 10.0, conditions.roughness)
@@ -239,7 +239,7 @@ def _sideways(lean: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[n
 
 
 def _distances_in_phase(command: RiderCommands, phase: str, spacing_m: float) -> list[float]:
-    """Return the distances at which the ride is in this phase. They are multiples of spacing_m."""
+    """Return the distances at which the ride is in this phase. The distances are multiples of spacing_m."""
     if phase not in command.phases:
         return []
     met = command.distance[command.phase == command.phases.index(phase)]
@@ -275,7 +275,7 @@ def _to_sensor(vectors: NDArray, mounting: NDArray, turned: NDArray) -> NDArray[
 
     vectors: The vectors, shape (n, 3).
     mounting: Rotation from sensor to vehicle axes, shape (3, 3).
-    turned: Small rotations of the mount, shape (n, 3), in rad. They are applied to second order.
+    turned: Small rotations of the mount, shape (n, 3), in rad. These rotations are applied to second order.
     """
     if turned.any():
         first = np.cross(turned, vectors)

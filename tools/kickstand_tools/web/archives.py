@@ -35,7 +35,8 @@ _STANDS_IN = {
 }
 _MPREMOTE = ("__init__.py", "mp_errno.py", "transport.py", "transport_serial.py")
 _NUMPY = "lib/python3.12/site-packages/"  # the folder of numpy in the conda package
-# These folders are a third of numpy's size. They contain parts for developers, for compilers and for random numbers.
+# These folders are a third of numpy's size. The folders contain parts for developers, for compilers and for random
+# numbers.
 _LEFT_OUT = ("/tests/", "/f2py/", "/random/", "/distutils/", "/testing/", "/include/", "/_pyinstaller/")
 _LICENCES = "info/licenses/"
 
@@ -90,7 +91,9 @@ def install_archive() -> bytes:
 
 
 def firmware() -> bytes:
-    """Pack the firmware for riders whose browser cannot connect to a board. They copy it with mpremote."""
+    """Pack the firmware for riders whose browser cannot connect to a board. These riders copy the firmware with
+    mpremote.
+    """
     return zipped({f"kickstand-firmware{path}": source.read_bytes() for path, source in firmware_files().items()})
 
 

@@ -93,7 +93,7 @@ class Device:
             else:
                 board.faults.restore("open")
         elif value:
-            board.faults.restore("open")  # only one save is cut
+            board.faults.restore("open")  # the supply is cut in one save only
             self.powered = True
         elif self.powered:
             board.clock.power_off()
@@ -162,7 +162,8 @@ class Device:
         return None
 
     def _display(self):
-        """Return the result of display(). While an OLED receives a new picture, the text is that of the old picture."""
+        """Return the result of display(). While an OLED receives a new picture, the text still describes the old
+        picture."""
         seen = display(self.board.lcd)
         if not seen["text"][0].startswith("?"):
             self._text = {name: seen[name] for name in ("text", "shown_deg")}

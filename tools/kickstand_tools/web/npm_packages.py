@@ -88,7 +88,7 @@ def _install(kept: Path) -> None:
 
 
 def _rename(directory: str, kept: Path) -> None:
-    """Rename a complete directory to kept, unless another process was first."""
+    """Rename a complete directory to the path `kept`, unless another process has already created this path."""
     try:
         os.rename(directory, kept)
     except OSError:

@@ -32,7 +32,7 @@ from ..logs.csv_lines import write_lean
 from ..logs.reader import read_blocks
 from .rides_given import sorted_out
 
-PLOTLY = "./plotly/plotly.min.js"  # the page of a ride loads it from the site
+PLOTLY = "./plotly/plotly.min.js"  # the page of a ride loads plotly from the site
 MADE = Path("../made")  # results are not written beside the given files, because names could collide
 _smoothed: dict[str, list] = {}  # {name of the last shown ride: results of smooth_blocks(), one per block}
 TOO_LONG = "this ride is too long for the memory of a browser: give a part of it"
@@ -251,5 +251,5 @@ def raising(function):
 
 
 def prepare():
-    """Prepare the module. Call it once, before all other functions."""
+    """Prepare the module. Call this function once, before all other functions."""
     np.linalg.inv, np.linalg.solve = raising(np.linalg.inv), raising(np.linalg.solve)

@@ -38,8 +38,8 @@ TYPES = {
 class Server(ThreadingHTTPServer):
     """Serves the site, and ignores a browser that disconnects.
 
-    With more than MOST connections the server ends an old one. It ends the oldest that has sent no request, or
-    otherwise the oldest of all.
+    With more than MOST connections the server ends an old connection: the oldest that has sent no request. If all have
+    sent a request, the server ends the oldest of all.
     """
 
     request_queue_size = 128
@@ -87,7 +87,7 @@ def server(files: dict[str, bytes], port: int = PORT) -> Server:
     """Return a server for the files of the site. Its port is server_address[1].
 
     files: {path: content}.
-    port: the wanted port. If it is in use, the server uses a free port.
+    port: the wanted port. If this port is in use, the server uses a free port.
     """
 
     class Handler(BaseHTTPRequestHandler):

@@ -45,11 +45,11 @@ def site_files() -> dict[str, bytes]:
     """
     files = npm_packages.find()
     files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in sorted(PAGE.rglob("*.*"))}
-    files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # with the suffix .txt a browser shows the file
+    files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # a browser shows a file with the suffix .txt
     files |= wiring_files()
     values = {"home": home(), "boards": wiring_tables(), "preview": sample_ride.preview()}
     library = files["plotly/plotly.min.js"].decode()
-    values["charts"] = " ".join(map(source_hash, (library, *page.SCRIPTS)))  # for the content security policy
+    values["charts"] = " ".join(map(source_hash, (library, *page.SCRIPTS)))  # hashes for the content security policy
     files |= {name: _filled(name, **values) for name in files if name.endswith(".html") or name == _STYLE}
     files |= documents.document_files(values["home"])
     files |= {f"sample/{name}": data for name, data in sample_ride.sample_ride().items()}

@@ -13,7 +13,7 @@ CHROMIUM = shutil.which("chromium")
 
 @contextlib.contextmanager
 def opened(files: dict[str, bytes]) -> Iterator[tuple[Any, str]]:
-    """A context that serves these files. It yields playwright's browser and the server's address."""
+    """A context that serves these files. The context yields playwright's browser and the server's address."""
     from playwright.sync_api import sync_playwright
 
     with serve.server(files, 0) as server, sync_playwright() as playwright:

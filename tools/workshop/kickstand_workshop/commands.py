@@ -136,7 +136,7 @@ def bands_command(
 
 
 def _console() -> Console:
-    """Return a console for standard output. Without a terminal it is wide enough for a table."""
+    """Return a console for standard output. Without a terminal the console is wide enough for a table."""
     console = Console()
     return console if console.is_terminal else Console(width=_WIDTH)
 

@@ -30,7 +30,7 @@ _WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
 }
 _NEEDS = {"gpx": ("GPX", "gpxpy"), "parquet": ("Parquet", "pyarrow")}  # name and library of a format
 _DATED = ("gpx", "racechrono", "vbo")  # formats that need date and time
-_CLOCK_S = 1e8  # a later time in a log is Unix time (March 1973)
+_CLOCK_S = 1e8  # a time in a log is Unix time if it is larger than this (March 1973)
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def export(
         written_s = Path(log).stat().st_mtime if isinstance(log, (Path, str)) else time.time()
         start_s = float(max(0, int(written_s - whole.seconds)))
     step_s = STEP_S[form]
-    if step_s:  # both the start and the times are rounded, so different times have different sums
+    if step_s:  # start and times are both rounded, so that different times stay different
         start_s = round(start_s / step_s) * step_s
     count = given = 0
 
@@ -105,7 +105,7 @@ def export(
                 block.speed_mps = np.interp(block.t_s, *whole.speeds.T)
             if form == "vbo":
                 block.lat_deg, block.lon_deg = whole.places.at(block.t_s)
-            block.lean_sigma_deg = np.where(block.trusted, block.lean_sigma_deg, np.nan)  # as the command replay does
+            block.lean_sigma_deg = np.where(block.trusted, block.lean_sigma_deg, np.nan)  # as in the output of `replay`
             if step_s:
                 block.t_s = rounded_to(block.t_s, step_s)
             count += len(block.t_s)
@@ -126,8 +126,8 @@ class _Whole:
     seconds: duration of the log.
     speeds: time since the first sample in s, and speed in m/s, shape (n, 2).
     places: the positions.
-    utc_s: Universal Time of the first sample; None if unknown. It is the median over the rows, because some values are
-        late.
+    utc_s: Universal Time of the first sample; None if unknown. The median over the rows is used, because some values
+        are late.
     """
 
     start_s: float

@@ -1,9 +1,9 @@
 """Writes Racelogic's VBO, which Circuit Tools opens and RaceChrono imports.
 
 Sections and standard channels follow
-https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.html. Only other channels have units.
-Columns and signs follow https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and the user guide
-of the VBOX HD Lite:
+https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.html. Standard channels have no units. All
+other channels have units. Columns and signs follow
+https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and the user guide of the VBOX HD Lite:
 
 * time: HHMMSS.SS
 * velocity: km/h
@@ -15,7 +15,7 @@ of the VBOX HD Lite:
 
 A log does not contain the number of satellites. The file says 4, because a position needs at least 4. Without a
 position, satellites and position are written as 0. Other columns without values are left out. VBO requires a velocity.
-Without a speed it is 0, and a comment in the file says so.
+If the log has no speed, the velocity is 0, and a comment in the file says so.
 """
 
 import time
@@ -57,7 +57,7 @@ def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
 
     blocks: should have positions in as many rows as possible.
     """
-    first = next(blocks)  # shows which channels the log has; a missing channel is NaN in all blocks
+    first = next(blocks)  # the first block shows which channels the log has; a missing channel is NaN in all blocks
     other = [column for column in OTHER if not np.all(np.isnan(getattr(first, column[2])))]
     lean = "lean-angle in degrees, > 0 to the right; " if OTHER[0] in other else ""
     satellites = f"satellites {_SATELLITES} stands for a position, 0 for none"

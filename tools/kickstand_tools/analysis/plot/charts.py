@@ -183,7 +183,8 @@ def lean_limit(seen: Overview) -> float:
 
 
 def envelope(time: Array, values: Array, points: int, gap_s: float = np.inf) -> tuple[Array, Array]:
-    """Reduce a long line to the smallest and the largest value of each stretch. The drawn line looks the same.
+    """Reduce a long line to the smallest and the largest value of each stretch. The drawn line looks the same as with
+    all samples.
 
     NaNs are left out. Each gap of over gap_s has one NaN in its middle, which interrupts the line.
 

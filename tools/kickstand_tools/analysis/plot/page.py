@@ -1,7 +1,7 @@
 """Writes the ride as one HTML page with charts that you can zoom. The page needs no other file.
 
 If the log has positions, a map is beside the charts. If you point at a moment in the map or in a chart, the page marks
-it in both.
+this moment in the map and in the charts.
 """
 
 from importlib.resources import files
@@ -72,7 +72,7 @@ def page(seen: Overview, library: str, allowed: str, tiles: bool = False, warnin
 
 
 def tiles_at(points: track_map.MapPoints) -> dict[str, Any]:
-    """Return the address of the tiles' server, and the position of its world map in the metres of this map."""
+    """Return the address of the tiles' server, and the position of the server's world map, in metres of this map."""
     lat, lon = np.radians(points.lat_deg), np.radians(points.lon_deg)
     scale_m = EARTH_M * float(np.cos(lat))
     return {

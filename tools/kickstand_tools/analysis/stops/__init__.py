@@ -1,1 +1,1 @@
-"""Finds the stops of a ride as in a brake test, and the standstills in which they end."""
+"""Measures the stops of a ride as in a brake test, and finds the standstill at the end of each stop."""

@@ -5,7 +5,7 @@ speed v0. The speed falls to vb = 0.8 v0 after the distance sb, and to ve = 0.1 
 
     dm = (vb^2 - ve^2) / (25.92 (se - sb))       dm in m/s2, speeds in km/h, distances in m
 
-At the standstill, the force shows the slope of the road, and the gyro's readings are its bias. Speed and pitch are
+At the standstill, the force shows the slope of the road, and the gyro reads only its bias. Speed and pitch are
 integrated backwards from the standstill. Because the pitch is known, the dive of the fork does not look like braking:
 
     dq/dt = w_y sin t - w_x cos t,   dv/dt = f_z - g sin q       (as in kickstand.lean.bike_model)
@@ -32,12 +32,13 @@ RATE_S = 0.02  # time between samples for the search of stops
 MIN_SPEED_MPS = 10.0 / 3.6
 # Smallest and largest mean deceleration of a stop. A larger deceleration means a fall or a fault.
 MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0
-LONGEST_S = 60.0  # longest time before a standstill in which the start of the braking is searched
+LONGEST_S = 60.0  # the search for the start of the braking goes back at most this long
 FEWEST = 10  # least number of samples at a standstill, to compute slope and bias
 GAP_S = 0.5  # longest gap in the readings over which speed and pitch are integrated
 REST_S = 2.5  # duration of the standstill that is used
 SETTLE_S = 0.5  # first part of a standstill that is not used, because the fork rebounds
-# Shares of the full deceleration. Over ONSET_SHARE, the vehicle is braking. Under FAINT_SHARE, it is not.
+# Shares of the full deceleration. Over ONSET_SHARE, the vehicle is braking. Under FAINT_SHARE, the vehicle is not
+# braking.
 ONSET_SHARE, FAINT_SHARE = 0.15, 0.04
 ONSET_S = 0.6  # longest time in which the deceleration rises from FAINT_SHARE to ONSET_SHARE
 
@@ -46,14 +47,14 @@ ONSET_S = 0.6  # longest time in which the deceleration rises from FAINT_SHARE t
 SENSOR_HEIGHT_M = 0.65
 
 MAX_SPEED_MPS = 250.0 / 3.6
-MAX_SIDE_M, MAX_HEADING_DEG = 15.0, 30.0  # largest deviation of a stop from a straight line; more is a bend
+MAX_SIDE_M, MAX_HEADING_DEG = 15.0, 30.0  # a stop that deviates more from a straight line is a bend
 # The speed is integrated backwards from a standstill to the previous standstill, where it should be 0. It may differ
 # from 0 by OPEN_MPS, plus OPEN_MPS2 for each second between the two standstills. A pitch error of one degree causes
 # 0.17 m/s2, and the gyro's drift adds to it. If more than SHOWING_S are between the standstills, this is not tested.
 OPEN_MPS, OPEN_MPS2, SHOWING_S = 3.0, 0.7, 30.0
 SPEED_S, SURELY_MPS2 = 15.0, 1.5  # longest duration and smallest deceleration of a stop that only the log's speed shows
 
-STRAIGHT_S = 0.1  # start of the braking, whose mean heading is used as the direction of the straight line
+STRAIGHT_S = 0.1  # the mean heading over this first part of the braking gives the straight line
 SMOOTH_S = 0.2  # averaging time of accelerations and jerks
 
 
@@ -179,7 +180,8 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
     time = part.t_s
     acceleration, pitch_rate, yaw_rate = _acceleration(part, rest)
     integrated = integral(time, acceleration)
-    # Integrate the speed backwards from the standstill. Correct it for the sensor, which moves when the bike pitches.
+    # Integrate the speed backwards from the standstill. Correct the speed for the motion of the sensor when the bike
+    # pitches.
     speed = integrated - integrated[-1] + SENSOR_HEIGHT_M * np.radians(pitch_rate)
     smooth = smoothed(acceleration, time, SMOOTH_S)
     begin = _onset(smooth, time, rest)

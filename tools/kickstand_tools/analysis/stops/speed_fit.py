@@ -1,7 +1,7 @@
 """Corrects a speed integrated from the acceleration by the speed in the log.
 
-A log with one speed per second has only two or three speeds in a hard stop. They do not show the course of the speed in
-between. The acceleration shows this course, but its integral drifts.
+A log with one speed per second has only two or three speeds in a hard stop. These few values do not show how the speed
+changes between them. The acceleration shows these changes, but its integral drifts.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ from kickstand.units import STANDARD_GRAVITY
 from ...signals import Array, best_lag, integral, smoothed
 from ..channels import Channels
 
-SMOOTH_S = 0.2  # averaging time of the acceleration that is multiplied by the delay of the speed
+SMOOTH_S = 0.2  # averaging time of the acceleration a(t) in fitted_speed()
 LEAD_S = 4.0  # the fit also uses the logged speeds in this time before the braking
 DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # delays of the speed to try, in s
 # A delay is searched only with at least ENOUGH_SPEEDS speeds, one per second. The standard deviation of the changes
@@ -52,8 +52,8 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
 
     v is the integrated speed, and a the measured acceleration. The unknowns are the scale error k, the acceleration
     error b (m/s2) and the delay error d (s). Slopes and fork dive that the gyro did not measure cause the error b. The
-    model of b is a random walk backwards in time. It is nearly 0 at standstill, and linear between knots. Its basis
-    functions are hat functions (linear B-splines).
+    model of b is a random walk backwards in time. The error b is nearly 0 at standstill, and linear between knots. Its
+    basis functions are hat functions (linear B-splines).
 
     part: the ride up to a standstill.
     begin: index at which braking begins.

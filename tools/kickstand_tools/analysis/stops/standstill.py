@@ -1,8 +1,9 @@
 """Detects standstills, for the stops of a ride.
 
 The limits are relative to the shaking of the ride. In simulated rides, these limits find all of the standing time. The
-fixed limits of signals.motionless, in deg/s and g, find only 54 to 92 %. Relative limits are worse only if an idling
-engine shakes as much as the road. Then they find 17 to 41 % of the standing time, and fixed limits find 91 %.
+fixed limits of signals.motionless, in deg/s and g, find only 54 to 92 % of this time. Relative limits are worse only if
+an idling engine shakes as much as the road. Then relative limits find 17 to 41 % of the standing time, and fixed limits
+find 91 %.
 """
 
 import numpy as np
@@ -16,10 +17,10 @@ STALE_S = 3.0  # largest age in s of a speed that is used
 # of the shaking while moving.
 QUIET_S = 1.0
 QUIET_SHARE = 0.15  # the share for the rates of pitch and yaw
-# The share for the vertical force. After a stop the fork shakes less than this. Smooth roads and idling engines shake
-# more.
+# The share for the vertical force. After a stop the fork shakes less than this. Smooth roads and idling engines cause
+# more shaking.
 QUIET_UP_SHARE = 0.2
-RIDING_PERCENTILE = 90.0  # percentile of the shaking that belongs to moving, even in a ride with long pauses
+RIDING_PERCENTILE = 90.0  # this percentile of the shaking comes from a moving vehicle, even with long pauses
 # Limits of the road's shaking. Shaking faster than ENGINE_S is the engine's. Changes slower than BEND_S are bends and
 # the dive of the fork
 ENGINE_S, BEND_S = 0.1, 0.5

@@ -3,7 +3,7 @@
 Column names and signs were found from the session tests/test_data/SFJ/*_0101.csv of
 https://github.com/m3rlin45/libxrk: at rest VerticalAcc is -1. LateralAcc and YawRate are positive in a right turn,
 InlineAcc when speeding up. The axes are therefore forward, right and down. If VerticalAcc is +1 at rest,
-VerticalAcc points up and keeps its sign. The signs of the other channels do not depend on this.
+VerticalAcc points up and keeps its sign. The signs of the other channels do not depend on the sign of VerticalAcc.
 """
 
 import numpy as np

@@ -26,8 +26,9 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 
 def read(files: list[RecordingFile], name: str, units: Mapping[str, str] = {}) -> AppRecording:
-    """Read a recording. units: "speed" is the unit of the column Speed. Without it, the unit is found from the
-    positions. Raises InputError for a missing column and for a unit that is not a unit of speed."""
+    """Read a recording. units: "speed" is the unit of the column Speed. Without this entry, the unit is found from the
+    positions. Raises InputError for a missing column and for a unit that is not a unit of speed.
+    """
     said = units.get("speed", "")
     if said:
         factor(said, SPEEDS, "speed")
@@ -56,7 +57,7 @@ def read(files: list[RecordingFile], name: str, units: Mapping[str, str] = {}) -
 
 
 def _header(file: RecordingFile) -> int | None:
-    """The number of the line of column names. Lines about the laps may come before it."""
+    """The number of the line of column names. Lines about the laps may come before this line."""
     for number, line in enumerate(file.text.split("\n", 200)[:200]):
         names = {plain(cell) for cell in names_in(line)}
         if {"gforcex", "gforcez", "time"} <= names:

@@ -1,10 +1,10 @@
 """Reads SensorLog (Bernd Thomas) from an iPhone or a Watch: one wide CSV. Each sensor has a time since the start of
 iOS.
 
-Columns are those of the example logs at http://sensorlog.berndthomas.net. Values come from Core Motion. Accelerations
-are in g, and read -1 along the axis that points up at rest
-(https://developer.apple.com/reference/uikit/uiacceleration). They are the sum of gravity and the user's acceleration,
-which the file also contains. Rates are in rad/s, right-handed.
+The columns are the same as in the example logs at http://sensorlog.berndthomas.net. Values come from Core Motion.
+Accelerations are in g, and read -1 along the axis that points up at rest
+(https://developer.apple.com/reference/uikit/uiacceleration). These accelerations are the sum of gravity and the user's
+acceleration, which the file also contains. Rates are in rad/s, right-handed.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Reads Racelogic's VBO, with the channels of an inertial unit such as the IMU04.
 
-Sections and standard channels are those of
+Sections and standard channels follow
 https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format. Latitude and longitude are in minutes, and
 longitude is positive in the west. The signs of the IMU04's channels are in "CAN Output - IMU04" at
 en.racelogic.support. Acceleration is x forward, y to the left, z up, including gravity. The yaw rate is positive

@@ -36,7 +36,7 @@ _ESP32_PINS = {
 
 
 def pins_of(machine):
-    """Return the GPIO numbers that machine.Pin accepts. On a classic ESP32 they include the flash's pins."""
+    """Return the GPIO numbers that machine.Pin accepts. On a classic ESP32 these numbers include the flash's pins."""
     ranges = ((0, 29),) if _chip(machine).startswith("RP2") else _ESP32_PINS[_kind(machine)]
     pins = frozenset(pin for first, last in ranges for pin in range(first, last + 1))
     return pins - {16, 17} if "SPIRAM" in machine else pins

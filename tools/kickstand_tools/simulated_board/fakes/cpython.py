@@ -10,7 +10,7 @@ from . import framebuf
 
 
 def supplement():
-    """Add the features. Drivers and app need them; the firmware's mathematics does not."""
+    """Add the features. Drivers and app need these features. The firmware's mathematics does not."""
     sys.modules.setdefault("micropython", _module())
     sys.modules.setdefault("framebuf", framebuf)
     if not hasattr(sys, "print_exception"):

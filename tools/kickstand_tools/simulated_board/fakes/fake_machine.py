@@ -14,7 +14,7 @@ PWRON_RESET = 1
 WDT_RESET = 3  # the rp2 port reports this cause also after machine.reset()
 
 _TICK_MS = 10  # tick of FreeRTOS on an ESP32
-_LEGACY_MS = 100  # time-out of an ESP32's legacy driver per byte. It is added once more at the end of a transfer
+_LEGACY_MS = 100  # time-out of an ESP32's legacy driver per byte, added once more at the end of a transfer
 _SPI_CALL_US = 20  # duration of a call into machine.SPI, including the driver's Python code
 _RP2_MAX_WATCHDOG_MS = 8388
 _ESP32_TICKS = 4  # ticks per millisecond of the second stage of an ESP32's watchdog, counted in 32 bits (ESP-IDF)

@@ -1,6 +1,6 @@
 """MicroPython's `os` with an ilistdir() that also returns sizes, as on a board, and the free space of a Pico's flash.
 
-On MicroPython this module replaces `os`. On CPython the names in ADDED are added to the real one.
+On MicroPython this module replaces `os`. On CPython the names in ADDED are added to the real `os`.
 """
 
 import os

@@ -1,6 +1,6 @@
 """MicroPython's `time` on the simulated board's clock.
 
-On MicroPython this module replaces `time`. On CPython the names in ADDED are added to the real one.
+On MicroPython this module replaces `time`. On CPython the names in ADDED are added to the real `time`.
 """
 
 CALL_US = 5  # duration of reading the time, without which a loop that waits for a time would never end

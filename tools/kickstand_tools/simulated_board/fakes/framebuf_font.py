@@ -14,7 +14,7 @@ OR OTHER DEALINGS IN THE SOFTWARE.
 
 from binascii import a2b_base64
 
-# Characters 32 to 127. Each has eight bytes, its columns from the left, with the topmost pixel in bit 0
+# Characters 32 to 127. Each letter has eight bytes, its columns from the left, with the topmost pixel in bit 0
 FONT = a2b_base64(
     b"AAAAAAAAAAAAAABPTwAAAAAHBwAABwcAFH9/FBR/fxQAJC5razoSAABjMxgMZmMAADJ/TU13clAAAAAEBgMBAAAAHD5jQQAAAABBYz4c"
     b"AAAIKj4cHD4qCAAICD4+CAgAAACA4GAAAAAACAgICAgIAAAAAGBgAAAAAEBgMBgMBgIAPn9JRX8+AABARH9/QEAAAGJzUUlPRgAAImNJ"

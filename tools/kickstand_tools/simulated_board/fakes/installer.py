@@ -19,7 +19,7 @@ class Installer:
         self._real = {}  # the replaced modules; None for a module that did not exist
 
     def install(self, board):
-        """Replace `machine`, `time` and `os` by those of this simulator.Board."""
+        """Replace `machine`, `time` and `os` by the fakes for this simulator.Board."""
         fake_machine.use(board)
         fake_time.use(board.clock, board.clock.now_us)
         self._replace("machine", fake_machine)
@@ -37,7 +37,7 @@ class Installer:
             self._replace("time", fake_time)
             self._replace("os", fake_os)
         else:
-            from . import cpython  # it imports modules that MicroPython does not have
+            from . import cpython  # cpython.py imports modules that MicroPython does not have
 
             cpython.supplement()
             for real, fake in _ADDED_TO:

@@ -35,7 +35,7 @@ class Bike:
     sensor_forward: float = 0.75  # distance of the sensor in front of the rear contact point
     sensor_left: float = 0.0
     # Pitch caused by the springs while both wheels are on the road, measured by a superbike's suspension sensors.
-    dive_deg_per_g: float = 2.8  # nose down in braking, for a telescopic fork. It is negative for an anti-dive fork
+    dive_deg_per_g: float = 2.8  # nose down in braking, for a telescopic fork; negative for an anti-dive fork
     squat_deg_per_g: float = 1.3  # nose up in acceleration
     dive_hz: float = 1.7
     dive_damping: float = 0.45
@@ -104,7 +104,7 @@ def chassis_lean(balance: Signal, bike: Bike, bank: Signal | float = 0.0, hang: 
 def weave(chance: np.random.Generator, command: RiderCommands, riding_deg: float) -> Signal:
     """Simulate the rider's random changes of the lean, in rad.
 
-    The changes are larger at walking pace, and small while the feet are on the ground. In bends they include
+    The changes are larger at walking pace, and small while the feet are on the ground. In bends the changes include
     corrections of the line.
 
     riding_deg: rms of the changes at speed.

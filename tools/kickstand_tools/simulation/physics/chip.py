@@ -18,7 +18,7 @@ _COUNTS = 32768.0
 _GYRO_COUNTS = 32750.0  # counts at the end of a range, from the data sheet's 65.5 counts per deg/s at 500 deg/s
 _ACCEL_NOISE_G = 400e-6 * np.sqrt(RATE_HZ / 2)  # rms of a conversion, from 400 ug/sqrt(Hz)
 _GYRO_NOISE_DPS = 0.005 * np.sqrt(RATE_HZ / 2)
-_CROSS_AXIS = 0.02  # sensitivity of an axis to its neighbours
+_CROSS_AXIS = 0.02  # sensitivity of an axis to motion along another axis
 GYRO_DPS_PER_G = 0.1  # sensitivity to linear acceleration
 CALIBRATED_C = 25.0
 
@@ -75,7 +75,7 @@ class Chip:
         Offsets and biases are uniformly distributed within the data sheet's limits. Scale and cross-axis sensitivity
         are normally distributed, with the limit at two standard deviations. For a change of temperature of 45 to 60 C,
         the data sheet allows drifts of 35 to 60 mg for the accelerometer and 20 deg/s for the gyro. An ordinary sensor
-        has a third of the accelerometer's drift and a fifth of the gyro's.
+        has a third of the accelerometer's drift and a fifth of the gyro's drift.
         """
 
         def near_one(scale: float, cross: float) -> NDArray[np.float64]:

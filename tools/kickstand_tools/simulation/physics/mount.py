@@ -97,7 +97,7 @@ def aliasing(chance: np.random.Generator, chip: Chip) -> Mount:
 
 
 def clipping(chance: np.random.Generator, chip: Chip) -> Mount:
-    """Return a logger with ranges of 2 g and 250 deg/s. Bumps and the engine exceed them."""
+    """Return a logger with ranges of 2 g and 250 deg/s. Bumps and the engine exceed these ranges."""
     return Mount(replace(chip, accel_range_g=2.0, gyro_range_dps=250.0))
 
 

@@ -46,7 +46,7 @@ class Shaking:
 def transmitted(f: Signal) -> NDArray:
     """Compute the complex transfer function of the quarter-car model.
 
-    It is the displacement of the chassis divided by the displacement of the road. f: frequencies in Hz.
+    The function is the displacement of the chassis divided by the displacement of the road. f: frequencies in Hz.
     """
     w = 2.0 * np.pi * f
     strut = _SPRING + 1j * w * _DAMPER

@@ -27,7 +27,7 @@ def derivative(x: Signal, rate_hz: float) -> Signal:
 
 
 def integral(x: Signal, rate_hz: float) -> Signal:
-    """Return the integral of x over time, by the trapezoidal rule. It is 0 at the start."""
+    """Return the integral of x over time, by the trapezoidal rule. The integral is 0 at the start."""
     return np.concatenate(([0.0], np.cumsum((x[1:] + x[:-1]) / (2.0 * rate_hz))))
 
 

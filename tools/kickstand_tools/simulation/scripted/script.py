@@ -1,6 +1,7 @@
 """Simulates a motorcycle in balance whose lean is known at every instant, and a perfect sensor on it.
 
-This is plain Python for CPython and MicroPython. It does not use the firmware's mathematics, because it tests them.
+This is plain Python for CPython and MicroPython. The module does not use the firmware's mathematics, because it tests
+them.
 
 The vehicle's axes are left, up and forward (right-handed). The lean is positive to the right, the yaw rate is positive
 in a left turn, and the slope is positive uphill. The attitude consists of three rotations in this order: heading about
@@ -106,9 +107,10 @@ def _glide(start, end, u, seconds):
 
 
 def yaw_rate_in_balance(lean, lift_mps2, speed_mps):
-    """Return the yaw rate that balances a lean, in rad/s about the road's normal. It is negative in a right turn.
+    """Return the yaw rate that balances a lean, in rad/s about the road's normal. The yaw rate is negative in a right
+    turn.
 
-    Below RIDING_MPS the feet help to balance, so the yaw rate is smaller. Below WALKING_MPS it is 0.
+    Below RIDING_MPS the feet help to balance, so the yaw rate is smaller. Below WALKING_MPS the yaw rate is 0.
 
     lean: Lean in rad, positive to the right.
     lift_mps2: Specific force perpendicular to the road.

@@ -32,7 +32,7 @@ def scrambled(number):
 def normal(number):
     """Compute a random number from a 32-bit hash, as the sum of its four bytes.
 
-    Its distribution is nearly normal, with the mean 0 and the rms 1.
+    The distribution of these numbers is nearly normal, with the mean 0 and the rms 1.
     """
     total = (number & 255) + (number >> 8 & 255) + (number >> 16 & 255) + (number >> 24)
     return (total - 510) / 147.8

@@ -11,7 +11,7 @@ from .markdown import Document, Heading, converted
 
 FOLDER = "docs/"  # in the site
 ALL = "all.html"
-_BETWEEN = "--"  # between a document's name and an anchor in it, on the page with all documents
+_BETWEEN = "--"  # separates a document's name from an anchor, on the page with all documents
 _TEMPLATE = Path(__file__).with_name("document.html")
 # The documents in reading order: (title of the group, paths in the project)
 GROUPS = (
@@ -77,8 +77,8 @@ def page_of(path: str) -> str:
 def document_files(home: str) -> dict[str, bytes]:
     """Build the pages of all documents, one page with all of them together, and their pictures.
 
-    home: the project's address, or "" if it is unknown. Without it, links to the project's other files and to its
-        issues are left out.
+    home: the project's address, or "" if it is unknown. Without an address, links to the project's other files and to
+        its issues are left out.
     Returns {path in the site: content}.
     """
     root = firmware_path.documents()

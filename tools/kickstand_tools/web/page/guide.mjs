@@ -1,14 +1,17 @@
-// Tells the visitor what to do next: in the first minute, and after a fault. It depends on what the firmware shows.
+// Tells the visitor what to do next: in the first minute, and after a fault. The advice depends on what the firmware
+// shows.
 
 import { shows } from "./shows.mjs";
 
 const RIDE_S = 3; // the last step is done after the lean was held for this time
 const WELL_DEG = 15; // smallest lean for the last step
-// When the display has shown a lean on a straight road for this time, a bend no longer makes the firmware doubt it
+// When the display has shown a lean on a straight road for this time, a bend no longer makes the firmware doubt the
+// lean
 const SURE_S = 7;
 const STRAIGHT_DEG = 3; // a smaller lean is treated as riding straight
 
-// The pose that the firmware wants, by the kind of view. A view that is not listed here does not change it.
+// The pose that the firmware wants, by the kind of view. A view that is not listed here does not change the wanted
+// pose.
 const WANTED = {
   unaligned: "kickstand",
   "ask-stand": "kickstand",
@@ -43,7 +46,7 @@ export class Guide {
   #sure = false; // true if the firmware has become sure of its lean since power-on
   #cut = false; // true from a power cut during a save until the next ride or alignment
 
-  /** Note that the power was cut. inSave: true if this was during a save. */
+  /** Record that the power was cut. inSave: true if this was during a save. */
   dark(inSave) {
     this.#cut = inSave;
     this.#sure = false;
@@ -181,7 +184,7 @@ export class Guide {
     return step(4, "Lean it: drag the motorcycle or the slider. Compare both figures.");
   }
 
-  /** Return the step until the firmware is sure of the lean. */
+  /** Return the step that is shown until the firmware is sure of the lean. */
   #straight(shown, state) {
     if (shown === null) this.#shownSince = null;
     else this.#shownSince ??= state.time;

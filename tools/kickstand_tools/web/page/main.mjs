@@ -99,7 +99,7 @@ byId("do").addEventListener("click", () => {
 });
 for (const id in FAULTS) {
   byId(id).addEventListener("click", (event) => {
-    // Show the guide, which explains and undoes the fault. On a phone it may be out of sight.
+    // Show the guide, which explains and undoes the fault. On a phone the guide may be out of sight.
     if (event.currentTarget.ariaPressed === "false") byId("todo").parentElement.scrollIntoView({ block: "nearest" });
     actions[id]();
   });

@@ -3,7 +3,7 @@
 import { fetchedAll } from "./fetched.mjs";
 import { loadPyodide } from "./pyodide/pyodide.mjs";
 
-// Files that Pyodide fetches. It waits forever for a missing file, so this module fetches them first.
+// Files that Pyodide fetches. Pyodide waits forever for a missing file, so this module fetches them first.
 const PARTS = ["pyodide.asm.js", "pyodide.asm.wasm", "python_stdlib.zip", "pyodide-lock.json"];
 const HERE = new URL("./", import.meta.url);
 export const PACKAGES = "/packages"; // folder of the unpacked archives

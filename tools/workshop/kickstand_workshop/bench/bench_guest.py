@@ -75,7 +75,7 @@ class MeasuredApp(app_module.App):
 
         seconds: recording time. out: a Sink to the host. spent: array for the us of each stage in a turn, or None.
         """
-        gc.collect()  # otherwise the arrays are behind garbage in the heap, and lengthen each collection
+        gc.collect()  # without this, the arrays would be behind garbage in the heap, and lengthen each collection
         turns = seconds * MAX_TURNS_HZ
         self._out, self._spent, self._turns = out, spent, turns
         self._until_us = seconds * 1_000_000

@@ -17,7 +17,7 @@ from rich.table import Table
 _LIMIT_S = 10.0
 _ROWS = 10  # number of modules in the table
 
-# Each module is imported after the modules that it imports. So its time does not contain their times.
+# Each module is imported after the modules that it imports. So the time of a module does not contain their times.
 _GUEST = """
 from time import ticks_diff, ticks_us
 took = []
@@ -51,7 +51,7 @@ def boot(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes], c
     """Measure the parts of the start.
 
     kind: Class of the emulated board.
-    world: Motion of the board, as for EmulatedDevice. It must be upright and at rest.
+    world: Motion of the board, as for EmulatedDevice. The board must be upright and at rest.
     files: Calibration files of the board.
     compiled: True to install the firmware as .mpy files.
 

@@ -65,7 +65,7 @@ def bands_of_log(log: Log, calibration: CalibrationFile) -> Figures:
 
 
 def of_recording(path: Path) -> Figures:
-    """Return the same as bands_of_log() for a recorded ride. The alignment is computed from this ride.
+    """Return the result of bands_of_log() for a recorded ride. The alignment is computed from this ride.
 
     Raises InputError if the log cannot be used.
     """

@@ -63,7 +63,8 @@ def trailing_mean(x: NDArray, seconds: float, rate_hz: float) -> NDArray[np.floa
 
 
 def complementary(samples: Samples) -> NDArray[np.float64]:
-    """Run the filter of most hobby projects. It integrates the roll rate, and corrects it by the force's direction."""
+    """Run the filter of most hobby projects. The filter integrates the roll rate, and corrects the result by the
+    force's direction."""
     leaned = np.degrees(np.arctan2(samples.force[:, 0], samples.force[:, 1]))
     step = samples.rate[:, 2] / samples.rate_hz
     result = np.empty_like(leaned)

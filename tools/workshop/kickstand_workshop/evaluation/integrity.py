@@ -1,7 +1,7 @@
 """Tests whether the lean meter ever shows a wrong lean as good, in simulated rides with each fault.
 
-The lean is judged as in aviation. At each moment it is good (shown and right), hidden, or misleading. A lean is right
-if its error is at most WRONG_DEG. A wrong lean is misleading if it is shown for over STANDS_S.
+The lean is judged as in aviation. At each moment the lean is good (shown and right), hidden, or misleading. A lean is
+right if its error is at most WRONG_DEG. A wrong lean is misleading if it is shown for over STANDS_S.
 """
 
 from collections.abc import Callable
@@ -122,7 +122,8 @@ class Outcome:
 
 
 def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Find the runs of True in the mask. Returns for each the index of its first entry and the index after its last."""
+    """Find the runs of True in the mask. Returns, for each run, the index of its first entry and the index after its
+    last entry."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
@@ -195,9 +196,9 @@ def _ill(job: FaultJob, readings: Array, rate_hz: float, calibration: Calibratio
 def device_trace_of(
     job: FaultJob, readings: Array, rate_hz: float, calibration: CalibrationFile, true: Array, speed: Array
 ) -> Trace:
-    """Run the whole device over any ride. The arguments are those of trace_of().
+    """Run the whole device over any ride. The arguments are the same as for trace_of().
 
-    The Trace has ten entries per second. Its sigma is NaN, because the display shows none.
+    The Trace has ten entries per second. Its sigma is NaN, because the display shows no sigma.
     """
     ill = _ill(job, readings, rate_hz, calibration)
     end = len(readings) - 1
@@ -267,7 +268,7 @@ def jobs(seeds: int, first_seed: int = 0, seconds: float = 120.0, device: bool =
     """Return the jobs for each seed: rides without a fault on good and bad mounts and roads, and one ride per fault.
 
     device: True runs all rides on the whole device. False runs only rides with a fault of the kind SEEN on the whole
-    device, and the others on the lean meter alone.
+    device, and all other rides on the lean meter alone.
     """
     numbers = range(first_seed, first_seed + seeds)
     conditions: list[tuple[str | None, str | None]] = [(None, None), *[(None, road) for road in CLASSES]]

@@ -1,6 +1,6 @@
 """Reports the results of integrity.py for each fault, as tables for a terminal, data for JSON, and a picture.
 
-The picture is a Stanford diagram, which aviation uses. It shows the error against the claimed accuracy.
+The picture is a Stanford diagram, which aviation uses. The diagram shows the error against the claimed accuracy.
 """
 
 import json
@@ -91,7 +91,7 @@ def _median(values: NDArray[np.float64]) -> float:
 def diagram(outcomes: list[Outcome], faulty: bool) -> NDArray[np.float64]:
     """Return the shares of the riding time, with a row for each of CLAIMS and a column for each class of ERROR_EDGES.
 
-    faulty: True for the rides with a fault, False for those without.
+    faulty: True for the rides with a fault, False for the rides without a fault.
     """
     total = sum((o.diagram for o in outcomes if bool(o.job.fault) == faulty), np.zeros_like(outcomes[0].diagram))
     return total / max(float(total.sum()), 1e-9)
@@ -132,7 +132,7 @@ def fault_table(outcomes: list[Outcome]) -> Table:
 
 
 def diagram_table(outcomes: list[Outcome]) -> Table:
-    """Return a table of the results of diagram(), for rides without a fault and rides with one."""
+    """Return a table of the results of diagram(), for rides without a fault and for rides with a fault."""
     made = Table(title="Error against claim, % of the riding", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     made.add_column("claimed sigma")
     for low, high in pairwise(ERROR_EDGES):

@@ -10,8 +10,8 @@ LEANED_DEG = 10.0  # smallest true lean for the fit of the slope, because most o
 _LAG_RANGE_S = (-0.2, 0.8)  # smallest and largest lag to try
 _LAG_SMOOTHING_S = 0.05
 _STILL_DPS = 1.0  # below this rms of the true roll rate no lag is computed
-# On a straight, yaw rate and lean stay below the first two limits and the speed above the third. It lasts _STRAIGHT_S
-# or longer
+# On a straight, yaw rate and lean stay below the first two limits and the speed above the third. A straight lasts
+# _STRAIGHT_S or longer
 _STRAIGHT_DPS, _STRAIGHT_DEG, _STRAIGHT_MPS, _STRAIGHT_S = 2.0, 6.0, 5.0, 1.0
 
 
@@ -53,7 +53,7 @@ def slope(shown: NDArray, true: NDArray, beyond: float = LEANED_DEG) -> float:
 def lag_ms(shown: NDArray, true: NDArray, rate_hz: float) -> float:
     """Find the delay of the shown roll rate at which it correlates best with the true roll rate.
 
-    The delay is refined by a parabola. Returns it in ms, or NaN if no delay is found.
+    The delay is refined by a parabola. Returns the delay in ms, or NaN if no delay is found.
     """
     width = max(round(_LAG_SMOOTHING_S * rate_hz), 1)
     window = np.full(width, 1.0 / width)

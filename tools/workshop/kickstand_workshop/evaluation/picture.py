@@ -12,7 +12,7 @@ from kickstand_tools.signals import window_spreads
 from numpy.typing import NDArray
 
 ZOOM_S = 60.0
-# Colour and line width of each lean. The leans are drawn in this order, the noisy ones first
+# Colour and line width of each lean. The leans are drawn in this order, noisy leans first
 _STYLES = {
     "formula": ("0.8", 0.4),
     "formula 0.3 s": ("tab:olive", 0.7),

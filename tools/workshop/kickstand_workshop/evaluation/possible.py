@@ -62,7 +62,7 @@ def _oracle_parameters() -> Iterator[None]:
 def gps_lean(made: SimulatedRide, rate_hz: float) -> NDArray[np.float64]:
     """The lean as in phone apps, shape (N), in degrees.
 
-    It is atan(speed x change of course / g) at each position, and stays the same until the next position.
+    The lean is atan(speed x change of course / g) at each position, and stays the same until the next position.
 
     rate_hz: number of positions per second.
     """
@@ -81,5 +81,5 @@ def gps_lean(made: SimulatedRide, rate_hz: float) -> NDArray[np.float64]:
 
 
 def leans(made: SimulatedRide) -> dict[str, NDArray[np.float64]]:
-    """Return the lean of oracle(), and that of gps_lean() at each rate in GPS_HZ, by name."""
+    """Return the lean of oracle(), and the lean of gps_lean() at each rate in GPS_HZ, by name."""
     return {NAME: oracle(made), **{f"GPS {rate_hz:g} Hz": gps_lean(made, rate_hz) for rate_hz in GPS_HZ}}

@@ -1,10 +1,10 @@
 """Compares estimators on a recorded ride. The calibration and a reference lean are computed from the ride itself.
 
 The calibration comes from `kickstand calibrate ride`. The reference lean is atan(v * yaw rate / g), averaged over 1 s,
-with the yaw rate about the bike's own up axis. Do not trust its values in degrees. The reference lean is too small for
-three reasons. The speed changes only once per second, tyres are wide, and the up axis leans with the bike. The
-reference also ignores slope and bank of the road. Use it to compare methods, and to reveal a lean that decays in a
-turn.
+with the yaw rate about the bike's own up axis. Do not trust the values of the reference lean. The reference lean is too
+small for three reasons. The speed changes only once per second, tyres are wide, and the up axis leans with the bike.
+The reference also ignores slope and bank of the road. Use the reference to compare methods, and to reveal a lean that
+decays in a turn.
 """
 
 from dataclasses import dataclass, field

@@ -30,7 +30,7 @@ class Job:
     """One ride to simulate.
 
     profile: Profile of the ride.
-    seed: Seed of the ride. It also sets the signs of the next two errors.
+    seed: Seed of the ride. The seed also sets the signs of the next two errors.
     seconds: Riding time.
     upright_error_deg: Error of the upright pose.
     pitch_change_deg: Change of pitch between the two poses.

@@ -87,7 +87,7 @@ def _diff(before: str, after: str) -> list[str]:
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="dev.py mutants", description=(__doc__ or "").split("\n")[0])
     parser.add_argument("package", choices=sorted(PACKAGES))
-    parser.add_argument("--sample", type=int, help="how many changes to try; all without it")
+    parser.add_argument("--sample", type=int, help="number of changes to try (default: all)")
     parser.add_argument("--seed", type=int, default=1, help="chooses the sample (default: 1)")
     parser.add_argument("--file", default="*.py", help="only files of this name or pattern")
     parser.add_argument("--lines", type=int, nargs=2, default=(1, 10**6), help="only lines from the first to the last")

@@ -1,7 +1,7 @@
 """Makes single changes to a file, with some operators of cosmic-ray and two of our own.
 
-cosmic-ray can replace an operator in the code by eleven others. This module uses only one or two similar operators,
-because the others would find the same missing tests.
+cosmic-ray can replace an operator in the code by eleven other operators. This module uses only one or two similar
+operators, because the other operators would find the same missing tests.
 """
 
 import ast
@@ -25,7 +25,7 @@ OPERATORS = (
     *("ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ExceptionReplacer", "ZeroIterationForLoop"),
     "AddNot",  # replaces a condition by its opposite
 )
-SMALL = 16  # integers up to 16 are counts and indices, and are changed by +1 and -1. Others are doubled and halved
+SMALL = 16  # integers up to 16 (counts, indices) are changed by +1 and -1, larger integers are doubled and halved
 
 
 class Change(NamedTuple):

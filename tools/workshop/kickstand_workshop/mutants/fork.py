@@ -18,12 +18,12 @@ import pytest
 
 WARM = ("numpy", "hypothesis", "click", "rich.console", "matplotlib.pyplot", "pandas", "plotly.graph_objects")
 WARM += ("pyarrow.parquet",)
-# These arguments skip the variants of tests on MicroPython. They are slow, and the same tests run on CPython.
+# These arguments skip the variants of tests on MicroPython. These variants are slow, and the same tests run on CPython.
 ARGUMENTS = ("-x", "-q", "-k", "not micropython", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0")
 KILLED, SURVIVED, TIMED_OUT = "killed", "survived", "timed out"
 # The tests of a change may use TIMES the processor time of the tests of the unchanged code, plus EXTRA_S
 TIMES, EXTRA_S = 3, 5
-WALL_TIMES = 10  # the same limit on the wall clock, as a multiple of the limit of processor time
+WALL_TIMES = 10  # limit of the elapsed time, as a multiple of the limit of processor time
 
 
 class Tests:

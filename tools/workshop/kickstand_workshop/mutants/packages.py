@@ -10,8 +10,8 @@ class Package(NamedTuple):
     """A package with its tests.
 
     sources: Patterns of the files of the code, relative to the project's root.
-    tests: Patterns of the files of the tests, in their running order. The fastest and most sensitive come first. Tests
-        with the same name as the changed file run before all others.
+    tests: Patterns of the files of the tests, in their running order. The fastest and most sensitive tests come first.
+        Tests with the same name as the changed file run before all others.
     """
 
     sources: tuple[str, ...]

@@ -10,7 +10,7 @@ from rich._export_format import CONSOLE_SVG_FORMAT
 from rich.console import Console
 from rich.terminal_theme import TerminalTheme
 
-MOMENT_S = 36.0  # in the right turn of the demo's script
+MOMENT_S = 36.0  # a time in the right turn of the demo's script
 _KEYS = "b button  B long press  p pause  q quit"
 
 _FONT = "DejaVu Sans Mono, Menlo, Consolas, monospace"

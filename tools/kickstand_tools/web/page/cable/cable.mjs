@@ -135,7 +135,8 @@ export function loadOnce(load) {
   };
 }
 
-/** Ask the rider to choose a port. Returns the port. Without one, calls tell(text) with the reason and returns null. */
+/** Ask the rider to choose a port. Returns the port. If none is chosen, calls tell(text) with the reason and returns
+ * null. */
 export async function choosePort(tell) {
   try {
     return await navigator.serial.requestPort();

@@ -9,7 +9,7 @@ addEventListener("beforeunload", (event) => {
   if (unsaved.size) event.preventDefault(); // the browser asks, because unsaved data is lost
 });
 
-/** Note whether work is in progress that would end if the rider left the page. on: true or false. */
+/** Record whether work is in progress that would end if the rider left the page. on: true or false. */
 export function busy(on) {
   if (on) unsaved.add(RUNNING);
   else unsaved.delete(RUNNING);

@@ -1,4 +1,5 @@
-// Draws the big gauge, an arc from left to right that is filled up to a value. It also marks the maximum of each side.
+// Draws the big gauge, an arc from left to right that is filled up to a value. The gauge also marks the maximum of each
+// side.
 
 import { sideOf } from "./measures.mjs";
 

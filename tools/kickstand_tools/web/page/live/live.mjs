@@ -53,7 +53,7 @@ async function start() {
   if (said) tell(sentences(said.refused ? [said.refused] : ["Stopped", ...said.notes]));
 }
 
-/** Keep the screen on if the browser can. The browser ends this when the page is no longer visible. */
+/** Keep the screen on if the browser can. The browser lets the screen turn off when the page is hidden. */
 async function stayAwake() {
   awake = await navigator.wakeLock?.request("screen").catch(() => null);
 }
@@ -72,7 +72,7 @@ function received(text) {
   if (!stopped) tell(`Recording${lacking}: ${clock(reading.seconds)}`);
 }
 
-/** Functions with which a Riding shows values here. */
+/** Functions with which an object of the class Riding shows values on this page. */
 const shown = {
   begin() {
     player.restart();

@@ -28,7 +28,7 @@ export async function openRide(files) {
   await sortOut(files.map((file) => file.name));
 }
 
-/** Identify the held files, and show the ride of the new ones. added: names of the new files. */
+/** Identify the held files, and show the ride of the new files. added: names of the new files. */
 async function sortOut(added) {
   held.show();
   await work(loaded ? "Looking through the files …" : "Loading the tools, 8 MB the first time …", async () => {

@@ -38,8 +38,8 @@ export function showReport({ words, warnings, name, calibration }) {
   for (const id of ["report", "more"]) byId(id).hidden = false;
 }
 
-/** Show the charts. page: their HTML. Its height depends on its width. The frame is new and visible before it loads. A
- * frame that was hidden earlier may draw nothing. */
+/** Show the charts. page: their HTML. The height of the page depends on its width. The frame is new and visible before it
+ * loads. A frame that was hidden earlier may draw nothing. */
 export function showCharts(page) {
   byId("charts").hidden = byId("drawing").hidden = false;
   byId("drawing").textContent = "Drawing the charts …";
@@ -49,7 +49,8 @@ export function showCharts(page) {
   byId("plot").replaceWith(frame);
 }
 
-// The frame may run scripts, but has no access to this page. It sends its height, and whether it could draw the charts.
+// The frame may run scripts, but has no access to this page. The frame sends its height, and whether it could draw the
+// charts.
 addEventListener("message", ({ source, data }) => {
   if (source !== byId("plot").contentWindow) return;
   if (Number.isFinite(data?.height)) byId("plot").style.height = `${data.height}px`;
