@@ -5,8 +5,8 @@ Copy it to the board as user.py, and restart (the firmware must be on the board;
     mpremote cp firmware/examples/user_light.py :user.py
     mpremote reset
 
-Wiring: an LED with 330 ohm from GPIO 16 of a Pico to ground; another pin on an ESP32. For more than 10 mA use a
-transistor. Without a board: kickstand try firmware/examples/user_light.py
+Wiring: connect an LED with 330 ohm between GPIO 16 of a Pico and ground. On an ESP32 choose another pin. For more than
+10 mA use a transistor. Without a board: kickstand try firmware/examples/user_light.py
 """
 
 from machine import Pin

@@ -7,8 +7,9 @@ Copy it to the board as user.py, and restart (the firmware must be on the board;
     mpremote cp firmware/examples/user_uart.py :user.py
     mpremote reset
 
-Wiring: GPIO 0 of a Pico (TX of UART 0) to RX of the other controller, and ground to ground; both at 3.3 V. On an ESP32
-choose UART 1 and two free pins. Without a board: kickstand try firmware/examples/user_uart.py
+Wiring: connect GPIO 0 of a Pico (TX of UART 0) to RX of the other controller, and ground to ground. Both controllers
+must use 3.3 V. On an ESP32 choose UART 1 and two free pins.
+Without a board: kickstand try firmware/examples/user_uart.py
 """
 
 from machine import UART, Pin

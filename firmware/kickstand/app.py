@@ -29,8 +29,8 @@ from .units import const
 LOOP_US = 10_000  # length of a turn in us; the chip's FIFO can keep the samples for much longer
 # Turns between two garbage collections. They use 80 KB of heap. While recording, 91 KB are free
 _COLLECT_TURNS = const(40)
-# The same number while aligning by driving, and with an OLED, a phone or user.py. These turns use 46 KB of heap. While
-# aligning by driving, 72 KB are free
+# Turns between two collections while aligning by driving, and with an OLED, a phone or user.py. They use 46 KB of heap.
+# While aligning by driving, 72 KB are free
 _COLLECT_TURNS_DRIVING = const(23)
 # Number of collections between two checks of the free heap. A check takes 3 ms on an ESP32. With a smaller heap, the
 # app checks after each collection.
@@ -57,8 +57,8 @@ def fill_gaps(n):
         value = -value  # each new float takes one block of the heap
 
 
-# Worst values of the last run, set when Ctrl-C ends it: length of the longest turn in us, smallest number of free
-# places in the chip's FIFO, and AxisWatch.shaken() of its axes. kickstand.status() prints them
+# Worst values of the last run, which kickstand.status() prints. Ctrl-C sets them. They are the length of the longest
+# turn in us, the smallest number of free places in the chip's FIFO, and AxisWatch.shaken() of the axes.
 worst = None
 
 

@@ -9,8 +9,8 @@ A code is a name for programs and is never shown. Three modules have words for e
 import gc
 import sys
 
-# The exceptions that the import of machine code can raise. It cannot run on CPython, on a port without viper, on an
-# ESP32 without enough free memory, or on a kind of chip that it was not compiled for.
+# The exceptions that the import of machine code can raise. Machine code cannot run on CPython, on a port without viper,
+# on an ESP32 without enough free memory, or on a kind of chip that it was not compiled for.
 NO_MACHINE_CODE = (ImportError, NameError, SyntaxError, MemoryError, ValueError)
 
 

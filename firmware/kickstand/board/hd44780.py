@@ -17,7 +17,7 @@ WIRINGS = (
     (0x01, 0x04, 0x08, False),  # the usual one: P0 RS, P2 E, P3 light
     (0x40, 0x10, 0x00, True),  # MJKDZ, GY-IICLCD: P6 RS, P4 E, P7 light, on while low
     (0x10, 0x40, 0x80, True),  # P4 RS, P6 E, P7 light
-    (0x01, 0x04, 0x00, False),  # like the usual one, but the light is on while P3 is low
+    (0x01, 0x04, 0x00, False),  # like the first wiring, but the light is on while P3 is low
 )
 _LINE_ADDRESSES = (0x80, 0xC0)  # instruction "set DDRAM address" for the beginning of each line (table 6)
 _CGRAM_ADDRESS = const(0x40)  # instruction "set CGRAM address" (table 6)
@@ -118,7 +118,7 @@ class Lcd:
     def _put(self, number, text):
         line = self._wanted[number]
         if isinstance(text, str):
-            if text == self._texts[number]:  # usually the text is unchanged, and this saves 0.2 ms for a conversion
+            if text == self._texts[number]:  # the text is usually unchanged, and skipping its conversion saves 0.2 ms
                 return
             self._texts[number] = text
             for i in range(_COLUMNS):
@@ -167,7 +167,8 @@ class Lcd:
                 while shown[last] == wanted[last]:
                     last -= 1
                 at = _LINE_ADDRESSES[i] + first
-                # Send dashes first, because an interrupted transfer must not leave half a number or the wrong side
+                # Send dashes first, because an interrupted transfer must not leave half a number or the wrong word for
+                # the side
                 if last > first:
                     self._send(at, memoryview(_DASHES)[first : last + 1])
                 self._send(at, memoryview(wanted)[first : last + 1])

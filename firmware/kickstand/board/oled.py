@@ -2,7 +2,8 @@
 describes its methods.
 
 Sources: data sheets Solomon Systech SSD1306 rev 1.1 and Sino Wealth SH1106 V2.3. The driver addresses both chips by
-pages of 8 rows, because an SH1106 has no other way. An SH1106 has 132 columns, and the panel shows the middle 128.
+pages of 8 rows, because an SH1106 has no other way of addressing. An SH1106 has 132 columns, and the panel shows the
+middle 128.
 """
 
 from time import ticks_add, ticks_diff, ticks_ms
@@ -23,8 +24,9 @@ _OFF = 0x40  # bit of the status: the panel is off
 # Low half of the status of an SH1106. An SSD1306 has 3 or 6 there, and a clone may have any value
 _SH1106_STATUS = (0x08, 0x00, 0x0C)
 _SH1106_OFFSET = 2  # first visible column of an SH1106
-# To avoid burn-in, the picture is shifted by each of these numbers of rows for _SHIFT_REFRESHES. Rows that leave the
-# panel at the top return at the bottom, so pictures leave the first two rows blank.
+# Numbers of rows by which the picture is shifted to avoid burn-in, one after the other. Each shift lasts for
+# _SHIFT_REFRESHES refreshes. Rows that leave the panel at the top return at the bottom, so pictures leave the first two
+# rows blank.
 _SHIFTS = (0, 1, 2, 1)
 _SHIFT_REFRESHES = const(6)
 # A panel of 32 rows has no blank rows at the top. So its picture is shifted down, over the two blank rows below the
@@ -39,7 +41,7 @@ _SET_UP_32 = b"\x00\xd5\x80\xa8\x1f\xd3\x00\xa1\xc8\xda\x02\xd9\xf1\xdb\x40\xa4"
 # its own chip a panel stays dark. A clone may report the status of the other chip, so all commands are sent to every
 # panel. Each chip ignores the other chip's commands.
 _SUPPLY = b"\xad\x8b\x8d\x14\x20\x02\x2e"
-# For each nibble, the byte with each of its bits doubled
+# For each nibble, a byte with each bit of the nibble doubled
 _SPREAD = bytes((i & 1) * 3 | (i & 2) * 6 | (i & 4) * 12 | (i & 8) * 24 for i in range(16))
 
 

@@ -67,8 +67,8 @@ class ActiveCalibration:
         self._use(calibration, False)
 
     def restart(self):
-        """Save the current trim, then restart the meter with the calibration in flash. A replay of the ride starts with
-        the same calibration."""
+        """Save the current trim, then restart the meter with the calibration in flash. So a replay of the ride can
+        start with the same calibration."""
         self._save_trim()
         self._meter.use(self.value)
 

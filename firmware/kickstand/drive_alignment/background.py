@@ -74,7 +74,8 @@ class BackgroundAlignment:
 
     def _restart(self):
         old = self._meter.calibration
-        self._calibration = old  # applies to all samples of this drive, even if another calibration is saved meanwhile
+        # use one calibration for all samples of this drive, even if another calibration is saved meanwhile
+        self._calibration = old
         trusted = self._leans and old.aligned and not self._asked
         up = old.vehicle_from_sensor[3:6] if trusted else None
         self.drive = DriveAlignment(MOTORCYCLE if self._leans else CAR, up, _KNOWN_BIAS if old.aligned else None)
@@ -109,7 +110,7 @@ class BackgroundAlignment:
             self._look_ms = ticks_add(now_ms, _LOOK_MS)
             self.fresh_speed(now_ms)
             if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > _LOOK_MS:
-                self._begin_again()  # done now, because after 6 days without a reading ticks_diff() is negative
+                self._begin_again()  # begin again now, because after 6 days without a reading ticks_diff() is negative
             self._look(now_ms)
         return speed
 

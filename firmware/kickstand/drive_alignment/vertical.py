@@ -24,8 +24,8 @@ _STILL_G = const(0.06)
 _STILL_DPS = const(3.0)
 _AVERAGE_S = const(0.5)
 _SAME_STOP_DEG = const(1.5)  # doors and passengers tilt a standing vehicle by less than this angle
-# If the sensor is still at another angle for longer than this, it was rotated. The other explanation is a late speed of
-# zero while the vehicle drives again, but that ends earlier.
+# If the sensor stays still at another angle for longer than this, the sensor was rotated. While a vehicle drives again
+# but a late speed is still zero, the angle also differs, but not for this long.
 _TURNED_S = const(6.0)
 # If a rate differs by more than this from the bias at the last stop, the vehicle drives in a bend and a speed of zero
 # is wrong. Warming up changes the bias by less.

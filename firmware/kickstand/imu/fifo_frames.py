@@ -22,11 +22,11 @@ _REPEATS = const(1)  # number of successive repetitions of the last frame
 _LIMIT = const(2)  # number of repetitions that make a frame dead
 LOST = const(3)  # number of frames with an axis at the end of its range, in this call
 _ROW = const(4)  # number of successive frames with an axis at the end of its range
-# The next four describe the frames since the last look
+# The next four entries describe the frames since the last look
 _ENDS = const(5)  # one bit per column that was at the end of its range
 _CLIPPED = const(6)  # number of frames with an axis at the end of its range
 _GYRO_CLIPPED = const(7)  # number of frames with an axis of the gyro at the end of its range
-_DIFFER = const(8)  # bits for axes that differed: y from x (bits 1 and 5), z from y (2 and 6), z from x (0 and 4)
+_DIFFER = const(8)  # bits of pairs of axes that differed: x and y (bits 1 and 5), y and z (2 and 6), x and z (0 and 4)
 DUE = const(9)  # number of samples until the next look
 _HARD = const(10)  # absolute counts of the accelerometer that show hard vibration
 _SHAKEN = const(11)  # number of frames that reached _HARD since the last look
@@ -224,7 +224,7 @@ class AxisWatch:
         return True
 
     def _load(self):
-        gc.collect()  # otherwise the new objects, which last, would be placed behind garbage
+        gc.collect()  # otherwise the module, which stays loaded, would be placed behind garbage
         from .axis_judge import AxisJudge
 
         self._judge = AxisJudge(*self._settings)

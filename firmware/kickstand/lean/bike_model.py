@@ -50,13 +50,14 @@ YAW_ERROR = 6
 SCALE_LEFT, CROSS_LEFT_UP = 7, 8
 CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD = 9, 10, 11
 
-# rad: largest pitch. Only a sensor in a hand reaches it, no motorcycle. At a pitch of 90 degrees the lean is undefined.
+# rad: largest pitch. A sensor in a hand can reach this pitch, but no motorcycle can. At a pitch of 90 degrees the lean
+# is undefined.
 MAX_PITCH = 1.2
 MIN_PITCH = -MAX_PITCH  # stored as a constant, because a negation for each sample would take heap and time
 
 # turn_rates() uses the yaw rate of a bike in balance if the speed is above _BALANCE_MIN_SPEED, the lean's standard
 # deviation is below BALANCE_SIGMA, and the measured rate differs by less than
-# _BALANCE_RATE + _BALANCE_SHARE x |balanced rate|. Comments in the form of measurements.py.
+# _BALANCE_RATE + _BALANCE_SHARE x |balanced rate|. The form of the comments is explained in measurements.py.
 _BALANCE_MIN_SPEED = const(4.0)  # m/s. Larger: the balanced rate is not used in slow turns.
 _BALANCE_RATE = const(0.1)  # rad/s. Larger: the balanced rate is used with a wrong lean or speed.
 _BALANCE_SHARE = const(0.5)  # ratio. Larger: the balanced rate is used with a wrong lean or speed.
@@ -165,7 +166,7 @@ class Linearisation:
         speed, yaw_error = x[SPEED], x[YAW_ERROR]
         st, ct, sq = sin(x[LEAN]), cos(x[LEAN]), sin(x[PITCH])
         cq = sqrt(1.0 - sq * sq)
-        yaw_rate = wx * st + wy * ct  # about the vertical, where there is no pitch
+        yaw_rate = wx * st + wy * ct  # rate about the vertical if there is no pitch
         per_rate = speed / STANDARD_GRAVITY  # centripetal acceleration in g per rad/s of yaw rate
         sideways = per_rate * wy
         acceleration = forward - sq + sideways * yaw_error
@@ -214,6 +215,6 @@ class Linearisation:
         self.pitching = per_rate * self.pitch_rate  # in g
 
     def lean_by_pitch(self, x):
-        """Return the part of the state's lean (rad) that (7) subtracts: the yaw error makes the bike's own pitch look
-        like lean."""
+        """Return the part of the state's lean that (7) subtracts, in rad. In this part, the yaw error makes pitch of
+        the bike look like lean."""
         return x[YAW_ERROR] * self.cos_lean * (tan(x[PITCH]) + 0.5 * x[YAW_ERROR] * self.sin_lean)

@@ -13,8 +13,8 @@ Three more means are of quantities that never stay large for long on a real ride
     the pitch
     the part of the pitch that the forward force does not confirm
 On a real slope the forward force contains a part of gravity, sin(pitch). If this part is missing, the pitch is wrong,
-and was caused by wrong rates. The filter then mistakes the missing force for an acceleration. So the bike seems to
-brake uphill or to accelerate downhill for longer than a real bike does.
+because wrong rates were integrated. The filter then mistakes the missing force for an acceleration. So the bike seems
+to brake uphill or to accelerate downhill for longer than a real bike does.
 
 Each mean is compared with its own spread, as in Student's t-test. On a road rougher than the filter expects, single
 innovations are large, and their means vary more.
@@ -52,7 +52,8 @@ _STEEP = const(0.21)  # rad: pitch. Without a fault: at most 0.14
 # rad: root mean square of the pitch that the forward force does not confirm. On a recorded ride without a fault: 0.096
 _SLOPE = const(0.12)
 # square of standard deviations: above this spread, the limits of left and up grow with the root of the spread. The
-# spread is the mean of half the squared change between windows. Larger: more leans are hidden on the roughest roads.
+# spread is the mean of half the squared change of the innovation from window to window. Larger: more leans are hidden
+# on the roughest roads.
 _SPREAD = const(0.4)
 # rad: limit of a steady mean lean after a doubt. Larger: fewer leans are hidden in bends, and on straights that look
 # like bends.
@@ -110,8 +111,8 @@ class Consistency:
         self._left_before = self._up_before = self._left_square = self._up_square = 0.0
 
     def gap(self, in_rest=True):
-        """Doubt until everything has fitted for a while, because the filter has restarted. in_rest: time at rest counts
-        as fitting."""
+        """Doubt until everything has fitted for a while, because the filter has restarted. in_rest: True if time at
+        rest counts as fitting."""
         self.doubt = True
         self._in_rest = in_rest
         self._fits_s = 0.0
@@ -145,7 +146,8 @@ class Consistency:
         self._up_long += long_gain * (up - self._up_long)
         self._side += long_gain * (max(-_MOST_SIDEWAYS, min(_MOST_SIDEWAYS, sideways)) - self._side)
         self._pitch += long_gain * (pitch - self._pitch)
-        square = -pitch * max(-abs(pitch), min(abs(pitch), push))  # pitch * pitch if all of the force is missing
+        # pitch * pitch if none of the pitch is in the forward force
+        square = -pitch * max(-abs(pitch), min(abs(pitch), push))
         self._slope_square += gain * (square - self._slope_square)
         change = left - self._left_before
         self._left_square += long_gain * (0.5 * change * change - self._left_square)

@@ -89,7 +89,7 @@ class Covariance:
         p[i * n + i] = variance
 
     def add_noise(self, i, variance):
-        """Add process noise to the variance of state i. For states that do not depend on others."""
+        """Add process noise to the variance of state i. Use this for states that do not depend on other states."""
         self._p[i * self.n + i] += variance
 
     def propagate_row(self, i, derivatives, seconds, noise):

@@ -42,8 +42,9 @@ SIGMA_START = (
     0.014,  # ratio: reading of the forward axis per rate about up
     0.014,  # ratio: scale error of the forward axis
 )
-# If the readings no longer fit (consistency.py), the filter restarts. The first two times it keeps the speed, and the
-# sensor's errors as estimated REMEMBER_S to 2 x REMEMBER_S earlier. Later it keeps nothing.
+# If the readings no longer fit (consistency.py), the filter restarts. The first two times it keeps the speed and
+# remembered errors of the sensor. These were estimated REMEMBER_S to 2 x REMEMBER_S earlier. Later restarts keep
+# nothing.
 REMEMBER_S = 10.0  # s. Larger: the remembered errors are older.
 # rad/s: standard deviation of a remembered bias. Larger: a bias that has changed is found sooner.
 SIGMA_GOOD_BIAS = radians(0.6)
@@ -133,8 +134,8 @@ SIGMA_SLOPE = radians(1.6)
 # s: duration of a slope. The value is fitted to rides; real slopes last longer. Larger: the lean in bends is found less
 # well.
 _SLOPE_S = const(3.0)
-# rad: pitch at which the assumption of a level road has half its weight. At twice this pitch it has a fifth. Larger:
-# wheelies are mistaken for slopes.
+# rad: pitch at which the assumption of a level road has half its weight. At twice this pitch the assumption has a fifth
+# of its weight. Larger: wheelies are mistaken for slopes.
 STEEP = radians(6.0)
 # The bike rides straight if lean and yaw rate are below the first two of the next three limits, and the speed is above
 # the third.
@@ -240,8 +241,9 @@ def straight_or_prior_speed(lean, speed, yaw_rate, seconds):
 
 
 def measured_speed(measured, speed, acceleration, seconds):
-    """Return the measurement of speed by a receiver or a wheel sensor. acceleration: m/s^2, which adds noise, because
-    the speed may be late. seconds: since the previous measured speed. Ten speeds per second count as much as one."""
+    """Return the measurement of speed by a receiver or a wheel sensor. acceleration: in m/s^2. It adds noise, because
+    the speed may be late. seconds: time since the previous measured speed. Ten speeds in a second count as much as one
+    speed."""
     late = _MEASURED_SPEED_LATE_S * acceleration
     scale = _SIGMA_SPEED_SCALE * measured
     variance = (_SIGMA_MEASURED_SPEED**2 + late * late) * max(1.0, 2 * _MEASURED_SPEED_S / seconds)

@@ -26,7 +26,8 @@ SIGMA_STRAIGHT = radians(1.5)
 # ratio: standard deviation of the force to the side in turns, divided by sin(lean). Tyres and rider cause this force.
 # Larger: turns to one side count less.
 _SIGMA_LEAN_SHARE = const(0.15)
-# ratio: variation of this force from turn to turn, divided by sin(lean), caused by the rider. Larger: turns count less.
+# ratio: variation of the force to the side from turn to turn, divided by sin(lean). The rider causes it. Larger: turns
+# count less.
 _SIGMA_TURN = const(0.04)
 # rad per rad/s: additional measurement noise, divided by the yaw rate. Larger: turns count less.
 _SIGMA_YAW_S = const(0.03)

@@ -184,10 +184,10 @@ class RideBlock:
         for i in range(FIELDS):
             state[i] = 0
             state[_MEANS + i] = START_MEAN
-        state[0] = 1  # the prediction divides by the n of the previous turn
+        state[0] = 1  # not 0, because the prediction divides by the n of the previous turn
         state[_PENDING] = state[_BITS] = 0
         state[_AT] = _HEAD_LENGTH + len(body)
-        # close() writes the two zeros: temperature and number of positions
+        # close() replaces the two zeros by the temperature and the number of positions
         numbers = MAGIC, _WHOLE_VERSION if len(body) > BODY_LENGTH else _VERSION, length, ride, sequence, time_us, 0
         rates = chip.accel_lsb_per_g, int(10 * chip.gyro_lsb_per_dps + 0.5), sample_hz
         version, delay = __version__.encode()[:10], int(10_000 * chip.gyro_delay_s + 0.5)

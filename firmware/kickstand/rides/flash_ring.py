@@ -33,7 +33,7 @@ def all_bytes(path):
 
 
 def make(path):
-    """Make a directory unless it exists. Raises OSError. Its number is EEXIST if a file has the directory's name."""
+    """Make a directory unless it exists. Raises OSError, with the number EEXIST if a file has the directory's name."""
     try:
         os.mkdir(path)
     except OSError as error:

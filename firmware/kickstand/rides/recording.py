@@ -1,4 +1,5 @@
-"""Begins and ends recordings. Before that it imports the required modules step by step, and tests the SD card."""
+"""Begins and ends recordings. Before a recording it imports the required modules step by step, and tests the SD
+card."""
 
 import gc
 
@@ -54,7 +55,7 @@ class Recording:
         needs."""
         names = ["block", "recorder"] if self._keeper else ["block", "ride_paths", "flash_ring", "recorder"]
         for name in names + ["card_trial"] * self.on_card:
-            gc.collect()  # otherwise the module's objects, which last, would be placed behind garbage
+            gc.collect()  # otherwise the module, which stays loaded, would be placed behind garbage
             __import__("kickstand.rides." + name)
             yield
         from .recorder import Recorder

@@ -19,7 +19,7 @@ _MAX_MPS = const(100.0)  # pulses that imply a higher speed are interference
 # A contact bounces if it was open for less than this time, and for less than a quarter of the shortest period
 _BOUNCE_US = const(3000)
 _STOPPED_MPS = const(0.5)  # a wheel slower than this counts as standing
-MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # after a time without a pulse the wheel counts as standing; limits of this time
+MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # limits of the time after which a wheel without pulses counts as standing
 _REPORT_MS = const(100)  # shortest time between two speeds from poll()
 _STANDING_MS = const(200)  # shortest time between two speeds of zero from poll()
 # STORM_EDGES edges in less than STORM_US are a storm, over 8,000 edges per second. The interrupt takes 33 us on a Pico,
@@ -74,7 +74,7 @@ class Wheel:
         self._off_ms = None  # time when poll() noticed that the interrupt is off
         self._edges = STORM_EDGES  # number of edges until the time since _edges_us is compared with STORM_US
         self._edges_us = ticks_us()
-        # The next three are used for soft interrupts only
+        # The next three attributes are used for soft interrupts only
         self._level = None  # level of the pin at the last interrupt
         self._same = False  # True after the first of two interrupts that find the level unchanged
         self._usual_us = 0  # usual time from pulse to pulse, 0 if unknown
@@ -87,7 +87,7 @@ class Wheel:
             self._edges = STORM_EDGES
             if (now - self._edges_us) & _TICKS < STORM_US:
                 self._off = True
-                pin.irq(None)  # takes no heap; done here, because in a storm the loop may get no time at all
+                pin.irq(None)  # turn off here, because in a storm the loop may get no time; this call takes no heap
             self._edges_us = now
         if pin.value():
             self._opened_us = now
