@@ -59,7 +59,8 @@ def test_riding_time_excludes_standing(tmp_path):
 
 
 def test_a_speed_that_is_always_0_hides_no_ride(tmp_path):
-    """A broken contact at the wheel gives a speed that is always 0. The riding time is then computed without it."""
+    """A broken contact at the wheel gives a speed that is always 0. The riding time is then computed without this
+    speed."""
     log = read_log(analysis_rides.short(tmp_path))
     without = words_of(log)
     log.speed_mps[::20] = 0.0

@@ -112,7 +112,7 @@ def test_stalled_processor_keeps_the_lean_right(riding):
         watch(riding, 0.3)
     assert samples.taken() > 150
     assert samples.lost() == 0
-    for stall_s in (0.45, 2.0):  # shorter and longer than the lean filter can bridge
+    for stall_s in (0.45, 2.0):  # the lean filter can bridge the first stall, but not the second
         riding.stall(stall_s)
         texts = watch(riding, RECOVERY_S)
         assert lean_is_right(riding), riding.lcd()

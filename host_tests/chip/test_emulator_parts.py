@@ -76,7 +76,7 @@ class Pins:
         return seen
 
     def write(self, value):
-        """Write a byte. Return True if a device acknowledges it."""
+        """Write a byte. Return True if a device acknowledges the byte."""
         for place in range(7, -1, -1):
             self.bit(value >> place & 1)
         return not self.bit(1)
@@ -494,7 +494,7 @@ def test_an_absent_device_aborts_after_its_address(chip):
 
 
 def test_an_enabled_controller_continues_its_transfer(chip):
-    """Enabling it again changes nothing, and other registers may be written during a transfer."""
+    """Enabling the controller again changes nothing, and other registers may be written during a transfer."""
     device = Memory(sends=b"\x42")
     controller, bus = i2c(chip, device)
     controller.write_uint32(DATA, 1 << 9 | 1 << 8)

@@ -144,7 +144,8 @@ def test_a_config_belongs_to_the_project_that_it_sets():
     assert found_others({"/config.py": "\ufeff" + OURS}).mended
     with pytest.raises(InputError, match=r"config\.py on the board: wrong"):
         found_others({"/config.py": OURS}, fault="wrong")
-    assert found_others({"/config.py": "DISPLAY = 1\nSIDE = 2\n"}, fault="wrong").moves  # two settings are too few
+    # two settings are too few for a config.py of Kickstand
+    assert found_others({"/config.py": "DISPLAY = 1\nSIDE = 2\n"}, fault="wrong").moves
     assert not found_others({"/config.py": "DISPLAY = 1\nSIDE = 2\n"}).moves
     assert found_others({"/config.py": "x = 1"}, ("/kickstand",), "wrong").moves
     assert not found_others({"/config.py": "x = 1"}, ("/kickstand",)).moves

@@ -68,7 +68,7 @@ def test_a_car_finds_its_alignment_and_shows_the_next_step(engine, tmp_path):
     assert record.at(3.0) == ["Brakings   0/5  ", "stop needed     "]
     assert record.first("brake straight") < 8.0
     assert record.first("braking...") < 30.0
-    assert record.at(62.0)[0].startswith("Raw")  # the first press shows the other page
+    assert record.at(62.0)[0].startswith("Raw")  # the first press leaves the page of the alignment
     assert record.first("Brakings   [2-4]/5", 65.0) < 67.0
     saved = record.first("Aligned by drive")
     assert saved < 150.0 and stops(saved, 6.0)
@@ -154,7 +154,7 @@ def test_a_side_that_the_rider_confirms_is_not_asked_for_again(asked, tmp_path):
 @pytest.mark.parametrize(("model", "config"), [({"until_s": 65.0}, {}), ({}, {"PULSES_PER_METRE": 0.25})])
 def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
     """If the wheel's wire breaks during the ride, the measured speed stays 0. With a second magnet the measured speed
-    is twice the true one. The display reports either fault at the next stop."""
+    is twice the true speed. The display reports either fault at the next stop."""
     plan = bike("wheel", 6, wheel=model, config={"SPEED": "wheel", **config})
     record = device_plans.run("cpython", tmp_path, plan)
     for town_round in range(6):
@@ -167,8 +167,8 @@ def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
 
 def test_errors_of_both_poses_are_found_while_riding(tmp_path):
     """A pitch of two degrees on the kickstand gives a yaw error of almost ten degrees. The firmware refines forward at
-    a stop, and at most 1.5 degrees remain. The upright pose was 2 degrees off. The new alignment keeps the trim that
-    corrects this, and the maxima."""
+    a stop, and at most 1.5 degrees remain. The upright pose was 2 degrees off, which the trim corrects. The new
+    alignment keeps the trim and the maxima."""
     plan = bike("wheel", 8, kickstand=(-12.0, 2.0))
     plan["ride"][1] = ["upright", 10.0, 2.0, 0.0]
     first = device_plans.run("cpython", tmp_path, {**plan, "until": 19.0})

@@ -164,8 +164,8 @@ def test_a_mount_that_moved(axis, degrees, from_s, words):
 
 @pytest.mark.parametrize("silent_s", [200.0, 500.0])
 def test_the_first_braking_counts_after_any_late_first_speed(silent_s):
-    """The first speed comes after 200 or 500 s. The history's time counter wraps around every nine minutes, and this
-    must not lose a braking event."""
+    """The first speed comes after 200 or 500 s. The history's time counter wraps around every nine minutes, and the
+    wrap must not lose a braking event."""
     legs = [[silent_s, 0.0, 0.0], *around(6)]
     result = drive(legs, source={"every_s": 1.0, "silent": (-1.0, silent_s)})
     assert result["counted"] == 6  # the six braking events; the vehicle only speeds up in turns

@@ -69,7 +69,8 @@ def test_the_verdicts_differ_and_turning_round_reverses_two_axes():
 
 @pytest.mark.parametrize(
     ("lively", "calm", "stuck"),
-    [(7, 0, False), (8, 0, True), (8, 45, True), (8, 46, False), (9, 51, True)],  # the least share is 15 %: 8 of 53
+    # the share must be at least 15 %, which is 8 of 53 s
+    [(7, 0, False), (8, 0, True), (8, 45, True), (8, 46, False), (9, 51, True)],
 )
 def test_a_stuck_speed_needs_eight_lively_seconds_of_a_seventh(lively, calm, stuck):
     check: Any = SpeedCheck()

@@ -96,7 +96,8 @@ def test_regression_is_weighted_least_squares(engine, count):
     weight = np.sqrt(seconds)[:, None]
     design = np.column_stack((a, np.ones(count), c))
     expected = np.linalg.lstsq(design * weight, force * weight, rcond=None)[0]
-    assert np.abs(np.array(forward) - expected[0]).max() < 2e-3  # due to the ridge term for c and to 32-bit sums
+    # the ridge term for c and 32-bit sums cause this difference
+    assert np.abs(np.array(forward) - expected[0]).max() < 2e-3
     assert np.abs(np.array(level) - expected[1]).max() < 2e-4
     assert 5 <= blocks <= 8
 
@@ -179,8 +180,8 @@ def test_a_late_speed_is_no_rotated_sensor():
 
 
 def test_each_vehicle_has_its_source_of_the_vertical():
-    """A car uses the vertical of its stops, or with a fit the mean of stops and fit. A motorcycle uses its upright
-    pose. Without the pose it uses the fit, or straight riding."""
+    """A car uses the vertical of its stops. With a fit it uses the mean of both verticals. A motorcycle uses its
+    upright pose. Without the pose it uses the fit, or straight riding."""
     standing = types.SimpleNamespace(up=None)
     fit = types.SimpleNamespace(level=[2.0 * part for part in level(4.0)])
 

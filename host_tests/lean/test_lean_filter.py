@@ -205,8 +205,8 @@ def test_turns_alone_find_a_pose_that_was_not_upright():
 
 
 def test_a_measured_speed_makes_no_long_bend_worse():
-    """The gyro's axis up has a scale error of 3 %. The wheel's speed has a scale error of 5 %. It is measured ten times
-    per second."""
+    """The gyro's axis up has a scale error of 3 %. The wheel's speed has a scale error of 5 %, and is measured ten
+    times per second."""
     lean, speed = held_from_side_to_side(190.0)
     force, rate = shaken(*balanced(190.0, lean, speed))
     rate[:, 1] *= 1.03

@@ -259,7 +259,8 @@ def test_the_g_shown_follows_smoothly_whether_aligned_or_not():
 
 
 def test_a_smoothed_force_that_is_not_updated_is_nan():
-    """These are the forces left and up of an aligned motorcycle. With an unaligned calibration they are updated."""
+    """For an aligned motorcycle the smoothed forces left and up are not updated. With an unaligned calibration they
+    are."""
     aligned, other = Calibration(), Calibration()
     aligned.aligned = True
     shown = meter(aligned)

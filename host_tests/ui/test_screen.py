@@ -53,8 +53,8 @@ def first_line(screen, now_ms):
 
 
 def test_a_cancelled_alignment_gets_no_more_samples(screen):
-    """This holds even during the 100 ms until the next page is shown. In that time the last sample would save the
-    alignment."""
+    """The alignment gets no sample even in the 100 ms until the next page is shown. In that time the last sample would
+    save the alignment."""
     screen.press(LONG, 0)
     screen.press(LONG, 100)
     assert screen.wizard is not None

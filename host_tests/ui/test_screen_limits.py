@@ -119,7 +119,7 @@ def test_a_short_press_closes_the_sensor_info(monkeypatch):
     shown.press(SHORT, 3000)
     assert shown.lines(3000)[0] != "info"
     choose(shown, "Sensor info")
-    shown.press(LONG, 3000)  # opens the menu above it
+    shown.press(LONG, 3000)  # opens the menu in front of the sensor's page
     assert shown.menu is not None and shown._info_open
 
 

@@ -12,13 +12,13 @@ from support.web.rider import Rider
 LEAN_DEG = 30
 RIDING_S = 6
 SLOWED = 4  # factor by which a slow phone is slower than the reference computer
-REFERENCE_LOOP_S = 0.06  # the limit of the processor time is for a computer with this _loop_s()
+# result of _loop_s() on the reference computer, for which the limit of the processor time is set
+REFERENCE_LOOP_S = 0.06
 
 
 @pytest.mark.long
 def test_a_first_visit(chromium, address, tmp_path):
-    """This is one test for all steps, because they run in real time. test_guide.py tests the steps after a power
-    cut."""
+    """One test has all steps, because they run in real time. test_guide.py tests the steps after a power cut."""
     rider = Rider(chromium, address, viewport={"width": 1000, "height": 700})
     first_minute(rider)
     pull_the_wire(rider)

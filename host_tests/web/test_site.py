@@ -245,7 +245,7 @@ def test_strange_or_slow_requests_do_not_stop_the_server(monkeypatch, capsys):
 
 
 def test_trickling_connections_are_ended_for_others(monkeypatch):
-    """These clients send a byte before each time-out, but never a whole request."""
+    """The trickling clients send a byte before each time-out, but never a whole request."""
     monkeypatch.setattr(serve, "MOST", 4)
     monkeypatch.setattr(serve, "FULL_S", 0.2)
     with serve.server({"index.html": b"the page"}, 0) as server:

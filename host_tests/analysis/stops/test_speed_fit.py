@@ -29,8 +29,8 @@ def conditioned(part, speed, acceleration, delay_s):
 
     * the scale of the integrated speed: 1 %.
     * the delay of the log's speed: 0.05 s.
-    * the error of the acceleration due to the road's slope: 0.05 m/s2 at the end of the part. From there it changes
-      backwards as a random walk of 0.1 m/s2 per root second, linear between points half a second apart.
+    * the error of the acceleration due to the road's slope: 0.05 m/s2 at the end of the part. Backwards from there this
+      error is a random walk of 0.1 m/s2 per root second. It is linear between points half a second apart.
     * each measured speed: 0.05 m/s.
     """
     time = part.t_s

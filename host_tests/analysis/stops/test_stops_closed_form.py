@@ -156,7 +156,7 @@ class TestStandstill:
         right = self.disturbed(9.0, 9.0)
         assert right == pytest.approx(5.0, rel=0.002)
         assert self.disturbed(2.56, 4.0) == pytest.approx(right, rel=1e-4)
-        # in this time the force counts as slope: 0.1 g during 1 of 2 s are 0.49 m/s2
+        # 0.1 g during 1 of these 2 s count as a slope of 0.49 m/s2
         assert self.disturbed(0.5, 1.5) == pytest.approx(right + 0.49, rel=0.02)
         assert self.disturbed(1.5, 2.5) == pytest.approx(right + 0.49, rel=0.02)
 
@@ -188,8 +188,8 @@ def test_steep_road_does_not_change_the_figures(up):
 
 @pytest.mark.parametrize(("samples", "counts"), [(10, 0), (11, 1)])
 def test_brief_standstill_shows_no_slope(samples, counts):
-    """The road falls by 10 %. A brief standstill does not show this slope, so the stop does not count. A longer one
-    shows it."""
+    """The road falls by 10 %. A brief standstill does not show this slope, so the stop does not count. A longer
+    standstill shows it."""
     road = braking(20.0, 5.0)
     still = (road.t_s >= 18.0 - 1e-6) & (road.t_s < 18.0 + samples / RATE_HZ - 1e-6)
     found = stops_of(road.channels(forward_g=road.mps2 / STANDARD_GRAVITY - 0.1), still)
@@ -300,8 +300,8 @@ def test_hard_stop_is_shown_by_the_speed_alone(mps2, counts):
     ("hard", "easy", "counts"), [((4.0, -4.0), (8.0, -0.5), True), ((4.0, -9.0), (16.0, -0.25), False)]
 )
 def test_stop_by_speed_alone_takes_at_most_15_seconds(hard, easy, counts):
-    """Braking from 20 m/s within 12 s is a stop. Braking from 40 m/s within 20 s is not, because only the last 15 s are
-    considered."""
+    """Braking from 20 m/s within 12 s is a stop. Braking from 40 m/s within 20 s is no stop, because only the last 15 s
+    are considered."""
     top_mps = -hard[0] * hard[1] - easy[0] * easy[1]
     road = Road((REST_S, 0.0), (top_mps / 4.0, 4.0), (3.0, 0.0), hard, easy, (REST_S, 0.0))
     ride = road.channels()
@@ -338,8 +338,8 @@ def test_stops_are_searched_at_50_samples_per_second():
 
 
 def test_the_straight_line_is_the_direction_just_before_braking():
-    """The line is the mean direction over the first tenth of a second of the stop. Here the vehicle turns by half a
-    degree in that time, so the mean is a quarter of a degree from both ends."""
+    """The straight line has the mean direction of the first tenth of a second of the stop. In that time the vehicle
+    turns by half a degree, so the mean is a quarter of a degree from both ends."""
     road = braking(20.0, 5.0)
     begin = 14.0 - 0.12
     ride = road.channels(yaw_rate_dps=np.where((road.t_s > begin - 0.01) & (road.t_s < begin + 0.09), 5.0, 0.0))
