@@ -53,10 +53,10 @@
 # LIVE = False
 # LIVE_PIN = None           # six digits, for example 271828, to enter once on each phone; ESP32 only
 
-# SD card for the rides, on SPI; without one they are stored in the board's flash. Set all five. A Pico also needs the
-# driver: mpremote mip install sdcard
-# There are no defaults: these values are for a Pico. ESP32: SD_SPI = 2 (the slot of machine.SDCard; also 3 on a
-# classic one, S2 and S3) and free pins, on a classic one for example SCK 25, MOSI 26, MISO 33, CS 32
+# SD card for the rides, on SPI. Without a card the rides are stored in the board's flash. Set all five. A Pico also
+# needs the driver: mpremote mip install sdcard
+# There are no defaults: these values are for a Pico. ESP32: set SD_SPI = 2, a slot of machine.SDCard. A classic ESP32,
+# S2 and S3 also have slot 3. Choose free pins, on a classic ESP32 for example SCK 25, MOSI 26, MISO 33, CS 32
 # SD_SPI = 0                # or 1
 # SD_SCK = 18
 # SD_MOSI = 19

@@ -5,9 +5,9 @@ SAMPLE_HZ on its own. One pass of the loop is called a turn. App.turn() processe
 collects garbage, feeds the watchdog and waits for the next turn.
 
 The methods that take most of a turn are step, turn, _pass_on, LeanMeter.update_sum and Sensor.fetch. Each of them must
-need at most eleven words for locals and stack, because MicroPython puts a larger frame on the heap. When this frame is
-freed, the allocator searches again from that place, through all garbage since the last collection. This costs up to
-1 ms per turn.
+need at most eleven words for locals and stack, because MicroPython puts a larger frame on the heap. When a frame on the
+heap is freed, the allocator next searches from there, through all garbage since the last collection. This search takes
+up to 1 ms per turn.
 """
 
 import gc

@@ -36,7 +36,7 @@ def _pin(value):
 
 
 _INPUT = _pin, "a number from 0 to 48, no pin of the chip's own USB, flash or console"
-# A button needs a pull-up. Pins that are only inputs do not have one.
+# A button needs a pull-up. Pins that are only inputs have no pull-up.
 _PIN = (lambda v: _pin(v) and v not in port.INPUT_PINS), _INPUT[1] + ", and none that is an input only"
 _SD_PINS = ("SD_SCK", "SD_MOSI", "SD_MISO", "SD_CS")
 # For each speed source, the names of its pin settings

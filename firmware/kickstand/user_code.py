@@ -57,7 +57,7 @@ class UserCode:
         self._slow = {}  # number of slow calls in a row, per function
         self._problems = []
         # Stored once, because each access to self._draw creates a new bound method. The display would then treat an
-        # unchanged picture as a new one.
+        # unchanged picture as a new picture.
         self._drawn = self._draw
         sys.modules.pop("user", None)
         self._functions.update(self._call("import", "user") or {})

@@ -48,7 +48,7 @@ def test_knock_at_the_start_is_not_riding():
 
 def test_riding_time_excludes_standing(tmp_path):
     """The log is 37 s long. The bike stands for 4 s before the ride and for 4 s after it. The riding time is tested
-    with a speed and without one."""
+    with a speed and without a speed."""
     for speed_hz in (0, 5):
         said = words_of(analysis_rides.short(tmp_path, speed_hz=speed_hz))
         minutes, seconds = said.ride[0][2].removeprefix("riding ").split(":")

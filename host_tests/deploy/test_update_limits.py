@@ -38,7 +38,8 @@ def test_a_plan_replaces_what_differs():
 
 
 def test_the_blocks_of_a_file_have_pointers():
-    """The second block begins with one pointer, the third with two, so three blocks of 4096 hold 12276 bytes."""
+    """The second block begins with one pointer, and the third block with two pointers. So three blocks of 4096 hold
+    12276 bytes."""
     for size, most in ((0, 1), (4096, 1), (4097, 2), (8188, 2), (8189, 3), (12_276, 3), (12_277, 4)):
         assert update.most_blocks(size, 4096) == most
     assert [update.least_blocks(size, 4096) for size in (512, 513, 5000)] == [0, 1, 2]

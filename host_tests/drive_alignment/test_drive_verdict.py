@@ -94,7 +94,7 @@ def test_bends_and_changes_of_the_speed_do_not_count_as_stuck():
         check.measure(12.0 + k // 7 * 0.1)
         check.update_second([0.05 * (k % 2), 1.0, 0.0])
     for k in range(40):
-        # every second is in a bend or directly after one
+        # every second is in a bend or directly after a bend
         check.update_second([0.05 * (k % 2), 1.0, 0.0], 5.1 * (k % 2 == 0))
     assert check.problem is None
 

@@ -34,7 +34,7 @@ def test_an_event_changes_the_speed_by_15_mps():
     assert ended([1.49, 0.0])[0] == [False, False]
     assert ended([1.5, 0.0])[0] == [False, True]
     assert ended([-0.9, -0.6, 0.0])[0] == [False, False, True]
-    # the event that ends has counted before the opposite one begins
+    # the event that ends has counted before the opposite event begins
     seen, finder = ended([1.0, -2.0])
     assert seen == [False, False] and finder.change == -2.0
     seen, finder = ended([2.0, -2.0])

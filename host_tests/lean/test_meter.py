@@ -41,7 +41,8 @@ def test_with_the_nose_far_up_or_down_there_is_no_lean():
 
 
 def test_after_the_poses_the_first_bend_shows_its_lean():
-    """The poses have measured the gyro's bias, and show that the bike was at rest. After power-on neither is known."""
+    """The poses have measured the gyro's bias, and show that the bike was at rest. After power-on the bias and the rest
+    are unknown."""
     for posed in (True, False):
         shown = meter()
         shown.use(shown.calibration, posed)

@@ -258,7 +258,7 @@ def test_blocks_of_a_stream_end_with_a_point(monkeypatch):
 
 
 def pulled(monkeypatch, tmp_path, *contents, whole=True, problems=()):
-    """Pull a ride of parts with these blocks. problems: those of the last part."""
+    """Pull a ride of parts with these blocks. problems: the problems of the last part."""
     parts = [pull._Part(3, k, 6, f"/rides/{k}") for k in range(len(contents))]
     monkeypatch.setattr(pull, "_read", lambda _, part, *more: (b"abc", whole))
     given = iter(contents)

@@ -46,7 +46,7 @@ def entries(shown) -> list[str]:
     for _ in range(len(shown.menu._entries)):
         found.append(shown.lines(0)[0][1:])
         shown.press(SHORT, 0)
-    assert shown.lines(0)[0][1:] == found[0]  # the first entry follows the last one
+    assert shown.lines(0)[0][1:] == found[0]  # the first entry follows the last entry
     return found
 
 

@@ -34,7 +34,8 @@ def test_a_first_visit(chromium, address, tmp_path):
 
 
 def first_minute(rider):
-    """Start with an empty page. At the end the shown lean is within two degrees of the true lean, on both sides."""
+    """Start with an empty page. At the end the shown lean is within two degrees of the true lean, in leans to the left
+    and to the right."""
     rider.align()
     rider.reads("Aligned!")
     rider.click("#do")  # ride
@@ -54,8 +55,8 @@ def first_minute(rider):
     true_deg, shown_deg = rider.leans()
     assert true_deg < 4 - LEAN_DEG
     assert shown_deg == pytest.approx(true_deg, abs=2.0)
-    # Chromium cannot slow down workers. So convert their processor time to that of the reference computer, and check
-    # that it leaves room for a processor that is SLOWED times slower.
+    # Chromium cannot slow down workers. So convert the workers' processor time to the time of the reference computer.
+    # This time must leave room for a processor that is SLOWED times slower.
     assert 0.0 < used_s * REFERENCE_LOOP_S / _loop_s() < RIDING_S / SLOWED
 
 

@@ -8,7 +8,7 @@ import pytest
 from kickstand.ui import messages
 from support.mpy import run_mpy
 
-# Carries out orders (s, name, value): waits s seconds, then acts. Most names are those of Device.act(). The name
+# Carries out orders (s, name, value): waits s seconds, then acts. Most names are explained in Device.act(). The name
 # turn_to presses the button until a view is shown.
 DRIVE = """
 import json, sys

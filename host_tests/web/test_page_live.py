@@ -23,7 +23,7 @@ PLAYED = """async () => {
 }"""
 REFUSED = "() => Object.defineProperty(window, 'indexedDB', { value: { open() { throw new Error('refused'); } } })"
 
-half_seconds = functools.partial(ride_writer.blocks, length=lambda _: 512)  # blocks as short as those of a stream
+half_seconds = functools.partial(ride_writer.blocks, length=lambda _: 512)  # blocks as short as the blocks of a stream
 
 
 @pytest.fixture(scope="module")

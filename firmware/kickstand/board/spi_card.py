@@ -33,7 +33,8 @@ class CheckedCard(SDCard):
             raise OSError(self._fault)
 
     def write(self, token, buf):
-        """Write one sector. The driver calls this method for each sector. After a fault it skips the other sectors."""
+        """Write one sector. The driver calls this method for each sector. After a fault it skips the remaining
+        sectors."""
         if self._fault:
             return
         self._send(token)

@@ -3,7 +3,7 @@
 Three things differ from the paper:
 * Equation (4) is the cross product of the upright and the tilted reading. As printed, the product is zero.
 * Equation (5) takes y from the upright reading and divides y by its own length.
-* If the kickstand is on the right, the paper's x and z point right and backward. So both signs are changed.
+* If the kickstand is on the right, the paper's x and z point right and backward. So the signs of x and z are changed.
 """
 
 from math import atan2, degrees

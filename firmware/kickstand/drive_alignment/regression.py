@@ -86,7 +86,7 @@ class ForwardRegression:
             sums[k + CF + i] += curve_g * f
 
     def end_event(self):
-        """After an event, begin the next block if this one is full. A generator of short steps."""
+        """After an event, begin the next block if the current block is full. A generator of short steps."""
         self._events_in_last += 1
         if self._events_in_last < self._events_per_block:
             return

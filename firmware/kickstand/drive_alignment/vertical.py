@@ -15,7 +15,7 @@ from ..rotation import angle_deg, norm, normalize, vector
 from ..units import const
 
 _STANDING_MPS = const(0.5)  # lower speeds count as standing, because a GPS at rest shows speeds up to this value
-MOVED_MPS = 2.0  # if the speed was higher than this, the next stop is a new one
+MOVED_MPS = 2.0  # if the speed was higher than this, the next stop is a new stop
 SETTLE_S = 1.0  # time for which a vehicle rocks after braking
 COUNTS_S = 2.0  # time that a stop must last after SETTLE_S to count
 # Largest difference at a stop between a mean over 0.1 s and a mean with the time constant _AVERAGE_S. An idling diesel,

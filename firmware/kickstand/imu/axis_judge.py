@@ -3,7 +3,7 @@
 An axis is faulty in three cases:
 * Its counts have at most two values, or their lowest bits do not change. The axis is dead, or its low byte is stuck.
 * Its low byte wraps around while its high byte stays the same. The high byte is stuck.
-* Its counts equal those of another axis.
+* Its counts equal the counts of another axis.
 """
 
 from micropython import const
@@ -128,7 +128,7 @@ class AxisJudge:
         return _ill(dead) if dead else _ill(equal, "equal") if equal else None
 
     def _show(self, watch, notice):
-        """Show a notice for a moment, unless the same one was shown in the last minute."""
+        """Show a notice for a moment, unless the same notice was shown in the last minute."""
         if watch.looks - self._noticed.get(notice.code, -_QUIET_LOOKS) >= _QUIET_LOOKS:
             self._noticed[notice.code] = watch.looks
             watch.notice = notice

@@ -237,7 +237,7 @@ except NO_MACHINE_CODE:
 else:
     _FRAME = b"\x7f\x00\x80\xff\xff\xff\x80\x00\x80\xff\x01\x00\xab\xcd"
     decode = checked(decode, decode_python, _FRAME, 0, array("h", range(7)))
-    # Eight frames. Frames 2 and 4 are at the ends of the range, and the last frame repeats the previous one.
+    # Eight frames. Frames 2 and 4 are at the ends of the range, and the last frame repeats the frame before it.
     _TRIAL = bytearray(_FRAME * 8)
     for _k in range(7):
         _TRIAL[14 * _k + 1] = _TRIAL[14 * _k + 9] = 250 - 40 * _k

@@ -10,7 +10,7 @@ State                                       Measured (a vector with [3] has the 
     psi  YAW_ERROR of the alignment. Pitch in the kickstand pose causes it: psi is this pitch over tan(tilt of the
          stand). A degree of pitch causes 5 degrees of yaw error at 11 degrees of tilt, and 11 degrees at 5.
     s_x, c_xy        SCALE_LEFT, CROSS_LEFT_UP: scale error of the gyro's left axis, and its reading of a rate about up
-    c_zx, c_zy, s_z  CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD: the same for its forward axis
+    c_zx, c_zy, s_z  CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD: errors of the gyro's forward axis
 The data sheet allows 3 % of scale error and 2 % of cross-axis sensitivity. A filter without these states would mistake
 them for bias in a long turn, and for lean in a quick roll. The up axis has no such states: without a measured speed its
 scale error cannot be distinguished from an error of the speed.
@@ -33,10 +33,10 @@ tan(lean of the bike) = tan t / cos psi.
 d is the part of the pitch rate q' that the springs cause. The wheels do not rise with it. Braking causes most of d, see
 (8) in dive.py. h is the height of the sensor above the roll axis.
 
-(4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a steady turn they cannot separate lean from speed,
-because their derivatives by lean and by speed are in the same proportion. In such a turn the ratio of two rates gives
-the lean: by (6) the pitch does not change, so by (2) w_x / w_y is tan t. At the beginning of a turn the speed from
-before the turn is still valid, and with this speed (4) gives the lean.
+(4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a steady turn they cannot separate lean from speed. The
+reason is that the derivatives by lean and by speed have the same ratio in (4) and (5). In such a turn the ratio of two
+rates gives the lean: by (6) the pitch does not change, so by (2) w_x / w_y is tan t. At the beginning of a turn the
+speed from before the turn is still valid, and with this speed (4) gives the lean.
 """
 
 from math import cos, radians, sin, sqrt, tan

@@ -38,8 +38,8 @@ _SHORT_S = const(3.0)
 _LONG_S = const(10.0)
 # standard deviations: larger innovations are reduced to this value. Larger: a single blow counts for more.
 _MOST = const(4.0)
-# Limits of the means. Larger: fewer leans are hidden, both right and wrong ones. Each comment gives the largest mean in
-# rides without a fault, on good and bad roads and mounts.
+# Limits of the means. Larger: fewer right leans and fewer wrong leans are hidden. Each comment gives the largest mean
+# in rides without a fault, on good and bad roads and mounts.
 LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations. Without a fault: at most 0.4 and 0.25
 UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations. Without a fault: at most 0.7 and 0.25
 # ratio: factor on the limits of up if the six positions were not done. The data sheet allows the accelerometer a scale
@@ -87,7 +87,7 @@ last_odd = None  # the last code of `odd`, for `kickstand status`
 
 
 class Consistency:
-    """Judges the innovations of each window. six_done: the six positions have measured the accelerometer.
+    """Judges the innovations of each window. six_done: True if the six positions have measured the accelerometer.
 
     Read-only attributes:
         doubt   True if the lean must not be shown

@@ -52,7 +52,7 @@ class Dive:
         self._push, self._pitch_rate = push, pitch_rate
         if last_push is None:
             return 0.0
-        jerk = (push - last_push) / seconds  # in g/s, from the middle of the last window to the middle of this one
+        jerk = (push - last_push) / seconds  # in g/s, from the middle of the last window to the middle of this window
         if not -_MAX_JERK < jerk < _MAX_JERK:  # also true for NaN
             return 0.0
         if speed > _MIN_SPEED:

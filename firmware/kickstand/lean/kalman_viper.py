@@ -2,7 +2,7 @@
 
 The code takes floats apart and computes with integers. A 32-bit float (IEEE 754 binary32) has a sign, 8 bits of
 exponent and 23 bits of mantissa; the mantissa's first bit is always 1 and not stored. Each sum is rounded once, to the
-nearest float. A float below 1.2e-38 counts as 0. An infinite sum, or one over 3.4e38, becomes not-a-number.
+nearest float. A float below 1.2e-38 counts as 0. An infinite sum, or a sum over 3.4e38, becomes not-a-number.
 """
 
 import micropython

@@ -208,8 +208,8 @@ class LeanFilter:
         return degrees(x[LEAN] + self._delay_s * self._roll_rate - self._upright)
 
     def _end_window(self):
-        """Start the work on the window that ends, unless it is the first one, the bike comes to rest or the filter must
-        restart. The work on the previous window is finished."""
+        """Start the work on the window that ends, unless it is the first window, the bike comes to rest or the filter
+        must restart. The work on the previous window is finished."""
         n = self._count
         means = [total / n for total in self._sums]
         seconds = self._window_us * 1e-6

@@ -64,7 +64,7 @@ MOVING_SPEED = 2.0  # m/s. Larger: slow riding on a smooth road is mistaken for 
 MOVING_S = 2.5  # s. Larger: a stop is detected later.
 # A bike is in balance above BALANCE_SPEED if the speed's standard deviation is below SIGMA_BALANCE_SPEED.
 BALANCE_SPEED = 2.0  # m/s. Larger: a slipped mount is detected at fewer speeds.
-SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a pushed bike is mistaken for a ridden one.
+SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a pushed bike is mistaken for a ridden bike.
 # ratio: largest force forward over force up on a bike. Larger: a board on a table is mistaken for a faulty sensor.
 MOST_FORWARD = 1.5
 # ratio: change of the gyro's scale and cross-axis errors with temperature since the six positions. The data sheet
@@ -108,8 +108,8 @@ _SIGMA_ROLL_HEIGHT_M = const(0.4)  # m: standard deviation of h. Larger: forces 
 # m/s: error of a speed from a receiver or a wheel sensor. Larger: measured speeds count for less.
 _SIGMA_MEASURED_SPEED = const(1.0)
 # ratio: scale error of the measured speed. A leaning tyre has a smaller radius, and slips. The scale error of the
-# gyro's up axis adds to it, because speed x yaw rate has both. Larger: measured speeds count for less, most at high
-# speed.
+# gyro's up axis is included, because the product speed x yaw rate has both errors. Larger: measured speeds count for
+# less, most at high speed.
 _SIGMA_SPEED_SCALE = const(0.05)
 # s: time for which the error _SIGMA_MEASURED_SPEED stays the same. Larger: measured speeds count for less.
 _MEASURED_SPEED_S = const(4.0)

@@ -2,9 +2,9 @@
 upright.
 
 A bike in balance has no specific force to the side. The mean force measured on straights comes from the roll
-misalignment and from the accelerometer's drift, so both are subtracted from the lean. In turns wide tyres and a rider
-who hangs off add a force that changes its sign with the turn. The trim is the part that left and right turns have in
-common.
+misalignment and from the accelerometer's drift, so both effects are subtracted from the lean. In turns wide tyres and a
+rider who hangs off add a force that changes its sign with the turn. The trim is the part that left and right turns have
+in common.
 """
 
 from math import radians, sin

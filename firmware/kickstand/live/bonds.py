@@ -30,7 +30,7 @@ class Bonds:
 
         Args:
             kind: the type of the key.
-            index: if key is None, the index of the value among those of this type.
+            index: if key is None, the index of the value among all values of this type.
             key: the key, or None.
         """
         if key is not None:

@@ -163,7 +163,7 @@ class RideRing:
             self._oldest, self._passed = None, ride
 
     def _find_oldest(self):
-        """Return the number of the oldest ride that may have parts, or None if this step has not found one. Raises
+        """Return the number of the oldest ride that may have parts, or None if this step has not found it. Raises
         OSError."""
         passed, size = self._passed, ride_paths.RIDES_IN_GROUP
         groups = ride_paths.groups(self._directory)

@@ -83,7 +83,7 @@ class Recording:
         """Do one step of creating the Recorder. The open menu calls this method repeatedly.
 
         One step is the import of one module and takes 0.1 s. The chip's FIFO can keep the samples of that time, but not
-        those of all steps together. If a step fails, start() reports it."""
+        the samples of all steps together. If a step fails, start() reports it."""
         if self._steps and not self._refused:
             self._refused = attempt(self._step)
 
@@ -110,8 +110,8 @@ class Recording:
         return self._refused
 
     def start_due(self):
-        """Begin to record if the settings or the keeper require it. Call this method at the first readings. Return the
-        same as start()."""
+        """Begin to record if the settings or the keeper require it. Call this method at the first readings. Return
+        None, or a Notice with the reason for a failure."""
         due, self._due = self._due, False
         return self.start() if due else None
 

@@ -140,7 +140,8 @@ class Wheel:
                 self._report_ms = ticks_add(now_ms, -MAX_STOP_MS)
             return None
         self._report_ms = now_ms
-        self._moved_ms = ticks_add(now_ms, -self._stop_ms)  # kept recent for the same reason as _report_ms above
+        # a recent time, because after 6 days ticks_diff() is negative
+        self._moved_ms = ticks_add(now_ms, -self._stop_ms)
         self._noisy = False
         self._usual_us = 0
         self._seen_us = None  # the next period begins with the next pulse
