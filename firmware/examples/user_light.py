@@ -16,5 +16,6 @@ lamp = Pin(16, Pin.OUT, value=0)
 
 
 def on_lean(lean_deg, trusted, meter):
-    """Switch the lamp. The firmware calls this ten times per second. The lamp is off while the lean is not trusted."""
+    """Switch the lamp. The firmware calls this function ten times per second. The lamp is off while the lean is not
+    trusted."""
     lamp.value(1 if trusted and abs(lean_deg) > LIMIT_DEG else 0)

@@ -18,6 +18,6 @@ uart = UART(0, baudrate=115_200, tx=Pin(0), rx=Pin(1))
 
 
 def on_lean(lean_deg, trusted, meter):
-    """Send the lean. The firmware calls this ten times per second. After a ? the receiver must not use the last
-    number."""
+    """Send the lean. The firmware calls this function ten times per second. After a ? the receiver must not use the
+    last number."""
     uart.write("%.1f\n" % lean_deg if trusted else "?\n")

@@ -120,7 +120,8 @@ class App:
                 self.step()
         except BaseException as error:
             if isinstance(error, KeyboardInterrupt):
-                # Stop the watchdog first, because a second Ctrl-C may interrupt the rest, and nothing feeds it now.
+                # Stop the watchdog first, because nothing feeds it now, and a second Ctrl-C may interrupt the next
+                # steps.
                 port.rest_watchdog()
             self.lcd.end(*STOPPED)
             global worst
@@ -146,7 +147,8 @@ class App:
         self._plan_collection()
 
     def step(self):
-        """Do one pass of the loop: turn(), collect garbage if it is time, feed the watchdog, wait. It takes LOOP_US."""
+        """Do one pass of the loop: turn(), collect garbage if it is time, feed the watchdog, wait. One pass takes
+        LOOP_US."""
         self.turn()
         self._turns_left -= 1
         if self._turns_left <= 0:  # collect between two turns, while the FIFO keeps the samples
@@ -186,7 +188,7 @@ class App:
         self._turns_left = self._planned_turns
 
     def turn(self):
-        """Process the samples in the FIFO and one press, and do at most one transfer to the display. It never waits."""
+        """Process the samples in the FIFO and one press, and do at most one transfer to the display. Never wait."""
         now_us, now_ms = ticks_us(), ticks_ms()
         n = self.sensor.fetch(now_ms)
         if self.sensor.clipped:

@@ -70,7 +70,8 @@ def answering(i2c, addresses=range(_FIRST, _LAST + 1)):
 
 def exchanged(sda, scl, addresses):
     """Return True if one of the addresses answers when SDA and SCL are exchanged."""
-    i2c = SoftI2C(Pin(sda), Pin(scl), freq=_SLOW_HZ, timeout=_TIMEOUT_US)  # its SCL comes first
+    # SoftI2C takes SCL first, so the wires are exchanged
+    i2c = SoftI2C(Pin(sda), Pin(scl), freq=_SLOW_HZ, timeout=_TIMEOUT_US)
     return bool(answering(i2c, addresses))
 
 

@@ -8,8 +8,8 @@ on_lean(lean_deg, trusted, meter)   is called ten times per second. While truste
 on_press(event)                     is called after each press. The event is board.button.SHORT or LONG.
 
 A function is disabled in three cases: it raises, it takes longer than _TOO_SLOW_MS, or _MOST_SLOW successive calls take
-longer than _SLOW_MS. A notice on display and console says so. The import of user.py and setup() may take any time. A
-MemoryError in any of them disables all of user.py.
+longer than _SLOW_MS. A notice on display and console names the disabled function. The import of user.py and setup() may
+take any time. A MemoryError in any of these functions disables all of user.py.
 
 This module is imported only if there is a user.py.
 """
@@ -70,7 +70,7 @@ class UserCode:
         return self._problems.pop(0) if self._problems else None
 
     def lean(self, trusted):
-        """Call the owner's on_lean(). This happens ten times per second.
+        """Call the owner's on_lean(). The app calls this method ten times per second.
 
         Args:
             trusted: True if the lean may be shown.

@@ -40,7 +40,8 @@ def test_standing_bike_is_not_riding(log):
 
 
 def test_knock_at_the_start_is_not_riding():
-    """The hand that switches the device on knocks it with 0.4 g for 0.02 s. Averaged over a second this is 0.008 g."""
+    """The hand that switches the device on knocks it with 0.4 g for 0.02 s. Averaged over a second, the knock has 0.008
+    g."""
     log = standing(40, 0.05, 1.5)
     log.accel_g[:2, 2] = 0.4
     assert words_of(log).ride[0][2] == "riding 0:00"

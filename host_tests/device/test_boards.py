@@ -81,8 +81,9 @@ def test_the_refusal_is_shown_where_the_display_s_pins_are_set(config, lines, tm
     ],
 )
 def test_a_classic_esp32_keeps_its_flash_and_its_console(machine, name, pin, tmp_path, capsys):
-    """The firmware refuses these pins. Driving a pin of the flash would crash the board at each start. Input-only pins
-    have no pull-up, so a button on such a pin would always read as pressed."""
+    """The firmware refuses pins of the console and of the flash, and input-only pins. Driving a pin of the flash would
+    crash the board at each start. Input-only pins have no pull-up, so a button on such a pin would always read as
+    pressed."""
     config = {**(CARD if name == "SD_CS" else {}), **({"SPEED": "wheel"} if name == "WHEEL_PIN" else {}), name: pin}
     if name == "GPS_TX":
         config = {**SPEED, **config}

@@ -60,8 +60,8 @@ def test_a_motorcycle_is_aligned(engine, known):
 
 @pytest.mark.parametrize("method", ["improved", "published"])
 def test_the_result_turns_with_the_sensor(method):
-    """If the sensor is mounted differently, the result changes by exactly this rotation, within 0.05 degrees. The
-    mounts are along the axes, some of them exactly opposite to the vehicle's axes."""
+    """If the sensor is rotated, the result changes by exactly this rotation, within 0.05 degrees. The mounts are along
+    the axes, some of them exactly opposite to the vehicle's axes."""
     legs = around(5, pause_s=2.0)
     plain = np.reshape(drive(legs, PLAIN, method=method)["matrix"], (3, 3))
     for order, signs in (

@@ -71,7 +71,7 @@ def test_the_worst_turn_and_a_position_fit_into_any_block(length):
 
 
 def test_a_block_contains_nothing_of_the_previous_one():
-    """Each block can be read without the others. A shorter block overwrites the rest of the previous one with
+    """Each block can be read without the others. A shorter block overwrites the rest of the previous block with
     zeros."""
     first, again = ride_writer.begun(4096), RideBlock(5000)
     for turn in some_turns(150):

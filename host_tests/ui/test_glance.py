@@ -103,7 +103,7 @@ def test_a_lean_is_drawn_as_number_arc_and_side(glance, lean_deg, digits, column
 
 
 def test_the_arrow_points_to_the_side_and_rec_is_below(glance):
-    """The arrow has 24 columns. Its point is one pixel high, and its back 29 pixels."""
+    """The arrow has 24 columns. Its point is one pixel high, and its back is 29 pixels high."""
     canvas = drawn(glance, glance.lean, recording=True, lean_deg=20.0)
     arrow = [call for call in canvas.calls if call[0] == "vline" and call[1] > 101]
     assert (len(arrow), arrow[0], arrow[-1]) == (24, ("vline", 125, 40, 1, 1), ("vline", 102, 26, 29, 1))

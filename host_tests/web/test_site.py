@@ -53,7 +53,7 @@ def test_site_is_written_to_a_folder(files, built, tmp_path):
 
 
 def test_site_built_on_github_knows_its_home(monkeypatch):
-    """A site built without the project's address contains no such link."""
+    """A site built without the project's address contains no link to it."""
     core = pytest.importorskip("hatchling.metadata.core")
     manager = pytest.importorskip("hatchling.plugin.manager")
 

@@ -14,7 +14,7 @@ from micropython import const
 
 # Index: LCD_WIRING - 1. The bits of RS, E and the backlight, then True if D4 to D7 are P0 to P3
 WIRINGS = (
-    (0x01, 0x04, 0x08, False),  # the usual one: P0 RS, P2 E, P3 light
+    (0x01, 0x04, 0x08, False),  # the usual wiring: P0 RS, P2 E, P3 light
     (0x40, 0x10, 0x00, True),  # MJKDZ, GY-IICLCD: P6 RS, P4 E, P7 light, on while low
     (0x10, 0x40, 0x80, True),  # P4 RS, P6 E, P7 light
     (0x01, 0x04, 0x00, False),  # like the first wiring, but the light is on while P3 is low

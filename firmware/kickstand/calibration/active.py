@@ -16,8 +16,9 @@ class ActiveCalibration:
 
     Args:
         meter: the LeanMeter that uses the Calibration.
-        changed: a function that is called as changed(replaced) after each change. `replaced` is True for another
-            alignment. Then maxima and the results of driving must be discarded. It is False for a small correction.
+        changed: a function that is called as changed(replaced) after each change. `replaced` is True after a new
+            alignment, which makes maxima and the results of driving invalid. `replaced` is False after a small
+            correction.
     """
 
     def __init__(self, meter, changed):

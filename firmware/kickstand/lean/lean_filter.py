@@ -34,7 +34,7 @@ from .upright_trim import UprightTrim
 
 _WINDOW_US = const(200_000)
 _FIRST_WINDOW_US = const(50_000)
-WORK_STEPS = 21  # steps of the work on a window; a test counts them
+WORK_STEPS = 21  # number of steps of the work on a window; a test checks this number
 _SLOW_STEP_US = const(12_000)  # if samples are further apart than this, there is time for all steps at once
 DELAY_S = 0.0048  # delay of the MPU6050's gyro at DLPF 3
 # m/s: above this speed the filter restarts. A board that lies on its nose seems to accelerate, but standstill is

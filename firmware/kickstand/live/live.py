@@ -22,7 +22,7 @@ def attach(radio, app):
 
 
 class Live:
-    """Sends to one phone.
+    """Sends packets to one phone.
 
     Args:
         radio: a Radio.

@@ -50,7 +50,7 @@ class Wheel:
         shortest_us = int(1e6 / (pulses_per_metre * _MAX_MPS))
         self._shortest_us = shortest_us
         self._open_us = min(_BOUNCE_US, shortest_us // 4)
-        self._metre_us = 1e6 / pulses_per_metre  # divided by the period in us this gives the speed in m/s
+        self._metre_us = 1e6 / pulses_per_metre  # time between two pulses at 1 m/s
         self._stop_ms = min(MAX_STOP_MS, max(MIN_STOP_MS, int(1000.0 / (pulses_per_metre * _STOPPED_MPS))))
         self.count = 0  # number of pulses that the interrupt has counted
         self._pulse_us = ticks_us()  # time of the last pulse

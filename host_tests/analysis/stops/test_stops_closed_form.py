@@ -91,8 +91,8 @@ def test_jerk_is_the_steepest_change_of_the_force():
         # from 4 % to 15 %, at most the last 0.6 s before the deceleration exceeds 15 % are braking
         (0.3, 6.0, 0.71),
         (0.8, 6.0, 0.71),
-        (1.0, 6.0, 4.08),  # above 15 % it is braking
-        (0.24, 1.4, 0.71),  # below 0.25 m/s2 it is a slope or the wind, even above 15 %
+        (1.0, 6.0, 4.08),  # above 15 % of the full deceleration, all of it is braking
+        (0.24, 1.4, 0.71),  # below 0.25 m/s2 the cause is a slope or the wind, even above 15 %
         (0.27, 1.4, 4.08),
     ],
 )
@@ -161,7 +161,8 @@ class TestStandstill:
         assert self.disturbed(1.5, 2.5) == pytest.approx(right + 0.49, rel=0.02)
 
     def test_rebound_of_the_fork_is_not_part_of_the_slope(self):
-        """The mean force of the rebound is zero, so it does not change the speed. It lasts less than half a second."""
+        """The mean force of the rebound is zero, so it does not change the speed. The rebound lasts less than half a
+        second."""
         road = braking(20.0, 5.0)
         ride = road.channels()
         after = road.t_s - 18.0
@@ -329,8 +330,8 @@ def test_log_may_begin_on_the_move():
 
 
 def test_stops_are_searched_at_50_samples_per_second():
-    """The log has 200 samples per second. Each value is the mean of four, for example at 13.88, 13.885, 13.89 and
-    13.895 s."""
+    """The log has 200 samples per second. Each value is the mean of four samples, for example at 13.88, 13.885, 13.89
+    and 13.895 s."""
     road = Road((REST_S, 0.0), (5.0, 4.0), (4.0, 0.0), (4.0, -5.0), (REST_S, 0.0), rate_hz=200.0)
     (stop,) = find_stops(road.channels())
     assert stop.start_s == pytest.approx(13.8875, abs=1e-6)
@@ -351,8 +352,8 @@ def test_the_straight_line_is_the_direction_just_before_braking():
     ("hard", "easy", "earlier_s"), [((2.0, -6.0), (1.4, -2.0), 0.71), ((10.0 / 9.0, -9.0), (2.4, -2.0), 4.08)]
 )
 def test_full_deceleration_is_from_the_last_two_seconds(hard, easy, earlier_s):
-    """The rider brakes hard and then eases the brake to 2 m/s2. Before this the engine slows the bike by 0.8 m/s2. A
-    stop begins at 15 % of the full deceleration.
+    """The rider brakes hard and then eases the brake to 2 m/s2. Before the rider brakes, the engine slows the bike by
+    0.8 m/s2. A stop begins at 15 % of the full deceleration.
 
     * If the hard braking fills a quarter of the last two seconds, it is the full deceleration. 15 % of its 6 m/s2 are
       0.9 m/s2, so the engine's braking does not count.

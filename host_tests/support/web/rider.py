@@ -139,7 +139,7 @@ class Rider:
             for thread in Path(f"/proc/{process}/task").glob("*"):
                 if (thread / "comm").read_text().strip() == "DedicatedWorker":
                     fields = (thread / "stat").read_text().rsplit(")", 1)[1].split()
-                    ticks += int(fields[11]) + int(fields[12])  # user time and kernel time
+                    ticks += int(fields[11]) + int(fields[12])  # the sum of user time and kernel time
         return ticks / os.sysconf("SC_CLK_TCK")
 
 
