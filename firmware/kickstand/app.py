@@ -1,13 +1,13 @@
 """The device: connects sensor, mathematics, button, flash and display, and runs the loop.
 
-Data flow in one direction: sensor -> calibration and alignment -> lean -> page -> display. The chip takes samples at
+Data flows in one direction: sensor -> calibration and alignment -> lean -> page -> display. The chip takes samples at
 SAMPLE_HZ on its own. One pass of the loop is called a turn. App.turn() processes the new samples. App.step() also
 collects garbage, feeds the watchdog and waits for the next turn.
 
 The methods that take most of a turn are step, turn, _pass_on, LeanMeter.update_sum and Sensor.fetch. Each of them must
 need at most eleven words for locals and stack, because MicroPython puts a larger frame on the heap. When a frame on the
-heap is freed, the allocator next searches from there, through all garbage since the last collection. This search takes
-up to 1 ms per turn.
+heap is freed, the next search for free memory begins there. It passes all garbage since the last collection, which
+takes up to 1 ms per turn.
 """
 
 import gc
@@ -32,8 +32,8 @@ _COLLECT_TURNS = const(40)
 # Turns between two collections while aligning by driving, and with an OLED, a phone or user.py. They use 46 KB of heap.
 # While aligning by driving, 72 KB are free
 _COLLECT_TURNS_DRIVING = const(23)
-# Number of collections between two checks of the free heap. A check takes 3 ms on an ESP32. With a smaller heap, the
-# app checks after each collection.
+# Number of collections between two checks of the free heap. A check takes 3 ms on an ESP32. If the drive, an OLED, a
+# phone or user.py also uses heap, the app checks after each collection.
 _PLAN_EVERY = const(4)
 SINGLE_GAPS = 300  # number of single free heap blocks after a collection
 _PAGE_MS = const(100)
@@ -268,7 +268,7 @@ class App:
     def _pass_on(self, n, dt_us, now_ms):
         """Pass the sum of n new samples to the meter, and each single sample to a wizard.
 
-        dt_us: time from the last earlier sample to the last new sample."""
+        dt_us: time from the previous sample to the last new sample."""
         chip = self.sensor.chip
         self.meter.update_sum(chip.sums, n, dt_us)
         if self.rides.recorder.active:
@@ -298,7 +298,7 @@ class App:
             problem = self.rides.start_due()
             if problem:
                 self.screen.notify(problem, ticks_ms())
-        # Delay the first page, because now it would only say that there is no lean yet
+        # Delay the first page, because a page shown now would only say that there is no lean yet
         self._page_ms = ticks_add(ticks_ms(), _FIRST_PAGE_MS)
 
     def _calibration_changed(self, replaced):

@@ -94,7 +94,7 @@ def checked(machine_code, plain, *arguments):
     Args:
         machine_code: the function in machine code.
         plain: the same function in Python.
-        arguments: the arguments for one call of each. The second call gets copies.
+        arguments: the arguments for one call of each function. The second call gets copies.
 
     Returns:
         machine_code if both functions give the same results. Otherwise plain, after a report on the console.

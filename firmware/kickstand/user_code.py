@@ -47,7 +47,7 @@ class UserCode:
     """The owner's code for an App.
 
     Attributes:
-        pages: list with one function per page. It takes no arguments and returns the page's lines.
+        pages: list with one function per page. Such a function takes no arguments and returns the page's lines.
     """
 
     def __init__(self, app):

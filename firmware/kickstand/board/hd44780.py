@@ -26,7 +26,7 @@ _COLUMNS = const(16)
 _DASHES = b"-" * _COLUMNS
 _NO_TEXT = "\n"
 _NEVER = b"\xfe" * _COLUMNS  # marks a line that was not written yet; no text uses this code
-# Time between two initialisations. After electrical noise the display may combine the wrong nibbles to bytes. Only an
+# Time between two initialisations. After electrical noise the display may combine the wrong nibbles into bytes. Only an
 # initialisation repairs this.
 _REINIT_MS = const(10_000)
 _PROBE_MS = const(200)  # time between two checks that the display is connected
@@ -40,8 +40,8 @@ _POWER_UP = const(-8)  # number of the first step after power-up, because the di
 _NIBBLES = (0x30, 0x30, 0x30, 0x20)
 _COMMANDS = b"\x28\x0c\x06\x02"
 _GLYPH_PARTS = const(4)  # the 64 bytes of character patterns are sent 16 at a time
-# Number of characters to blank behind each line, one line per step. A larger display (20x4 or 20x2) would show other
-# memory there.
+# Number of characters to blank behind each line, one line per step. A larger display (20x4 or 20x2) would show
+# characters from other memory there.
 _BEHIND = const(24)
 _STEPS = len(_NIBBLES) + 1 + _GLYPH_PARTS + 2
 

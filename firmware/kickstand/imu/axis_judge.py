@@ -136,7 +136,8 @@ class AxisJudge:
 
 
 def _ill(axes, how=None):
-    """Return the Notice for faulty axes. It names the gyro's faulty axes, or the accelerometer's if the gyro has none.
+    """Return the Notice for faulty axes. It names the gyro's faulty axes or, if the gyro has none, the accelerometer's
+    faulty axes.
 
     Args:
         axes: one bit per column of a frame.

@@ -39,8 +39,8 @@ _WRAPPED = const(0x20000)  # bit in _SEEN that is set when the counts jump by _J
 _JUMP = const(192)
 
 # Half of the range of 8 g or 16 g. The low-pass hides most of a vibration. If half of the range is left after the
-# low-pass, the vibration was clipped before it. Then the mean is wrong, because the readings are clipped unevenly. A
-# range below 8 g has no limit for vibration, because bends alone reach half of that range.
+# low-pass, the vibration was clipped before the low-pass. Then the mean is wrong, because the readings are clipped
+# unevenly. A range below 8 g has no limit for vibration, because bends alone reach half of that range.
 _HARD_COUNTS = const(16384)
 _COLUMNS = (0, 1, 2, 4, 5, 6)  # the axes' columns in a frame
 _ALL_DIFFER = const(0x77)

@@ -24,9 +24,9 @@ from micropython import const
 
 from .fifo_frames import FRAME, SATURATED, AxisWatch, add_up, decode
 
-# setup() writes the registers from SMPLRT_DIV on one by one: SMPLRT_DIV (p. 11), CONFIG with DLPF_CFG (p. 13),
-# GYRO_CONFIG (p. 14), ACCEL_CONFIG (p. 15) and, if the chip has it, ACCEL_CONFIG2. ACCEL_CONFIG2 sets the low-pass of
-# the accelerometer alone.
+# setup() writes the registers one after another, beginning with SMPLRT_DIV: SMPLRT_DIV (p. 11), CONFIG with DLPF_CFG
+# (p. 13), GYRO_CONFIG (p. 14), ACCEL_CONFIG (p. 15) and, if the chip has it, ACCEL_CONFIG2. ACCEL_CONFIG2 sets the
+# low-pass of the accelerometer alone.
 _SMPLRT_DIV = const(0x19)
 _FIFO_EN = const(0x23)  # p. 16
 _ACCEL_XOUT_H = const(0x3B)  # p. 29; the fourteen bytes from this register on belong to one sampling instant

@@ -8,12 +8,13 @@ State                                       Measured (a vector with [3] has the 
     v  SPEED  forward
     b  BIAS_LEFT, BIAS_UP, BIAS_FORWARD: change of the gyro's bias since the calibration
     psi  YAW_ERROR of the alignment. Pitch in the kickstand pose causes it: psi is this pitch over tan(tilt of the
-         stand). A degree of pitch causes 5 degrees of yaw error at 11 degrees of tilt, and 11 degrees at 5.
+         stand). A degree of pitch causes 5 degrees of yaw error at 11 degrees of tilt, and 11 degrees at 5 degrees of
+         tilt.
     s_x, c_xy        SCALE_LEFT, CROSS_LEFT_UP: scale error of the gyro's left axis, and its reading of a rate about up
     c_zx, c_zy, s_z  CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD: errors of the gyro's forward axis
 The data sheet allows 3 % of scale error and 2 % of cross-axis sensitivity. A filter without these states would mistake
-them for bias in a long turn, and for lean in a quick roll. The up axis has no such states: without a measured speed its
-scale error cannot be distinguished from an error of the speed.
+these errors for bias in a long turn, and for lean in a quick roll. The up axis has no such states: without a measured
+speed its scale error cannot be distinguished from an error of the speed.
 
 Equations, with ' for the derivative by time
     rates, corrected         w = w_m - b,  then  w_z -= c_zx w_x + c_zy w_y + s_z w_z,  w_x -= s_x w_x + c_xy w_y
@@ -30,8 +31,8 @@ which is q + psi sin t. For example, on a slope of 10 % a yaw error of 5 degrees
 removes this part, to second order in psi. On a level road q is -psi sin t, and (7) agrees with
 tan(lean of the bike) = tan t / cos psi.
 
-d is the part of the pitch rate q' that the springs cause. The wheels do not rise with it. Braking causes most of d, see
-(8) in dive.py. h is the height of the sensor above the roll axis.
+d is the part of the pitch rate q' that the springs cause. The wheels do not rise with this pitch. Braking causes most
+of d, see (8) in dive.py. h is the height of the sensor above the roll axis.
 
 (4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a steady turn they cannot separate lean from speed. The
 reason is that the derivatives by lean and by speed have the same ratio in (4) and (5). In such a turn the ratio of two
@@ -128,7 +129,7 @@ def possible_pitch(pitch):
 
 
 def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
-    """Return the rates about left and up, in rad/s, for derivatives that multiply a rate by a state.
+    """Return the rates about left and up, in rad/s, to use in derivatives that multiply a rate by a state.
 
     A bike in balance has the rate v w_y / g = -cos q sin t about up. If the measured rate about up is close to this
     rate, the function returns the rates of a bike in balance. Otherwise, and with a speed of 0, it returns the measured

@@ -40,16 +40,17 @@ _LONG_S = const(10.0)
 _MOST = const(4.0)
 # Limits of the means. Larger: fewer right leans and fewer wrong leans are hidden. Each comment gives the largest mean
 # in rides without a fault, on good and bad roads and mounts.
-LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations. Without a fault: at most 0.4 and 0.25
-UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations. Without a fault: at most 0.7 and 0.25
+LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations. Largest without a fault: 0.4 and 0.25
+UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations. Largest without a fault: 0.7 and 0.25
 # ratio: factor on the limits of up if the six positions were not done. The data sheet allows the accelerometer a scale
 # error of 3 % and an offset of 80 mg. Without the six positions, these errors show only at rest. Larger: fewer leans
 # are hidden.
 _UNMEASURED = const(2.0)
-# ratio: force to the side divided by force up, minus the trim. Without a fault: at most 0.12
+# ratio: force to the side divided by force up, minus the trim. Largest without a fault: 0.12
 _SIDEWAYS = const(0.15)
-_STEEP = const(0.21)  # rad: pitch. Without a fault: at most 0.14
-# rad: root mean square of the pitch that the forward force does not confirm. On a recorded ride without a fault: 0.096
+_STEEP = const(0.21)  # rad: pitch. Largest without a fault: 0.14
+# rad: root mean square of the pitch that the forward force does not confirm. Largest on a recorded ride without a
+# fault: 0.096
 _SLOPE = const(0.12)
 # square of standard deviations: above this spread, the limits of left and up grow with the root of the spread. The
 # spread is the mean of half the squared change of the innovation from window to window. Larger: more leans are hidden

@@ -7,7 +7,7 @@ update      propagate the covariance over the window, and apply each measurement
 inject      add the corrections to the state
 
 The steps from linearise to inject take longer than one sample. They are a generator, spread over the samples of the
-next window: each sample runs it to its next yield. Forces are in g, speeds in m/s, angles in rad.
+next window. Each sample runs the generator to its next yield. Forces are in g, speeds in m/s, angles in rad.
 """
 
 from math import atan2, degrees, pi, sin, sqrt

@@ -10,8 +10,8 @@ These arguments are the same in all functions:
     means: see bike_model.predict()
 
 SIGMA_... are standard deviations (1 sigma). A disturbance that lasts tau seconds affects several measurements, so their
-errors are not independent. Therefore its variance in windows of T seconds is sigma^2 2 tau / T. The parameters of
-standstill and trim are in rest.py and upright_trim.py, in the same form.
+errors are not independent. Therefore the variance of the disturbance in windows of T seconds is sigma^2 2 tau / T. The
+parameters of standstill and trim are in rest.py and upright_trim.py, in the same form.
 """
 
 from math import radians
@@ -82,10 +82,11 @@ PRIOR_SPEED = 15.0
 # rad: error of the integrated rates, caused by vibration. Larger: the lean follows the forces more and the gyro less.
 NOISE_ANGLE = radians(0.24)
 NOISE_SPEED = 0.35  # m/s. Larger: the estimated speed adapts sooner in turns, and is less steady on straights.
-NOISE_BIAS = radians(0.01)  # rad/s: 0.6 deg/s in five minutes of warming up. Larger: long turns are mistaken for bias.
+# rad/s: a bias drifts by 0.6 deg/s in five minutes of warming up. Larger: long turns are mistaken for bias.
+NOISE_BIAS = radians(0.01)
 # Lost readings
-# rad/s: unknown roll rate during lost readings. The unknown pitch rate is a quarter of it. Larger: after a gap the lean
-# is hidden for longer.
+# rad/s: unknown roll rate during lost readings. The unknown pitch rate is a quarter of this rate. Larger: after a gap
+# the lean is hidden for longer.
 SIGMA_LOST_RATE = radians(30.0)
 # g: unknown forward force during lost readings. Larger: after a gap the lean is hidden for longer.
 SIGMA_LOST_FORCE = 0.3
@@ -182,7 +183,7 @@ def gyro_variances(sigma, r):
         return None
 
     def variance(i, j):
-        """Return the variance of the reading of the vehicle's axis i per rate about its axis j."""
+        """Return the variance of a gyro error: the reading of axis i per rate about axis j, in the vehicle's axes."""
         total = _SIGMA_GYRO_DRIFT**2
         for a in range(3):
             for b in range(3):

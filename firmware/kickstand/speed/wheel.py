@@ -43,7 +43,7 @@ class Wheel:
 
     Attributes:
         age_ms: the age of the speed that poll() last returned.
-        problem: a Notice to show once, or None. The caller that shows it sets problem to None.
+        problem: a Notice to show once, or None. The caller that shows the Notice sets problem to None.
     """
 
     def __init__(self, pin, pulses_per_metre, irq):
@@ -99,8 +99,8 @@ class Wheel:
         """Handle a soft interrupt.
 
         During a transfer to sensor or display the interrupt waits. If the contact closes and opens meanwhile, two
-        interrupts find the level unchanged. These two count as a pulse, unless they come so early that the contact is
-        bouncing."""
+        interrupts find the level unchanged. The two interrupts count as one pulse, unless they come so early that the
+        contact is bouncing."""
         level = pin.value()
         if level != self._level or self._edges == 1:
             self._level, self._same = level, False
