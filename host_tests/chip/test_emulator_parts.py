@@ -18,7 +18,8 @@ ADDRESS = 0x27
 
 
 class Memory:
-    """A device that stores what is written, and sends these bytes in turn. stored: number of bytes it acknowledges."""
+    """A device that stores the written bytes, and sends the bytes `sends` in turn. stored: number of bytes it
+    acknowledges."""
 
     address = ADDRESS
 
@@ -446,7 +447,7 @@ def test_the_host_link_passes_bytes_both_ways(chip):
 
 
 def i2c(chip, *devices):
-    """Return a controller with bits of 8 + 12 cycles, and its bus. TX_EMPTY interrupts are those of the SDK."""
+    """Return a controller with bits of 8 + 12 cycles, and its bus. TX_EMPTY interrupts are configured as by the SDK."""
     from kickstand_emulator.i2c_controller import TimedI2C
 
     bus = Bus(Clock(), 4, 5)

@@ -103,7 +103,8 @@ def test_a_car_finds_out_that_its_sensor_was_remounted(tmp_path):
     record = device_plans.run("cpython", tmp_path, car("wheel", 7, remount=[20.0, 8]))
     assert record.first("Aligned by drive") < math.inf
     after, true = stored(tmp_path).vehicle_from_sensor, sensor_errors.random_mounting(8)
-    assert max(abs(a - b) for a, b in zip(after, true, strict=True)) < 0.12  # the sensor's errors cause up to 4 degrees
+    # the sensor's errors cause an error of up to 4 degrees
+    assert max(abs(a - b) for a, b in zip(after, true, strict=True)) < 0.12
     assert max(abs(a - b) for a, b in zip(before.vehicle_from_sensor, true, strict=True)) > 0.5
 
 
@@ -113,7 +114,7 @@ TURN_S = POSES_S + 30.0 * 2 + 9.0  # a time in a right turn of 20 degrees
 
 @pytest.fixture(scope="module")
 def unanswered(tmp_path_factory):
-    """Return the Record of a ride. The kickstand is on the other side than set, and the rider does not answer the
+    """Return the Record of a ride. The kickstand is not on the side that is set, and the rider does not answer the
     question."""
     return device_plans.run("cpython", tmp_path_factory.mktemp("asked"), bike("gps", 3, kickstand=(12.0,)))
 
@@ -183,7 +184,7 @@ def test_errors_of_both_poses_are_found_while_riding(tmp_path):
 
 
 def test_a_moved_mount_hides_the_lean_despite_other_messages(tmp_path):
-    """Later the wheel's wire breaks, too, before the rider has answered the first message."""
+    """Later the wheel's wire also breaks, before the rider has answered the first message."""
     record = device_plans.run(
         "cpython", tmp_path, bike("wheel", 6, remount=[POSES_S + 60.0, 8], wheel={"until_s": 130.0})
     )

@@ -6,7 +6,7 @@ from kickstand_tools.simulation.scripted import script
 from support import device_plans, engines
 
 FROM_S = 32.0
-# From FROM_S on the bike rolls quickly from side to side. So a displayed lean tells how old it is.
+# From FROM_S on the bike rolls quickly from side to side. So the value of a displayed lean shows how old it is.
 RIDE = [
     *device_plans.RIDE[:3],
     ["turn", -30.0, 2.0],

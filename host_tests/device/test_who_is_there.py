@@ -129,7 +129,7 @@ def test_the_other_address_is_tried(mine, tmp_path, monkeypatch):
 
 
 def test_a_clock_that_has_the_sensors_address_is_not_set(tmp_path, monkeypatch):
-    """The driver writes nothing to this address but the number of the register to read."""
+    """The driver only reads at this address. It writes nothing but the number of the register to read."""
     clocks = []
 
     def fit(board):

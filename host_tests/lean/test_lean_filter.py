@@ -164,7 +164,7 @@ def test_power_on_in_the_hand_and_laid_down(seed):
 
 @pytest.mark.parametrize("braking_mps2", [2.5, 6.0])
 def test_an_even_braking_on_a_smooth_road_is_no_rest(braking_mps2):
-    """The end of such braking is as calm as a bike at rest on a slope. Rest must be found only when the bike has
+    """The end of even braking is as calm as a bike at rest on a slope. Rest must be found only when the bike has
     stopped, and the lean must stay certain."""
     seconds = 20.0 / braking_mps2
     speed = np.concatenate((np.zeros(5 * HZ), np.linspace(0.0, 20.0, 8 * HZ), np.full(6 * HZ, 20.0)))

@@ -29,7 +29,8 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has
 
 WEATHER = b"# my weather station\nwhile True: pass\n"
 OFTEN = [("record", "full"), ("pull", "kill"), ("pull", "cable"), ("flash", "cable"), ("smooth", "kill")]
-FAST, ALL = 2, 10  # number of random moments, for each case in OFTEN usually, and for each case in KINDS nightly
+# number of random moments: FAST for each case in OFTEN, and ALL for each case in KINDS in a nightly run
+FAST, ALL = 2, 10
 
 
 class Scene:

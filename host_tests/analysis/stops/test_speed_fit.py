@@ -125,7 +125,7 @@ def test_impossible_delay_of_the_speed_is_ignored(late_s):
     [
         ({"seconds": 30.0}, {"seconds": 29.0}),  # thirty speeds are needed
         ({"seconds": 30.0, "every_s": 0.5}, {"seconds": 29.0, "every_s": 0.5}),  # only one speed per second counts
-        # the speeds must change by 0.5 m/s rms, and their change is 0.66 s times the amplitude of the acceleration
+        # the change of the speeds must be 0.5 m/s rms; it is 0.66 s times the amplitude of the acceleration
         ({"size_mps2": 0.80}, {"size_mps2": 0.70}),
     ],
 )

@@ -46,11 +46,11 @@ def test_every_figure_of_a_stop_is_right(speed):
     assert stop.stop_s == pytest.approx(18.0, abs=near)
     assert stop.duration_s == stop.stop_s - stop.start_s
     assert stop.initial_speed_mps == pytest.approx(20.0, rel=near)
-    # the last term is the corner where braking begins within one sample
+    # the last term is the effect of the first sample, within which braking begins
     assert stop.distance_m == pytest.approx(40.0 + 20.0 * 0.12 - 5.0 * 0.02**2 / 4.0, rel=near)
     assert stop.mfdd_mps2 == pytest.approx(5.0, rel=near)
     assert stop.peak_mps2 == pytest.approx(5.0, rel=near)
-    # the step of the force is averaged over 11 samples, and its corner over 3
+    # the step of the force is averaged over 11 samples, and its corner over 3 samples
     assert stop.jerk_mps3 == pytest.approx(5.0 / 0.22 * 41 / 44, rel=near)
     assert stop.side_m == stop.heading_deg == 0.0
 
@@ -79,7 +79,8 @@ def test_jerk_is_the_steepest_change_of_the_force():
     road.mps2 = road.mps2 - braked[: len(road.t_s)]
     road.rests = (road.t_s < REST_S) | (road.t_s > 17.9)
     (stop,) = find_stops(road.channels())
-    assert stop.jerk_mps3 == pytest.approx(20.0, rel=0.15)  # smaller, because the force is smoothed twice over 0.2 s
+    # the jerk is smaller, because the force is smoothed twice over 0.2 s
+    assert stop.jerk_mps3 == pytest.approx(20.0, rel=0.15)
     assert stop.peak_mps2 == pytest.approx(6.0, rel=0.01)
     assert stop.initial_speed_mps == pytest.approx(lost, rel=0.01)
 
@@ -141,7 +142,7 @@ def test_only_readings_after_the_last_gap_are_integrated():
 
 
 class TestStandstill:
-    """The rest after the stop shows the slope and the gyro's reading at rest."""
+    """The standstill after the stop shows the slope and the gyro's reading at rest."""
 
     def disturbed(self, begin_s: float, end_s: float, off_g: float = 0.1) -> float:
         """Return the MFDD if the force has an error of off_g from begin_s to end_s, counted from the standstill at

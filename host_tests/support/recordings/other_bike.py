@@ -178,7 +178,7 @@ def _smooth(values, seconds):
 
 
 def _noise(chance, n, seconds):
-    """Return n samples of smooth noise with rms 1. It changes within about this many seconds."""
+    """Return n samples of smooth noise with rms 1. The noise changes within about this many `seconds`."""
     knots = chance.standard_normal(int(n / FINE_HZ / seconds) + 3)
     values = _smooth(np.interp(np.arange(n) / FINE_HZ / seconds, np.arange(len(knots)), knots), 0.5 * seconds)
     return values / np.std(values)
