@@ -168,7 +168,7 @@ def source(tmp_path_factory):
     place = tmp_path_factory.mktemp("source")
     command.works("simulate", "--profile", "street", "--seconds", 20, "--out", place)
     command.works("calibrate", "two", place / "KICKSTAND.csv", place / "UPRIGHT.csv", "--out", place / "RIDE.cal.json")
-    for verb in ("import", "smooth"):  # so each fork finds the modules already imported
+    for verb in ("import", "smooth"):  # import now, so each fork finds the modules already imported
         (made := place / verb).mkdir()
         command.works(*Computed(made, place, verb).arguments)
     return place
