@@ -5,8 +5,8 @@ Copy it to the board as user.py, and restart (the firmware must be on the board;
     mpremote cp firmware/examples/user_light.py :user.py
     mpremote reset
 
-Wiring: an LED with 330 ohm from GPIO 16 of a Pico to ground; another pin on an ESP32. For more than 10 mA use a
-transistor. Without a board: kickstand try firmware/examples/user_light.py
+Wiring: connect an LED with 330 ohm between GPIO 16 of a Pico and ground. On an ESP32 choose another pin. For more than
+10 mA use a transistor. Without a board: kickstand try firmware/examples/user_light.py
 """
 
 from machine import Pin
@@ -16,5 +16,6 @@ lamp = Pin(16, Pin.OUT, value=0)
 
 
 def on_lean(lean_deg, trusted, meter):
-    """Switch the lamp. The firmware calls this ten times per second. The lamp is off while the lean is not trusted."""
+    """Switch the lamp. The firmware calls this function ten times per second. The lamp is off while the lean is not
+    trusted."""
     lamp.value(1 if trusted and abs(lean_deg) > LIMIT_DEG else 0)

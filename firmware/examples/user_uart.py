@@ -7,8 +7,9 @@ Copy it to the board as user.py, and restart (the firmware must be on the board;
     mpremote cp firmware/examples/user_uart.py :user.py
     mpremote reset
 
-Wiring: GPIO 0 of a Pico (TX of UART 0) to RX of the other controller, and ground to ground; both at 3.3 V. On an ESP32
-choose UART 1 and two free pins. Without a board: kickstand try firmware/examples/user_uart.py
+Wiring: connect GPIO 0 of a Pico (TX of UART 0) to RX of the other controller, and ground to ground. Both controllers
+must use 3.3 V. On an ESP32 choose UART 1 and two free pins.
+Without a board: kickstand try firmware/examples/user_uart.py
 """
 
 from machine import UART, Pin
@@ -17,6 +18,6 @@ uart = UART(0, baudrate=115_200, tx=Pin(0), rx=Pin(1))
 
 
 def on_lean(lean_deg, trusted, meter):
-    """Send the lean. The firmware calls this ten times per second. After a ? the receiver must not use the last
-    number."""
+    """Send the lean. The firmware calls this function ten times per second. After a ? the receiver must not use the
+    last number."""
     uart.write("%.1f\n" % lean_deg if trusted else "?\n")

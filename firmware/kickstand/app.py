@@ -1,13 +1,13 @@
 """The device: connects sensor, mathematics, button, flash and display, and runs the loop.
 
-Data flow in one direction: sensor -> calibration and alignment -> lean -> page -> display. The chip takes samples at
+Data flows in one direction: sensor -> calibration and alignment -> lean -> page -> display. The chip takes samples at
 SAMPLE_HZ on its own. One pass of the loop is called a turn. App.turn() processes the new samples. App.step() also
 collects garbage, feeds the watchdog and waits for the next turn.
 
 The methods that take most of a turn are step, turn, _pass_on, LeanMeter.update_sum and Sensor.fetch. Each of them must
-need at most eleven words for locals and stack, because MicroPython puts a larger frame on the heap. When this frame is
-freed, the allocator searches again from that place, through all garbage since the last collection. This costs up to
-1 ms per turn.
+need at most eleven words for locals and stack, because MicroPython puts a larger frame on the heap. When a frame on the
+heap is freed, the next search for free memory begins there. It passes all garbage since the last collection, which
+takes up to 1 ms per turn.
 """
 
 import gc
@@ -29,11 +29,11 @@ from .units import const
 LOOP_US = 10_000  # length of a turn in us; the chip's FIFO can keep the samples for much longer
 # Turns between two garbage collections. They use 80 KB of heap. While recording, 91 KB are free
 _COLLECT_TURNS = const(40)
-# The same number while aligning by driving, and with an OLED, a phone or user.py. These turns use 46 KB of heap. While
-# aligning by driving, 72 KB are free
+# Turns between two collections while aligning by driving, and with an OLED, a phone or user.py. They use 46 KB of heap.
+# While aligning by driving, 72 KB are free
 _COLLECT_TURNS_DRIVING = const(23)
-# Number of collections between two checks of the free heap. A check takes 3 ms on an ESP32. With a smaller heap, the
-# app checks after each collection.
+# Number of collections between two checks of the free heap. A check takes 3 ms on an ESP32. If the drive, an OLED, a
+# phone or user.py also uses heap, the app checks after each collection.
 _PLAN_EVERY = const(4)
 SINGLE_GAPS = 300  # number of single free heap blocks after a collection
 _PAGE_MS = const(100)
@@ -57,8 +57,8 @@ def fill_gaps(n):
         value = -value  # each new float takes one block of the heap
 
 
-# Worst values of the last run, set when Ctrl-C ends it: length of the longest turn in us, smallest number of free
-# places in the chip's FIFO, and AxisWatch.shaken() of its axes. kickstand.status() prints them
+# Worst values of the last run, which kickstand.status() prints. Ctrl-C sets them. They are the length of the longest
+# turn in us, the smallest number of free places in the chip's FIFO, and AxisWatch.shaken() of the axes.
 worst = None
 
 
@@ -120,7 +120,8 @@ class App:
                 self.step()
         except BaseException as error:
             if isinstance(error, KeyboardInterrupt):
-                # Stop the watchdog first, because a second Ctrl-C may interrupt the rest, and nothing feeds it now.
+                # Stop the watchdog first, because nothing feeds it now, and a second Ctrl-C may interrupt the next
+                # steps.
                 port.rest_watchdog()
             self.lcd.end(*STOPPED)
             global worst
@@ -146,7 +147,8 @@ class App:
         self._plan_collection()
 
     def step(self):
-        """Do one pass of the loop: turn(), collect garbage if it is time, feed the watchdog, wait. It takes LOOP_US."""
+        """Do one pass of the loop: turn(), collect garbage if it is time, feed the watchdog, wait. One pass takes
+        LOOP_US."""
         self.turn()
         self._turns_left -= 1
         if self._turns_left <= 0:  # collect between two turns, while the FIFO keeps the samples
@@ -186,7 +188,7 @@ class App:
         self._turns_left = self._planned_turns
 
     def turn(self):
-        """Process the samples in the FIFO and one press, and do at most one transfer to the display. It never waits."""
+        """Process the samples in the FIFO and one press, and do at most one transfer to the display. Never wait."""
         now_us, now_ms = ticks_us(), ticks_ms()
         n = self.sensor.fetch(now_ms)
         if self.sensor.clipped:
@@ -266,7 +268,7 @@ class App:
     def _pass_on(self, n, dt_us, now_ms):
         """Pass the sum of n new samples to the meter, and each single sample to a wizard.
 
-        dt_us: time from the last earlier sample to the last new sample."""
+        dt_us: time from the previous sample to the last new sample."""
         chip = self.sensor.chip
         self.meter.update_sum(chip.sums, n, dt_us)
         if self.rides.recorder.active:
@@ -296,7 +298,7 @@ class App:
             problem = self.rides.start_due()
             if problem:
                 self.screen.notify(problem, ticks_ms())
-        # Delay the first page, because now it would only say that there is no lean yet
+        # Delay the first page, because a page shown now would only say that there is no lean yet
         self._page_ms = ticks_add(ticks_ms(), _FIRST_PAGE_MS)
 
     def _calibration_changed(self, replaced):

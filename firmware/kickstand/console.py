@@ -70,7 +70,8 @@ no-such-pin|config.py: {0} = {1} is not a pin of this board ({2})
 i2c-pins|config.py: {1}_SDA = {2} and {1}_SCL = {3} do not belong to I2C {4} ({5})
 uart-pins|config.py: GPS_TX = {1} and GPS_RX = {2} do not belong to UART {3} ({4})
 """
-_RECORDING_STOPPED = "recording stopped: {0}"  # the same for every fault of a recording; the display names the fault
+# one sentence for all faults of a recording; only the display names the fault
+_RECORDING_STOPPED = "recording stopped: {0}"
 
 
 def sentence(refusal):

@@ -70,7 +70,8 @@ def answering(i2c, addresses=range(_FIRST, _LAST + 1)):
 
 def exchanged(sda, scl, addresses):
     """Return True if one of the addresses answers when SDA and SCL are exchanged."""
-    i2c = SoftI2C(Pin(sda), Pin(scl), freq=_SLOW_HZ, timeout=_TIMEOUT_US)  # its SCL comes first
+    # SoftI2C takes SCL first, so the wires are exchanged
+    i2c = SoftI2C(Pin(sda), Pin(scl), freq=_SLOW_HZ, timeout=_TIMEOUT_US)
     return bool(answering(i2c, addresses))
 
 
@@ -155,7 +156,7 @@ def fifo_fault(chip):
     values[0] of the Notice is the fault in words. The test takes up to 0.3 s and leaves the FIFO empty. Raises OSError
     from the bus."""
     chip.restart_fifo()
-    left = chip.waiting()  # may already hold a sample that arrived after the restart
+    left = chip.waiting()  # the FIFO may already hold a sample that arrived after the restart
     chip.write_register(_INT_ENABLE, 1)
     before = _reading(chip)
     sleep_ms(_PERIODS * chip.period_ms)

@@ -9,8 +9,8 @@ A code is a name for programs and is never shown. Three modules have words for e
 import gc
 import sys
 
-# The exceptions that the import of machine code can raise. It cannot run on CPython, on a port without viper, on an
-# ESP32 without enough free memory, or on a kind of chip that it was not compiled for.
+# The exceptions that the import of machine code can raise. Machine code cannot run on CPython, on a port without viper,
+# on an ESP32 without enough free memory, or on a kind of chip that it was not compiled for.
 NO_MACHINE_CODE = (ImportError, NameError, SyntaxError, MemoryError, ValueError)
 
 
@@ -94,7 +94,7 @@ def checked(machine_code, plain, *arguments):
     Args:
         machine_code: the function in machine code.
         plain: the same function in Python.
-        arguments: the arguments for one call of each. The second call gets copies.
+        arguments: the arguments for one call of each function. The second call gets copies.
 
     Returns:
         machine_code if both functions give the same results. Otherwise plain, after a report on the console.

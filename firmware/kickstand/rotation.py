@@ -47,8 +47,8 @@ def normalize(a):
 
 
 def rotate(out, m, a):
-    """Write the product M a into out (Nicolae's equation 15, from the sensor's axes to the vehicle's). Here out may be
-    a."""
+    """Write the product M a into out (Nicolae's equation 15, from the sensor's axes to the vehicle's). Here `out` may
+    be the same array as `a`."""
     x, y, z = a[0], a[1], a[2]
     out[0] = m[0] * x + m[1] * y + m[2] * z
     out[1] = m[3] * x + m[4] * y + m[5] * z

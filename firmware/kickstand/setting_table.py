@@ -36,7 +36,7 @@ def _pin(value):
 
 
 _INPUT = _pin, "a number from 0 to 48, no pin of the chip's own USB, flash or console"
-# A button needs a pull-up. Pins that are only inputs do not have one.
+# A button needs a pull-up. Pins that are only inputs have no pull-up.
 _PIN = (lambda v: _pin(v) and v not in port.INPUT_PINS), _INPUT[1] + ", and none that is an input only"
 _SD_PINS = ("SD_SCK", "SD_MOSI", "SD_MISO", "SD_CS")
 # For each speed source, the names of its pin settings
@@ -71,7 +71,8 @@ _TABLE = {
     "GPS_BAUD": (9600, _whole(4800, 115_200)),
     "PULSES_PER_METRE": (0.5, (_pulses, "pulses along a metre of road, from 0.1 to 100")),
 }
-# The same table for pins. A wrong pin is replaced by None, because the default pin may be connected to something else.
+# The table of the pins, in the same form. A wrong pin is replaced by None, because the default pin may be connected to
+# something else.
 _PINS = {
     "SENSOR_SDA": (port.SENSOR_PINS[0], _PIN),
     "SENSOR_SCL": (port.SENSOR_PINS[1], _PIN),
@@ -139,5 +140,5 @@ def _check(settings, config):
     if not settings.leans and settings.SPEED is None:
         raise SettingsError("needs-speed", "SPEED")
     fitting = MIN_DLPF[settings.SAMPLE_HZ]
-    if settings.DLPF < fitting:  # the engine's vibration would alias and look like a slow motion
+    if settings.DLPF < fitting:  # otherwise vibration of the engine would alias and look like a slow motion
         raise SettingsError("aliasing", "DLPF", settings.DLPF, settings.SAMPLE_HZ, fitting)

@@ -8,8 +8,8 @@ on_lean(lean_deg, trusted, meter)   is called ten times per second. While truste
 on_press(event)                     is called after each press. The event is board.button.SHORT or LONG.
 
 A function is disabled in three cases: it raises, it takes longer than _TOO_SLOW_MS, or _MOST_SLOW successive calls take
-longer than _SLOW_MS. A notice on display and console says so. The import of user.py and setup() may take any time. A
-MemoryError in any of them disables all of user.py.
+longer than _SLOW_MS. A notice on display and console names the disabled function. The import of user.py and setup() may
+take any time. A MemoryError in any of these functions disables all of user.py.
 
 This module is imported only if there is a user.py.
 """
@@ -47,7 +47,7 @@ class UserCode:
     """The owner's code for an App.
 
     Attributes:
-        pages: list with one function per page. It takes no arguments and returns the page's lines.
+        pages: list with one function per page. Such a function takes no arguments and returns the page's lines.
     """
 
     def __init__(self, app):
@@ -57,7 +57,7 @@ class UserCode:
         self._slow = {}  # number of slow calls in a row, per function
         self._problems = []
         # Stored once, because each access to self._draw creates a new bound method. The display would then treat an
-        # unchanged picture as a new one.
+        # unchanged picture as a new picture.
         self._drawn = self._draw
         sys.modules.pop("user", None)
         self._functions.update(self._call("import", "user") or {})
@@ -70,7 +70,7 @@ class UserCode:
         return self._problems.pop(0) if self._problems else None
 
     def lean(self, trusted):
-        """Call the owner's on_lean(). This happens ten times per second.
+        """Call the owner's on_lean(). The app calls this method ten times per second.
 
         Args:
             trusted: True if the lean may be shown.

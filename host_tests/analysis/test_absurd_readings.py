@@ -20,7 +20,7 @@ def spinning(seed):
 
 
 def test_impossible_readings_give_a_warning_and_no_lean():
-    """Such readings make the filter diverge in some of the six rides, but not in all."""
+    """Impossible readings make the filter diverge in some of the six rides, but not in all."""
     diverged_in = 0
     for seed in range(6):
         notices = []

@@ -69,7 +69,7 @@ def test_yaw_and_pitch_cause_the_stated_lean_error(ride, name, degrees):
     said = vars(lean_cost(Quality(**angles, gravity_g=1.0, straight_s=60.0, lateral_g=NONE, forward_g=NONE)))
     most = said.pop(f"{name}_deg")
     assert cost < 1.75 * most + 0.15
-    if ride[3] != "city":  # in slow rides the cost is smaller
+    if ride[3] != "city":  # the cost is smaller in slow rides
         assert cost > 0.3 * most
     assert set(said.values()) == {0.0}
 
@@ -161,14 +161,15 @@ def test_report_gives_the_cost_of_an_error_and_the_remedy(scripted, name, degree
     most = {"yaw": yaw_cost_deg(degrees), "roll": max(0.0, degrees - 3.5), "pitch": 0.33}[name]
     assert cost == pytest.approx(most, abs=0.05)
     car = with_calibration(scripted, name, degrees, vehicle="car")
-    # it shows no lean that could get worse
+    # a car has no lean that an error could make worse
     assert "lean_cost" not in report.as_data(overview(open_ride(scripted, car)))
 
 
 def test_alignment_is_good_if_fully_known_and_exact(scripted):
     seen = overview(open_ride(scripted, with_calibration(scripted, "yaw", 2.6)))
     assert report.words(seen).alignment.startswith("Alignment: good.")
-    dear = dataclasses.replace(seen.quality, pitch_deg=2.0)  # these cost 0.14 and 0.17 degrees of lean
+    # the errors of yaw and pitch cost 0.14 and 0.17 degrees of lean
+    dear = dataclasses.replace(seen.quality, pitch_deg=2.0)
     for quality in (dataclasses.replace(seen.quality, yaw_deg=None), dear):
         said = report.words(dataclasses.replace(seen, quality=quality)).alignment
         assert said.startswith("Alignment: it seems off by ")

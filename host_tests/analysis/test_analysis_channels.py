@@ -41,7 +41,7 @@ def test_maxima_are_those_of_the_display(ride):
     whole = joined(list(ride.blocks()))
     for start in range(0, len(whole.t_s), 777):
         summary.add(whole.part(slice(start, start + 777)))
-    # the display averages over windows of 150 ms that begin every 75 ms; in the summary they begin at every sample
+    # windows of 150 ms begin every 75 ms on the display, but at every sample in the summary
     assert meter.max_left_deg - 0.01 < summary.left_deg.value < meter.max_left_deg + 0.5
     assert meter.max_right_deg - 0.01 < summary.right_deg.value < meter.max_right_deg + 0.5
     assert summary.left_deg.value > 25

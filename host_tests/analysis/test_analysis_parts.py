@@ -113,7 +113,7 @@ def test_time_without_readings_is_missing():
     total = summary(made(500, t_s=t_s + 7.0))
     assert total.missing_s == pytest.approx(3.01) and total.duration_s == pytest.approx(7.99)
     assert total.riding_s == pytest.approx(4.98)
-    assert summary(made(100, step_s=0.5)).missing_s == 0.0  # a slow log has no gaps
+    assert summary(made(100, step_s=0.5)).missing_s == 0.0  # two samples per second are no gaps
 
 
 def test_the_alignment_of_a_straight_ride_by_hand():
@@ -142,7 +142,8 @@ def test_what_a_ride_must_have_to_show_its_alignment():
         return quality(made(n, forward_g=push, yaw_rate_dps=yaw_dps), standing)
 
     assert of(yaw_dps=1.9).roll_deg is not None and of(yaw_dps=2.1).roll_deg is None
-    assert of(seconds=12.6).roll_deg is not None and of(seconds=11.4).roll_deg is None  # standstill takes 2 s of it
+    # 2 s of this time are standstill
+    assert of(seconds=12.6).roll_deg is not None and of(seconds=11.4).roll_deg is None
     assert of(push_g=0.06).yaw_deg is not None and of(push_g=0.04).yaw_deg is None
     assert of(seconds=63.0).pitch_deg is not None and of(seconds=61.0).pitch_deg is None
     assert of(stands=False).pitch_deg is None and of(stands=False).gravity_g is None
@@ -168,7 +169,8 @@ def test_a_vehicle_has_moved_if_it_turned_pushed_or_had_a_speed():
     bump = (np.arange(n) > 2000) & (np.arange(n) < 2500)
     assert moved(yaw_rate_dps=3.1 * bump) and not moved(yaw_rate_dps=2.9 * bump)
     assert moved(forward_g=-0.052 * bump) and not moved(forward_g=0.048 * bump)
-    assert not moved(forward_g=0.3, yaw_rate_dps=9.0)  # such constant values are the ground's slope and the gyro's bias
+    # constant values come from the slope of the ground and the gyro's bias
+    assert not moved(forward_g=0.3, yaw_rate_dps=9.0)
     assert moved(speed_mps=1.1) and not moved(speed_mps=0.9, yaw_rate_dps=50.0 * bump)
     assert not overviews._has_moved(made(100, yaw_rate_dps=np.arange(100.0)))
     assert overviews._changes(np.array([1.0, 2.0, 8.0])) == 6.0
@@ -282,7 +284,7 @@ def test_the_figures_of_a_report_are_rounded():
 def test_absurd_readings_are_those_of_the_second_before():
     t_s = np.arange(300) / 100.0
     force, rates = np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3))
-    force[50, 0], rates[60, 0] = 99.0, 9999.0  # more than a second before 2.5 s
+    force[50, 0], rates[60, 0] = 99.0, 9999.0  # at 0.5 and 0.6 s, too early to be named for 2.5 s
     force[160, 2], rates[250, 1] = -30.0, -5000.0
     (block,) = read_blocks(api.Log(t_s, force, rates))
     notice = _divergence_notice(block, 250)

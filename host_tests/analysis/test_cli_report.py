@@ -59,7 +59,8 @@ def test_unknown_figures_are_not_reported(ride, tmp_path):
     seen = overview(open_ride(ride, up_is_back))
     assert [notice.code for notice in seen.notices] == ["up-off"]
     total = seen.summary
-    total.left_deg = total.right_deg = total.brake_g = total.accel_g = Peak()  # as if no value was sure enough
+    # no values, as if none was certain enough
+    total.left_deg = total.right_deg = total.brake_g = total.accel_g = Peak()
     rows = {name: value for name, value, _ in report.words(seen).ride}
     names = "Max left", "Max right", "Over 30°", "Over 40°", "Max braking", "Max acceleration"
     assert [rows[name] for name in names] == ["--"] * 6

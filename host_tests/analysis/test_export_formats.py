@@ -115,7 +115,7 @@ def test_vbo_has_a_channel_with_gaps(tmp_path):
 
 def test_vbo_keeps_the_heading_at_standstill(tmp_path):
     """The vehicle goes north and then east, and then stands. At standstill the position moves 0.8 mm north, like the
-    noise of a receiver. The heading must not follow it."""
+    noise of a receiver. The heading must not follow this movement."""
     ridden, stood = block(0.0, 1.0, 2.0), block(3.0, 4.0)
     ridden.lat_deg[1:] += 1e-5
     ridden.lon_deg[2] += 1e-5

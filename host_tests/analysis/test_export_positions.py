@@ -121,8 +121,8 @@ def test_vbo_interpolates_positions_for_every_row(tmp_path):
 
 @pytest.mark.parametrize("form", ["gpx", "racechrono", "vbo"])
 def test_time_of_the_satellites_is_preferred(tmp_path, form):
-    """The satellites' time is used if the log's own clock was wrong. It is also used for a stretch that begins in a
-    second without a position."""
+    """The satellites' time is used if the log's own clock was wrong. The satellites' time is also used for a stretch
+    that begins in a second without a position."""
     for ride in (log(1.2e9), api.Stretch(log(), 12.5, 25.0)):
         out = exported(form, tmp_path, ride)
         if form == "gpx":

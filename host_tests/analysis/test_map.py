@@ -100,7 +100,7 @@ def test_map_has_left_blue_right_orange_and_north_up():
     lean = np.asarray(dots["marker"]["color"])
     assert lean.min() < -20.0 and lean.max() > 30.0
     assert made["layout"]["yaxis"]["scaleanchor"] == "x"
-    assert "autorange" not in made["layout"]["yaxis"]  # without it, y grows upwards
+    assert "autorange" not in made["layout"]["yaxis"]  # without autorange, y grows upwards
     assert "N" in made["layout"]["annotations"][1]["text"]
 
 

@@ -40,7 +40,8 @@ def test_standing_bike_is_not_riding(log):
 
 
 def test_knock_at_the_start_is_not_riding():
-    """The hand that switches the device on knocks it with 0.4 g for 0.02 s. Averaged over a second this is 0.008 g."""
+    """The hand that switches the device on knocks it with 0.4 g for 0.02 s. Averaged over a second, the knock has 0.008
+    g."""
     log = standing(40, 0.05, 1.5)
     log.accel_g[:2, 2] = 0.4
     assert words_of(log).ride[0][2] == "riding 0:00"
@@ -48,7 +49,7 @@ def test_knock_at_the_start_is_not_riding():
 
 def test_riding_time_excludes_standing(tmp_path):
     """The log is 37 s long. The bike stands for 4 s before the ride and for 4 s after it. The riding time is tested
-    with a speed and without one."""
+    with a speed and without a speed."""
     for speed_hz in (0, 5):
         said = words_of(analysis_rides.short(tmp_path, speed_hz=speed_hz))
         minutes, seconds = said.ride[0][2].removeprefix("riding ").split(":")
@@ -59,7 +60,8 @@ def test_riding_time_excludes_standing(tmp_path):
 
 
 def test_a_speed_that_is_always_0_hides_no_ride(tmp_path):
-    """A broken contact at the wheel gives a speed that is always 0. The riding time is then computed without it."""
+    """A broken contact at the wheel gives a speed that is always 0. The riding time is then computed without this
+    speed."""
     log = read_log(analysis_rides.short(tmp_path))
     without = words_of(log)
     log.speed_mps[::20] = 0.0

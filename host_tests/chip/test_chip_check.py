@@ -117,8 +117,8 @@ PLANTED = {
 
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_defect_that_hides_others_is_found_by_its_name(name):
-    """Each board has one defect. Its line comes first, before those of its consequences. With the eleven defects above,
-    the tests plant twenty."""
+    """Each board has one defect. The line of the defect comes first, before the lines of its consequences. Together
+    with the eleven defects above, the tests plant twenty defects."""
     what, planted = PLANTED[name]
     found = checked("pico", **planted)
     assert next(iter(found), None) == what, found

@@ -35,7 +35,7 @@ def board():
 
 
 def test_fast_division_gives_the_results_of_rp2040py():
-    """Results, flags and cycles are the same, also for division by zero and for signed numbers."""
+    """Results, flags and cycles equal those of rp2040py, also for division by zero and for signed numbers."""
     device = pico()  # skips the test without the emulator
     from rp2040py.rp2040 import RP2040
 

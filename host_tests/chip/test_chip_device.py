@@ -28,7 +28,8 @@ def test_two_presses_align_a_new_board_for_good(chip):
     """The sensor is not calibrated. After the pose on the kickstand and the upright pose, the power is switched off and
     on. Then the display shows the lean of the bike."""
     ride = Ride([kickstand(5.5), upright(5.5), upright(1e6, lean_deg=LEAN_DEG)])
-    part = Sensor(seed=1, share=0.1)  # only a tenth of the usual errors, because no calibration corrects them here
+    # a tenth of the usual sensor errors, because no calibration corrects them in this test
+    part = Sensor(seed=1, share=0.1)
     device = CHIPS[chip](part.world(ride.motion), firmware(chip))
     device.power_on()
     shows(device, r"Raw.*\|(Not aligned|On stand: press)", 3.0)
@@ -115,7 +116,7 @@ def test_stalled_processor_keeps_the_lean_right(riding):
         watch(riding, 0.3)
     assert samples.taken() > 150
     assert samples.lost() == 0
-    for stall_s in (0.45, 2.0):  # shorter and longer than the lean filter can bridge
+    for stall_s in (0.45, 2.0):  # the lean filter can bridge the first stall, but not the second
         riding.stall(stall_s)
         texts = watch(riding, RECOVERY_S)
         assert lean_is_right(riding), riding.lcd()

@@ -40,7 +40,7 @@ def board(config="", world=None, files=None):
 
 @pytest.mark.nightly  # host_tests/device has the same faults on MicroPython for Linux
 def test_board_survives_ctrl_c_unplugging_and_soft_reset():
-    """The owner does all three to a running board."""
+    """The owner presses Ctrl-C, unplugs the board and does a soft reset, each while the board is running."""
     with board() as device:
         shows(device, LEAN, BOOT_S)
         faults = device.board.faults
@@ -138,8 +138,8 @@ _SIDES = [[1, 0, 0], [0, 0, -1], [0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, -1, 0], [
 
 @pytest.mark.nightly
 def test_six_positions_by_the_button():
-    """The rider begins in the menu. The last pose, after the six sides, is a free one. At the end the calibration is in
-    flash."""
+    """The rider begins in the menu. After the six sides comes a last pose, which is free. At the end the calibration is
+    in flash."""
     steps = [[0, None]]
     for i, up in enumerate(_SIDES):
         steps += [[8.0 + 6.0 * i, up], [13.0 + 6.0 * i, None]]

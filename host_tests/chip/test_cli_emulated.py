@@ -72,7 +72,8 @@ def test_an_esp32_needs_no_emulator_of_the_pico():
 
 
 class Emulating(threading.Thread):
-    """Runs `kickstand emulate` beside the test, with these files on its board. It ends at end_s of the board's time."""
+    """Runs `kickstand emulate` beside the test, with these files on its board. The command ends at end_s of the board's
+    time."""
 
     def __init__(self, patch, files, chip):
         super().__init__(daemon=True)

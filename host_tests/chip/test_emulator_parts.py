@@ -18,7 +18,8 @@ ADDRESS = 0x27
 
 
 class Memory:
-    """A device that stores what is written, and sends these bytes in turn. stored: number of bytes it acknowledges."""
+    """A device that stores the written bytes, and sends the bytes `sends` in turn. stored: number of bytes it
+    acknowledges."""
 
     address = ADDRESS
 
@@ -76,7 +77,7 @@ class Pins:
         return seen
 
     def write(self, value):
-        """Write a byte. Return True if a device acknowledges it."""
+        """Write a byte. Return True if a device acknowledges the byte."""
         for place in range(7, -1, -1):
             self.bit(value >> place & 1)
         return not self.bit(1)
@@ -446,7 +447,7 @@ def test_the_host_link_passes_bytes_both_ways(chip):
 
 
 def i2c(chip, *devices):
-    """Return a controller with bits of 8 + 12 cycles, and its bus. TX_EMPTY interrupts are those of the SDK."""
+    """Return a controller with bits of 8 + 12 cycles, and its bus. TX_EMPTY interrupts are configured as by the SDK."""
     from kickstand_emulator.i2c_controller import TimedI2C
 
     bus = Bus(Clock(), 4, 5)
@@ -494,7 +495,7 @@ def test_an_absent_device_aborts_after_its_address(chip):
 
 
 def test_an_enabled_controller_continues_its_transfer(chip):
-    """Enabling it again changes nothing, and other registers may be written during a transfer."""
+    """Enabling the controller again changes nothing, and other registers may be written during a transfer."""
     device = Memory(sends=b"\x42")
     controller, bus = i2c(chip, device)
     controller.write_uint32(DATA, 1 << 9 | 1 << 8)

@@ -62,7 +62,7 @@ def test_command_of_another_package_runs(installed):
         ("lap_timer:laps_command", "", "AttributeError"),
         ("lap_timer:laps_command", "laps_command = 3", "is not a click command"),
         ("no_such_module", "", "ModuleNotFoundError"),
-        ("not an object!", "", "cannot be loaded"),  # the error depends on Python's version,
+        ("not an object!", "", "cannot be loaded"),  # the words of the error depend on Python's version
     ],
 )
 def test_a_broken_command_is_one_line_with_its_package(installed, tmp_path, value, module, why):
@@ -107,5 +107,6 @@ def test_users_own_script_is_not_run(tmp_path):
 
 
 def test_a_checkout_has_the_workshops_commands():
-    """The wheel does not have these commands, see host_tests/deploy/test_cli_package.py."""
+    """Only a checkout has the workshop's commands. host_tests/deploy/test_cli_package.py tests that the wheel does not
+    have them."""
     assert {"bands", "bench", "evaluate"} <= set(main.kickstand.list_commands(None))

@@ -211,7 +211,7 @@ def test_in_a_checkout_the_firmware_and_config_are_the_checkouts(tmp_path, monke
     (tmp_path / "config.py").write_text("")
     assert firmware_path.config() == root / "firmware" / "config.py"  # only an installed package uses this file
     (tmp_path / "firmware" / "kickstand").mkdir(parents=True)
-    assert firmware_path.config() == root / "firmware" / "config.py"  # it is no checkout yet
+    assert firmware_path.config() == root / "firmware" / "config.py"  # the folder is no checkout yet
     (tmp_path / "firmware" / "config.py").write_text("")
     assert firmware_path.config() == tmp_path / "firmware" / "config.py"
     assert errors.extra("web") == f'{sys.executable} -m pip install -e "{root}[web]"'

@@ -333,7 +333,8 @@ def test_only_an_export_without_calibration_is_aligned_by_bends(beside, given, t
         write_calibration(tmp_path / name, dataclasses.replace(KNOWN, gyro_bias_dps=np.full(3, 1.0 + k)))
     taken = ride._from_export(source, tmp_path / "other.json" if given else None)
     assert taken and taken[0] is found
-    assert taken[1].gyro_bias_dps[0] == float(len(names))  # the file of the option, then the one beside the export
+    # the calibration of the option is used first, then the calibration beside the export
+    assert taken[1].gyro_bias_dps[0] == float(len(names))
 
 
 def test_a_joined_track_says_when_the_ride_began():

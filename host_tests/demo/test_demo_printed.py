@@ -50,7 +50,7 @@ def heads(lines):
 
 
 def test_a_frame_is_printed_when_the_display_has_changed(monkeypatch, capsys):
-    """The same page is printed at most every 0.25 s, another page at once."""
+    """Changes of the same page are printed at most every 0.25 s. Another page is printed at once."""
     frames = [
         at(1.0, "Lean  27° left", ""),
         at(1.05, "Lean  27° left", ""),
@@ -269,7 +269,7 @@ def test_the_bike_by_hand_names_what_it_does():
 
 
 def test_the_bike_by_hand_keeps_its_limits():
-    """It leans at most 50 degrees, speeds up by at most 3 m/s2, and brakes with at most 5 m/s2."""
+    """The bike leans at most 50 degrees, speeds up by at most 3 m/s2, and brakes with at most 5 m/s2."""
     for wish, lean in ((80.0, 50.0), (-80.0, -50.0)):
         bike = HandBike(vibration_g=0.0)
         bike.ride(15.0)

@@ -1,4 +1,4 @@
-"""A config.py is a program and may end, hide or delay its own check. It is then refused in one line."""
+"""A config.py is a program and may end, hide or delay its own check. Such a config.py is refused in one line."""
 
 import pytest
 from kickstand_tools.deploy import config_check

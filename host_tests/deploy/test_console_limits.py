@@ -15,7 +15,8 @@ from mpremote.transport import TransportError
 
 
 class Clock:
-    """Both clocks. Each wait and each empty look at the port takes its time; a sleep only moves the second clock."""
+    """The monotonic clock and the wall clock. Each wait and each empty look at the port takes time. A sleep only moves
+    the wall clock."""
 
     def __init__(self):
         self.now = self.wall = 100.0
@@ -26,7 +27,7 @@ class Clock:
 
 
 class Talker:
-    """A board that sends its pieces one after another. A number is a pause in s, a text in quotes a sleep."""
+    """A board that sends its pieces one after another. A number is a pause in s. A text in quotes is a sleep."""
 
     def __init__(self, clock, *pieces):
         self.clock, self.written = clock, b""

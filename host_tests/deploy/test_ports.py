@@ -1,5 +1,5 @@
-"""The firmware uses only features that both MicroPython for the Pico and MicroPython for the ESP32 have. It compiles
-for both."""
+"""The firmware uses only features that both MicroPython for the Pico and MicroPython for the ESP32 have. The firmware
+compiles for both ports."""
 
 import ast
 import contextlib
@@ -48,7 +48,7 @@ def stubs(request):
             if done.returncode != 0:
                 said = done.stderr.strip() or "pip failed"
                 pytest.skip(f"no {wanted[0]}: it cannot be installed: {said.splitlines()[-1]}")
-            with contextlib.suppress(OSError):  # another process has already installed them
+            with contextlib.suppress(OSError):  # another process has already installed the stubs
                 os.rename(f"{scratch}/stubs", directory)
     return request.param, directory
 

@@ -38,7 +38,8 @@ def test_a_plan_replaces_what_differs():
 
 
 def test_the_blocks_of_a_file_have_pointers():
-    """The second block begins with one pointer, the third with two, so three blocks of 4096 hold 12276 bytes."""
+    """The second block begins with one pointer, and the third block with two pointers. So three blocks of 4096 hold
+    12276 bytes."""
     for size, most in ((0, 1), (4096, 1), (4097, 2), (8188, 2), (8189, 3), (12_276, 3), (12_277, 4)):
         assert update.most_blocks(size, 4096) == most
     assert [update.least_blocks(size, 4096) for size in (512, 513, 5000)] == [0, 1, 2]
@@ -144,7 +145,8 @@ def test_a_config_belongs_to_the_project_that_it_sets():
     assert found_others({"/config.py": "\ufeff" + OURS}).mended
     with pytest.raises(InputError, match=r"config\.py on the board: wrong"):
         found_others({"/config.py": OURS}, fault="wrong")
-    assert found_others({"/config.py": "DISPLAY = 1\nSIDE = 2\n"}, fault="wrong").moves  # two settings are too few
+    # two settings are too few for a config.py of Kickstand
+    assert found_others({"/config.py": "DISPLAY = 1\nSIDE = 2\n"}, fault="wrong").moves
     assert not found_others({"/config.py": "DISPLAY = 1\nSIDE = 2\n"}).moves
     assert found_others({"/config.py": "x = 1"}, ("/kickstand",), "wrong").moves
     assert not found_others({"/config.py": "x = 1"}, ("/kickstand",)).moves

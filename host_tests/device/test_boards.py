@@ -15,7 +15,8 @@ LEANING = [[0, 25]]
 SENSOR, LCD = 0x68, 0x27
 SPEED = {"SPEED": "gps", "GPS_TX": 25, "GPS_RX": 26}
 CARD = {"SD_SPI": 2, "SD_SCK": 25, "SD_MOSI": 26, "SD_MISO": 33, "SD_CS": 32}
-FREE = {"SENSOR_SDA": 8, "SENSOR_SCL": 9, "LCD_SDA": 6, "LCD_SCL": 7, "BUTTON_PIN": 10}  # not on a classic ESP32
+# pins that are free on other chips than a classic ESP32
+FREE = {"SENSOR_SDA": 8, "SENSOR_SCL": 9, "LCD_SDA": 6, "LCD_SCL": 7, "BUTTON_PIN": 10}
 WIRED_TO_FREE = {"sensor_pins": [8, 9], "lcd_pins": [6, 7], "button_pin": 10}
 ESP32_PINS = [4, 18, 19, 21, 22]
 
@@ -80,8 +81,9 @@ def test_the_refusal_is_shown_where_the_display_s_pins_are_set(config, lines, tm
     ],
 )
 def test_a_classic_esp32_keeps_its_flash_and_its_console(machine, name, pin, tmp_path, capsys):
-    """The firmware refuses these pins. Driving a pin of the flash would crash the board at each start. Input-only pins
-    have no pull-up, so a button on such a pin would always read as pressed."""
+    """The firmware refuses pins of the console and of the flash, and input-only pins. Driving a pin of the flash would
+    crash the board at each start. Input-only pins have no pull-up, so a button on such a pin would always read as
+    pressed."""
     config = {**(CARD if name == "SD_CS" else {}), **({"SPEED": "wheel"} if name == "WHEEL_PIN" else {}), name: pin}
     if name == "GPS_TX":
         config = {**SPEED, **config}

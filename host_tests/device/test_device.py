@@ -134,7 +134,8 @@ def six_positions(free, repeat=False):
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
 def test_six_positions_then_alignment_of_a_part_with_errors(engine, tmp_path):
-    """This is the main task from start to end. After both wizards the lean is right despite the sensor's errors."""
+    """A new rider does the six positions and then the alignment. Afterwards the lean is right despite the sensor's
+    errors."""
     record = device_plans.run(engine, tmp_path, {**six_positions([0.5, 0.6, -0.7]), "seed": 3})
     assert record.first("any of the six") < math.inf
     assert record.first(r"Side \+x done") < 12

@@ -68,7 +68,7 @@ def test_a_car_finds_its_alignment_and_shows_the_next_step(engine, tmp_path):
     assert record.at(3.0) == ["Brakings   0/5  ", "stop needed     "]
     assert record.first("brake straight") < 8.0
     assert record.first("braking...") < 30.0
-    assert record.at(62.0)[0].startswith("Raw")  # the first press shows the other page
+    assert record.at(62.0)[0].startswith("Raw")  # the first press leaves the page of the alignment
     assert record.first("Brakings   [2-4]/5", 65.0) < 67.0
     saved = record.first("Aligned by drive")
     assert saved < 150.0 and stops(saved, 6.0)
@@ -103,7 +103,8 @@ def test_a_car_finds_out_that_its_sensor_was_remounted(tmp_path):
     record = device_plans.run("cpython", tmp_path, car("wheel", 7, remount=[20.0, 8]))
     assert record.first("Aligned by drive") < math.inf
     after, true = stored(tmp_path).vehicle_from_sensor, sensor_errors.random_mounting(8)
-    assert max(abs(a - b) for a, b in zip(after, true, strict=True)) < 0.12  # the sensor's errors cause up to 4 degrees
+    # the sensor's errors cause an error of up to 4 degrees
+    assert max(abs(a - b) for a, b in zip(after, true, strict=True)) < 0.12
     assert max(abs(a - b) for a, b in zip(before.vehicle_from_sensor, true, strict=True)) > 0.5
 
 
@@ -113,7 +114,7 @@ TURN_S = POSES_S + 30.0 * 2 + 9.0  # a time in a right turn of 20 degrees
 
 @pytest.fixture(scope="module")
 def unanswered(tmp_path_factory):
-    """Return the Record of a ride. The kickstand is on the other side than set, and the rider does not answer the
+    """Return the Record of a ride. The kickstand is not on the side that is set, and the rider does not answer the
     question."""
     return device_plans.run("cpython", tmp_path_factory.mktemp("asked"), bike("gps", 3, kickstand=(12.0,)))
 
@@ -154,7 +155,7 @@ def test_a_side_that_the_rider_confirms_is_not_asked_for_again(asked, tmp_path):
 @pytest.mark.parametrize(("model", "config"), [({"until_s": 65.0}, {}), ({}, {"PULSES_PER_METRE": 0.25})])
 def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
     """If the wheel's wire breaks during the ride, the measured speed stays 0. With a second magnet the measured speed
-    is twice the true one. The display reports either fault at the next stop."""
+    is twice the true speed. The display reports either fault at the next stop."""
     plan = bike("wheel", 6, wheel=model, config={"SPEED": "wheel", **config})
     record = device_plans.run("cpython", tmp_path, plan)
     for town_round in range(6):
@@ -167,8 +168,8 @@ def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
 
 def test_errors_of_both_poses_are_found_while_riding(tmp_path):
     """A pitch of two degrees on the kickstand gives a yaw error of almost ten degrees. The firmware refines forward at
-    a stop, and at most 1.5 degrees remain. The upright pose was 2 degrees off. The new alignment keeps the trim that
-    corrects this, and the maxima."""
+    a stop, and at most 1.5 degrees remain. The upright pose was 2 degrees off, which the trim corrects. The new
+    alignment keeps the trim and the maxima."""
     plan = bike("wheel", 8, kickstand=(-12.0, 2.0))
     plan["ride"][1] = ["upright", 10.0, 2.0, 0.0]
     first = device_plans.run("cpython", tmp_path, {**plan, "until": 19.0})
@@ -183,7 +184,7 @@ def test_errors_of_both_poses_are_found_while_riding(tmp_path):
 
 
 def test_a_moved_mount_hides_the_lean_despite_other_messages(tmp_path):
-    """Later the wheel's wire breaks, too, before the rider has answered the first message."""
+    """Later the wheel's wire also breaks, before the rider has answered the first message."""
     record = device_plans.run(
         "cpython", tmp_path, bike("wheel", 6, remount=[POSES_S + 60.0, 8], wheel={"until_s": 130.0})
     )

@@ -101,7 +101,7 @@ def test_a_sagging_supply_while_the_calibration_is_read(fault, aligned):
 
 @pytest.fixture
 def in_turn_300(monkeypatch):
-    """Return a function. It replaces pass 300 of the app's loop by a call of its argument."""
+    """Return a function that replaces pass 300 of the app's loop by a call of its argument."""
     from kickstand import app
 
     original, calls = app.App.turn, []
@@ -146,7 +146,7 @@ def test_a_sensor_lost_in_a_turn(lean, off_s, tmp_path):
     record = device_plans.run("cpython", tmp_path, {**plan, "faults": [["unplug_sensor", [40.0, off_s]]]})
     assert record.lean_at(39.5) == pytest.approx(lean, abs=2)
     assert record.first("No sensor|Sensor", 40) < 40.5
-    assert all(abs(shown - lean) <= 7 for shown in record.leans(40.6, 52))  # before that no lean is shown
+    assert all(abs(shown - lean) <= 7 for shown in record.leans(40.6, 52))  # before 40.6 s no lean is shown
     assert record.lean_at(51) == pytest.approx(lean, abs=3)
 
 

@@ -6,7 +6,7 @@ from kickstand_tools.simulation.scripted import script
 from support import device_plans, engines
 
 FROM_S = 32.0
-# From FROM_S on the bike rolls quickly from side to side. So a displayed lean tells how old it is.
+# From FROM_S on the bike rolls quickly from side to side. So the value of a displayed lean shows how old it is.
 RIDE = [
     *device_plans.RIDE[:3],
     ["turn", -30.0, 2.0],
@@ -14,7 +14,8 @@ RIDE = [
     *[["turn", 40.0 * (-1) ** k, 0.3] for k in range(8)],
 ]
 TRUE = script.Ride([getattr(script, name)(*more) for name, *more in RIDE])
-OLDEST_S = 0.5 + 0.1 + 0.1  # half a second, the time to write a page, and the time between two frames of the record
+# sum of half a second, the time to write a page, and the time between two frames of the record
+OLDEST_S = 0.5 + 0.1 + 0.1
 HANG_S = 1.46  # with this duration, the first page after the hang is complete at the next frame of the record
 NEAR_DEG = 10.0  # readings lost while the bike rolls cause errors of up to 8 degrees for a while
 

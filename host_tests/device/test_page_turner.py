@@ -1,4 +1,5 @@
-"""The PageTurner presses the button until a page is shown. If the page never appears, it stops."""
+"""The PageTurner presses the button until a page is shown. If the page never appears, the PageTurner reports it and
+stops."""
 
 import pytest
 from support import device_plans

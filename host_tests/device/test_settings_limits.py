@@ -1,4 +1,4 @@
-"""The limits of each setting in config.py, and the settings that do not fit together. Also the words of notices."""
+"""Tests the limits of each setting in config.py, the settings that do not fit together, and the words of notices."""
 
 import sys
 import types

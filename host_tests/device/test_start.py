@@ -184,7 +184,7 @@ def test_a_display_without_its_driver_is_probed_less_often(without, board, monke
     assert board.run(start.main, 31.0) == "off"
     words = "no memory for that" if said == NO_MEMORY else "incomplete firmware"
     times = capsys.readouterr().out.count(words)
-    assert 8 <= times <= 10 and board.boots == 1  # after 0.4, 0.8, 1.6, 3.2 s, then every 6.4 s
+    assert 8 <= times <= 10 and board.boots == 1  # attempts after 0.4, 0.8, 1.6 and 3.2 s, then every 6.4 s
 
 
 @pytest.mark.parametrize("missing", [MemoryError, ImportError])

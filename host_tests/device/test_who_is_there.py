@@ -129,7 +129,7 @@ def test_the_other_address_is_tried(mine, tmp_path, monkeypatch):
 
 
 def test_a_clock_that_has_the_sensors_address_is_not_set(tmp_path, monkeypatch):
-    """The driver writes nothing to this address but the number of the register to read."""
+    """The driver only reads at this address. It writes nothing but the number of the register to read."""
     clocks = []
 
     def fit(board):
@@ -260,8 +260,8 @@ def test_a_nack_does_not_fail_the_set_up(nth, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("wiring", [1, 2, 3, 4])
 def test_status_finds_the_wiring_of_a_backpack(wiring, tmp_path, monkeypatch):
-    """The board shows the number of each possible wiring, and uses this wiring to do so. Only the text of the right
-    wiring is readable and lit."""
+    """The board sends the number of each possible wiring with the wiring itself. Only the text of the right wiring is
+    readable and lit."""
     monkeypatch.chdir(tmp_path)
     board = Board(noisy)
     setattr(board.lcd, "wiring", wiring)  # noqa: B010 - only Lcd has this attribute, not Oled

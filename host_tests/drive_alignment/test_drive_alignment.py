@@ -60,8 +60,8 @@ def test_a_motorcycle_is_aligned(engine, known):
 
 @pytest.mark.parametrize("method", ["improved", "published"])
 def test_the_result_turns_with_the_sensor(method):
-    """If the sensor is mounted differently, the result changes by exactly this rotation, within 0.05 degrees. The
-    mounts are along the axes, some of them exactly opposite to the vehicle's axes."""
+    """If the sensor is rotated, the result changes by exactly this rotation, within 0.05 degrees. The mounts are along
+    the axes, some of them exactly opposite to the vehicle's axes."""
     legs = around(5, pause_s=2.0)
     plain = np.reshape(drive(legs, PLAIN, method=method)["matrix"], (3, 3))
     for order, signs in (
@@ -164,8 +164,8 @@ def test_a_mount_that_moved(axis, degrees, from_s, words):
 
 @pytest.mark.parametrize("silent_s", [200.0, 500.0])
 def test_the_first_braking_counts_after_any_late_first_speed(silent_s):
-    """The first speed comes after 200 or 500 s. The history's time counter wraps around every nine minutes, and this
-    must not lose a braking event."""
+    """The first speed comes after 200 or 500 s. The history's time counter wraps around every nine minutes, and the
+    wrap must not lose a braking event."""
     legs = [[silent_s, 0.0, 0.0], *around(6)]
     result = drive(legs, source={"every_s": 1.0, "silent": (-1.0, silent_s)})
     assert result["counted"] == 6  # the six braking events; the vehicle only speeds up in turns

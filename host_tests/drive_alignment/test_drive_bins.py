@@ -20,7 +20,7 @@ def drive(rate_hz=100, every_s=0.5, events=7, seed=5, before=()):
     """Simulate a drive as a Log with uneven sample times.
 
     rate_hz: number of samples per second.
-    every_s: approximate time between two speeds. They fall on different places within the bins.
+    every_s: approximate time between two speeds. The speeds come at different places within the bins.
     events: number of braking events.
     before: legs that are driven before these events.
     """
@@ -119,8 +119,8 @@ def test_another_slope_in_the_next_log_is_no_moved_mount():
 
 def test_bins_have_their_speeds_where_they_came():
     """The log has 100 samples per second, and a bin is 50 ms long. Speeds come at a bin's first sample, in its middle
-    and at its end, and after a gap of 2 s. The age of a speed in the middle is counted from the bin's last sample but
-    one."""
+    and at its end, and after a gap of 2 s. The age of a speed in the middle is counted from the second-to-last sample
+    of the bin."""
     t_s = np.append(np.arange(11), np.arange(210, 216)) / 100.0
     speed = np.full(17, np.nan)
     speed[[0, 2, 5, 7, 11]] = [10.0, 10.2, 10.5, 10.7, 11.0]

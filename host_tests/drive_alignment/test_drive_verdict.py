@@ -69,7 +69,8 @@ def test_the_verdicts_differ_and_turning_round_reverses_two_axes():
 
 @pytest.mark.parametrize(
     ("lively", "calm", "stuck"),
-    [(7, 0, False), (8, 0, True), (8, 45, True), (8, 46, False), (9, 51, True)],  # the least share is 15 %: 8 of 53
+    # the share must be at least 15 %, which is 8 of 53 s
+    [(7, 0, False), (8, 0, True), (8, 45, True), (8, 46, False), (9, 51, True)],
 )
 def test_a_stuck_speed_needs_eight_lively_seconds_of_a_seventh(lively, calm, stuck):
     check: Any = SpeedCheck()
@@ -93,7 +94,7 @@ def test_bends_and_changes_of_the_speed_do_not_count_as_stuck():
         check.measure(12.0 + k // 7 * 0.1)
         check.update_second([0.05 * (k % 2), 1.0, 0.0])
     for k in range(40):
-        # every second is in a bend or directly after one
+        # every second is in a bend or directly after a bend
         check.update_second([0.05 * (k % 2), 1.0, 0.0], 5.1 * (k % 2 == 0))
     assert check.problem is None
 

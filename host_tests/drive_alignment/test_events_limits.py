@@ -34,7 +34,7 @@ def test_an_event_changes_the_speed_by_15_mps():
     assert ended([1.49, 0.0])[0] == [False, False]
     assert ended([1.5, 0.0])[0] == [False, True]
     assert ended([-0.9, -0.6, 0.0])[0] == [False, False, True]
-    # the event that ends has counted before the opposite one begins
+    # the event that ends has counted before the opposite event begins
     seen, finder = ended([1.0, -2.0])
     assert seen == [False, False] and finder.change == -2.0
     seen, finder = ended([2.0, -2.0])
@@ -51,8 +51,9 @@ def test_only_straight_changes_make_an_event_straight():
 
 
 def test_the_last_event_by_hand():
-    """Intervals of 0.5 and 1 s with changes of -0.1 and -0.4 g s have -0.2 and -0.4 g: the weight is 0.02 + 0.16. The
-    force is the vertical (0, 1, 0) plus forward (0, 0, 1) times the acceleration."""
+    """In intervals of 0.5 and 1 s the speed changes by -0.1 and -0.4 g s. The accelerations are therefore -0.2 and -0.4
+    g. The weight is 0.5 x 0.04 + 1 x 0.16. The force is the vertical (0, 1, 0) plus forward (0, 0, 1) times the
+    acceleration."""
     last, out = LastEvent(), [0.0] * 3
     assert last.forward(out, [0.0, 1.0, 0.0]) == 0.0 and out == [0.0] * 3
     last.add(0.5, -0.1, [0.0, 0.5, -0.1])

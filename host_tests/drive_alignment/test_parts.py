@@ -96,7 +96,8 @@ def test_regression_is_weighted_least_squares(engine, count):
     weight = np.sqrt(seconds)[:, None]
     design = np.column_stack((a, np.ones(count), c))
     expected = np.linalg.lstsq(design * weight, force * weight, rcond=None)[0]
-    assert np.abs(np.array(forward) - expected[0]).max() < 2e-3  # due to the ridge term for c and to 32-bit sums
+    # the ridge term for c and 32-bit sums cause this difference
+    assert np.abs(np.array(forward) - expected[0]).max() < 2e-3
     assert np.abs(np.array(level) - expected[1]).max() < 2e-4
     assert 5 <= blocks <= 8
 
@@ -120,9 +121,9 @@ def test_two_fits_at_the_same_time_do_not_interfere():
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_parts_of_a_drive(engine):
-    """Forward turns by 12 degrees after five of eight blocks, and pitch by 5 degrees after four. The differences
-    between the parts match numpy. These differences do not depend on the forward direction of the whole drive, so two
-    directions are tried."""
+    """Forward turns by 12 degrees after five of eight blocks. The pitch changes by 5 degrees after four blocks. The
+    differences between the parts match numpy. These differences do not depend on the forward direction of the whole
+    drive, so two directions are tried."""
     rng = np.random.default_rng(5)
     weights, seconds = rng.uniform(0.1, 0.5, 8), rng.uniform(25.0, 40.0, 8)
     angles = np.array([0.0] * 5 + [12.0] * 3) + rng.normal(0.0, 1.0, 8)
@@ -179,8 +180,8 @@ def test_a_late_speed_is_no_rotated_sensor():
 
 
 def test_each_vehicle_has_its_source_of_the_vertical():
-    """A car uses the vertical of its stops, or with a fit the mean of stops and fit. A motorcycle uses its upright
-    pose. Without the pose it uses the fit, or straight riding."""
+    """A car uses the vertical of its stops. With a fit, the car uses the mean of the verticals from stops and fit. A
+    motorcycle uses its upright pose. Without the pose it uses the fit, or straight riding."""
     standing = types.SimpleNamespace(up=None)
     fit = types.SimpleNamespace(level=[2.0 * part for part in level(4.0)])
 
@@ -220,7 +221,7 @@ def test_a_bend_at_a_stuck_zero_is_no_stop(share, moved):
     [(2.0, 0.0, 0.02, 0), (4.0, 0.0, 0.02, 1), (9.0, 1.0, 0.0, 0), (9.0, 0.0, 0.2, 0)],
 )
 def test_a_stop_requires_stillness_and_time(seconds, speed, shake_g, stops):
-    """A stop needs three seconds at rest. The force may shake no more than it does from an idling engine."""
+    """A stop needs three seconds at rest. The force may shake no more than with an idling engine."""
     standing = StandingVertical()
     for k in range(round(seconds * 10)):
         standing.update([0.0, 1.0, shake_g * (-1) ** k], (0.0, 0.0, 0.0), speed, 0.1)

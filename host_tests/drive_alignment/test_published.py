@@ -74,8 +74,8 @@ def test_the_rotation_is_the_articles(a, b, axis, by_hand):
 
 @pytest.mark.parametrize("turned", [1.0, 1j, 0.6 - 0.8j])
 def test_the_dispersion_by_hand(turned):
-    """The dispersion is d = (1 - rho2) / (2 R^2), where R is the length of the mean direction, and rho2 the mean cosine
-    of twice the angle from it.
+    """The dispersion is d = (1 - rho2) / (2 R^2), where R is the length of the mean direction, and rho2 is the mean
+    cosine of twice the angle from the mean direction.
 
     Three directions, at -a, 0 and a, with cos a = 0.8:
         R = 2.6 / 3
@@ -260,7 +260,7 @@ def test_a_braking_with_a_gap_is_dropped_and_earlier_ones_stay(lost):
 
 @pytest.mark.parametrize("lost", [lost_samples, lost_speeds])
 def test_the_loss_of_a_dropped_braking_is_dropped_too(lost):
-    """The speed falls by 3 m/s before the gap, and by 0.5 s x 2 m/s2 = 1 m/s after it. Only the fall after the gap
+    """The speed falls by 3 m/s before the gap, and by 0.5 s x 2 m/s2 = 1 m/s after the gap. Only the fall after the gap
     counts. It is less than the 1.5 m/s that a braking event needs."""
     drive = Drive()
     drive.reach_15_mps()

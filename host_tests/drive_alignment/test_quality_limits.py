@@ -200,7 +200,7 @@ def test_a_same_stop_differs_by_less_than_15_degrees():
     for pitch, standing_still in ((1.3, True), (2.9, False)):
         standing = StandingVertical()
         stand(standing, pitched(0.0), 4.0)
-        for _ in range(3):  # slowly, so the force is still
+        for _ in range(3):  # the pitch changes slowly, so the force counts as still
             stand(standing, pitched(pitch), 1.5)
         assert standing.standing is standing_still and not standing.moved
 

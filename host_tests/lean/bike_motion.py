@@ -38,7 +38,8 @@ def meter(calibration=None, **options):
 
 
 def ride(shown, seconds, speed_mps=None, **motion):
-    """Pass the readings of a steady motion to the meter. speed_mps only affects these readings. It is not measured."""
+    """Pass the readings of a steady motion to the meter. speed_mps only affects these readings. The meter gets no
+    measured speed."""
     readings = reading(*force_and_rate(speed_mps=speed_mps or 0.0, **motion))
     for _ in range(int(seconds / DT_S + 0.5)):
         shown.update(readings, DT_US)

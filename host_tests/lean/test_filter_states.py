@@ -99,7 +99,7 @@ def biased(bias_dps, seconds=30.0):
 
 
 def test_rest_shows_every_bias_and_a_restart_keeps_it():
-    """The bike is then rocked. If a bias was not found, the lean is wrong."""
+    """After the rest the bike is rocked. The lean would then be wrong if a bias was not found."""
     bias_dps = (1.2, -0.9, 1.5)
     for restarted in (False, True):
         estimator, bias = biased(bias_dps)

@@ -164,7 +164,7 @@ def test_power_on_in_the_hand_and_laid_down(seed):
 
 @pytest.mark.parametrize("braking_mps2", [2.5, 6.0])
 def test_an_even_braking_on_a_smooth_road_is_no_rest(braking_mps2):
-    """The end of such braking is as calm as a bike at rest on a slope. Rest must be found only when the bike has
+    """The end of even braking is as calm as a bike at rest on a slope. Rest must be found only when the bike has
     stopped, and the lean must stay certain."""
     seconds = 20.0 / braking_mps2
     speed = np.concatenate((np.zeros(5 * HZ), np.linspace(0.0, 20.0, 8 * HZ), np.full(6 * HZ, 20.0)))
@@ -205,8 +205,8 @@ def test_turns_alone_find_a_pose_that_was_not_upright():
 
 
 def test_a_measured_speed_makes_no_long_bend_worse():
-    """The gyro's axis up has a scale error of 3 %. The wheel's speed has a scale error of 5 %. It is measured ten times
-    per second."""
+    """The gyro's axis up has a scale error of 3 %. The wheel's speed has a scale error of 5 %, and is measured ten
+    times per second."""
     lean, speed = held_from_side_to_side(190.0)
     force, rate = shaken(*balanced(190.0, lean, speed))
     rate[:, 1] *= 1.03

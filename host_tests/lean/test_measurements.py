@@ -66,7 +66,8 @@ def test_the_error_at_rest_is_subtracted_from_the_force_up():
 
 
 def test_a_wheelie_is_pulled_to_level_less_than_a_hill():
-    """The pull on the pitch is the innovation divided by the variance. It is smaller for 30 degrees than for 6."""
+    """The pull on the pitch is the innovation divided by the variance. The pull is smaller at a pitch of 30 degrees
+    than at 6 degrees."""
     x, here = model(lean_deg=30.0, pitch_deg=2.0, speed_mps=15.0, yaw_error_deg=4.0)
     row, innovation, _ = measurements.level_road(here, x, WINDOW_S)
     assert row == here.level_row

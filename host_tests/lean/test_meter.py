@@ -41,7 +41,8 @@ def test_with_the_nose_far_up_or_down_there_is_no_lean():
 
 
 def test_after_the_poses_the_first_bend_shows_its_lean():
-    """The poses have measured the gyro's bias, and show that the bike was at rest. After power-on neither is known."""
+    """The poses have measured the gyro's bias, and show that the bike was at rest. After power-on the bias and the rest
+    are unknown."""
     for posed in (True, False):
         shown = meter()
         shown.use(shown.calibration, posed)
@@ -259,7 +260,8 @@ def test_the_g_shown_follows_smoothly_whether_aligned_or_not():
 
 
 def test_a_smoothed_force_that_is_not_updated_is_nan():
-    """These are the forces left and up of an aligned motorcycle. With an unaligned calibration they are updated."""
+    """For an aligned motorcycle the smoothed forces left and up are not updated. With an unaligned calibration they are
+    updated."""
     aligned, other = Calibration(), Calibration()
     aligned.aligned = True
     shown = meter(aligned)

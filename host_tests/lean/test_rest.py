@@ -22,7 +22,7 @@ def test_rest_takes_ten_seconds_if_the_bike_seems_to_roll():
     detector = RestDetector()
     rested_after(detector, 5.0, rolling=True)
     assert rested_after(detector, 3.0) == 1.5  # counted from the time when nothing indicates rolling any more
-    assert rested_after(detector, 3.0, rolling=True) == 2.0  # ten seconds in all, of both kinds
+    assert rested_after(detector, 3.0, rolling=True) == 2.0  # ten seconds of stillness in all, with and without rolling
 
 
 def test_a_movement_about_or_along_any_axis_ends_the_rest():

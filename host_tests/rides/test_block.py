@@ -47,10 +47,11 @@ def places(block):
 
 @pytest.mark.parametrize("length", range(700, 720))
 def test_the_worst_turn_and_a_position_fit_into_any_block(length):
-    """A quiet turn needs few bits. In a violent turn after quiet ones, every number needs the longest code."""
+    """A quiet turn needs few bits. In a violent turn after quiet turns, every number needs the longest code."""
     quiet = [800] * 7, 8, 40_000
     count = 0
-    for violent in (False, True):  # the first round counts the quiet turns; in the second round the last one is violent
+    # the first round counts the quiet turns; in the second round the last turn is violent
+    for violent in (False, True):
         block = RideBlock(5000)
         for sequence in range(2):  # only the second block reserves room for a position from its beginning on
             ride_writer.begun(length, sequence, block)
@@ -70,7 +71,7 @@ def test_the_worst_turn_and_a_position_fit_into_any_block(length):
 
 
 def test_a_block_contains_nothing_of_the_previous_one():
-    """Each block can be read without the others. A shorter block overwrites the rest of the previous one with
+    """Each block can be read without the others. A shorter block overwrites the rest of the previous block with
     zeros."""
     first, again = ride_writer.begun(4096), RideBlock(5000)
     for turn in some_turns(150):

@@ -29,7 +29,8 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has
 
 WEATHER = b"# my weather station\nwhile True: pass\n"
 OFTEN = [("record", "full"), ("pull", "kill"), ("pull", "cable"), ("flash", "cable"), ("smooth", "kill")]
-FAST, ALL = 2, 10  # number of random moments: for each case in OFTEN, and nightly for each case in KINDS
+# number of random moments: FAST for each case in OFTEN, and ALL for each case in KINDS in a nightly run
+FAST, ALL = 2, 10
 
 
 class Scene:
@@ -102,7 +103,7 @@ class Pull(Scene):
 
 
 class Record(Scene):
-    """A recording beside an earlier one."""
+    """A recording beside an earlier recording."""
 
     def __init__(self, place):
         super().__init__(place)
@@ -167,7 +168,7 @@ def source(tmp_path_factory):
     place = tmp_path_factory.mktemp("source")
     command.works("simulate", "--profile", "street", "--seconds", 20, "--out", place)
     command.works("calibrate", "two", place / "KICKSTAND.csv", place / "UPRIGHT.csv", "--out", place / "RIDE.cal.json")
-    for verb in ("import", "smooth"):  # so each fork finds the modules already imported
+    for verb in ("import", "smooth"):  # import now, so each fork finds the modules already imported
         (made := place / verb).mkdir()
         command.works(*Computed(made, place, verb).arguments)
     return place
@@ -259,7 +260,7 @@ def test_no_existing_file_is_lost(verb, fault, count, source, tmp_path):
 
 
 def test_a_killed_command_that_writes_in_place_loses_data(source, tmp_path, monkeypatch):
-    """This proves that the test above can fail. Without a temporary file, an earlier result is cut."""
+    """A command without a temporary file loses an earlier result, so the test above can fail."""
 
     @contextlib.contextmanager
     def in_place(path):

@@ -218,7 +218,7 @@ def test_a_stream_is_a_log_from_its_first_block():
 
 def test_lost_blocks_and_gaps_of_a_stream_are_noted():
     notes = streamed([whole_block(2), whole_block(5, 2_000_000)])[2]
-    assert notes == ["4 blocks of half a second did not arrive: the log has gaps"]  # blocks 0, 1, 3 and 4
+    assert notes == ["4 blocks of half a second did not arrive: the log has gaps"]  # the lost blocks are 0, 1, 3 and 4
     late = whole_block()
     late.turns[1] = turn(2_000_000, sums=(0, 32768, 0, 0, 0, 0))
     assert streamed([late])[2] == [block_reader.missing_note([0.98])]
@@ -258,7 +258,7 @@ def test_blocks_of_a_stream_end_with_a_point(monkeypatch):
 
 
 def pulled(monkeypatch, tmp_path, *contents, whole=True, problems=()):
-    """Pull a ride of parts with these blocks. problems: those of the last part."""
+    """Pull a ride of parts with these blocks. problems: the problems of the last part."""
     parts = [pull._Part(3, k, 6, f"/rides/{k}") for k in range(len(contents))]
     monkeypatch.setattr(pull, "_read", lambda _, part, *more: (b"abc", whole))
     given = iter(contents)

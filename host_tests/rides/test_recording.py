@@ -135,7 +135,7 @@ def test_a_ride_after_an_alignment_begins_like_its_replay(keeper):
 
 
 def test_the_second_start_reuses_the_recorder(root, clock):
-    """A recording also starts if the menu was open for too short a time to prepare it."""
+    """A recording also starts if the menu was closed before the recording was prepared."""
     from kickstand.rides.recording import Recording
 
     settings = SimpleNamespace(SD_SPI=None, RECORD=False, SAMPLE_HZ=200)

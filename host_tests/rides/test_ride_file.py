@@ -80,7 +80,7 @@ def held(block):
 
 
 def test_every_turn_comes_back_exactly():
-    """This includes turns with the largest numbers."""
+    """The written turns include turns with the largest numbers."""
     turns = [*_EXTREMES, *ride_writer.turns(200), *_EXTREMES]
     data = written(turns)
     block = block_reader.parse(data)
@@ -163,7 +163,8 @@ def sealed(data):
 
 
 def test_a_block_with_impossible_values_is_bad(tmp_path):
-    """So every block that the reader accepts can be written as a log and shown live."""
+    """Every block that the reader accepts can be written as a log and shown live, because the reader rejects impossible
+    values."""
     good = ride_writer.blocks(1, speed=True, places_every=50)[0][0]
     head = struct.calcsize(block_format.HEAD)
     start = head + store.BODY_LENGTH

@@ -1,4 +1,4 @@
-"""Positions in recorded rides. They are exact, belong to the right turn, and displace no other data."""
+"""Positions in recorded rides are exact, belong to the right turn, and displace no other data."""
 
 import struct
 
@@ -43,7 +43,7 @@ def test_no_turn_is_lost_and_positions_keep_their_turn(every, length):
     assert [turn.speed_mps for block in blocks for turn in block.turns][:101:100] == [0.0, 1.0]
     for block, content in zip(blocks, data):
         free = content[: -6 - 16 * sum(bool(turn.place) for turn in block.turns)]
-        assert len(free) - len(free.rstrip(b"\0")) < 16 + 60  # unused: only room for one turn
+        assert len(free) - len(free.rstrip(b"\0")) < 16 + 60  # the unused bytes have room for one turn only
 
 
 def said(*values: int) -> list:

@@ -38,7 +38,8 @@ def test_the_stream_ends_itself_and_the_lean_continues(engine, tmp_path, capsys)
     record = device_plans.run(engine, tmp_path, plan, capsys)
     assert FROM_S < record.first("USB not read") < FROM_S + 3.0
     assert record.at(39)[0] == "Lean  20° right "
-    assert record.first("Lean  20° right ") < 28  # as early as without a stream, so nothing delays the loop any more
+    # the lean returns as early as without a stream, so nothing delays the loop any more
+    assert record.first("Lean  20° right ") < 28
     streamed = list(blocks(record.console))
     assert [block.sequence for block in streamed] == list(range(len(streamed)))
     assert 35 < len(streamed) < 42

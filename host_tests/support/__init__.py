@@ -1,2 +1,2 @@
-"""Helpers that the tests share: they run boards, devices and programs, and read their output. Some run on MicroPython
-too."""
+"""Helpers that the tests share: they run boards, devices and programs, and read their output. Some helpers run on
+MicroPython too."""

@@ -36,7 +36,7 @@ def write(chip, register, *values):
 
 
 def counts(chip):
-    """Read one burst. Return its seven signed numbers: three forces, the temperature, three rates."""
+    """Read one burst. Return the seven signed numbers in it: three forces, the temperature, three rates."""
     data = read(chip, 0x3B, 14)
     values = [data[2 * i] << 8 | data[2 * i + 1] for i in range(7)]
     return [value - 65536 if value > 32767 else value for value in values]
@@ -55,7 +55,7 @@ def on_board(program, until_s=1.0, **fitted):
 
 
 def firmware(until_s=30.0, **fitted):
-    """Decorate test(board), so that it runs as the firmware of a new Board(**fitted). It must run to its end."""
+    """Decorate test(board), so that it runs as the firmware of a new Board(**fitted). The test must run to its end."""
 
     def decorated(function):
         def test():

@@ -26,7 +26,7 @@ class CheckedBoard:
 
     world, fitted: see Board.
     config: settings.
-    presses: [(at_s, for_s), ...]. None: one press when the check asks for it.
+    presses: [(at_s, for_s), ...]. With None the button is pressed once, when the check asks for a press.
 
     board: the Board. Plant a defect in it before you call findings().
     said: the messages to the rider.

@@ -25,7 +25,7 @@ RIDE = [
     ["turn", 40.0, 5.0],
     ["straight", 6.0],
 ]
-LEFT_S, RIGHT_S, STRAIGHT_S = 30.0, 38.0, 44.0  # times late in the two turns and in the straight after them
+LEFT_S, RIGHT_S, STRAIGHT_S = 30.0, 38.0, 44.0  # a time near the end of each turn, and in the straight after the turns
 PRESSES = [[2, 0.15], [12, 0.15]]
 ALIGNED = {"ride": RIDE, "presses": PRESSES, "until": 46}
 

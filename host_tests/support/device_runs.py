@@ -92,8 +92,8 @@ def remounted(world, motion, seed, at_s, mounting_seed):
 
 
 class Device:
-    """The whole device on a simulated board. First schedule the events with the board's methods and those below, then
-    call run()."""
+    """The whole device on a simulated board. First schedule the events with the methods of the board and the methods
+    below, then call run()."""
 
     def __init__(self, world, **fitted):
         """world(t_s): the motion that the sensor measures. fitted: arguments of Board."""

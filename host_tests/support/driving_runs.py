@@ -56,7 +56,7 @@ def samples(legs, vehicle="car", tilt_deg=0.0, noise_g=0.003, start_mps=0.0):
             if vehicle == "car":
                 force[0] += side
             else:
-                lean = math.atan(side)  # to the left in a left turn
+                lean = math.atan(side)  # positive, to the left, in a left turn
                 force[1] = math.sqrt(1.0 + side * side)
                 rate[0], rate[1] = yaw_dps * math.sin(lean), yaw_dps * math.cos(lean)
             for i in range(3):

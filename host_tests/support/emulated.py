@@ -1,4 +1,4 @@
-"""Creates the emulated boards for their tests, or skips a test that cannot have one."""
+"""Creates the emulated boards for their tests, or skips a test that cannot have a board."""
 
 import functools
 import hashlib

@@ -11,7 +11,7 @@ class PageTurner:
         self._seen = []  # the views shown at the presses so far, in the search for _wanted[0]
 
     def turn_to(self, name):
-        """Add a view to the wanted ones. The names are in kickstand/state.py."""
+        """Add a view to the wanted views. The names are in kickstand/state.py."""
         self._wanted.append(name)
 
     def presses(self, view):

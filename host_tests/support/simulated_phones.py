@@ -12,8 +12,8 @@ class Phone:
 
     def __init__(self, board, acts=()):
         self._board = board
-        self.packets = []  # [s, name of the characteristic, bytes]
-        self.said = []  # [s, what happened, answer]
+        self.packets = []  # one [s, name of the characteristic, bytes] per received packet
+        self.said = []  # one [s, what happened, answer] per event
         for at_s, name, *more in acts:
             board.at(at_s, lambda name=name, more=more: self._do(name, more))
 

@@ -67,8 +67,8 @@ def test_the_maxima_are_drawn_to_both_sides(glance, left, right, digits):
     ],
 )
 def test_an_acceleration_is_drawn_as_number_and_bar(glance, forward_g, digits, word, bar):
-    """Three marks show 0 g and the two peaks. The peak of 0.4 g is 24 columns to the right, and that of 1.2 g is at the
-    left edge."""
+    """Three marks show 0 g and the two peaks. The peak of 0.4 g is 24 columns to the right, and the peak of 1.2 g is at
+    the left edge."""
     meter = {"smooth_force": [0.0, 1.0, forward_g], "max_accel_g": 0.4, "max_brake_g": 1.2}
     canvas = drawn(glance, glance.acceleration, **meter)
     assert canvas.digits == dict(zip([(0, 8), (34, 8), (62, 8)], digits))
@@ -103,7 +103,7 @@ def test_a_lean_is_drawn_as_number_arc_and_side(glance, lean_deg, digits, column
 
 
 def test_the_arrow_points_to_the_side_and_rec_is_below(glance):
-    """The arrow has 24 columns. Its point is one pixel high, and its back 29 pixels."""
+    """The arrow has 24 columns. Its point is one pixel high, and its back is 29 pixels high."""
     canvas = drawn(glance, glance.lean, recording=True, lean_deg=20.0)
     arrow = [call for call in canvas.calls if call[0] == "vline" and call[1] > 101]
     assert (len(arrow), arrow[0], arrow[-1]) == (24, ("vline", 125, 40, 1, 1), ("vline", 102, 26, 29, 1))

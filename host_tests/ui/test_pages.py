@@ -185,7 +185,7 @@ def test_the_sensor_page_of_a_fault_lists_the_devices():
 
 
 def test_the_sensor_page_counts_gaps_starts_and_lost_samples():
-    """The page shows each of them for two seconds."""
+    """The page shows each count for two seconds."""
     chip = types.SimpleNamespace(name="MPU6050", temperature_c=lambda counts: counts / 10.0, overflows=3, address=0x69)
     calibration = types.SimpleNamespace(six_done=True, aligned=False)
     shown = meter(reading=[1, 2, 3, 285, 5, 6, 7], calibration=calibration)

@@ -33,7 +33,7 @@ def test_the_band_of_a_reason_is_centred():
 
 
 def test_each_digit_has_its_own_120_bytes():
-    """The glyphs are drawn from bands of 8 rows; the 1 has a column of 40 rows or less, and the 8 is symmetric."""
+    """Each glyph has bands of 8 rows. The digit 1 has a column of 40 rows or less, and the digit 8 is symmetric."""
     from kickstand.ui import glance
 
     assert len(glance._GLYPHS) == 10 and len(glance.DIGITS) == 1200

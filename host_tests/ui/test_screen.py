@@ -53,8 +53,8 @@ def first_line(screen, now_ms):
 
 
 def test_a_cancelled_alignment_gets_no_more_samples(screen):
-    """This holds even during the 100 ms until the next page is shown. In that time the last sample would save the
-    alignment."""
+    """The alignment gets no sample even in the 100 ms until the next page is shown. In that time the last sample would
+    save the alignment."""
     screen.press(LONG, 0)
     screen.press(LONG, 100)
     assert screen.wizard is not None
@@ -106,7 +106,7 @@ def test_a_fault_hides_the_pages_and_the_menu_the_fault(sensor, screen):
 
 def test_pages_of_the_owner_follow_the_last_page(screen):
     screen.pages.own += [lambda: ("one", ""), lambda: ("two", "")]
-    screen._meter.trusted = False  # then each page shows the same lines
+    screen._meter.trusted = False  # without a trusted lean, each page always shows the same lines
     shown = []
     from kickstand.ui import page_ring
 
@@ -157,7 +157,7 @@ def test_the_menu_asks_for_alignment_by_driving(drive, screen):
         screen.press(SHORT, 100 * k + 50)
     screen.press(LONG, 1500)
     assert asked == [True]
-    assert screen.pages._at == len(page_ring.MOTORCYCLE)  # the page after those of the motorcycle
+    assert screen.pages._at == len(page_ring.MOTORCYCLE)  # the page after the motorcycle's pages
 
 
 def test_the_problem_of_a_pose_is_known_until_the_next_pose(screen):

@@ -46,7 +46,7 @@ def entries(shown) -> list[str]:
     for _ in range(len(shown.menu._entries)):
         found.append(shown.lines(0)[0][1:])
         shown.press(SHORT, 0)
-    assert shown.lines(0)[0][1:] == found[0]  # the first entry follows the last one
+    assert shown.lines(0)[0][1:] == found[0]  # the first entry follows the last entry
     return found
 
 
@@ -119,7 +119,7 @@ def test_a_short_press_closes_the_sensor_info(monkeypatch):
     shown.press(SHORT, 3000)
     assert shown.lines(3000)[0] != "info"
     choose(shown, "Sensor info")
-    shown.press(LONG, 3000)  # opens the menu above it
+    shown.press(LONG, 3000)  # opens the menu in front of the sensor's page
     assert shown.menu is not None and shown._info_open
 
 

@@ -180,7 +180,8 @@ def test_a_side_is_accepted_up_to_30_degrees_and_once(accel, lines):
 
 
 def test_the_slanted_pose_is_at_least_20_degrees_off():
-    """The slope and the offset of the fit apply: 0.8 * 0.4 + 0.02 is 0.34, of 1 g 19.9 degrees."""
+    """The slope and the offset of the fit are used. The force along x is 0.8 * 0.4 + 0.02 = 0.34 g, which is a tilt of
+    19.9 degrees."""
     for x, lines in ((0.4, ("Slant it more:", "19\xdf is too flat")), (0.41, ("Check: slant it", "and hold still"))):
         made = six(_fitted=([0.02, 0.0, 0.0], [0.8, 1.0, 1.0]))
         made._next_pose()
@@ -192,7 +193,8 @@ def test_a_spoilt_turn_may_be_repeated_up_to_12_poses():
     made = six(_poses=[0] * 10, _sides=[0, 1, 2, 3, 4, -1])
     assert not made._again()
     made._turn.running, made._turn.quick, made._turn.lost = True, False, True
-    assert not made._again()  # 10 + 3: the repeated pose, the missing side, the slanted pose
+    # 10 poses are taken, and three more are needed: the repeated pose, the missing side, the slanted pose
+    assert not made._again()
     made._poses = [0] * 9
     assert made._again()
     made._turn.running = False

@@ -1,4 +1,4 @@
-"""The site on a server, and the page Rides. If the site cannot be built, its tests are skipped."""
+"""Fixtures with the site on a server and the page Rides. If the site cannot be built, its tests are skipped."""
 
 import threading
 

@@ -109,7 +109,7 @@ def test_on_a_phone_a_heading_is_two_touches_away(chromium, address):
 
 def test_on_paper_there_is_the_text_alone(chromium, address):
     rider = Rider(chromium, address + LOOKED_AT[0], **LAPTOP)
-    rider.page.set_viewport_size({"width": 673, "height": 1000})  # A4 without its margins
+    rider.page.set_viewport_size({"width": 673, "height": 1000})  # the width of A4 paper without margins
     rider.page.emulate_media(media="print", color_scheme="dark")
     hidden = rider.page.locator("header, footer, main nav, .quick").all()
     assert hidden and not any(one.is_visible() for one in hidden)

@@ -12,13 +12,13 @@ from support.web.rider import Rider
 LEAN_DEG = 30
 RIDING_S = 6
 SLOWED = 4  # factor by which a slow phone is slower than the reference computer
-REFERENCE_LOOP_S = 0.06  # the limit of the processor time is for a computer with this _loop_s()
+# result of _loop_s() on the reference computer, for which the limit of the processor time is set
+REFERENCE_LOOP_S = 0.06
 
 
 @pytest.mark.long
 def test_a_first_visit(chromium, address, tmp_path):
-    """This is one test for all steps, because they run in real time. test_guide.py tests the steps after a power
-    cut."""
+    """One test has all steps, because they run in real time. test_guide.py tests the steps after a power cut."""
     rider = Rider(chromium, address, viewport={"width": 1000, "height": 700})
     first_minute(rider)
     pull_the_wire(rider)
@@ -34,7 +34,8 @@ def test_a_first_visit(chromium, address, tmp_path):
 
 
 def first_minute(rider):
-    """Start with an empty page. At the end the shown lean is within two degrees of the true lean, on both sides."""
+    """Start with an empty page. At the end the shown lean is within two degrees of the true lean, in leans to the left
+    and to the right."""
     rider.align()
     rider.reads("Aligned!")
     rider.click("#do")  # ride
@@ -54,8 +55,8 @@ def first_minute(rider):
     true_deg, shown_deg = rider.leans()
     assert true_deg < 4 - LEAN_DEG
     assert shown_deg == pytest.approx(true_deg, abs=2.0)
-    # Chromium cannot slow down workers. So convert their processor time to that of the reference computer, and check
-    # that it leaves room for a processor that is SLOWED times slower.
+    # Chromium cannot slow down workers. So convert the workers' processor time to the time of the reference computer.
+    # This time must leave room for a processor that is SLOWED times slower.
     assert 0.0 < used_s * REFERENCE_LOOP_S / _loop_s() < RIDING_S / SLOWED
 
 

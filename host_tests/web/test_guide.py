@@ -8,7 +8,7 @@ import pytest
 from kickstand.ui import messages
 from support.mpy import run_mpy
 
-# Carries out orders (s, name, value): waits s seconds, then acts. Most names are those of Device.act(). The name
+# Carries out orders (s, name, value): waits s seconds, then acts. Most names are explained in Device.act(). The name
 # turn_to presses the button until a view is shown.
 DRIVE = """
 import json, sys
@@ -176,8 +176,8 @@ def test_the_power_goes_in_a_save_or_by_its_switch(stages):
 
 
 def test_it_rides_straight_until_the_meter_is_sure(stages):
-    """If the rider leans too early, the guide asks for a straight and says how long. After that time, the display keeps
-    showing the lean in a bend."""
+    """If the rider leans too early, the guide asks for a straight and says how long it must be. After that time, the
+    display keeps showing the lean in a bend."""
     stages(
         ([*ALIGN, RIDE, ("wait", 5)], "not sure", 4, "It rides straight for ten seconds", ""),
         ([("lean", 30), ("wait", 2)], "not sure", 4, "needs ten seconds on a straight", "straight"),
@@ -200,7 +200,7 @@ def test_after_power_on_in_a_bend_it_says_what_ends_the_doubt(stages):
 
 
 def test_it_rides_straight_is_not_said_of_a_bike_that_leans(guide):
-    """This holds before and after the first lean."""
+    """The guide does not say so before or after the first lean."""
     tick = {"powered": True, "plugged": True, "pose": "ride", "phase": "ride", "stage": 0}
     tick.update(t_s=1.0, lean_deg=-7.5)
     said = [

@@ -128,7 +128,7 @@ def packets(tmp_path_factory):
 
 
 def test_saved_bluetooth_log_can_be_reported_and_smoothed(chromium, address, packets, tmp_path):
-    """The smoothed lean is within 1.5 degrees of the displayed one. The log's time continues when the packets' 16-bit
+    """The smoothed lean is within 1.5 degrees of the displayed lean. The log's time continues when the packets' 16-bit
     time overflows. Late packets are recognised."""
     heard, record = packets
     rider = Rider(chromium, address + "live.html")

@@ -54,7 +54,8 @@ def test_interrupted_installation_is_completed_up_to_the_lean(chromium, address)
     on the board, because copying all of them takes a minute."""
     line = SerialLine(chromium, address + "install.html")
     poses = Ride([kickstand(5.5), upright(5.5), upright(1e6, lean_deg=LEAN_DEG)])
-    part = Sensor(seed=1, share=0.1)  # only a tenth of the usual errors, because no calibration corrects them here
+    # a tenth of the usual sensor errors, because no calibration corrects them in this test
+    part = Sensor(seed=1, share=0.1)
     feels, started_s = part.world(poses.motion), 0.0
     missing = ("/main.py", "/kickstand/calibration/")
     there = {path: data for path, data in firmware().items() if not path.startswith(missing)}

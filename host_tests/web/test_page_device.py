@@ -31,6 +31,6 @@ def test_the_page_turns_the_loop_as_the_firmware_does(tmp_path):
 
 
 def test_a_press_that_comes_with_its_release_counts(tmp_path):
-    """This happens if the browser stalls for longer than the press."""
+    """Press and release come together if the browser stalls for longer than the press."""
     page = run("page", [[1.0, "button", True], [1.0, "button", False]], tmp_path / "page")
     assert any(display["text"][0].startswith("Stand: hold") for _, display in page["displays"])

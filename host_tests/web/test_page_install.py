@@ -45,8 +45,8 @@ def choose(line, name, value):
 
 
 def test_a_new_board_gets_the_firmware_and_its_settings(line, board):
-    """An invalid setting is reported beside its field, by the firmware's own rules. Nothing is copied until it is
-    corrected."""
+    """An invalid setting is reported beside its field, by the firmware's own rules. Nothing is copied until the setting
+    is corrected."""
     line.plug_in(RawPrompt(board))
     assert line.look().startswith("Imagined Pico with RP2040, MicroPython 1.26.1 is there.")
     page = line.rider.page

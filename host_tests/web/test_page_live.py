@@ -23,7 +23,7 @@ PLAYED = """async () => {
 }"""
 REFUSED = "() => Object.defineProperty(window, 'indexedDB', { value: { open() { throw new Error('refused'); } } })"
 
-half_seconds = functools.partial(ride_writer.blocks, length=lambda _: 512)  # blocks as short as those of a stream
+half_seconds = functools.partial(ride_writer.blocks, length=lambda _: 512)  # blocks as short as the blocks of a stream
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,8 @@ def board(tmp_path):
 
 
 def test_pulled_cable_leaves_the_log(line, rider, board, tmp_path):
-    """After that the gauge shows no lean. Earlier it shows "--" while the bike sways too much for a certain lean."""
+    """After the cable is pulled, the gauge shows no lean. Before that, it shows "--" while the bike sways too much for
+    a certain lean."""
     blocks, _ = half_seconds(3)
     line.plug_in(RawPrompt(board, blocks))
     rider.page.click("#start")
@@ -83,7 +84,7 @@ def test_car_shows_g_instead_of_a_lean(line, rider, board, tmp_path, monkeypatch
 
 
 def braking_in_a_left_bend(count, seed=0):
-    """Yield turns as ride_writer.turns() does, for a car: 0.2 and 0.3 g."""
+    """Yield turns as ride_writer.turns() does, for a car with forces of 0.2 g backward and 0.3 g to the left."""
     for _ in range(count):
         yield [2 * mean for mean in (-851, 1324, 4096, 0, 0, 98, 0)], 2, 10_000
 
@@ -243,9 +244,9 @@ def test_board_without_firmware_is_sent_to_page_install(line, rider, board):
 
 
 def test_simulated_board_is_watched_without_a_real_one(chromium, address):
-    """This works in a browser that cannot connect to a board, such as a phone's. The page shows a lean to each side,
-    marked as simulated. The chart of the last minute is on the first screen. Until then the page shows no empty
-    figures and no empty chart."""
+    """The browser cannot connect to a board, like the browser of a phone. The page shows a lean to each side, marked as
+    simulated. The chart of the last minute is on the first screen. Before the start the page shows no empty figures and
+    no empty chart."""
     rider = Rider(chromium, address + "live.html", **PHONE)
     page = rider.page
     page.evaluate("document.documentElement.dataset.serial = 'no'")

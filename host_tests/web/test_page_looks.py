@@ -73,7 +73,7 @@ def test_a_phone_leans_the_motorcycle_if_it_has_motion_data(chromium, address):
 
 
 def test_nothing_is_below_the_choice_of_the_display(chromium, address):
-    """This also holds in a narrow window of a computer, where the page explains the keys, too."""
+    """No text is below the choice, even in a narrow window of a computer, where the page also explains the keys."""
     rider = Rider(chromium, address, viewport={"width": 390, "height": 844})
     for width in (360, 390, 420, 480, 512, 560, 800):
         rider.page.set_viewport_size({"width": width, "height": 844})

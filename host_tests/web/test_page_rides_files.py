@@ -141,7 +141,7 @@ def test_files_are_added_and_removed_in_any_order(page, ride, calibration, tmp_p
 
 
 def test_the_columns_of_a_table_can_be_named(page, tmp_path):
-    """The page offers the same as the options --columns and --units of `import`."""
+    """The page has the same choices as the options --columns and --units of `import`."""
     log, riding = tmp_path / "log.csv", app_exports.riding().every(4)
     log.write_text(app_exports.any_table(riding).replace("Acc_X", "Quantity 1", 1))
     assert page.give(log).endswith("and no acceleration found in it: say what its columns are.")

@@ -61,7 +61,7 @@ def test_by_the_keyboard_alone(chromium, address):
 
 def test_every_step_has_its_room(chromium, address, files):
     """A longer text must not move the parts of the page below it. The texts come from the guide's source, so the
-    longest one is included."""
+    longest text is included."""
     guide = files["guide.mjs"].decode()
     pages = re.findall(r'^  \w+: "(.{20,})",$', guide, re.M)
     steps = [text for pair in re.findall(r'"([^"\n]{25,})"|`([^`]{25,})`', guide) for text in pair if text]

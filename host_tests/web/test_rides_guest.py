@@ -12,7 +12,7 @@ def test_singular_matrix_is_detected_in_webassembly():
     silent = rides_guest.raising(lambda matrix: np.full_like(matrix, np.nan))
     with pytest.raises(np.linalg.LinAlgError):
         silent(np.zeros((3, 3)))
-    assert np.all(np.isnan(silent(np.full((3, 3), np.nan))))  # as numpy does on other platforms
+    assert np.all(np.isnan(silent(np.full((3, 3), np.nan))))  # numpy does the same on other platforms
     assert rides_guest.raising(np.linalg.inv)(2.0 * np.eye(2)).tolist() == [[0.5, 0.0], [0.0, 0.5]]
 
 
@@ -32,7 +32,7 @@ def test_calibration_of_another_ride_is_not_used(ride, tmp_path, monkeypatch, na
 
 
 def test_two_recordings_of_single_files_are_two_rides(tmp_path, monkeypatch):
-    """Only files of one app that form one recording are one ride."""
+    """Several files are one ride only if an app wrote them as one recording."""
     riding = app_exports.riding().every(4)
     parts = {name: text for name, text in app_exports.phyphox(riding).items() if "/" not in name}
     files = {"b.csv": app_exports.racechrono(riding), "a.csv": app_exports.racechrono(riding), **parts}

@@ -53,7 +53,7 @@ def test_site_is_written_to_a_folder(files, built, tmp_path):
 
 
 def test_site_built_on_github_knows_its_home(monkeypatch):
-    """A site built without the project's address contains no such link."""
+    """A site built without the project's address contains no link to it."""
     core = pytest.importorskip("hatchling.metadata.core")
     manager = pytest.importorskip("hatchling.plugin.manager")
 
@@ -245,7 +245,7 @@ def test_strange_or_slow_requests_do_not_stop_the_server(monkeypatch, capsys):
 
 
 def test_trickling_connections_are_ended_for_others(monkeypatch):
-    """These clients send a byte before each time-out, but never a whole request."""
+    """The trickling clients send a byte before each time-out, but never a whole request."""
     monkeypatch.setattr(serve, "MOST", 4)
     monkeypatch.setattr(serve, "FULL_S", 0.2)
     with serve.server({"index.html": b"the page"}, 0) as server:

@@ -66,7 +66,7 @@ LOOK = """(seconds) => new Promise((done) => {
 
 
 def flashes(samples):
-    """Return the texts that last for less than LASTING_S, without the first and the last one.
+    """Return the texts that last for less than LASTING_S, without the first and the last text.
 
     samples: [[s, text], ...].
     """

@@ -23,7 +23,8 @@ class Button:
         self._pressed = self._raw = self.held()
         self._changed_ms = None
         self._pressed_ms = 0
-        # True after the long press was reported. At first also True, for a press that began before this object existed
+        # True after the long press was reported. At first it is also True, to ignore a press that began before this
+        # object existed
         self._long_sent = True
 
     def held(self):

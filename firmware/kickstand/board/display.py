@@ -103,7 +103,7 @@ class Display:
             self._fresh = True
 
     def flush(self):
-        """Send everything now, in about 0.1 s. For texts shown before the loop runs or after it has failed."""
+        """Send everything now, in about 0.1 s. Use this method before the loop runs or after the loop has failed."""
         self._probed_ms = None
         for _ in range(_FLUSH_STEPS):
             self.tick(ticks_ms())

@@ -14,10 +14,10 @@ from micropython import const
 
 # Index: LCD_WIRING - 1. The bits of RS, E and the backlight, then True if D4 to D7 are P0 to P3
 WIRINGS = (
-    (0x01, 0x04, 0x08, False),  # the usual one: P0 RS, P2 E, P3 light
+    (0x01, 0x04, 0x08, False),  # the usual wiring: P0 RS, P2 E, P3 light
     (0x40, 0x10, 0x00, True),  # MJKDZ, GY-IICLCD: P6 RS, P4 E, P7 light, on while low
     (0x10, 0x40, 0x80, True),  # P4 RS, P6 E, P7 light
-    (0x01, 0x04, 0x00, False),  # like the usual one, but the light is on while P3 is low
+    (0x01, 0x04, 0x00, False),  # like the first wiring, but the light is on while P3 is low
 )
 _LINE_ADDRESSES = (0x80, 0xC0)  # instruction "set DDRAM address" for the beginning of each line (table 6)
 _CGRAM_ADDRESS = const(0x40)  # instruction "set CGRAM address" (table 6)
@@ -26,7 +26,7 @@ _COLUMNS = const(16)
 _DASHES = b"-" * _COLUMNS
 _NO_TEXT = "\n"
 _NEVER = b"\xfe" * _COLUMNS  # marks a line that was not written yet; no text uses this code
-# Time between two initialisations. After electrical noise the display may combine the wrong nibbles to bytes. Only an
+# Time between two initialisations. After electrical noise the display may combine the wrong nibbles into bytes. Only an
 # initialisation repairs this.
 _REINIT_MS = const(10_000)
 _PROBE_MS = const(200)  # time between two checks that the display is connected
@@ -40,8 +40,8 @@ _POWER_UP = const(-8)  # number of the first step after power-up, because the di
 _NIBBLES = (0x30, 0x30, 0x30, 0x20)
 _COMMANDS = b"\x28\x0c\x06\x02"
 _GLYPH_PARTS = const(4)  # the 64 bytes of character patterns are sent 16 at a time
-# Number of characters to blank behind each line, one line per step. A larger display (20x4 or 20x2) would show other
-# memory there.
+# Number of characters to blank behind each line, one line per step. A larger display (20x4 or 20x2) would show
+# characters from other memory there.
 _BEHIND = const(24)
 _STEPS = len(_NIBBLES) + 1 + _GLYPH_PARTS + 2
 
@@ -118,7 +118,7 @@ class Lcd:
     def _put(self, number, text):
         line = self._wanted[number]
         if isinstance(text, str):
-            if text == self._texts[number]:  # usually the text is unchanged, and this saves 0.2 ms for a conversion
+            if text == self._texts[number]:  # the text is usually unchanged, and skipping its conversion saves 0.2 ms
                 return
             self._texts[number] = text
             for i in range(_COLUMNS):
@@ -167,7 +167,8 @@ class Lcd:
                 while shown[last] == wanted[last]:
                     last -= 1
                 at = _LINE_ADDRESSES[i] + first
-                # Send dashes first, because an interrupted transfer must not leave half a number or the wrong side
+                # Send dashes first, because an interrupted transfer must not leave half a number or the wrong word for
+                # the side
                 if last > first:
                     self._send(at, memoryview(_DASHES)[first : last + 1])
                 self._send(at, memoryview(wanted)[first : last + 1])

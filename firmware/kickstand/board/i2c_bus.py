@@ -7,8 +7,8 @@ from machine import Pin
 from . import port
 
 _HALF_PERIOD_US = 5  # half a period of SCL while a bus is freed, so SCL runs at 100 kHz
-# Time-out in bit times. On a Pico it limits a whole transfer of at most 136 bytes, on an ESP32 a single bit. The
-# default of 50 ms would stop the loop for too long.
+# Time-out in bit times. On a Pico the time-out is for a whole transfer, which has at most 136 bytes. On an ESP32 the
+# time-out is for each bit. The default of 50 ms would stop the loop for too long.
 _TIMEOUT_BITS = 2000
 
 

@@ -2,7 +2,8 @@
 describes its methods.
 
 Sources: data sheets Solomon Systech SSD1306 rev 1.1 and Sino Wealth SH1106 V2.3. The driver addresses both chips by
-pages of 8 rows, because an SH1106 has no other way. An SH1106 has 132 columns, and the panel shows the middle 128.
+pages of 8 rows, because an SH1106 has no other way of addressing. An SH1106 has 132 columns, and the panel shows the
+middle 128.
 """
 
 from time import ticks_add, ticks_diff, ticks_ms
@@ -19,27 +20,28 @@ _PARTS, _PARTS_SLOW, _SLOW_HZ = 3, 2, 200_000
 _PROBE_MS = const(200)  # time between two checks that the display has kept its power
 _REFRESH_MS = const(10_000)  # time until everything is sent again, to repair the effects of electrical noise
 _POWER_UP_MS = 40
-_OFF = 0x40  # bit of the status: the panel is off
+_OFF = 0x40  # bit of the status that is set while the panel is off
 # Low half of the status of an SH1106. An SSD1306 has 3 or 6 there, and a clone may have any value
 _SH1106_STATUS = (0x08, 0x00, 0x0C)
 _SH1106_OFFSET = 2  # first visible column of an SH1106
-# To avoid burn-in, the picture is shifted by each of these numbers of rows for _SHIFT_REFRESHES. Rows that leave the
-# panel at the top return at the bottom, so pictures leave the first two rows blank.
+# Numbers of rows by which the picture is shifted to avoid burn-in, one after the other. Each shift lasts for
+# _SHIFT_REFRESHES refreshes. Rows that leave the panel at the top return at the bottom, so pictures leave the first two
+# rows blank.
 _SHIFTS = (0, 1, 2, 1)
 _SHIFT_REFRESHES = const(6)
 # A panel of 32 rows has no blank rows at the top. So its picture is shifted down, over the two blank rows below the
 # text.
 _SHIFTS_32 = (0, 63, 62, 63)
-# First a control byte, which starts a stream of commands. Then the commands: clock; number of rows - 1; no offset;
-# columns and rows from the side opposite to the cable; COM pins alternate (64 rows) or in sequence (32); pre-charge;
-# VCOMH; show the RAM
+# The first byte is a control byte, which starts a stream of commands. The commands are: clock; number of rows - 1; no
+# offset; columns and rows from the side opposite to the cable; COM pins alternate (64 rows) or in sequence (32);
+# pre-charge; VCOMH; show the RAM
 _SET_UP = b"\x00\xd5\x80\xa8\x3f\xd3\x00\xa1\xc8\xda\x12\xd9\xf1\xdb\x40\xa4"
 _SET_UP_32 = b"\x00\xd5\x80\xa8\x1f\xd3\x00\xa1\xc8\xda\x02\xd9\xf1\xdb\x40\xa4"
-# For the SH1106: DC-DC converter. For the SSD1306: charge pump, page addressing, no scrolling. Without the commands for
-# its own chip a panel stays dark. A clone may report the status of the other chip, so all commands are sent to every
-# panel. Each chip ignores the other chip's commands.
+# Commands for the SH1106: DC-DC converter. Commands for the SSD1306: charge pump, page addressing, no scrolling.
+# Without the commands for its own chip a panel stays dark. A clone may report the status of the other chip, so all
+# commands are sent to every panel. Each chip ignores the other chip's commands.
 _SUPPLY = b"\xad\x8b\x8d\x14\x20\x02\x2e"
-# For each nibble, the byte with each of its bits doubled
+# For each nibble, a byte with each bit of the nibble doubled
 _SPREAD = bytes((i & 1) * 3 | (i & 2) * 6 | (i & 4) * 12 | (i & 8) * 24 for i in range(16))
 
 
@@ -68,7 +70,7 @@ class Oled:
     """The driver of the OLED. display.py describes its methods.
 
     Args:
-        kind: "ssd1306", "sh1106", "auto" or "ssd1306-32". The last one is a panel of 32 rows, which shows only the two
+        kind: "ssd1306", "sh1106", "auto" or "ssd1306-32". The last kind is a panel of 32 rows, which shows only the two
             lines.
         contrast: 0 to 255.
         inverted: True for dark on bright.
@@ -119,8 +121,8 @@ class Oled:
         return not self._lit or self._changed or self._drawn is not self._wanted
 
     def show(self, line1, line2, picture=None):
-        """Set the picture. Without a picture, set the two lines, in letters of double height. The codes are those of
-        hd44780.py."""
+        """Set the picture. Without a picture, set the two lines, in letters of double height. The lines have the
+        character codes of hd44780.py."""
         wanted = (self.draws and picture) or tuple(
             [line if isinstance(line, str) else bytes(line) for line in (line1, line2)]
         )

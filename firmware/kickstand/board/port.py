@@ -28,9 +28,9 @@ if IS_ESP32:
     PIN_IRQ = {}
     I2C_NUMBERED = False  # see open_i2c()
     SD_SPI = (2, 3)  # the slots of machine.SDCard that are SPI
-    # Pins that the chip itself needs. On a pin of its own USB, an output disconnects the board from the computer until
-    # BOOT is held. On a pin of a classic chip's flash (6 to 11), an output crashes the board at each start. The third
-    # group is the console
+    # Pins that the chip itself needs. An output on a pin of the chip's USB disconnects the board from the computer
+    # until BOOT is held. An output on a pin of a classic chip's flash (6 to 11) crashes the board at each start. Pins 1
+    # and 3 of a classic chip are the console.
     _CHIP = MACHINE.split(" with ESP32")[-1].lstrip("-")[:2]  # "S2", "C3", ...; classic: "", "UN", "D2" or "PI"
     _CLASSIC = not (_CHIP[:1] in ("S", "C", "H", "P") and _CHIP[1:].isdigit())
     TAKEN_PINS = {"S2": (19, 20), "S3": (19, 20), "C3": (18, 19), "C6": (12, 13), "H2": (26, 27)}.get(

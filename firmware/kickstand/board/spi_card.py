@@ -11,8 +11,9 @@ from sdcard import SDCard  # type: ignore[import-not-found]
 
 from ..units import const
 
-_CLOCK_HZ = const(10_000_000)  # the driver's default of 1.32 MHz would take 25 ms for a block of a ride
-_BUSY_MS = const(1000)  # cards may take 250 to 500 ms (SD Physical Layer Simplified Specification, section 4.6.2.2)
+_CLOCK_HZ = const(10_000_000)  # with the driver's default of 1.32 MHz, a block of a ride would take 25 ms
+# a card may be busy for 250 to 500 ms (SD Physical Layer Simplified Specification, section 4.6.2.2)
+_BUSY_MS = const(1000)
 _ACCEPTED = 0x05  # data response, section 7.3.3.1
 
 
@@ -32,7 +33,8 @@ class CheckedCard(SDCard):
             raise OSError(self._fault)
 
     def write(self, token, buf):
-        """Write one sector. The driver calls this method for each sector. After a fault it skips the other sectors."""
+        """Write one sector. The driver calls this method for each sector. After a fault it skips the remaining
+        sectors."""
         if self._fault:
             return
         self._send(token)

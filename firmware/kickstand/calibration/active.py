@@ -16,8 +16,9 @@ class ActiveCalibration:
 
     Args:
         meter: the LeanMeter that uses the Calibration.
-        changed: a function that is called as changed(replaced) after each change. `replaced` is True for another
-            alignment. Then maxima and the results of driving must be discarded. It is False for a small correction.
+        changed: a function that is called as changed(replaced) after each change. `replaced` is True after a new
+            alignment, which makes maxima and the results of driving invalid. `replaced` is False after a small
+            correction.
     """
 
     def __init__(self, meter, changed):
@@ -67,8 +68,8 @@ class ActiveCalibration:
         self._use(calibration, False)
 
     def restart(self):
-        """Save the current trim, then restart the meter with the calibration in flash. A replay of the ride starts with
-        the same calibration."""
+        """Save the current trim, then restart the meter with the calibration in flash. So a replay of the ride can
+        start with the same calibration."""
         self._save_trim()
         self._meter.use(self.value)
 

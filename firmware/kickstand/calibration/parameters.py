@@ -6,8 +6,8 @@ into the vehicle's axes.
 
 from ..rotation import is_identity, matrix, product, rotate, vector
 
-# Limits of plausible parameters. The data sheet allows an offset of 50 to 80 mg and a scale error of 3 %; real boards
-# exceed both.
+# Limits of plausible parameters. The data sheet allows an offset of 50 to 80 mg and a scale error of 3 %, but real
+# boards exceed both.
 MAX_OFFSET_G = 0.5
 MIN_SLOPE, MAX_SLOPE = 0.8, 1.2
 MAX_MATRIX_ERROR = 0.15  # largest difference between an entry of accel_matrix or gyro_matrix and the identity matrix
@@ -71,7 +71,7 @@ class Calibration:
         return new
 
     def set_scale(self, accel_lsb_per_g, gyro_lsb_per_dps):
-        """Set the counts per g and per deg/s of the next readings. Before the first call both are 1."""
+        """Set the counts per g and per deg/s of the next readings. Before the first call both numbers are 1."""
         self._accel_lsb = accel_lsb_per_g
         self.set_accel(self.accel_offset, self.accel_slope)
         self._gyro_scale = 1.0 / gyro_lsb_per_dps
@@ -131,8 +131,9 @@ class Calibration:
     def in_vehicle(self):
         """Return calibration and alignment combined, as matrices and offsets for raw counts.
 
-        The results combine Nicolae's equations (18)-(20), accel_matrix and gyro_matrix, and equation (15). With them a
-        reading takes 18 multiplications: force = force_matrix * counts + force_offset, and the same for the rate.
+        The results combine Nicolae's equations (18)-(20), accel_matrix and gyro_matrix, and equation (15). They convert
+        a reading with 18 multiplications: force = force_matrix * counts + force_offset, and rate = rate_matrix * counts
+        + rate_offset.
 
         Returns:
             force_matrix: 9 values, in g per count.

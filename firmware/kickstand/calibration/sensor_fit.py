@@ -23,13 +23,13 @@ _UNKNOWNS = const(18)
 _GYRO = 9  # index of the gyro's first unknown; it follows offset (3), slope (3) and N (3, in the order yz, xz, xy)
 _STEPS = const(5)
 _SIGMA_FORCE = const(0.0015)  # standard deviation of a pose's force, in g
-_SIGMA_TURN = const(0.0015)  # error of a turn's angle that the poses at its ends cause, 1 sigma, in rad
+_SIGMA_TURN = const(0.0015)  # standard deviation of a turn's angle, caused by the poses at its ends, in rad
 # Random walk of the gyro's bias during a turn, in deg/s per sqrt(s). The poses at both ends measure the bias, so the
 # variance of the angle is walk^2 seconds^3 / 12.
 _BIAS_WALK_DPS = const(0.008)
 # Standard deviations of the priors. SIGMA_OFFSET is in g. SIGMA_SKEW is for N, SIGMA_SCALE for the diagonal of X, and
 # SIGMA_CROSS for the rest of X. The data sheet allows errors of 0.03 in the gyro's scale and of 0.02 between its axes.
-# The accelerometer's axes may also be rotated against the gyro's.
+# The accelerometer's axes may also be rotated against the gyro's axes.
 SIGMA_OFFSET, SIGMA_SLOPE, SIGMA_SKEW = 0.1, 0.1, 0.012
 SIGMA_SCALE, SIGMA_CROSS = 0.03, 0.02
 # Limits for accepting the fit
@@ -42,7 +42,8 @@ _GROSS_MISFIT = const(0.25)
 # Factors between the reading of a faulty axis and the true rate. They are tried to find a single wrong axis.
 _READS = const((-1.0, 0.25, 0.5, 0.75, 1.3, 2.0, 4.0))
 _DEAD_RAD = const(0.2)  # an axis that measured less than this angle in every turn is dead
-# Largest standard error of a measured scale. If it is larger, no turn about this axis has measured the scale.
+# Largest standard error of a measured scale. With a larger standard error, no turn about this axis has measured the
+# scale.
 _PROOF_SIGMA = const(0.025)
 
 
@@ -119,7 +120,8 @@ class SensorFit:
             x: the 9 entries of X, row by row.
 
         Returns:
-            misfit: `before` minus the force of the pose after the turn, which R rotates back; 3 values in rad.
+            misfit: `before` minus the force of the next pose, rotated back by R; 3 values in rad, because the force is
+                1 g.
             before: the force of the pose before the turn, corrected for the gyro's errors; 3 values in g.
         """
         turn = self._turns[k][0]

@@ -127,7 +127,8 @@ def _solve(rows):
     """Solve six linear equations in place, by Gauss-Jordan elimination with partial pivoting.
 
     Args:
-        rows: six lists. Each has six coefficients and the right-hand side, which the solution replaces.
+        rows: six lists, one per equation. Each list has six coefficients and the right-hand side, which the solution
+            replaces.
 
     Returns:
         False if the equations are singular.

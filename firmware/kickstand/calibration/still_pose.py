@@ -1,6 +1,6 @@
 """Averages the readings of one pose, and checks that the sensor was still.
 
-A dead sensor must not be accepted as a still one. So each axis must change by a count from time to time, because a
+A dead sensor must not be accepted as a still sensor. So each axis must change by a count from time to time, because a
 working axis has noise. A gyro axis must not be too noisy.
 
 The sums are integers, because 32-bit floats would lose the digits that averaging gains.

@@ -71,7 +71,7 @@ class Store:
     def unchanged(self):
         """Return True if both files read the same as in load() or save().
 
-        If they do not, a file was misread, for example in a voltage sag. Then the loaded record may be the older of the
+        If they differ, a file was misread, for example in a voltage sag. Then the loaded record may be the older of the
         two, and the newer record must not be overwritten."""
         sequence, _, problems = self._newest()
         return sequence == self._sequence and problems == self._problems

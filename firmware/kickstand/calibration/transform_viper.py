@@ -1,4 +1,4 @@
-"""The function products_python() of transform.py as machine code. Both must give the same integers."""
+"""The function products_python() of transform.py as machine code. Both functions must give the same integers."""
 
 import micropython
 

@@ -15,10 +15,11 @@ from math import cos, radians, sin
 
 from ..units import const
 
-_STEP_RAD = const(0.02)  # a step ends when the sensor has turned by this angle about one axis; smaller is more exact
+# a step ends when the sensor has turned by this angle about one axis; a smaller angle is more exact
+_STEP_RAD = const(0.02)
 _STEP_US = const(60_000)  # a step also ends after this time
-# 0.95 of the gyro's range, in counts. It is less than the full range, because the chip's low-pass hides single
-# conversions that were at the end of the range.
+# 0.95 of the gyro's range, in counts. It is less than the full range, because the low-pass of the chip hides single
+# readings at the end of the range.
 _QUICK = const(31_000)
 
 

@@ -3,7 +3,7 @@
 Three things differ from the paper:
 * Equation (4) is the cross product of the upright and the tilted reading. As printed, the product is zero.
 * Equation (5) takes y from the upright reading and divides y by its own length.
-* If the kickstand is on the right, the paper's x and z point right and backward. So both signs are changed.
+* If the kickstand is on the right, the paper's x and z point right and backward. So the signs of x and z are changed.
 """
 
 from math import atan2, degrees
@@ -102,8 +102,8 @@ def align(calibration, kickstand, upright, side):
 def check_turn(calibration, kickstand, upright, turn):
     """Raise GyroError unless the gyro's turn between the two poses agrees with the tilt between them.
 
-    The check is weaker if the turn took longer. After a minute it hardly checks a tilt of 12 degrees. If readings were
-    lost, nothing is checked.
+    The longer the turn took, the more difference is allowed. After a minute the check hardly limits a tilt of 12
+    degrees. If readings were lost, nothing is checked.
 
     Args:
         calibration: a Calibration with offset and slope.
@@ -119,7 +119,8 @@ def check_turn(calibration, kickstand, upright, turn):
     cross(axis, u, v)
     tilt = atan2(norm(axis), dot(u, v))
     misfit = 9.9
-    # Try two biases: that of the kickstand pose, which is the stiller one, and the mean of both poses for a drift.
+    # Try two biases. The bias of the kickstand pose is better without drift, because a stand holds the bike stiller.
+    # The mean bias of both poses is better if the bias has drifted.
     for share in (0.0, 0.5):
         r = turn.attitude(upright.gyro, share)
         rotate(back, r, v)

@@ -1,8 +1,8 @@
-"""Aligns the sensor by driving. Standing and driving straight show the vertical, braking shows forward (ViriCiti).
+"""Aligns the sensor by driving. Standing and driving straight show the vertical, and braking shows forward.
 
-This improves the published method. Forward comes from a regression of force on change of speed. The intercept of the
-regression absorbs forces that are not braking. Bends are excluded, the lag of the speed is estimated, and the result
-has a standard error.
+The module improves the method that ViriCiti published. Forward comes from a regression of force on change of speed. The
+intercept of the regression absorbs forces that are not braking. Bends are excluded, the lag of the speed is estimated,
+and the result has a standard error.
 
     drive = DriveAlignment("car")                  # or ("motorcycle", up) with the vertical from two poses
     drive.update(force, rate, dt_us)               # about 100 times per second, in the sensor's axes

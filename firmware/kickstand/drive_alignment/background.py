@@ -21,7 +21,8 @@ _LOOK_MS = const(1000)  # time between two calls of _look()
 _FRESH_MS = const(3000)  # a speed older than this does not prove a standstill
 _AWAY_MPS = const(2.0)  # a faster vehicle has driven off
 
-# The bias in the corrected rates of an aligned sensor, because the bias of its poses is already subtracted
+# The remaining bias in the corrected rates of an aligned sensor. It is 0, because the bias of the poses is already
+# subtracted.
 _KNOWN_BIAS = (0.0, 0.0, 0.0)
 STAND_SIDE, MOUNT_MOVED = "other-side", "mount-moved"
 _QUESTIONS = (STAND_SIDE, MOUNT_MOVED)  # codes of the messages that hide the lean until the rider answers
@@ -74,7 +75,8 @@ class BackgroundAlignment:
 
     def _restart(self):
         old = self._meter.calibration
-        self._calibration = old  # applies to all samples of this drive, even if another calibration is saved meanwhile
+        # use one calibration for all samples of this drive, even if another calibration is saved meanwhile
+        self._calibration = old
         trusted = self._leans and old.aligned and not self._asked
         up = old.vehicle_from_sensor[3:6] if trusted else None
         self.drive = DriveAlignment(MOTORCYCLE if self._leans else CAR, up, _KNOWN_BIAS if old.aligned else None)
@@ -83,8 +85,8 @@ class BackgroundAlignment:
         self._clear_sums()
 
     def ask(self):
-        """Drop the current drive and start one that replaces the alignment. The rider requests this after remounting
-        the sensor."""
+        """Drop the current drive, and start a drive that replaces the alignment. The rider requests this after
+        remounting the sensor."""
         self.shown = True
         self.begin(True)
 
@@ -109,7 +111,7 @@ class BackgroundAlignment:
             self._look_ms = ticks_add(now_ms, _LOOK_MS)
             self.fresh_speed(now_ms)
             if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > _LOOK_MS:
-                self._begin_again()  # done now, because after 6 days without a reading ticks_diff() is negative
+                self._begin_again()  # begin again now, because after 6 days without a reading ticks_diff() is negative
             self._look(now_ms)
         return speed
 
@@ -223,7 +225,7 @@ class BackgroundAlignment:
         """Clear the message after the rider has read it.
 
         Args:
-            agreed: True to do what the message offers. STAND_SIDE offers to exchange forward and backward.
+            agreed: True to accept what the message offers. STAND_SIDE offers to exchange forward and backward.
         """
         code, self.message = self.message.code, None
         self._answered.append(code)

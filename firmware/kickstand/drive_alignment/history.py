@@ -7,10 +7,10 @@ while float32 sums lose digits as they grow. Integers also need no heap.
 from array import array
 
 BIN_US = 100_000
-SIZE = 64  # number of bins, enough for the lag of a speed, the interval before it, and the time to process both
+SIZE = 64  # number of bins, enough for the lag of a speed, the interval before the speed, and the time to process them
 MASK = 0x1FFFFFFF
 _HALF = 0x10000000
-COLUMNS = 4  # three integrals of the force in 1e-6 g s, and one of the yaw rate in 1e-5 degrees
+COLUMNS = 4  # three integrals of the force in 1e-6 g s, and one integral of the yaw rate in 1e-5 degrees
 
 
 def difference(a, b):

@@ -1,5 +1,5 @@
-"""Compares forward and the vertical between two parts of a drive. If they differ, the mount may have moved between
-them.
+"""Compares forward and the vertical between two parts of a drive. If forward or the vertical differs, the mount may
+have moved between the two parts.
 
 The time of a move is unknown, so the drive is split in two after each block in turn. The scatter of forward between the
 blocks within each part shows which difference is likely by chance. The variance of a part's forward falls with the

@@ -27,8 +27,8 @@ AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0
 # The mount moved if two parts differ by more than one of the next three limits
 # Difference of forward. A long banked motorway curve that was treated as straight caused a difference of 15 degrees
 _MOVED_DEG = const(30.0)
-PITCH_DEG = 7.0  # difference of pitch. A road that goes 6 % uphill and then 6 % downhill causes a smaller one
-# Difference of roll. The banked curve caused 6 degrees. This limit is not used on a motorcycle, because it leans
+PITCH_DEG = 7.0  # difference of pitch. Slopes of 6 % uphill and then 6 % downhill cause less
+# Difference of roll. The banked curve caused 6 degrees. A motorcycle leans, so it has no limit of roll
 ROLL_DEG = 7.0
 # The mount moved if forward from one event differs by over _EVENT_OFF_DEG from forward of the whole drive. An event is
 # judged only if its weight and the length of its forward exceed the two limits below. On recorded drives no such event

@@ -21,7 +21,7 @@ BLOCKS = 8
 LAG_STEP_US = 250_000  # difference between two successive lags
 LAGS = 11  # number of lags, from 0 to 2.5 s
 # Indices of the sums of one regression block: the time in s, and the integrals of a, c, a a, a c, c c, f, a f and c f
-# over this time. The last three have 3 values each.
+# over this time. The last three integrals have 3 values each.
 _TERMS = const(15)
 SECONDS, A, C, AA, AC, CC, F, AF, CF = 0, 1, 2, 3, 4, 5, 6, 9, 12
 _RIDGE = const(1e-6)  # ridge term in g^2, which keeps the coefficient of c at zero if the drive had no bend
@@ -86,7 +86,7 @@ class ForwardRegression:
             sums[k + CF + i] += curve_g * f
 
     def end_event(self):
-        """After an event, begin the next block if this one is full. A generator of short steps."""
+        """After an event, begin the next block if the current block is full. A generator of short steps."""
         self._events_in_last += 1
         if self._events_in_last < self._events_per_block:
             return

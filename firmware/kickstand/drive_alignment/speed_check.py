@@ -6,12 +6,12 @@ from ..errors import AlignmentError
 from ..units import const
 
 _NEGATIVE_MPS = const(-0.5)  # speeds from this value up to zero are noise of a standing vehicle
-# A second is lively if its mean force differs by this much from that of the previous second. At standstill no second is
-# lively. While driving, most seconds are lively.
+# A second is lively if its mean force differs by this much from the mean force of the previous second. At standstill no
+# second is lively. While driving, most seconds are lively.
 _LIVELY_G = const(0.03)
 _TURNING_DPS = const(5.0)  # a second with a larger yaw rate is ignored, because a bend is lively at constant speed too
-# The speed is stuck if two conditions hold. It has not changed for at least _STUCK_S lively seconds, and these are at
-# least the share _STUCK_SHARE of all seconds since its last change. Four braking events together have 8 lively seconds.
+# The speed is stuck if two conditions hold. It has not changed for at least _STUCK_S lively seconds, and at least
+# _STUCK_SHARE of all seconds since its last change are lively. Four braking events together have 8 lively seconds.
 _STUCK_S = const(8)
 _STUCK_SHARE = const(0.15)
 # Limits of the ratio between the change of force and the change of speed. The ratio should be 1. The pitch of a braking

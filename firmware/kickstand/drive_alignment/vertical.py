@@ -15,7 +15,7 @@ from ..rotation import angle_deg, norm, normalize, vector
 from ..units import const
 
 _STANDING_MPS = const(0.5)  # lower speeds count as standing, because a GPS at rest shows speeds up to this value
-MOVED_MPS = 2.0  # if the speed was higher than this, the next stop is a new one
+MOVED_MPS = 2.0  # if the speed was higher than this, the next stop is a new stop
 SETTLE_S = 1.0  # time for which a vehicle rocks after braking
 COUNTS_S = 2.0  # time that a stop must last after SETTLE_S to count
 # Largest difference at a stop between a mean over 0.1 s and a mean with the time constant _AVERAGE_S. An idling diesel,
@@ -24,8 +24,8 @@ _STILL_G = const(0.06)
 _STILL_DPS = const(3.0)
 _AVERAGE_S = const(0.5)
 _SAME_STOP_DEG = const(1.5)  # doors and passengers tilt a standing vehicle by less than this angle
-# If the sensor is still at another angle for longer than this, it was rotated. The other explanation is a late speed of
-# zero while the vehicle drives again, but that ends earlier.
+# If the sensor stays still at another angle for longer than this, the sensor was rotated. While a vehicle drives again
+# but a late speed is still zero, the angle also differs, but not for this long.
 _TURNED_S = const(6.0)
 # If a rate differs by more than this from the bias at the last stop, the vehicle drives in a bend and a speed of zero
 # is wrong. Warming up changes the bias by less.

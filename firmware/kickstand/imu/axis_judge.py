@@ -3,7 +3,7 @@
 An axis is faulty in three cases:
 * Its counts have at most two values, or their lowest bits do not change. The axis is dead, or its low byte is stuck.
 * Its low byte wraps around while its high byte stays the same. The high byte is stuck.
-* Its counts equal those of another axis.
+* Its counts equal the counts of another axis.
 """
 
 from micropython import const
@@ -21,10 +21,11 @@ _SEEN = const(19)
 _HIGH_BYTE = const(0x10000)
 _WRAPPED = const(0x20000)
 
-# The number of successive quiet looks that make an axis faulty. The columns are dlpf 1 to 6. The gyro has a row for
-# each range, from 250 deg/s up. The limits are for the noise of the quietest chip: 100 ug/sqrt(Hz) of the
-# accelerometer, at 16 g, and 0.004 deg/s/sqrt(Hz) of the gyro. With this noise a working axis at rest reaches its limit
-# only once in 1e12 looks. 0 means that the noise is too far below one count to decide.
+# The number of successive quiet looks that make an axis faulty. A look is quiet if the counts had at most two values,
+# or if their lowest bit did not change. The columns are dlpf 1 to 6. The gyro has a row for each range, from 250 deg/s
+# up. The limits are for the noise of the quietest chip: 100 ug/sqrt(Hz) of the accelerometer, at 16 g, and 0.004
+# deg/s/sqrt(Hz) of the gyro. With this noise a working axis at rest reaches its limit only once in 1e12 looks. 0 means
+# that the noise is too far below one count to decide.
 _ACCEL_LOOKS = (1, 1, 1, 4, 15, 80)
 _GYRO_LOOKS = (
     (1, 1, 1, 3, 5, 11),
@@ -128,14 +129,15 @@ class AxisJudge:
         return _ill(dead) if dead else _ill(equal, "equal") if equal else None
 
     def _show(self, watch, notice):
-        """Show a notice for a moment, unless the same one was shown in the last minute."""
+        """Show a notice for a moment, unless the same notice was shown in the last minute."""
         if watch.looks - self._noticed.get(notice.code, -_QUIET_LOOKS) >= _QUIET_LOOKS:
             self._noticed[notice.code] = watch.looks
             watch.notice = notice
 
 
 def _ill(axes, how=None):
-    """Return the Notice for faulty axes. It names the gyro's faulty axes, or the accelerometer's if the gyro has none.
+    """Return the Notice for faulty axes. It names the gyro's faulty axes or, if the gyro has none, the accelerometer's
+    faulty axes.
 
     Args:
         axes: one bit per column of a frame.

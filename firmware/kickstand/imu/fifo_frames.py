@@ -22,11 +22,11 @@ _REPEATS = const(1)  # number of successive repetitions of the last frame
 _LIMIT = const(2)  # number of repetitions that make a frame dead
 LOST = const(3)  # number of frames with an axis at the end of its range, in this call
 _ROW = const(4)  # number of successive frames with an axis at the end of its range
-# The next four describe the frames since the last look
+# The next four entries describe the frames since the last look
 _ENDS = const(5)  # one bit per column that was at the end of its range
 _CLIPPED = const(6)  # number of frames with an axis at the end of its range
 _GYRO_CLIPPED = const(7)  # number of frames with an axis of the gyro at the end of its range
-_DIFFER = const(8)  # bits for axes that differed: y from x (bits 1 and 5), z from y (2 and 6), z from x (0 and 4)
+_DIFFER = const(8)  # bits of pairs of axes that differed: x and y (bits 1 and 5), y and z (2 and 6), x and z (0 and 4)
 DUE = const(9)  # number of samples until the next look
 _HARD = const(10)  # absolute counts of the accelerometer that show hard vibration
 _SHAKEN = const(11)  # number of frames that reached _HARD since the last look
@@ -39,8 +39,8 @@ _WRAPPED = const(0x20000)  # bit in _SEEN that is set when the counts jump by _J
 _JUMP = const(192)
 
 # Half of the range of 8 g or 16 g. The low-pass hides most of a vibration. If half of the range is left after the
-# low-pass, the vibration was clipped before it. Then the mean is wrong, because the readings are clipped unevenly. A
-# range below 8 g has no limit for vibration, because bends alone reach half of that range.
+# low-pass, the vibration was clipped before the low-pass. Then the mean is wrong, because the readings are clipped
+# unevenly. A range below 8 g has no limit for vibration, because bends alone reach half of that range.
 _HARD_COUNTS = const(16384)
 _COLUMNS = (0, 1, 2, 4, 5, 6)  # the axes' columns in a frame
 _ALL_DIFFER = const(0x77)
@@ -224,7 +224,7 @@ class AxisWatch:
         return True
 
     def _load(self):
-        gc.collect()  # otherwise the new objects, which last, would be placed behind garbage
+        gc.collect()  # otherwise the module, which stays loaded, would be placed behind garbage
         from .axis_judge import AxisJudge
 
         self._judge = AxisJudge(*self._settings)
@@ -237,7 +237,7 @@ except NO_MACHINE_CODE:
 else:
     _FRAME = b"\x7f\x00\x80\xff\xff\xff\x80\x00\x80\xff\x01\x00\xab\xcd"
     decode = checked(decode, decode_python, _FRAME, 0, array("h", range(7)))
-    # Eight frames. Frames 2 and 4 are at the ends of the range, and the last frame repeats the previous one.
+    # Eight frames. Frames 2 and 4 are at the ends of the range, and the last frame repeats the frame before it.
     _TRIAL = bytearray(_FRAME * 8)
     for _k in range(7):
         _TRIAL[14 * _k + 1] = _TRIAL[14 * _k + 9] = 250 - 40 * _k

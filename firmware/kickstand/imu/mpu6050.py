@@ -24,9 +24,9 @@ from micropython import const
 
 from .fifo_frames import FRAME, SATURATED, AxisWatch, add_up, decode
 
-# setup() writes the registers from SMPLRT_DIV on one by one: SMPLRT_DIV (p. 11), CONFIG with DLPF_CFG (p. 13),
-# GYRO_CONFIG (p. 14), ACCEL_CONFIG (p. 15) and, if the chip has it, ACCEL_CONFIG2. ACCEL_CONFIG2 sets the low-pass of
-# the accelerometer alone.
+# setup() writes the registers one after another, beginning with SMPLRT_DIV: SMPLRT_DIV (p. 11), CONFIG with DLPF_CFG
+# (p. 13), GYRO_CONFIG (p. 14), ACCEL_CONFIG (p. 15) and, if the chip has it, ACCEL_CONFIG2. ACCEL_CONFIG2 sets the
+# low-pass of the accelerometer alone.
 _SMPLRT_DIV = const(0x19)
 _FIFO_EN = const(0x23)  # p. 16
 _ACCEL_XOUT_H = const(0x3B)  # p. 29; the fourteen bytes from this register on belong to one sampling instant
@@ -70,7 +70,7 @@ CHIPS = {
     0x74: ("MPU6515", 333.87, 21.0, True, 512, 0xF8),
     0x78: ("MPU6500 0x78", 333.87, 21.0, True, 512, 0xF8),
     0x98: ("ICM20689", 326.8, 25.0, True, 512, 0xF8),
-    0x19: ("MPU6886", 326.8, 25.0, True, 512, 0x18),  # it always adds the temperature to the FIFO, so it has no bit
+    0x19: ("MPU6886", 326.8, 25.0, True, 512, 0x18),  # no bit for the temperature, which the chip always stores
 }
 _NAME = const(0)
 _LSB_PER_C = const(1)
@@ -78,7 +78,7 @@ _ZERO_C = const(2)
 _HAS_ACCEL_CONFIG2 = const(3)
 _FIFO_EN_BITS = const(5)
 
-_MAX_FRAMES = const(8)  # most frames in one transfer, used after a delay; the transfer takes 3 ms at 400 kHz
+_MAX_FRAMES = const(8)  # most frames in one transfer, which then takes 3 ms at 400 kHz
 # Most frames in one transfer while fewer than _MAX_FRAMES are in the FIFO. Because of this limit, one slow pass of the
 # loop does not slow the next pass.
 _FEW_FRAMES = const(3)
@@ -224,7 +224,7 @@ class Mpu6050:
         run too. Raises OSError from the bus."""
         self._read_into(_SMPLRT_DIV, self._readback)  # SMPLRT_DIV to FIFO_EN
         self._read_into(_USER_CTRL, self._three)  # USER_CTRL, PWR_MGMT_1 and PWR_MGMT_2
-        # An accepted unknown chip is also sent ACCEL_CONFIG2, but it may not have that register.
+        # Skip ACCEL_CONFIG2 of an accepted unknown chip, because the chip may not have that register.
         for i in range(5 if self.who_am_i in CHIPS and self._chip()[_HAS_ACCEL_CONFIG2] else 4):
             if self._readback[i] != self._configuration[i]:
                 return False

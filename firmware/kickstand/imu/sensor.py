@@ -11,7 +11,7 @@ from .mpu6050 import UnknownChip
 _RETRY_MS = const(50)  # time between two attempts to set the chip up
 _FAILURES = const(3)  # number of successive failed transfers that are a fault; one or two NACKs are tolerated
 _SILENT_MS = const(100)  # longest time without a sample; a longer time is a fault
-# The same limit while the FIFO overflows because the board has no time to read it
+# Longest time without a sample while the FIFO overflows, because the board has no time to read the FIFO
 _STALE_MS = const(500)
 _SETTLED_MS = const(1000)  # if a fault returns within this time, the set-up did not help
 _FRUITLESS = const(3)  # number of successive set-ups that did not help before the FIFO is tested

@@ -8,12 +8,13 @@ State                                       Measured (a vector with [3] has the 
     v  SPEED  forward
     b  BIAS_LEFT, BIAS_UP, BIAS_FORWARD: change of the gyro's bias since the calibration
     psi  YAW_ERROR of the alignment. Pitch in the kickstand pose causes it: psi is this pitch over tan(tilt of the
-         stand). A degree of pitch causes 5 degrees of yaw error at 11 degrees of tilt, and 11 degrees at 5.
+         stand). A degree of pitch causes 5 degrees of yaw error at 11 degrees of tilt, and 11 degrees at 5 degrees of
+         tilt.
     s_x, c_xy        SCALE_LEFT, CROSS_LEFT_UP: scale error of the gyro's left axis, and its reading of a rate about up
-    c_zx, c_zy, s_z  CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD: the same for its forward axis
+    c_zx, c_zy, s_z  CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD: errors of the gyro's forward axis
 The data sheet allows 3 % of scale error and 2 % of cross-axis sensitivity. A filter without these states would mistake
-them for bias in a long turn, and for lean in a quick roll. The up axis has no such states: without a measured speed its
-scale error cannot be distinguished from an error of the speed.
+these errors for bias in a long turn, and for lean in a quick roll. The up axis has no such states: without a measured
+speed its scale error cannot be distinguished from an error of the speed.
 
 Equations, with ' for the derivative by time
     rates, corrected         w = w_m - b,  then  w_z -= c_zx w_x + c_zy w_y + s_z w_z,  w_x -= s_x w_x + c_xy w_y
@@ -30,13 +31,13 @@ which is q + psi sin t. For example, on a slope of 10 % a yaw error of 5 degrees
 removes this part, to second order in psi. On a level road q is -psi sin t, and (7) agrees with
 tan(lean of the bike) = tan t / cos psi.
 
-d is the part of the pitch rate q' that the springs cause. The wheels do not rise with it. Braking causes most of d, see
-(8) in dive.py. h is the height of the sensor above the roll axis.
+d is the part of the pitch rate q' that the springs cause. The wheels do not rise with this pitch. Braking causes most
+of d, see (8) in dive.py. h is the height of the sensor above the roll axis.
 
-(4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a steady turn they cannot separate lean from speed,
-because their derivatives by lean and by speed are in the same proportion. In such a turn the ratio of two rates gives
-the lean: by (6) the pitch does not change, so by (2) w_x / w_y is tan t. At the beginning of a turn the speed from
-before the turn is still valid, and with this speed (4) gives the lean.
+(4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a steady turn they cannot separate lean from speed. The
+reason is that the derivatives by lean and by speed have the same ratio in (4) and (5). In such a turn the ratio of two
+rates gives the lean: by (6) the pitch does not change, so by (2) w_x / w_y is tan t. At the beginning of a turn the
+speed from before the turn is still valid, and with this speed (4) gives the lean.
 """
 
 from math import cos, radians, sin, sqrt, tan
@@ -50,13 +51,14 @@ YAW_ERROR = 6
 SCALE_LEFT, CROSS_LEFT_UP = 7, 8
 CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD = 9, 10, 11
 
-# rad: largest pitch. Only a sensor in a hand reaches it, no motorcycle. At a pitch of 90 degrees the lean is undefined.
+# rad: largest pitch. A sensor in a hand can reach this pitch, but no motorcycle can. At a pitch of 90 degrees the lean
+# is undefined.
 MAX_PITCH = 1.2
 MIN_PITCH = -MAX_PITCH  # stored as a constant, because a negation for each sample would take heap and time
 
 # turn_rates() uses the yaw rate of a bike in balance if the speed is above _BALANCE_MIN_SPEED, the lean's standard
 # deviation is below BALANCE_SIGMA, and the measured rate differs by less than
-# _BALANCE_RATE + _BALANCE_SHARE x |balanced rate|. Comments in the form of measurements.py.
+# _BALANCE_RATE + _BALANCE_SHARE x |balanced rate|. The form of the comments is explained in measurements.py.
 _BALANCE_MIN_SPEED = const(4.0)  # m/s. Larger: the balanced rate is not used in slow turns.
 _BALANCE_RATE = const(0.1)  # rad/s. Larger: the balanced rate is used with a wrong lean or speed.
 _BALANCE_SHARE = const(0.5)  # ratio. Larger: the balanced rate is used with a wrong lean or speed.
@@ -127,7 +129,7 @@ def possible_pitch(pitch):
 
 
 def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
-    """Return the rates about left and up, in rad/s, for derivatives that multiply a rate by a state.
+    """Return the rates about left and up, in rad/s, to use in derivatives that multiply a rate by a state.
 
     A bike in balance has the rate v w_y / g = -cos q sin t about up. If the measured rate about up is close to this
     rate, the function returns the rates of a bike in balance. Otherwise, and with a speed of 0, it returns the measured
@@ -165,7 +167,7 @@ class Linearisation:
         speed, yaw_error = x[SPEED], x[YAW_ERROR]
         st, ct, sq = sin(x[LEAN]), cos(x[LEAN]), sin(x[PITCH])
         cq = sqrt(1.0 - sq * sq)
-        yaw_rate = wx * st + wy * ct  # about the vertical, where there is no pitch
+        yaw_rate = wx * st + wy * ct  # rate about the vertical if there is no pitch
         per_rate = speed / STANDARD_GRAVITY  # centripetal acceleration in g per rad/s of yaw rate
         sideways = per_rate * wy
         acceleration = forward - sq + sideways * yaw_error
@@ -214,6 +216,6 @@ class Linearisation:
         self.pitching = per_rate * self.pitch_rate  # in g
 
     def lean_by_pitch(self, x):
-        """Return the part of the state's lean (rad) that (7) subtracts: the yaw error makes the bike's own pitch look
-        like lean."""
+        """Return the part of the state's lean that (7) subtracts, in rad. In this part, the yaw error makes pitch of
+        the bike look like lean."""
         return x[YAW_ERROR] * self.cos_lean * (tan(x[PITCH]) + 0.5 * x[YAW_ERROR] * self.sin_lean)

@@ -13,8 +13,8 @@ Three more means are of quantities that never stay large for long on a real ride
     the pitch
     the part of the pitch that the forward force does not confirm
 On a real slope the forward force contains a part of gravity, sin(pitch). If this part is missing, the pitch is wrong,
-and was caused by wrong rates. The filter then mistakes the missing force for an acceleration. So the bike seems to
-brake uphill or to accelerate downhill for longer than a real bike does.
+because wrong rates were integrated. The filter then mistakes the missing force for an acceleration. So the bike seems
+to brake uphill or to accelerate downhill for longer than a real bike does.
 
 Each mean is compared with its own spread, as in Student's t-test. On a road rougher than the filter expects, single
 innovations are large, and their means vary more.
@@ -38,21 +38,23 @@ _SHORT_S = const(3.0)
 _LONG_S = const(10.0)
 # standard deviations: larger innovations are reduced to this value. Larger: a single blow counts for more.
 _MOST = const(4.0)
-# Limits of the means. Larger: fewer leans are hidden, both right and wrong ones. Each comment gives the largest mean in
-# rides without a fault, on good and bad roads and mounts.
-LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations. Without a fault: at most 0.4 and 0.25
-UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations. Without a fault: at most 0.7 and 0.25
+# Limits of the means. Larger: fewer right leans and fewer wrong leans are hidden. Each comment gives the largest mean
+# in rides without a fault, on good and bad roads and mounts.
+LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations. Largest without a fault: 0.4 and 0.25
+UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations. Largest without a fault: 0.7 and 0.25
 # ratio: factor on the limits of up if the six positions were not done. The data sheet allows the accelerometer a scale
 # error of 3 % and an offset of 80 mg. Without the six positions, these errors show only at rest. Larger: fewer leans
 # are hidden.
 _UNMEASURED = const(2.0)
-# ratio: force to the side divided by force up, minus the trim. Without a fault: at most 0.12
+# ratio: force to the side divided by force up, minus the trim. Largest without a fault: 0.12
 _SIDEWAYS = const(0.15)
-_STEEP = const(0.21)  # rad: pitch. Without a fault: at most 0.14
-# rad: root mean square of the pitch that the forward force does not confirm. On a recorded ride without a fault: 0.096
+_STEEP = const(0.21)  # rad: pitch. Largest without a fault: 0.14
+# rad: root mean square of the pitch that the forward force does not confirm. Largest on a recorded ride without a
+# fault: 0.096
 _SLOPE = const(0.12)
 # square of standard deviations: above this spread, the limits of left and up grow with the root of the spread. The
-# spread is the mean of half the squared change between windows. Larger: more leans are hidden on the roughest roads.
+# spread is the mean of half the squared change of the innovation from window to window. Larger: more leans are hidden
+# on the roughest roads.
 _SPREAD = const(0.4)
 # rad: limit of a steady mean lean after a doubt. Larger: fewer leans are hidden in bends, and on straights that look
 # like bends.
@@ -86,7 +88,7 @@ last_odd = None  # the last code of `odd`, for `kickstand status`
 
 
 class Consistency:
-    """Judges the innovations of each window. six_done: the six positions have measured the accelerometer.
+    """Judges the innovations of each window. six_done: True if the six positions have measured the accelerometer.
 
     Read-only attributes:
         doubt   True if the lean must not be shown
@@ -110,8 +112,8 @@ class Consistency:
         self._left_before = self._up_before = self._left_square = self._up_square = 0.0
 
     def gap(self, in_rest=True):
-        """Doubt until everything has fitted for a while, because the filter has restarted. in_rest: time at rest counts
-        as fitting."""
+        """Doubt until everything has fitted for a while, because the filter has restarted. in_rest: True if time at
+        rest counts as fitting."""
         self.doubt = True
         self._in_rest = in_rest
         self._fits_s = 0.0
@@ -145,7 +147,8 @@ class Consistency:
         self._up_long += long_gain * (up - self._up_long)
         self._side += long_gain * (max(-_MOST_SIDEWAYS, min(_MOST_SIDEWAYS, sideways)) - self._side)
         self._pitch += long_gain * (pitch - self._pitch)
-        square = -pitch * max(-abs(pitch), min(abs(pitch), push))  # pitch * pitch if all of the force is missing
+        # pitch * pitch if none of the pitch is in the forward force
+        square = -pitch * max(-abs(pitch), min(abs(pitch), push))
         self._slope_square += gain * (square - self._slope_square)
         change = left - self._left_before
         self._left_square += long_gain * (0.5 * change * change - self._left_square)

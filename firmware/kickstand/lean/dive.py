@@ -14,7 +14,9 @@ from ..units import STANDARD_GRAVITY, const
 
 # The comment of each parameter has its unit, its meaning and, after "Larger:", the effect of a larger value.
 
-PRIOR_SHARE = 0.026  # rad per g: 1.5 degrees per g. Larger: before the share is found, more pitch counts as dive.
+# rad per g: share before the first braking, 1.5 degrees per g. Larger: before the share is found, more pitch counts as
+# dive.
+PRIOR_SHARE = 0.026
 # (g/s)^2: weight of PRIOR_SHARE in the sum of a'^2. Larger: the share is found later, and varies less.
 _PRIOR_SQUARE = const(5.3)
 _MIN_SHARE = const(-0.035)  # rad per g: smallest share. It is negative, because an anti-dive fork may lift the nose
@@ -52,7 +54,7 @@ class Dive:
         self._push, self._pitch_rate = push, pitch_rate
         if last_push is None:
             return 0.0
-        jerk = (push - last_push) / seconds  # in g/s, from the middle of the last window to the middle of this one
+        jerk = (push - last_push) / seconds  # in g/s, from the middle of the last window to the middle of this window
         if not -_MAX_JERK < jerk < _MAX_JERK:  # also true for NaN
             return 0.0
         if speed > _MIN_SPEED:

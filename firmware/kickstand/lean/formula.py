@@ -12,7 +12,8 @@ _TOO_SMALL = 0.01  # (0.1 g)^2: smallest squared force that has a direction. In 
 
 
 def static_lean_deg(force):
-    """Return the lean of a standing bike in degrees, > 0 to the right. It is (21) with a sign, and exact near upright.
+    """Return the lean of a standing bike in degrees, > 0 to the right. This is equation (21) with a sign. It is exact
+    near upright.
 
     force: left, up, forward in g.
     """
@@ -20,8 +21,8 @@ def static_lean_deg(force):
 
 
 def centripetal_g(left_g, up_g, yaw_rate):
-    """Return s, the centripetal acceleration in g, by (26). The force gives its size, the yaw rate its sign, > 0 in a
-    left turn. Without a yaw rate s is 0."""
+    """Return s, the centripetal acceleration in g, by (26). The force gives the size of s. The yaw rate gives its sign,
+    which is > 0 in a left turn. Without a yaw rate s is 0."""
     excess = left_g * left_g + up_g * up_g - 1.0
     if excess <= 0.0 or yaw_rate == 0.0:
         return 0.0

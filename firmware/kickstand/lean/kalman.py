@@ -14,7 +14,7 @@ from ..units import const
 _MIN_VARIANCE = const(1e-10)  # a lower bound, because rounding in 32-bit floats could make a variance negative
 # Terms of a Jacobian's row between two yields. Without machine code three terms take a millisecond.
 _TERMS_PER_STEP = const(3)
-# Largest squared innovation, in variances, with full weight (5 sigma). Larger ones get less weight. They are not
+# Largest squared innovation, in variances, with full weight (5 sigma). Larger innovations get less weight. They are not
 # rejected, because the state may be wrong.
 _GATE = const(25.0)
 
@@ -89,7 +89,7 @@ class Covariance:
         p[i * n + i] = variance
 
     def add_noise(self, i, variance):
-        """Add process noise to the variance of state i. For states that do not depend on others."""
+        """Add process noise to the variance of state i. Use this for states that do not depend on other states."""
         self._p[i * self.n + i] += variance
 
     def propagate_row(self, i, derivatives, seconds, noise):

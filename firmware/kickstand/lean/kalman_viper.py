@@ -2,7 +2,7 @@
 
 The code takes floats apart and computes with integers. A 32-bit float (IEEE 754 binary32) has a sign, 8 bits of
 exponent and 23 bits of mantissa; the mantissa's first bit is always 1 and not stored. Each sum is rounded once, to the
-nearest float. A float below 1.2e-38 counts as 0. An infinite sum, or one over 3.4e38, becomes not-a-number.
+nearest float. A float below 1.2e-38 counts as 0. An infinite sum, or a sum over 3.4e38, becomes not-a-number.
 """
 
 import micropython
@@ -16,9 +16,10 @@ def add_products(out: ptr32, factors: ptr32, source: ptr32, n: int, rows: int): 
         if a_exponent == 0:
             continue
         if a_exponent == 255:
-            a_exponent = 1024  # then every product is too large
+            a_exponent = 1024  # an infinite factor makes every product too large
         a_exponent -= 126
-        a_high = ((a >> 12) & 0x7FF) | 0x800  # the mantissa in halves of 12 bits: a product must fit in 31 bits
+        # the mantissa is split into halves of 12 bits, because a product must fit in 31 bits
+        a_high = ((a >> 12) & 0x7FF) | 0x800
         a_low = a & 0xFFF
         at = i * n
         for k in range(i + 1 if rows > 1 else n):

@@ -7,7 +7,7 @@ update      propagate the covariance over the window, and apply each measurement
 inject      add the corrections to the state
 
 The steps from linearise to inject take longer than one sample. They are a generator, spread over the samples of the
-next window: each sample runs it to its next yield. Forces are in g, speeds in m/s, angles in rad.
+next window. Each sample runs the generator to its next yield. Forces are in g, speeds in m/s, angles in rad.
 """
 
 from math import atan2, degrees, pi, sin, sqrt
@@ -34,7 +34,7 @@ from .upright_trim import UprightTrim
 
 _WINDOW_US = const(200_000)
 _FIRST_WINDOW_US = const(50_000)
-WORK_STEPS = 21  # steps of the work on a window; a test counts them
+WORK_STEPS = 21  # number of steps of the work on a window; a test checks this number
 _SLOW_STEP_US = const(12_000)  # if samples are further apart than this, there is time for all steps at once
 DELAY_S = 0.0048  # delay of the MPU6050's gyro at DLPF 3
 # m/s: above this speed the filter restarts. A board that lies on its nose seems to accelerate, but standstill is
@@ -85,7 +85,7 @@ class LeanFilter:
                 self._kept.append((i, self._p.rows[i][i]))
         self._x = x
         self._p = None
-        self._upright = self.trim.angle  # LEAN of a bike that is upright
+        self._upright = self.trim.angle  # value of the state LEAN while the bike is upright
         self._rest = RestDetector(not self._kept)
         # _speed: the latest measured speed, until a window uses it. _last_speed: the speed used last. _speed_s: seconds
         # since then. _straight_s: seconds since straight_or_prior_speed() was used.
@@ -198,7 +198,7 @@ class LeanFilter:
         self._window_us += dt_us
         if self._work is not None:
             for _ in range(self._steps):
-                if next(self._work, True):  # a yield gives None, the end gives True
+                if next(self._work, True):  # next() returns None at a yield and True at the end
                     self._work = None
                     break
         elif self._window_us >= (_WINDOW_US if self._p is not None else _FIRST_WINDOW_US):
@@ -208,8 +208,8 @@ class LeanFilter:
         return degrees(x[LEAN] + self._delay_s * self._roll_rate - self._upright)
 
     def _end_window(self):
-        """Start the work on the window that ends, unless it is the first one, the bike comes to rest or the filter must
-        restart. The work on the previous window is finished."""
+        """Start the work on the window that ends, unless it is the first window, the bike comes to rest or the filter
+        must restart. The work on the previous window is finished."""
         n = self._count
         means = [total / n for total in self._sums]
         seconds = self._window_us * 1e-6
@@ -343,10 +343,10 @@ class LeanFilter:
         sideways = (means[5] - means[7] * x[YAW_ERROR]) / max(means[6], 0.5) - self.trim.angle
         if x[SPEED] < measurements.BALANCE_SPEED or p.rows[SPEED][SPEED] > measurements.SIGMA_BALANCE_SPEED**2:
             sideways = 0.0
-        if abs(means[7]) < measurements.MOST_FORWARD * abs(means[6]):  # else the sensor is on no bike
+        if abs(means[7]) < measurements.MOST_FORWARD * abs(means[6]):  # otherwise the sensor is not on a bike
             up_misfit = p.misfit
             if abs(x[PITCH]) > 2 * measurements.STEEP:
-                misfit = up_misfit = 0.0  # in a wheelie the equations do not hold: only its duration is judged
+                misfit = up_misfit = 0.0  # the equations do not hold in a wheelie, so only its duration is judged
             lean = x[LEAN] - self._upright
             pitch, turning = x[PITCH], model.yaw_rate
             self._failed = self.consistency.add(misfit, up_misfit, sideways, pitch, push, lean, turning, seconds)
@@ -356,8 +356,9 @@ class LeanFilter:
         self._speed_s += seconds
         self._straight_s = min(self._straight_s, seconds) + seconds
         if measured is not None and (self._last_speed is None or self._speed_s > measurements.MEASURED_SPEED_EVERY_S):
-            # The acceleration comes from measured speeds only, because a pitch error would bias the estimated one
-            acceleration, since = 0.0, 2 * measurements.SPEED_SCALE_S  # so the first speed's errors count once
+            # The acceleration comes from measured speeds only, because a pitch error would bias the estimated
+            # acceleration
+            acceleration, since = 0.0, 2 * measurements.SPEED_SCALE_S  # the noise of the first speed is not raised
             if self._last_speed is not None:
                 acceleration, since = (measured - self._last_speed) / self._speed_s, self._speed_s
             self._speed, self._last_speed, self._speed_s = None, measured, 0.0
@@ -383,7 +384,7 @@ class LeanFilter:
             x[i] += p.take_correction(i)
         x[SPEED] = max(0.0, x[SPEED])
         x[PITCH] = possible_pitch(x[PITCH])
-        # Not at rest: there the force shows the lean, and a sensor in the hand makes the yaw error meaningless
+        # Not needed at rest, where the force shows the lean. The yaw error is meaningless for a sensor in the hand.
         if not self._rest.resting:
             self._upright = self.trim.angle + model.lean_by_pitch(x)
         if x[LEAN] > pi:

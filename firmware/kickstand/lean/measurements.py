@@ -10,8 +10,8 @@ These arguments are the same in all functions:
     means: see bike_model.predict()
 
 SIGMA_... are standard deviations (1 sigma). A disturbance that lasts tau seconds affects several measurements, so their
-errors are not independent. Therefore its variance in windows of T seconds is sigma^2 2 tau / T. The parameters of
-standstill and trim are in rest.py and upright_trim.py, in the same form.
+errors are not independent. Therefore the variance of the disturbance in windows of T seconds is sigma^2 2 tau / T. The
+parameters of standstill and trim are in rest.py and upright_trim.py, in the same form.
 """
 
 from math import radians
@@ -42,8 +42,9 @@ SIGMA_START = (
     0.014,  # ratio: reading of the forward axis per rate about up
     0.014,  # ratio: scale error of the forward axis
 )
-# If the readings no longer fit (consistency.py), the filter restarts. The first two times it keeps the speed, and the
-# sensor's errors as estimated REMEMBER_S to 2 x REMEMBER_S earlier. Later it keeps nothing.
+# If the readings no longer fit (consistency.py), the filter restarts. The first two times it keeps the speed and
+# remembered errors of the sensor. These were estimated REMEMBER_S to 2 x REMEMBER_S earlier. Later restarts keep
+# nothing.
 REMEMBER_S = 10.0  # s. Larger: the remembered errors are older.
 # rad/s: standard deviation of a remembered bias. Larger: a bias that has changed is found sooner.
 SIGMA_GOOD_BIAS = radians(0.6)
@@ -63,7 +64,7 @@ MOVING_SPEED = 2.0  # m/s. Larger: slow riding on a smooth road is mistaken for 
 MOVING_S = 2.5  # s. Larger: a stop is detected later.
 # A bike is in balance above BALANCE_SPEED if the speed's standard deviation is below SIGMA_BALANCE_SPEED.
 BALANCE_SPEED = 2.0  # m/s. Larger: a slipped mount is detected at fewer speeds.
-SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a pushed bike is mistaken for a ridden one.
+SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a pushed bike is mistaken for a ridden bike.
 # ratio: largest force forward over force up on a bike. Larger: a board on a table is mistaken for a faulty sensor.
 MOST_FORWARD = 1.5
 # ratio: change of the gyro's scale and cross-axis errors with temperature since the six positions. The data sheet
@@ -81,10 +82,11 @@ PRIOR_SPEED = 15.0
 # rad: error of the integrated rates, caused by vibration. Larger: the lean follows the forces more and the gyro less.
 NOISE_ANGLE = radians(0.24)
 NOISE_SPEED = 0.35  # m/s. Larger: the estimated speed adapts sooner in turns, and is less steady on straights.
-NOISE_BIAS = radians(0.01)  # rad/s: 0.6 deg/s in five minutes of warming up. Larger: long turns are mistaken for bias.
+# rad/s: a bias drifts by 0.6 deg/s in five minutes of warming up. Larger: long turns are mistaken for bias.
+NOISE_BIAS = radians(0.01)
 # Lost readings
-# rad/s: unknown roll rate during lost readings. The unknown pitch rate is a quarter of it. Larger: after a gap the lean
-# is hidden for longer.
+# rad/s: unknown roll rate during lost readings. The unknown pitch rate is a quarter of this rate. Larger: after a gap
+# the lean is hidden for longer.
 SIGMA_LOST_RATE = radians(30.0)
 # g: unknown forward force during lost readings. Larger: after a gap the lean is hidden for longer.
 SIGMA_LOST_FORCE = 0.3
@@ -107,8 +109,8 @@ _SIGMA_ROLL_HEIGHT_M = const(0.4)  # m: standard deviation of h. Larger: forces 
 # m/s: error of a speed from a receiver or a wheel sensor. Larger: measured speeds count for less.
 _SIGMA_MEASURED_SPEED = const(1.0)
 # ratio: scale error of the measured speed. A leaning tyre has a smaller radius, and slips. The scale error of the
-# gyro's up axis adds to it, because speed x yaw rate has both. Larger: measured speeds count for less, most at high
-# speed.
+# gyro's up axis is included, because the product speed x yaw rate has both errors. Larger: measured speeds count for
+# less, most at high speed.
 _SIGMA_SPEED_SCALE = const(0.05)
 # s: time for which the error _SIGMA_MEASURED_SPEED stays the same. Larger: measured speeds count for less.
 _MEASURED_SPEED_S = const(4.0)
@@ -133,8 +135,8 @@ SIGMA_SLOPE = radians(1.6)
 # s: duration of a slope. The value is fitted to rides; real slopes last longer. Larger: the lean in bends is found less
 # well.
 _SLOPE_S = const(3.0)
-# rad: pitch at which the assumption of a level road has half its weight. At twice this pitch it has a fifth. Larger:
-# wheelies are mistaken for slopes.
+# rad: pitch at which the assumption of a level road has half its weight. At twice this pitch the assumption has a fifth
+# of its weight. Larger: wheelies are mistaken for slopes.
 STEEP = radians(6.0)
 # The bike rides straight if lean and yaw rate are below the first two of the next three limits, and the speed is above
 # the third.
@@ -181,7 +183,7 @@ def gyro_variances(sigma, r):
         return None
 
     def variance(i, j):
-        """Return the variance of the reading of the vehicle's axis i per rate about its axis j."""
+        """Return the variance of a gyro error: the reading of axis i per rate about axis j, in the vehicle's axes."""
         total = _SIGMA_GYRO_DRIFT**2
         for a in range(3):
             for b in range(3):
@@ -240,8 +242,9 @@ def straight_or_prior_speed(lean, speed, yaw_rate, seconds):
 
 
 def measured_speed(measured, speed, acceleration, seconds):
-    """Return the measurement of speed by a receiver or a wheel sensor. acceleration: m/s^2, which adds noise, because
-    the speed may be late. seconds: since the previous measured speed. Ten speeds per second count as much as one."""
+    """Return the measurement of speed by a receiver or a wheel sensor. acceleration: in m/s^2. It adds noise, because
+    the speed may be late. seconds: time since the previous measured speed. Ten speeds in a second count as much as one
+    speed."""
     late = _MEASURED_SPEED_LATE_S * acceleration
     scale = _SIGMA_SPEED_SCALE * measured
     variance = (_SIGMA_MEASURED_SPEED**2 + late * late) * max(1.0, 2 * _MEASURED_SPEED_S / seconds)

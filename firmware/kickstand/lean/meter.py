@@ -16,7 +16,7 @@ TRIM_MAX_VARIANCE = radians(0.5) ** 2  # largest variance of a trim that is kept
 _TRIM_STEP_DEG = const(0.3)  # smallest change of the trim that is saved, to protect the flash from wear
 FALLEN_DEG = 65.0  # the bike has fallen after _FALLEN_US of at least this lean
 _FALLEN_US = const(1_000_000)
-HELD_US = 75_000  # a maximum must last twice as long, because a pothole jerks the sensor for a shorter time
+HELD_US = 75_000  # a maximum must last for twice this time, because the jerk of a pothole is shorter
 _WHEELIE_DEG = const(20.0)  # pitch. No road is so steep, and the filter's equations do not hold in a wheelie.
 
 
@@ -57,7 +57,8 @@ class LeanMeter:
         if calibration is not self.calibration:
             self.suppressed_reason = None
         self.calibration = calibration
-        self._smooth_all = not (calibration.aligned and self._leans)  # pages then show left and up as well
+        # if True, the pages also show the forces to the left and up
+        self._smooth_all = not (calibration.aligned and self._leans)
         self.smooth_force[0] = self.smooth_force[1] = 0.0 if self._smooth_all else float("nan")
         self._transform = Transform(calibration)
         measured = gyro_variances(calibration.gyro_sigma, calibration.vehicle_from_sensor)
@@ -157,8 +158,8 @@ class LeanMeter:
         self._follow(dt_us)
 
     def _follow(self, dt_us):
-        """Update filter, smoothed force, fallen and maxima with the new force and rate. dt_us: since the previous
-        ones."""
+        """Update filter, smoothed force, fallen and maxima with the new force and rate. dt_us: time since the previous
+        force and rate."""
         if dt_us > LOST_US:
             if dt_us > GAP_US:
                 self.restart()
@@ -166,7 +167,7 @@ class LeanMeter:
                 self.filter.inflate_covariance(dt_us * 1e-6)
         if self._fresh:
             self._fresh = False
-            # There is no previous sample. So ignore dt_us, because the board and a replay must compute the same
+            # There is no previous sample. So ignore dt_us, because the board and a replay must compute the same lean
             dt_us, gain = 0, 1.0
         else:
             gain = dt_us / (_SMOOTH_US + dt_us)

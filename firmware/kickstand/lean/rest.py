@@ -50,8 +50,8 @@ class RestDetector:
             self._average = readings
         average = self._average
         gain = min(1.0, seconds / _AVERAGE_S)
-        # The average rate must be small after subtracting the estimated bias or only the calibrated one. Otherwise a
-        # wrong estimate, as after moving the sensor by hand, would never be corrected.
+        # The average rate must be small after subtracting either the estimated bias or only the calibrated bias.
+        # Otherwise a wrong estimate, as after moving the sensor by hand, would never be corrected.
         still = near_estimate = near_calibration = True
         for i in range(6):
             deviation = readings[i] - average[i]
@@ -64,8 +64,8 @@ class RestDetector:
                 still = still and abs(deviation) < _MAX_FORCE_G
         still = still and (near_estimate or near_calibration) and not moving
         self._still_s = self._still_s + seconds if still else 0.0
-        # A second timer, because steady braking looks still. With one timer, it would count as rest as soon as the
-        # estimated speed is low.
+        # Steady braking looks still, so there is a second timer. With one timer, braking would count as rest as soon as
+        # the estimated speed is low.
         self._not_rolling_s = self._not_rolling_s + seconds if still and not rolling else 0.0
         self.resting = self._not_rolling_s >= _REST_S or self._still_s >= _REST_ROLLING_S
         if self.resting:

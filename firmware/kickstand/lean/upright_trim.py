@@ -2,9 +2,9 @@
 upright.
 
 A bike in balance has no specific force to the side. The mean force measured on straights comes from the roll
-misalignment and from the accelerometer's drift, so both are subtracted from the lean. In turns wide tyres and a rider
-who hangs off add a force that changes its sign with the turn. The trim is the part that left and right turns have in
-common.
+misalignment and from the accelerometer's drift, so both effects are subtracted from the lean. In turns wide tyres and a
+rider who hangs off add a force that changes its sign with the turn. The trim is the part that left and right turns have
+in common.
 """
 
 from math import radians, sin
@@ -26,7 +26,8 @@ SIGMA_STRAIGHT = radians(1.5)
 # ratio: standard deviation of the force to the side in turns, divided by sin(lean). Tyres and rider cause this force.
 # Larger: turns to one side count less.
 _SIGMA_LEAN_SHARE = const(0.15)
-# ratio: variation of this force from turn to turn, divided by sin(lean), caused by the rider. Larger: turns count less.
+# ratio: variation of the force to the side from turn to turn, divided by sin(lean). The rider causes it. Larger: turns
+# count less.
 _SIGMA_TURN = const(0.04)
 # rad per rad/s: additional measurement noise, divided by the yaw rate. Larger: turns count less.
 _SIGMA_YAW_S = const(0.03)

@@ -15,7 +15,7 @@ class Bonds:
 
     def __init__(self, pin):
         self._pin = pin
-        self._keys = {}  # maps (type, key) to a value; all three come from MicroPython's bluetooth
+        self._keys = {}  # maps (type, key) to a value, all in the form of MicroPython's bluetooth
         self._changed = False
         try:
             with open(PATH) as file:
@@ -30,7 +30,7 @@ class Bonds:
 
         Args:
             kind: the type of the key.
-            index: if key is None, the index of the value among those of this type.
+            index: if key is None, the index of the value among all values of this type.
             key: the key, or None.
         """
         if key is not None:

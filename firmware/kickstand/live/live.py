@@ -22,7 +22,7 @@ def attach(radio, app):
 
 
 class Live:
-    """Sends to one phone.
+    """Sends packets to one phone.
 
     Args:
         radio: a Radio.
@@ -155,7 +155,8 @@ class Live:
         for packet in range(4):
             interval = intervals[packet]
             late_ms = ticks_diff(now_ms, dues[packet])
-            if interval and 2 * late_ms >= -period_ms:  # the next call would be farther from the scheduled time
+            # send now if the next call would be farther from the scheduled time
+            if interval and 2 * late_ms >= -period_ms:
                 dues[packet] = ticks_add(now_ms, interval - (late_ms if late_ms < period_ms else 0))
                 self._send_one(packet, lean, now_ms)
 

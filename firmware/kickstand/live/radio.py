@@ -98,7 +98,8 @@ class Radio:
         return self._attempt(self._ble.gap_advertise, _ADVERTISE_US, self._found, resp_data=self._named)
 
     def send(self, handle, data):
-        """Queue a notification. Return False if the radio has no room for it, or the phone has just disconnected."""
+        """Queue a notification. Return False if the radio has no room for the notification, or the phone has just
+        disconnected."""
         return self._attempt(self._ble.gatts_notify, self.phone, handle, data)
 
     def keep(self, handle, data):

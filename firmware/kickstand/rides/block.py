@@ -18,8 +18,8 @@ The head has these fields:
 * delay of the gyro's low-pass in tenths of a millisecond; 0 in rides up to version 0.3.0
 
 An entry describes one pass of the main loop, App.turn(), called "a turn" here. It has the number of samples (n), the
-microseconds since the previous turn, and the sums of the samples' six counts (ax ay az gx gy gz). From these a replay
-computes the same mean as the board. An entry can also be a speed. Then n is 0, and the speed in cm/s follows.
+microseconds since the previous turn, and the sums of the samples' six counts (ax ay az gx gy gz). From these numbers a
+replay computes the same mean as the board. An entry can also be a speed. Then n is 0, and the speed in cm/s follows.
 
 A position is the index of an entry (the turn that follows the fix) and the four numbers of Gps.place(). Readers up to
 version 0.4.0 do not know positions. They skip these bytes like the zeros and read the rest.
@@ -75,9 +75,9 @@ def block_length(index):
     """Return the number of bytes in ride block `index` of a file. A ride block fills the littlefs block of the same
     index.
 
-    Each block of littlefs except the first begins with 4-byte pointers to earlier blocks. It has one pointer, plus one
-    for each time that the block's index can be halved (littlefs, SPEC.md, CTZ skip-lists). A ride block that ends
-    together with a block of littlefs is never copied when the file grows."""
+    Each block of littlefs except the first begins with 4-byte pointers to earlier blocks. It has one pointer, and one
+    more pointer for each time that the block's index can be halved (littlefs, SPEC.md, CTZ skip-lists). A ride block
+    that ends together with a block of littlefs is never copied when the file grows."""
     if index == 0:
         return BLOCK
     length = BLOCK - 4
@@ -90,8 +90,8 @@ def block_length(index):
 def encode_python(entry, state, out):
     """Append an entry to a buffer.
 
-    On the board, encode() is the machine code of block_viper.py. On a computer it is this function. Both write the same
-    bytes.
+    On the board, encode() is the machine code of block_viper.py. On a computer it is this function. Both functions
+    write the same bytes.
 
     Args:
         entry: array('i', FIELDS).
@@ -141,8 +141,8 @@ except NO_MACHINE_CODE:
     encode = encode_python
 else:
     _ENTRY = array("i", (2, 9999, -30000, 30000, -1, 0, 255, -256, 0))
-    # A state for the comparison of both functions. It has a previous entry, small and large means, and three pending
-    # bits.
+    # A state to compare encode() with encode_python(). It has a previous entry, small and large means, and three
+    # pending bits.
     _STATE = array("i", (3, 1, -1, 29000, 70, -7, 254, 77, 0) + tuple(range(16, 160, 16)) + (5, 3, 0, 5000))
     encode = checked(encode, encode_python, _ENTRY, _STATE, bytearray(40))
 
@@ -184,10 +184,10 @@ class RideBlock:
         for i in range(FIELDS):
             state[i] = 0
             state[_MEANS + i] = START_MEAN
-        state[0] = 1  # the prediction divides by the n of the previous turn
+        state[0] = 1  # not 0, because the prediction divides by the n of the previous turn
         state[_PENDING] = state[_BITS] = 0
         state[_AT] = _HEAD_LENGTH + len(body)
-        # close() writes the two zeros: temperature and number of positions
+        # close() replaces the two zeros by the temperature and the number of positions
         numbers = MAGIC, _WHOLE_VERSION if len(body) > BODY_LENGTH else _VERSION, length, ride, sequence, time_us, 0
         rates = chip.accel_lsb_per_g, int(10 * chip.gyro_lsb_per_dps + 0.5), sample_hz
         version, delay = __version__.encode()[:10], int(10_000 * chip.gyro_delay_s + 0.5)

@@ -1,4 +1,4 @@
-"""Writes rides to the board's flash or an SD card, and removes the oldest to make room.
+"""Writes rides to the board's flash or an SD card, and removes the oldest rides to make room.
 
 A ride is written in parts: files of about a minute in flash, of a quarter of an hour on a card. RESERVE bytes of the
 flash always stay free for the calibration and new firmware.
@@ -14,9 +14,10 @@ from .block import BLOCK, block_length
 _DIRECTORY = 0x4000  # bit in the mode of os.stat() that marks a directory
 _ENOSPC = const(28)  # error number for a full disk; MicroPython's errno does not define it
 PART_BLOCKS = 16  # number of ride blocks in a part in flash
-# Number of ride blocks in a part on a card. A day's ride then takes 85 files. With PART_BLOCKS it would take 1300.
+# Number of ride blocks in a part on a card. A day's ride then takes 85 files. With PART_BLOCKS it would take 1300
+# files.
 _CARD_PART_BLOCKS = const(256)
-FIRMWARE = 103 * BLOCK  # space for the compiled firmware; each file takes whole blocks, each folder takes two
+FIRMWARE = 103 * BLOCK  # space for the compiled firmware; each file takes whole blocks, each folder takes two blocks
 RESERVE = 63 * BLOCK  # largest free space that an update of compiled firmware needs, plus a margin
 
 
@@ -33,7 +34,7 @@ def all_bytes(path):
 
 
 def make(path):
-    """Make a directory unless it exists. Raises OSError. Its number is EEXIST if a file has the directory's name."""
+    """Make a directory unless it exists. Raises OSError, with the number EEXIST if a file has the directory's name."""
     try:
         os.mkdir(path)
     except OSError as error:
@@ -163,7 +164,7 @@ class RideRing:
             self._oldest, self._passed = None, ride
 
     def _find_oldest(self):
-        """Return the number of the oldest ride that may have parts, or None if this step has not found one. Raises
+        """Return the number of the oldest ride that may have parts, or None if this step has not found it. Raises
         OSError."""
         passed, size = self._passed, ride_paths.RIDES_IN_GROUP
         groups = ride_paths.groups(self._directory)

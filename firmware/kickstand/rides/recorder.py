@@ -74,7 +74,7 @@ class Recorder:
         self._interrupted = False
         self._speed = self._place = None  # the last speed (cm/s) and position since the previous turn
         self._waiting = None  # the block being written
-        self._at = 0  # number of its bytes that are already written
+        self._at = 0  # number of bytes of this block that are already written
         self.active = True
         self._begin_block()
 

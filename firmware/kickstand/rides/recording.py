@@ -1,4 +1,5 @@
-"""Begins and ends recordings. Before that it imports the required modules step by step, and tests the SD card."""
+"""Begins and ends recordings. Before a recording it imports the required modules step by step, and tests the SD
+card."""
 
 import gc
 
@@ -54,7 +55,7 @@ class Recording:
         needs."""
         names = ["block", "recorder"] if self._keeper else ["block", "ride_paths", "flash_ring", "recorder"]
         for name in names + ["card_trial"] * self.on_card:
-            gc.collect()  # otherwise the module's objects, which last, would be placed behind garbage
+            gc.collect()  # otherwise the module, which stays loaded, would be placed behind garbage
             __import__("kickstand.rides." + name)
             yield
         from .recorder import Recorder
@@ -82,7 +83,7 @@ class Recording:
         """Do one step of creating the Recorder. The open menu calls this method repeatedly.
 
         One step is the import of one module and takes 0.1 s. The chip's FIFO can keep the samples of that time, but not
-        those of all steps together. If a step fails, start() reports it."""
+        the samples of all steps together. If a step fails, start() reports it."""
         if self._steps and not self._refused:
             self._refused = attempt(self._step)
 
@@ -109,8 +110,8 @@ class Recording:
         return self._refused
 
     def start_due(self):
-        """Begin to record if the settings or the keeper require it. Call this method at the first readings. Return the
-        same as start()."""
+        """Begin to record if the settings or the keeper require it. Call this method at the first readings. Return
+        None, or a Notice with the reason for a failure."""
         due, self._due = self._due, False
         return self.start() if due else None
 

@@ -76,8 +76,8 @@ def newest_ride(directory, below=RIDES_IN_ALL):
 def next_ride(directory):
     """Return the number for a new ride, which is the newest number plus one. Raises OSError.
 
-    No recording reaches the largest possible number, but a directory of the board's owner may have it. Then the new
-    ride gets a free number below it."""
+    No recording reaches the largest possible number, but a directory of the board's owner may have this number. Then
+    the new ride gets a free number below it."""
     below = RIDES_IN_ALL
     while True:
         newest = newest_ride(directory, below)

@@ -38,7 +38,7 @@ _KMH_MPS = const(1.0 / 3.6)  # one km/h in m/s
 _DAY_MS = 86_401_000  # length of a day with a leap second
 # Valid years after 2000. A receiver sends an earlier date after a week rollover, or before it knows the date.
 _YEARS = (25, 79)
-_POSITIONS = (b"GGA", b"GLL", b"GNS")  # of the kinds without a speed, these are reported first
+_POSITIONS = (b"GGA", b"GLL", b"GNS")  # sentences without a speed that are reported before other kinds
 _UBX = b"\xb5b"  # the beginning of a u-blox binary message; class, number and a two-byte length follow
 _UBX_CLASSES = b"\x01\x02\x05\x06\x0a\x0b\x0d\x10\x13\x21\x27\x28"
 _DIGITS = 5  # number of decimals of a minute of arc; the last decimal is 2 cm
@@ -55,7 +55,7 @@ class Gps:
             with the smallest delay.
     """
 
-    problem = None  # always None; only a Wheel sets its attribute of this name
+    problem = None  # always None for a Gps; a Wheel has the same attribute and sets it
 
     def __init__(self, uart):
         self._uart = uart

@@ -84,7 +84,7 @@ def open_speed(settings):
 
 def _open_uart(settings):
     pins = settings.GPS_TX, settings.GPS_RX
-    # Nothing is sent. But a UART takes two pins, and rp2's default TX is one of the sensor's pins.
+    # Set TX too, although nothing is sent. The default TX of a Pico is one of the sensor's pins.
     try:
         tx, rx = Pin(pins[0]), Pin(pins[1])
         return UART(settings.GPS_UART, settings.GPS_BAUD, tx=tx, rx=rx, rxbuf=_RX_BUFFER, timeout=0)

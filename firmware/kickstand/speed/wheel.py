@@ -19,7 +19,7 @@ _MAX_MPS = const(100.0)  # pulses that imply a higher speed are interference
 # A contact bounces if it was open for less than this time, and for less than a quarter of the shortest period
 _BOUNCE_US = const(3000)
 _STOPPED_MPS = const(0.5)  # a wheel slower than this counts as standing
-MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # after a time without a pulse the wheel counts as standing; limits of this time
+MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # limits of the time after which a wheel without pulses counts as standing
 _REPORT_MS = const(100)  # shortest time between two speeds from poll()
 _STANDING_MS = const(200)  # shortest time between two speeds of zero from poll()
 # STORM_EDGES edges in less than STORM_US are a storm, over 8,000 edges per second. The interrupt takes 33 us on a Pico,
@@ -43,14 +43,14 @@ class Wheel:
 
     Attributes:
         age_ms: the age of the speed that poll() last returned.
-        problem: a Notice to show once, or None. The caller that shows it sets problem to None.
+        problem: a Notice to show once, or None. The caller that shows the Notice sets problem to None.
     """
 
     def __init__(self, pin, pulses_per_metre, irq):
         shortest_us = int(1e6 / (pulses_per_metre * _MAX_MPS))
         self._shortest_us = shortest_us
         self._open_us = min(_BOUNCE_US, shortest_us // 4)
-        self._metre_us = 1e6 / pulses_per_metre  # divided by the period in us this gives the speed in m/s
+        self._metre_us = 1e6 / pulses_per_metre  # time between two pulses at 1 m/s
         self._stop_ms = min(MAX_STOP_MS, max(MIN_STOP_MS, int(1000.0 / (pulses_per_metre * _STOPPED_MPS))))
         self.count = 0  # number of pulses that the interrupt has counted
         self._pulse_us = ticks_us()  # time of the last pulse
@@ -74,7 +74,7 @@ class Wheel:
         self._off_ms = None  # time when poll() noticed that the interrupt is off
         self._edges = STORM_EDGES  # number of edges until the time since _edges_us is compared with STORM_US
         self._edges_us = ticks_us()
-        # The next three are used for soft interrupts only
+        # The next three attributes are used for soft interrupts only
         self._level = None  # level of the pin at the last interrupt
         self._same = False  # True after the first of two interrupts that find the level unchanged
         self._usual_us = 0  # usual time from pulse to pulse, 0 if unknown
@@ -87,7 +87,7 @@ class Wheel:
             self._edges = STORM_EDGES
             if (now - self._edges_us) & _TICKS < STORM_US:
                 self._off = True
-                pin.irq(None)  # takes no heap; done here, because in a storm the loop may get no time at all
+                pin.irq(None)  # turn off here, because in a storm the loop may get no time; this call takes no heap
             self._edges_us = now
         if pin.value():
             self._opened_us = now
@@ -99,8 +99,8 @@ class Wheel:
         """Handle a soft interrupt.
 
         During a transfer to sensor or display the interrupt waits. If the contact closes and opens meanwhile, two
-        interrupts find the level unchanged. These two count as a pulse, unless they come so early that the contact is
-        bouncing."""
+        interrupts find the level unchanged. The two interrupts count as one pulse, unless they come so early that the
+        contact is bouncing."""
         level = pin.value()
         if level != self._level or self._edges == 1:
             self._level, self._same = level, False
@@ -140,7 +140,8 @@ class Wheel:
                 self._report_ms = ticks_add(now_ms, -MAX_STOP_MS)
             return None
         self._report_ms = now_ms
-        self._moved_ms = ticks_add(now_ms, -self._stop_ms)  # kept recent for the same reason as _report_ms above
+        # a recent time, because after 6 days ticks_diff() is negative
+        self._moved_ms = ticks_add(now_ms, -self._stop_ms)
         self._noisy = False
         self._usual_us = 0
         self._seen_us = None  # the next period begins with the next pulse

@@ -9,7 +9,8 @@ from . import messages, pages
 from .wizard import ASKING, RESULT, Wizard
 
 _RESULT_MS = const(4000)
-_FRESH_MS = const(90_000)  # time after the kickstand pose in which its bias of the gyro is valid; later it may drift
+# for this time after the kickstand pose the gyro's bias from the pose is valid; later the bias may drift
+_FRESH_MS = const(90_000)
 _ASK = (("On the stand,", "press button"), ("Now upright:", "hold it, press"))
 _TAKING = ("Stand: hold", "Upright: hold")
 

@@ -88,7 +88,8 @@ class SixWizard(Wizard):
             if next(self._work, True):  # None while the work continues, True at its end
                 self._computed(now_ms)
         elif self._spoilt_turn and not self._told and self.state in (TAKING, NOTICE):
-            # Readings may also be lost because they were at the end of the range. So the message fits both cases.
+            # The turn was too fast, or readings were lost. Readings at the end of the range are lost too, so one
+            # message is enough.
             self._told = True
             self._notice(now_ms, "Turned too fast:", "turn it slower")
 

@@ -21,7 +21,8 @@ class Road:
         ends = np.cumsum([seconds for seconds, _ in legs])
         steps = np.array([mps2 for _, mps2 in legs] + [0.0])
         before, after = (steps[np.searchsorted(ends, self.t_s + off)] for off in (-1e-9, 1e-9))
-        self.mps2 = (before + after) / 2.0  # the mean at a corner makes the trapezoidal rule exact
+        # at a corner the mean of the values before and after makes the trapezoidal rule exact
+        self.mps2 = (before + after) / 2.0
         corners = np.concatenate(([0.0], np.cumsum([seconds * mps2 for seconds, mps2 in legs])))
         self.mps = np.interp(self.t_s, np.concatenate(([0.0], ends)), corners)
         self.mps[np.abs(self.mps) < 1e-9] = 0.0

@@ -128,8 +128,8 @@ def test_stops_without_a_speed_match_the_truth(ride):
 
 
 def test_mfdd_follows_its_definition():
-    """If the deceleration is constant, the MFDD equals it. Only the braking from 0.8 v0 to 0.1 v0 counts, where v0 is
-    the initial speed."""
+    """The MFDD equals the deceleration if the deceleration is constant. Only the braking from 0.8 v0 to 0.1 v0 counts,
+    where v0 is the initial speed."""
     v = np.linspace(20.0, 0.0, 2001)
     assert mfdd_mps2(v, (20.0**2 - v * v) / (2 * 5.0)) == pytest.approx(5.0, rel=1e-9)
     # decelerate at 3 m/s2 down to 0.8 v0, then at 8 and 5, then at 3 again

@@ -33,7 +33,7 @@ def maybe(**changed: float) -> Channels:
     ride.up_g += changed.get("heavier", 0.0) * middle
     ride.forward_g += changed.get("drifting", 0.0) * np.where(middle, t - BEGIN_S, 0.0)
     ride.rolling[middle] = np.arange(np.count_nonzero(middle)) % 10 < changed.get("rolling", 0.0)
-    if "rested" in changed:  # the filter found a rest during the ride, with this force
+    if "rested" in changed:  # during the ride the filter found a rest, with this upward force
         rest = (t >= 5.0) & (t < 7.0)
         ride.resting[rest] = 1.0
         ride.up_g[rest] = changed["rested"]
@@ -78,7 +78,7 @@ def test_each_condition_of_a_standstill_has_its_limit(stands, does_not):
 
 @pytest.mark.parametrize("ridden_s", [(0.0, 24.0), (8.0, 15.0)])
 def test_standstill_is_found_within_half_a_second(ridden_s):
-    """The standstill is found this fast even if it is the larger part of the log."""
+    """The standstill is found within this time even if most of the log is standstill."""
     ride = maybe()
     ride = ride.part((ride.t_s >= ridden_s[0]) & (ride.t_s < ridden_s[1]))
     times = ride.t_s[standing(ride)]

@@ -29,8 +29,8 @@ def conditioned(part, speed, acceleration, delay_s):
 
     * the scale of the integrated speed: 1 %.
     * the delay of the log's speed: 0.05 s.
-    * the error of the acceleration due to the road's slope: 0.05 m/s2 at the end of the part. From there it changes
-      backwards as a random walk of 0.1 m/s2 per root second, linear between points half a second apart.
+    * the error of the acceleration due to the road's slope: 0.05 m/s2 at the end of the part. Backwards from there this
+      error is a random walk of 0.1 m/s2 per root second. It is linear between points half a second apart.
     * each measured speed: 0.05 m/s.
     """
     time = part.t_s
@@ -125,7 +125,7 @@ def test_impossible_delay_of_the_speed_is_ignored(late_s):
     [
         ({"seconds": 30.0}, {"seconds": 29.0}),  # thirty speeds are needed
         ({"seconds": 30.0, "every_s": 0.5}, {"seconds": 29.0, "every_s": 0.5}),  # only one speed per second counts
-        # the speeds must change by 0.5 m/s rms, and their change is 0.66 s times the amplitude of the acceleration
+        # the change of the speeds must be 0.5 m/s rms; it is 0.66 s times the amplitude of the acceleration
         ({"size_mps2": 0.80}, {"size_mps2": 0.70}),
     ],
 )

@@ -46,11 +46,11 @@ def test_every_figure_of_a_stop_is_right(speed):
     assert stop.stop_s == pytest.approx(18.0, abs=near)
     assert stop.duration_s == stop.stop_s - stop.start_s
     assert stop.initial_speed_mps == pytest.approx(20.0, rel=near)
-    # the last term is the corner where braking begins within one sample
+    # the last term is the effect of the first sample, within which braking begins
     assert stop.distance_m == pytest.approx(40.0 + 20.0 * 0.12 - 5.0 * 0.02**2 / 4.0, rel=near)
     assert stop.mfdd_mps2 == pytest.approx(5.0, rel=near)
     assert stop.peak_mps2 == pytest.approx(5.0, rel=near)
-    # the step of the force is averaged over 11 samples, and its corner over 3
+    # the step of the force is averaged over 11 samples, and its corner over 3 samples
     assert stop.jerk_mps3 == pytest.approx(5.0 / 0.22 * 41 / 44, rel=near)
     assert stop.side_m == stop.heading_deg == 0.0
 
@@ -79,7 +79,8 @@ def test_jerk_is_the_steepest_change_of_the_force():
     road.mps2 = road.mps2 - braked[: len(road.t_s)]
     road.rests = (road.t_s < REST_S) | (road.t_s > 17.9)
     (stop,) = find_stops(road.channels())
-    assert stop.jerk_mps3 == pytest.approx(20.0, rel=0.15)  # smaller, because the force is smoothed twice over 0.2 s
+    # the jerk is smaller, because the force is smoothed twice over 0.2 s
+    assert stop.jerk_mps3 == pytest.approx(20.0, rel=0.15)
     assert stop.peak_mps2 == pytest.approx(6.0, rel=0.01)
     assert stop.initial_speed_mps == pytest.approx(lost, rel=0.01)
 
@@ -91,8 +92,8 @@ def test_jerk_is_the_steepest_change_of_the_force():
         # from 4 % to 15 %, at most the last 0.6 s before the deceleration exceeds 15 % are braking
         (0.3, 6.0, 0.71),
         (0.8, 6.0, 0.71),
-        (1.0, 6.0, 4.08),  # above 15 % it is braking
-        (0.24, 1.4, 0.71),  # below 0.25 m/s2 it is a slope or the wind, even above 15 %
+        (1.0, 6.0, 4.08),  # above 15 % of the full deceleration, all of it is braking
+        (0.24, 1.4, 0.71),  # below 0.25 m/s2 the cause is a slope or the wind, even above 15 %
         (0.27, 1.4, 4.08),
     ],
 )
@@ -141,7 +142,7 @@ def test_only_readings_after_the_last_gap_are_integrated():
 
 
 class TestStandstill:
-    """The rest after the stop shows the slope and the gyro's reading at rest."""
+    """The standstill after the stop shows the slope and the gyro's reading at rest."""
 
     def disturbed(self, begin_s: float, end_s: float, off_g: float = 0.1) -> float:
         """Return the MFDD if the force has an error of off_g from begin_s to end_s, counted from the standstill at
@@ -156,12 +157,13 @@ class TestStandstill:
         right = self.disturbed(9.0, 9.0)
         assert right == pytest.approx(5.0, rel=0.002)
         assert self.disturbed(2.56, 4.0) == pytest.approx(right, rel=1e-4)
-        # in this time the force counts as slope: 0.1 g during 1 of 2 s are 0.49 m/s2
+        # 0.1 g during 1 of these 2 s count as a slope of 0.49 m/s2
         assert self.disturbed(0.5, 1.5) == pytest.approx(right + 0.49, rel=0.02)
         assert self.disturbed(1.5, 2.5) == pytest.approx(right + 0.49, rel=0.02)
 
     def test_rebound_of_the_fork_is_not_part_of_the_slope(self):
-        """The mean force of the rebound is zero, so it does not change the speed. It lasts less than half a second."""
+        """The mean force of the rebound is zero, so it does not change the speed. The rebound lasts less than half a
+        second."""
         road = braking(20.0, 5.0)
         ride = road.channels()
         after = road.t_s - 18.0
@@ -188,8 +190,8 @@ def test_steep_road_does_not_change_the_figures(up):
 
 @pytest.mark.parametrize(("samples", "counts"), [(10, 0), (11, 1)])
 def test_brief_standstill_shows_no_slope(samples, counts):
-    """The road falls by 10 %. A brief standstill does not show this slope, so the stop does not count. A longer one
-    shows it."""
+    """The road falls by 10 %. A brief standstill does not show this slope, so the stop does not count. A longer
+    standstill shows it."""
     road = braking(20.0, 5.0)
     still = (road.t_s >= 18.0 - 1e-6) & (road.t_s < 18.0 + samples / RATE_HZ - 1e-6)
     found = stops_of(road.channels(forward_g=road.mps2 / STANDARD_GRAVITY - 0.1), still)
@@ -300,8 +302,8 @@ def test_hard_stop_is_shown_by_the_speed_alone(mps2, counts):
     ("hard", "easy", "counts"), [((4.0, -4.0), (8.0, -0.5), True), ((4.0, -9.0), (16.0, -0.25), False)]
 )
 def test_stop_by_speed_alone_takes_at_most_15_seconds(hard, easy, counts):
-    """Braking from 20 m/s within 12 s is a stop. Braking from 40 m/s within 20 s is not, because only the last 15 s are
-    considered."""
+    """Braking from 20 m/s within 12 s is a stop. Braking from 40 m/s within 20 s is no stop, because only the last 15 s
+    are considered."""
     top_mps = -hard[0] * hard[1] - easy[0] * easy[1]
     road = Road((REST_S, 0.0), (top_mps / 4.0, 4.0), (3.0, 0.0), hard, easy, (REST_S, 0.0))
     ride = road.channels()
@@ -329,8 +331,8 @@ def test_log_may_begin_on_the_move():
 
 
 def test_stops_are_searched_at_50_samples_per_second():
-    """The log has 200 samples per second. Each value is the mean of four, for example at 13.88, 13.885, 13.89 and
-    13.895 s."""
+    """The log has 200 samples per second. Each value is the mean of four samples, for example at 13.88, 13.885, 13.89
+    and 13.895 s."""
     road = Road((REST_S, 0.0), (5.0, 4.0), (4.0, 0.0), (4.0, -5.0), (REST_S, 0.0), rate_hz=200.0)
     (stop,) = find_stops(road.channels())
     assert stop.start_s == pytest.approx(13.8875, abs=1e-6)
@@ -338,8 +340,8 @@ def test_stops_are_searched_at_50_samples_per_second():
 
 
 def test_the_straight_line_is_the_direction_just_before_braking():
-    """The line is the mean direction over the first tenth of a second of the stop. Here the vehicle turns by half a
-    degree in that time, so the mean is a quarter of a degree from both ends."""
+    """The straight line has the mean direction of the first tenth of a second of the stop. In that time the vehicle
+    turns by half a degree, so the mean is a quarter of a degree from both ends."""
     road = braking(20.0, 5.0)
     begin = 14.0 - 0.12
     ride = road.channels(yaw_rate_dps=np.where((road.t_s > begin - 0.01) & (road.t_s < begin + 0.09), 5.0, 0.0))
@@ -351,8 +353,8 @@ def test_the_straight_line_is_the_direction_just_before_braking():
     ("hard", "easy", "earlier_s"), [((2.0, -6.0), (1.4, -2.0), 0.71), ((10.0 / 9.0, -9.0), (2.4, -2.0), 4.08)]
 )
 def test_full_deceleration_is_from_the_last_two_seconds(hard, easy, earlier_s):
-    """The rider brakes hard and then eases the brake to 2 m/s2. Before this the engine slows the bike by 0.8 m/s2. A
-    stop begins at 15 % of the full deceleration.
+    """The rider brakes hard and then eases the brake to 2 m/s2. Before the rider brakes, the engine slows the bike by
+    0.8 m/s2. A stop begins at 15 % of the full deceleration.
 
     * If the hard braking fills a quarter of the last two seconds, it is the full deceleration. 15 % of its 6 m/s2 are
       0.9 m/s2, so the engine's braking does not count.

@@ -16,7 +16,7 @@ SIZES = (0.0, 1e-3, 1e-6, 9.80665, 57.29578, 1000.0, 1e6, 1e12, -1.0)
 
 
 def _of_lines(way):
-    """Return a function that breaks a text, from a function that breaks a list of lines."""
+    """Turn a function that breaks a list of lines into a function that breaks a text."""
 
     @functools.wraps(way)
     def of_text(text: bytes, chance: random.Random) -> bytes:
@@ -27,7 +27,7 @@ def _of_lines(way):
 
 
 def _of_cells(way):
-    """Return a function that breaks a text, from a function that changes lists of cells in place."""
+    """Turn a function that changes lists of cells in place into a function that breaks a text."""
 
     @functools.wraps(way)
     def of_text(text: bytes, chance: random.Random) -> bytes:

@@ -1,8 +1,8 @@
 """Rides whose road, bike, rider, mount and sensor are drawn at random from realistic values.
 
-They use the second simulator (other_bike.py), which shares only one part with kickstand_tools.simulation: on request,
-the sensor with the data sheet's errors and its calibration by six positions. Parameters of the estimators are fitted
-with even seeds only, and figures are reported for odd ones:
+The rides come from the second simulator (other_bike.py). It shares only one part with kickstand_tools.simulation, on
+request: the sensor with the data sheet's errors and its calibration by six positions. Parameters of the estimators are
+fitted with even seeds only, and figures are reported for odd seeds:
 
     OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.drawn_rides odd 100
 """
@@ -103,7 +103,7 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
 
     seconds: longest duration.
     mounts: one mount per device on the bike. None: one device with a random mount.
-    kind: a key of DRAWN. None: a random one.
+    kind: a key of DRAWN. None: a random kind.
     sheet: True for a sensor with all errors of its data sheet, calibrated by one log of the six positions and by two
         poses. False for a sensor that only has the errors that remain after a calibration.
     """

@@ -60,7 +60,7 @@ class Measured(Known):
 def limit_ride(simulator, profile, seed, mount=None, seconds=SECONDS):
     """Return a ride with its true lean and speed as a Measured.
 
-    simulator: "simulate" or "drawn". profile: a key of TARGETS. mount: name of a mount, or None for a firm one.
+    simulator: "simulate" or "drawn". profile: a key of TARGETS. mount: name of a mount, or None for a firm mount.
     """
     if simulator == "drawn":
         kind = "sweepers" if profile == "sweeper" else profile

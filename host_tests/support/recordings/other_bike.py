@@ -105,7 +105,7 @@ def other_ride(kind, seed, seconds, height_m=0.0, speed=False):
 def _tolerances(chance):
     """Return two matrices (3, 3) with the errors of scale and of cross-axes that remain after the six positions.
 
-    The first matrix is the gyro's, the second the accelerometer's.
+    The first matrix is for the gyro, the second matrix is for the accelerometer.
     """
     return [
         np.eye(3) + chance.uniform(-1.0, 1.0, (3, 3)) * np.where(np.eye(3) > 0, scale, cross)
@@ -178,7 +178,7 @@ def _smooth(values, seconds):
 
 
 def _noise(chance, n, seconds):
-    """Return n samples of smooth noise with rms 1. It changes within about this many seconds."""
+    """Return n samples of smooth noise with rms 1. The noise changes within about this many `seconds`."""
     knots = chance.standard_normal(int(n / FINE_HZ / seconds) + 3)
     values = _smooth(np.interp(np.arange(n) / FINE_HZ / seconds, np.arange(len(knots)), knots), 0.5 * seconds)
     return values / np.std(values)

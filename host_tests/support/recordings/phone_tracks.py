@@ -33,7 +33,8 @@ def track(
     error_m: standard deviation of a position's error.
     changes_s: time within which this error changes.
     smooth_s: part of late_s that is the mean delay of a low-pass filter.
-    before_s, after_s: time that the track begins before the ride and ends after it.
+    before_s: time from the beginning of the track to the beginning of the ride. after_s: time from the end of the ride
+        to the end of the track.
     speed: True if the track has speeds.
     pace: (new time in s, factor on the speed) of each sample of the ride, to ride the same road at another speed.
     """

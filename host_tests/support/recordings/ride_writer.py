@@ -50,7 +50,7 @@ def turns(count, seed=0):
 def place(k):
     """Return the k-th position of a ride, in the form of Gps.place().
 
-    The positions are 0.1 s apart. The first one is 17.9 s before midnight on New Year's Eve.
+    The positions are 0.1 s apart. The first position is 17.9 s before midnight on New Year's Eve.
     """
     day_ms, date = 86_382_100 + 100 * k, 26 << 9 | 12 << 5 | 31
     if day_ms >= 86_400_000:
@@ -87,7 +87,7 @@ def blocks(
 
 
 def begun(length, sequence=0, block=None):
-    """Return an empty block of ride 1. block: a RideBlock to reuse, or None for a new one."""
+    """Return an empty block of ride 1. block: a RideBlock to reuse, or None for a new block."""
     block = block or RideBlock(5000)
     block.begin(length, 1, sequence, 0, CHIP, 200, bytes(80))
     return block

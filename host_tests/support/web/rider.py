@@ -82,7 +82,8 @@ class Rider:
     def moved(self):
         """Return the layout shifts if they add up to more than 0.01. People notice 0.1.
 
-        If the machine is busy while a page is loading, the browser draws the header in parts, and it shifts by 0.001.
+        If the machine is busy while a page is loading, the browser draws the header in parts, and the header shifts by
+        0.001.
         """
         shifts = self.seen("shifts")
         return shifts if sum(shift[0] for shift in shifts) > 0.01 else []
@@ -138,7 +139,7 @@ class Rider:
             for thread in Path(f"/proc/{process}/task").glob("*"):
                 if (thread / "comm").read_text().strip() == "DedicatedWorker":
                     fields = (thread / "stat").read_text().rsplit(")", 1)[1].split()
-                    ticks += int(fields[11]) + int(fields[12])  # user time and kernel time
+                    ticks += int(fields[11]) + int(fields[12])  # the sum of user time and kernel time
         return ticks / os.sysconf("SC_CLK_TCK")
 
 
