@@ -116,7 +116,11 @@ PACKAGES = {
         " imu/test_registers imu/test_sensor device/test_boards",
     ),
     "demo": _package("tools/kickstand_tools/demo/*.py", "demo/test_demo_p* simulation/test_rides"),
-    "web": _package("tools/kickstand_tools/web/*.py", "web/test_web_parts web/test_rides_guest"),
+    "web": _package(
+        "tools/kickstand_tools/web/*.py",
+        "web/test_web_parts web/test_rides_g* web/test_try_device web/test_sample_ride web/test_page_device"
+        " web/test_site",  # in a browser, runs only if the others noticed nothing
+    ),
     "fleet": _package(
         "tools/kickstand_fleet/**/*.py",
         "fleet/test_fleet_parts fleet/test_journal fleet/test_evidence fleet/test_manifest fleet/test_moved"
