@@ -4,6 +4,8 @@ import itertools
 import json
 
 import pytest
+from kickstand_tools.simulated_board.clock import Clock
+from kickstand_tools.simulated_board.lcd import Lcd
 from kickstand_tools.web.device import STATE, WHOLE_TICKS, PageDevice, display
 
 
@@ -221,21 +223,17 @@ def test_an_oled_keeps_its_text_while_a_picture_arrives(board):
 
 
 def test_characters_are_sent_only_of_a_display_that_is_on():
-    device = PageDevice()
-    try:
-        lcd = device.board.lcd
-        lcd.ddram[0] = ord("A")
-        blank = [[0x20] * 16] * 2
-        for on, two_lines, codes in (
-            (False, False, blank),
-            (True, False, blank),
-            (False, True, blank),
-            (True, True, [[0x41] + [0x20] * 15, [0x20] * 16]),
-        ):
-            lcd.on, lcd.two_lines = on, two_lines
-            assert display(lcd)["codes"] == codes
-        lcd.ddram[:16] = b"Lean 12\xdf left   "
-        assert display(lcd)["shown_deg"] == -12.0
-        assert display(lcd)["cgram"] == [0] * 64
-    finally:
-        device.board.uninstall()
+    lcd = Lcd(Clock())
+    lcd.ddram[0] = ord("A")
+    blank = [[0x20] * 16] * 2
+    for on, two_lines, codes in (
+        (False, False, blank),
+        (True, False, blank),
+        (False, True, blank),
+        (True, True, [[0x41] + [0x20] * 15, [0x20] * 16]),
+    ):
+        lcd.on, lcd.two_lines = on, two_lines
+        assert display(lcd)["codes"] == codes
+    lcd.ddram[:16] = b"Lean 12\xdf left   "
+    assert display(lcd)["shown_deg"] == -12.0
+    assert display(lcd)["cgram"] == [0] * 64
