@@ -56,8 +56,18 @@ def test_each_fault_has_its_share_of_the_fleet(drives, tmp_path):
     fleet.make_fleet(tmp_path, 100, 1, 20.0)
     rows = table(tmp_path / "TRUTH.csv")
     assert Counter(row["trouble"] for row in rows) == {
-        **{"": 67, "moved-between": 6, "moved-within": 6, "late": 3, "dead": 3, "dies": 2, "km/h": 3},
-        **{"circles": 2, "garbage": 2, "empty": 2, "cut": 2, "missing": 2},
+        "": 67,
+        "moved-between": 6,
+        "moved-within": 6,
+        "late": 3,
+        "dead": 3,
+        "dies": 2,
+        "km/h": 3,
+        "circles": 2,
+        "garbage": 2,
+        "empty": 2,
+        "cut": 2,
+        "missing": 2,
     }
     assert [row["trouble"] for row in rows] != sorted((row["trouble"] for row in rows), reverse=True)  # in any order
     assert Counter(row["status"] for row in rows) == {"aligned": 100 - 6 - 6 - 3 - 3 - 3 - 2, "refused": 23}
