@@ -21,13 +21,14 @@ def part(turn_deg=0.0, axis=UP, count=8, varied=1.0, sway=NO_SWAY, log=0):
     a = np.sqrt(varied / count / 4.0)
     terms = np.array([[1.0, sign * a, other * a, 0.0] for sign in (-1.0, 1.0) for other in (-1e-3, 1e-3)])
     force = terms[:, :3] @ np.array([mount[1], mount[2], mount[0]])
+    begin_s = np.linspace(0.0, 8.0 * (count - 1), count)
     return Blocks(
         np.tile(terms.T @ terms, (count, 1, 1)),
         np.tile(terms.T @ force, (count, 1, 1)),
         np.tile(mount.T @ sway @ mount, (count, 1, 1)),
         np.full(count, log),
-        8.0 * np.arange(count),
-        8.0 * np.arange(count) + 7.0,
+        begin_s,
+        begin_s + 7.0,
     )
 
 
@@ -112,7 +113,7 @@ def test_uncertain_sway_is_not_used():
 def log_of(seconds, turn_deg=0.0, axis=UP, at_s=0.0):
     """Return the intervals of a log whose mount rotates at at_s."""
     count = int(seconds)
-    t_s = np.arange(count) + 0.5
+    t_s = np.linspace(0.5, count - 0.5, count)
     a = np.where(np.arange(count) % 4 < 2, -0.2, 0.2)
     c = np.where(np.arange(count) % 6 < 3, -0.1, 0.1)
     terms = np.column_stack((np.ones(count), a, c, np.zeros(count)))

@@ -110,7 +110,7 @@ def test_a_mount_moves_between_two_logs_or_during_one(drives, tmp_path):
         if vehicle.trouble == "moved-between":
             assert len(logs) in (2, 3) and vehicle.moved_log in range(1, len(logs)) and row["moved_s"] == ""
             for k, (_, _, mount, *_, moved) in enumerate(logs):
-                assert moved is None and mount == pytest.approx(after if k >= vehicle.moved_log else before)
+                assert moved is None and mount == pytest.approx(after if k >= (vehicle.moved_log or 0) else before)
         else:
             ((_, route, mount, *_, moved),) = logs
             assert moved[0] == vehicle.moved_s == float(row["moved_s"]) and moved[1] is after

@@ -20,7 +20,14 @@ def road(speed=10.0, acceleration=0.0, lateral=0.0, slope=0.0, camber=0.0, count
     """Return four seconds of steady driving. lateral: acceleration to the left, in m/s2. slope, camber: in rad."""
     one = np.ones(count)
     yaw_rate = lateral / max(speed, 1e-9)
-    return Route(0.02 * np.arange(count), speed * one, acceleration * one, yaw_rate * one, slope * one, camber * one)
+    return Route(
+        np.linspace(0.0, 0.02 * (count - 1), count),
+        speed * one,
+        acceleration * one,
+        yaw_rate * one,
+        slope * one,
+        camber * one,
+    )
 
 
 def readings(route, kind="car", sensor=EXACT, sigmas=0.0):

@@ -1,11 +1,13 @@
 """Parts of the site without a browser: the server, the packed files, and the packages from npm."""
 
+import contextlib
 import http.client
 import importlib.machinery
 import importlib.util
 import io
 import json
 import os
+import socket
 import subprocess
 import sys
 import tarfile
@@ -76,6 +78,26 @@ def test_a_used_port_is_replaced_by_a_free_one(monkeypatch):
     monkeypatch.setattr(serve, "Server", refused)
     with pytest.raises(OSError, match="Cannot assign"):
         serve.server({})
+
+
+def test_the_65th_connection_ends_the_oldest_silent_one():
+    with serve.server(FILES, 0) as server, contextlib.ExitStack() as opened:
+        threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
+
+        def connect():
+            return opened.enter_context(socket.create_connection(server.server_address[:2], timeout=10.0))
+
+        connections = [connect() for _ in range(64)]
+        connections[1].setblocking(False)
+        with pytest.raises(BlockingIOError):
+            connections[1].recv(1)
+        latest = connect()
+        assert connections[0].recv(1) == b""  # it was ended
+        with pytest.raises(BlockingIOError):
+            connections[1].recv(1)
+        latest.sendall(b"GET / HTTP/1.0\r\n\r\n")
+        assert latest.recv(12) == b"HTTP/1.1 200"
+        server.shutdown()
 
 
 def test_the_same_files_give_the_same_zip():
