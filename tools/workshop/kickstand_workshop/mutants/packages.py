@@ -112,7 +112,8 @@ PACKAGES = {
     ),
     "simulated_board": _package(
         "tools/kickstand_tools/simulated_board/*.py tools/kickstand_tools/simulated_board/fakes/*.py",
-        "simulated_board/test_board_models simulated_board/test_board_[!m]* simulated_board/test_gps_hostile"
+        "simulated_board/test_board_models simulated_board/test_[dp]*_models simulated_board/test_board_[!m]*"
+        " simulated_board/test_gps_hostile"
         " imu/test_registers imu/test_sensor device/test_boards",
     ),
     "demo": _package("tools/kickstand_tools/demo/*.py", "demo/test_demo_p* simulation/test_rides"),
