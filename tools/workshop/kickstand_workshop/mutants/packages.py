@@ -116,7 +116,10 @@ PACKAGES = {
         " simulated_board/test_gps_hostile"
         " imu/test_registers imu/test_sensor device/test_boards",
     ),
-    "demo": _package("tools/kickstand_tools/demo/*.py", "demo/test_demo_p* simulation/test_rides"),
+    "demo": _package(
+        "tools/kickstand_tools/demo/*.py",
+        "demo/test_hand_bike demo/test_demo_[ps]* simulation/test_rides demo/test_demo",
+    ),
     "web": _package(
         "tools/kickstand_tools/web/*.py",
         "web/test_web_parts web/test_rides_g* web/test_try_device web/test_sample_ride web/test_page_device"
