@@ -84,6 +84,7 @@ def test_bends_of_the_road_are_apart():
         # {time: (speed, acceleration to the left)}. Fast and slow circles alternate if both are at their lower limits
         (0.0, 0.49, {10.8: (5.0, 1.75), 15.8: (2.0, 1.05), 20.8: (5.0, 1.75)}),
         (0.0, 0.5, {10.8: (5.0, -1.75), 15.8: (2.0, -1.05)}),
+        (0.5, 0.49, {16.9: (6.5, 2.275), 25.4: (4.0, 1.4), 33.9: (6.5, 2.275)}),
         (1.0, 0.49, {23.0: (8.0, 2.8), 35.0: (6.0, 2.1), 47.0: (6.0, 2.1)}),
     ],
 )

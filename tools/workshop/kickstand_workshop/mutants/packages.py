@@ -107,7 +107,7 @@ PACKAGES = {
     ),
     "cli": _package(
         "tools/kickstand_tools/cli/*.py",
-        "cli/test_printed_lines cli/test_cli_usage cli/test_blame cli/test_added_commands"
+        "cli/test_printed_lines cli/test_options cli/test_cli_usage cli/test_blame cli/test_added_commands"
         " calibration/test_cli_calibration_file",
     ),
     "simulated_board": _package(
