@@ -2,6 +2,7 @@
 
 import os
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from kickstand_tools.demo.device import seen
@@ -20,10 +21,10 @@ STATE: State = {
 }
 
 
-def drawn(paused=False, **changed):
+def drawn(paused=False, **changed: Any):
     """Return the lines of the picture."""
     console = Console(width=100, record=True, file=open(os.devnull, "w"))
-    state: State = {**STATE, **changed}
+    state: Any = {**STATE, **changed}
     console.print(screen(state, "a title", "the keys", paused))
     return console.export_text().splitlines()
 

@@ -128,7 +128,7 @@ PACKAGES = {
     "fleet": _package(
         "tools/kickstand_fleet/**/*.py",
         "fleet/test_fleet_parts fleet/test_simulated_* fleet/test_pictures_parts fleet/test_moved_parts"
-        " fleet/test_period_parts fleet/test_journal fleet/test_evidence fleet/test_manifest fleet/test_moved"
+        " fleet/test_period_parts fleet/test_journal fleet/test_evidence* fleet/test_manifest fleet/test_moved"
         " fleet/test_forward fleet/test_period fleet/test_full_disk fleet/test_fleet_page",
     ),
     "emulator": _package(  # the other modules run only with an emulated chip, whose tests take minutes
