@@ -202,6 +202,8 @@ def test_a_cards_size_is_in_its_csd():
     assert exchanged(made, 0xFF, 0xFF)[1] == 0xFE
     csd = made.exchange(b"\xff" * 16)
     assert int.from_bytes(csd[7:10], "big") == 3  # (3 + 1) * 512 KB
+    assert csd[0] == 0x40 and csd[1:7] == bytes(6) == csd[10:]
+    assert exchanged(made, 0xFF, 0xFF, 0xFF) == [0xFF] * 3  # the check sum and the end
     assert (made.ioctl(4, 0), made.ioctl(5, 0), made.ioctl(1, 0)) == (4096, 512, 0)
     made.writeblocks(2, b"a" * 512 + bytes(512) + b"c" * 512)
     assert sorted(made.data) == [2, 4]  # sectors of zeros are not stored

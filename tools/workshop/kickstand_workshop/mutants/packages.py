@@ -112,7 +112,8 @@ PACKAGES = {
     ),
     "simulated_board": _package(
         "tools/kickstand_tools/simulated_board/*.py tools/kickstand_tools/simulated_board/fakes/*.py",
-        "simulated_board/test_board_models simulated_board/test_[lops]*_models simulated_board/test_board_[!m]*"
+        "simulated_board/test_board_models simulated_board/test_[lop]* simulated_board/test_sensor_models"
+        " simulated_board/test_board_[!m]*"
         " simulated_board/test_gps_hostile"
         " imu/test_registers imu/test_sensor device/test_boards",
     ),
