@@ -128,9 +128,8 @@ PACKAGES = {
     ),
     "fleet": _package(
         "tools/kickstand_fleet/**/*.py",
-        "fleet/test_fleet_parts fleet/test_simulated_* fleet/test_pictures_parts fleet/test_moved_parts"
-        " fleet/test_period_parts fleet/test_journal fleet/test_evidence* fleet/test_manifest fleet/test_moved"
-        " fleet/test_forward fleet/test_period fleet/test_full_disk fleet/test_fleet_page",
+        "fleet/test_*_parts fleet/test_simulated_* fleet/test_journal fleet/test_evidence fleet/test_manifest"
+        " fleet/test_moved fleet/test_forward fleet/test_period fleet/test_full_disk fleet/test_fleet_page",
     ),
     "emulator": _package(  # the other modules run only with an emulated chip, whose tests take minutes
         "tools/kickstand_emulator/console_*.py tools/kickstand_emulator/device.py tools/kickstand_emulator/flash*.py"
