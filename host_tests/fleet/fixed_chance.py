@@ -1,6 +1,7 @@
 """Replaces random numbers by fixed ones, so that simulations have known results."""
 
 import itertools
+from typing import Any
 
 import numpy as np
 
@@ -18,13 +19,13 @@ class Fixed(np.random.Generator):
         self._share, self._sigmas = share, sigmas
         self._choices = itertools.chain(choices, itertools.repeat(choices[-1] if choices else 0.0))
 
-    def uniform(self, low=0.0, high=1.0, size=None):
+    def uniform(self, low: Any = 0.0, high: Any = 1.0, size: Any = None) -> Any:
         value = low + self._share * (high - low)
         return value if size is None else np.full(size, value)
 
-    def random(self, *_, **__):
+    def random(self, *_: Any, **__: Any) -> Any:
         return next(self._choices)
 
-    def normal(self, loc=0.0, scale=1.0, size=None):
+    def normal(self, loc: Any = 0.0, scale: Any = 1.0, size: Any = None) -> Any:
         value = loc + self._sigmas * scale
         return value if size is None else np.full(size, value)

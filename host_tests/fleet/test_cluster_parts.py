@@ -137,7 +137,7 @@ def test_a_task_whose_worker_died_runs_again_alone_at_the_end(way):
 @pytest.mark.parametrize("way", ["die", "cancel", "lose"])
 def test_a_task_whose_worker_died_twice_is_the_cause(way):
     found = outcomes(6, _1=[way, way], _4=["die"])
-    assert found[1][:2] == [None, CRASHED] and "died twice" in found[1][2]
+    assert found[1][:2] == [None, CRASHED] and "died twice" in str(found[1][2])
     assert found[4] == [4, "", ""] and sorted(Client.latest.begun[6:]) == [1, 4]
 
 
