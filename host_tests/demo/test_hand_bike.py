@@ -141,3 +141,11 @@ def test_it_accelerates_until_1_mps_below_its_goal(t_s, accelerates):
     bike.truth(10.0)
     bike.ride(15.0)
     assert (bike.truth(10.0 + t_s)[3] == "accelerate") is accelerates
+
+
+@pytest.mark.parametrize(("after_s", "phase"), [(1.5, "roll"), (1.68, "held turn")])
+def test_a_turn_is_held_when_the_roll_rate_is_under_0_02_rad_per_s(after_s, phase):
+    """A roll to 25 degrees has this rate after 1.58 s, and is then within 0.006 rad of its goal."""
+    bike = riding()
+    bike.lean_to(25.0)
+    assert bike.truth(20.0 + after_s)[3] == phase

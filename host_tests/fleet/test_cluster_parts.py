@@ -46,9 +46,14 @@ class Future:
 
 
 class Client:
-    """Replaces Dask's client. ways: {item: list of what its tasks do, in sequence}. Other tasks return their item."""
+    """Replaces Dask's client.
+
+    ways: {item: list of what its tasks do, in sequence}. Other tasks return their item.
+    task_s: duration of a task.
+    """
 
     ways: dict[int, list[str]] = {}
+    task_s = 0.01
     latest: "Client"
 
     def __init__(self, address, timeout):
@@ -76,8 +81,8 @@ class Client:
         self.begun.append(future.item)
         ways = self.ways.get(future.item, [])
         way = ways.pop(0) if ways else "return"
-        self.note((time.time(), (future.key, "w1")))
-        if way == "hang":
+        if way == "hang":  # no other task is announced, so none is ended on a busy machine
+            self.note((time.time(), (future.key, "w1")))
             return
         errors = {"die": KilledWorker(), "raise": ValueError("on purpose"), "lose": OSError("gone")}
         status = {"die": "error", "raise": "error", "cancel": "cancelled", "disconnect": "cancelled"}.get(
@@ -85,7 +90,7 @@ class Client:
         )
         if way == "disconnect":
             self.status = "closed"
-        threading.Timer(0.01, future.end, (status, errors.get(way))).start()
+        threading.Timer(self.task_s, future.end, (status, errors.get(way))).start()
 
     def restart_workers(self, workers, timeout, raise_for_error):
         self.restarted.append((workers, raise_for_error))
@@ -112,9 +117,15 @@ def outcomes(count, timeout_s=600.0, **ways):
 
 def test_each_task_has_one_outcome():
     assert outcomes(9) == {k: [k, "", ""] for k in range(9)}
-    latest = Client.latest
-    assert latest.most == 4  # two for each of the two workers
-    assert latest.asked == (ADDRESS, 20.0) and latest.waited == (1, 20.0)
+    assert Client.latest.asked == (ADDRESS, 20.0) and Client.latest.waited == (1, 20.0)
+
+
+@pytest.mark.parametrize(("workers", "most"), [(1, 2), (3, 6)])
+def test_each_worker_has_two_tasks_at_a_time(monkeypatch, workers, most):
+    monkeypatch.setattr(Client, "task_s", 0.4)  # all tasks are submitted before the first of them ends
+    monkeypatch.setattr(Client, "scheduler_info", lambda *_, **__: {"workers": dict.fromkeys(range(workers))})
+    outcomes(most + 1)
+    assert Client.latest.most == most
 
 
 def test_without_tasks_no_cluster_is_asked(monkeypatch):
