@@ -149,3 +149,13 @@ def test_a_turn_is_held_when_the_roll_rate_is_under_0_02_rad_per_s(after_s, phas
     bike = riding()
     bike.lean_to(25.0)
     assert bike.truth(20.0 + after_s)[3] == phase
+
+
+@pytest.mark.parametrize(("after_s", "phase"), [(1.1, "roll"), (1.3, "straight")])
+def test_a_bike_is_straight_below_a_lean_of_0_02_rad(after_s, phase):
+    """A roll from 25 degrees back to 0 reaches this lean after 1.21 s."""
+    bike = riding()
+    bike.lean_to(25.0)
+    bike.truth(30.0)
+    bike.lean_to(0.0)
+    assert bike.truth(30.0 + after_s)[3] == phase

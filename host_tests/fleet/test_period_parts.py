@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 from kickstand_fleet import files, period, tables
+from kickstand_fleet.journal import StoreJournal
 from kickstand_fleet.manifest import Period
 from kickstand_fleet.moved import Move
 from kickstand_tools.calibration.file import CalibrationFile
@@ -170,3 +171,16 @@ def test_marks_in_a_store_are_read_once_per_folder(monkeypatch):
     marks = files.identities([f"{place}/a/1", f"{place}/a/2", f"{place}/b/1", f"{place}/a/3"])
     assert asked == [f"{place}/a", f"{place}/b"]
     assert marks[f"{place}/a/3"] == "" and all(mark.startswith("3-") for mark in list(marks.values())[:3])
+
+
+def test_a_damaged_result_in_a_store_is_counted_and_computed_again():
+    place = "memory://fleet-journal/journal"
+    with StoreJournal(place) as journal:
+        for key in ("a", "b", "c"):
+            journal.add(key, period.failed(THEIRS, "crashed", key), again=key == "c")
+    for name in ("b.json", "c.again.json"):
+        files.write_bytes(f"{place}/{name}", b'{"key": "b"')
+    with StoreJournal(place) as journal:
+        assert journal.damaged == 2
+        assert ["a" in journal, "b" in journal, "c" in journal] == [True, False, False]
+        assert [found.alignment["message"] for found in journal.results(["a", "b", "c"])] == ["a"]
