@@ -136,6 +136,15 @@ def test_drives_take_about_the_wanted_time_on_later_days(drives, tmp_path):
     assert len({start // 86_400.0 for start in starts}) > 8
 
 
+def test_usually_a_drive_has_50_samples_per_second_for_about_four_minutes(drives, tmp_path):
+    fleet.make_fleet(tmp_path, 3, troubles=["moved-within"] * 3)
+    assert {route.time[1] for _, route, *_ in drives} == {0.02}
+    assert all(0.8 * 240.0 < route.time[-1] < 1.3 * 240.0 + 20.0 for _, route, *_ in drives)
+    first = (tmp_path / "TRUTH.csv").read_text()
+    fleet.make_fleet(tmp_path / "again", 3, 0, troubles=["moved-within"] * 3)
+    assert (tmp_path / "again" / "TRUTH.csv").read_text() == first  # the usual seed is 0
+
+
 def test_broken_files(drives, tmp_path):
     names = ["garbage", "empty", "cut", "missing", ""]
     made = fleet.make_fleet(tmp_path, 5, 3, 20.0, troubles=names)
