@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from kickstand_tools.demo.device import seen
-from kickstand_tools.demo.score import Score, State
+from kickstand_tools.demo.score import Score, State, table
 from kickstand_tools.demo.screen import bike, screen
 from rich.console import Console
 
@@ -120,3 +120,16 @@ def test_each_held_turn_is_counted_once():
     assert figures["held turn 2"].worst == -47.0 and figures["all"].rms_error == pytest.approx(
         ((3.0**2 + 3.0**2 + 17.0**2 + 47.0**2) / 4.0) ** 0.5
     )
+
+
+def test_a_line_separates_the_whole_ride_from_its_parts():
+    score = Score()
+    for phase in ("held turn", "roll"):
+        score.add({**STATE, "phase": phase})
+    console = Console(width=100, record=True, file=open(os.devnull, "w"))
+    console.print(table(score.figures()))
+    lines = console.export_text().splitlines()
+    starts = [
+        line.lstrip("│ ").split("  ")[0] if line.startswith("│") else line[0] for line in lines if line[:1] in "│├"
+    ]
+    assert [start.split(" │")[0].strip() for start in starts[-4:]] == ["held turn 1", "rolling in and out", "├", "all"]
