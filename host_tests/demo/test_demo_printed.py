@@ -132,17 +132,20 @@ def test_the_device_steered_by_commands():
 
 
 def test_the_scripted_rider_aligns_a_board_with_12_6_volts(tmp_path):
-    """The user's program measures the battery through a divider of 11."""
+    """The user's program measures the battery through a divider of 11. The rider also turns to its page."""
     user = tmp_path / "my.py"
-    user.write_text("import machine\nprint('battery', round(machine.ADC(26).read_u16() * 3.3 / 65535 * 11, 1))\n")
+    user.write_text(
+        "import machine\nprint('battery', round(machine.ADC(26).read_u16() * 3.3 / 65535 * 11, 1))\n"
+        "def page(meter):\n    return 'My own page', ''\n"
+    )
     shown, last_s = set(), 0.0
     with DeviceProcess("cpython", "script", 0.0, user=user) as device:
-        while last_s < 16.0 and not device.ended:
+        while last_s < 33.0 and not device.ended:
             for state in device.ticks(10.0):
                 last_s = state["t_s"]
                 shown.add(" ".join(state["lcd"]))
         device.send("quit")
-    assert any("Aligned!" in text for text in shown)
+    assert any("Aligned!" in text for text in shown) and any("My own page" in text for text in shown)
     assert "battery 12.6" in device.console
 
 

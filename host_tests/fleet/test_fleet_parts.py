@@ -237,6 +237,8 @@ def test_a_store_works_as_a_directory_does():
         files.read_bytes(f"{base}/a", 4)
     with pytest.raises(InputError, match="there is no such file"):
         files.read_bytes(f"{base}/none")
+    with pytest.raises(InputError, match=r"^nothing://a: Protocol not known"):
+        files.read_bytes("nothing://a")
     assert set(files.listed(base)) == {"memory:///fleet-parts/a", "memory:///fleet-parts/b.csv"}
     assert files.listed("memory://nowhere") == {}
     assert files.matches(f"{base}/*.csv") == ["memory:///fleet-parts/b.csv"]

