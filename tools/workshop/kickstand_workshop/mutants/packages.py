@@ -64,7 +64,8 @@ PACKAGES = {
     "published": _package("tools/kickstand_tools/calibration/published.py", "drive_alignment/test_published"),
     "aligning": _package(
         "tools/kickstand_tools/calibration/[!p]*.py tools/kickstand_tools/calibration/p[or]*.py",
-        "calibration/test_aligning_parts calibration/test_sensor_fit calibration/test_cli_calibration_file"
+        "calibration/test_aligning_parts calibration/test_poses_of_logs drive_alignment/test_drive_feed"
+        " calibration/test_sensor_fit calibration/test_cli_calibration_file"
         " calibration/test_cli_calibrate drive_alignment/test_drive_bins drive_alignment/test_cli_drive",
     ),
     "logs": _package(
