@@ -59,7 +59,7 @@ PACKAGES = {
         "firmware/kickstand/[!r]*.py",
         "device/test_settings_limits device/test_state device/test_console_words device/test_diagnosis_cases"
         " device/test_user_code_calls device/test_app_turns device/test_app_loop device/test_start_choices"
-        " device/test_status_lines device/test_boards device/test_who_is_there",
+        " device/test_status_lines device/test_opened_devices device/test_boards device/test_who_is_there",
     ),
     "published": _package("tools/kickstand_tools/calibration/published.py", "drive_alignment/test_published"),
     "aligning": _package(
