@@ -67,8 +67,15 @@ def test_the_report_of_a_new_board(report):
 
 
 def test_flash_is_counted_in_kb_and_a_written_block_is_timed(report, monkeypatch):
+    """A block of flash has 4096 bytes."""
+    written = []
+
     def fit(board, module):
-        real_open, remove = open, os.remove
+        real_open = open
+
+        def remove(path):
+            written.append(os.path.getsize(path))
+            os.remove(path)
 
         def statvfs(path):
             assert path == "/"
@@ -85,7 +92,7 @@ def test_flash_is_counted_in_kb_and_a_written_block_is_timed(report, monkeypatch
     words, took = line(report(fit=fit), "Memory").rsplit(", ", 1)
     assert words == "50 KB free; flash 400 KB free"
     assert took.endswith(" ms to write a block") and 37 <= int(took.split()[0]) <= 39
-    assert not os.path.exists("trial.tmp")
+    assert written == [4096] and not os.path.exists("trial.tmp")
 
 
 @pytest.mark.parametrize(("display", "words"), [("lcd", "LCD at 0x27"), ("ssd1306", "OLED at 0x3c")])
