@@ -87,7 +87,7 @@ PACKAGES = {
     "analysis": _package(
         "tools/kickstand_tools/analysis/*.py tools/kickstand_tools/analysis/plot/*.py",
         "analysis/test_analysis_parts analysis/test_report_words analysis/test_chart_parts analysis/test_ride_blocks"
-        " analysis/test_riding analysis/test_analysis_channels"
+        " analysis/test_drawn_values analysis/test_riding analysis/test_analysis_channels"
         " analysis/test_al* analysis/test_c* analysis/test_map",
     ),
     "overlay": _package("tools/kickstand_tools/overlay/*.py", "overlay/test_[gosv]* overlay/test_c*"),
