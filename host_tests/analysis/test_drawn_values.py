@@ -126,6 +126,8 @@ def test_the_points_of_a_map_have_time_lean_and_speed(vehicle, lean):
     line, dots = track_map.figure(points, one)["data"]
     assert line["customdata"][0] == [0.0, 0.0, 36.0] and line["customdata"][-1][0] == pytest.approx(300.0, abs=1.0)
     assert len(line["x"]) == len(dots["x"]) == len(dots["customdata"])
+    assert dots["customdata"] == [row[0] for row in line["customdata"]]
+    assert dots["customdata"] == pytest.approx(points.t_s, abs=0.051) and dots["customdata"][1] % 1.0 != 0.0
     if lean:
         assert dots["marker"]["color"][-1] == pytest.approx(30.0, abs=0.1)
         assert dots["marker"]["colorbar"]["ticktext"] == ["30", "0", "30"]

@@ -93,6 +93,14 @@ def test_values_are_in_the_gauges_order():
     assert [value[0] for value in made.at(np.array([0.05])).values] == pytest.approx([1, 2, 3, 4, 5, 6])
 
 
+def test_a_single_speed_is_not_shown():
+    """Between two speeds, values are interpolated. One speed has no neighbour, and nothing is divided by 0."""
+    none, speed = np.full(3, 0.0), np.array([math.nan, 9.0, math.nan])
+    made = shown.Shown(np.array([0.0, 0.1, 0.2]), none, none, none, speed, none, none)
+    with np.errstate(all="raise"):
+        assert made.has_speed and np.all(np.isnan(made.at(np.array([0.05, 0.1])).speed_mps))
+
+
 @pytest.fixture
 def drawn(monkeypatch):
     """Return a function that draws a picture of the gauge, and returns where the spot of the forces is, and the angles

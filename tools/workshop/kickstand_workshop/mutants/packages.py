@@ -82,7 +82,9 @@ PACKAGES = {
         " joining/test_matching joining/test_c* imports/test_joining",
     ),
     "estimation": _package(
-        "tools/kickstand_tools/estimation/*.py", "estimation/test_estimation_parts estimation/test_[esa]*"
+        "tools/kickstand_tools/estimation/*.py",
+        "estimation/test_smooth_steps estimation/test_ride_limits estimation/test_estimation_parts"
+        " estimation/test_[esa]*",
     ),
     "analysis": _package(
         "tools/kickstand_tools/analysis/*.py tools/kickstand_tools/analysis/plot/*.py",
