@@ -154,3 +154,9 @@ def test_a_cut_log_counts_its_samples(tmp_path):
     (tmp_path / "a.csv").write_text(NAMES + "\n" + "".join(f"{k / 4},0,1,0,0,0,{k}\n" for k in range(9)))
     assert csv_lines.cut_log(tmp_path / "a.csv", tmp_path / "b.csv", 0.5, 1.25) == (4, 0.75)
     assert (tmp_path / "b.csv").read_text().splitlines()[1:] == [f"{k / 4},0,1,0,0,0,{k}" for k in range(2, 6)]
+
+
+def test_a_single_sample_can_be_cut_out(tmp_path):
+    (tmp_path / "a.csv").write_text(NAMES + "\n" + "".join(f"{k / 4},0,1,0,0,0,{k}\n" for k in range(9)))
+    assert csv_lines.cut_log(tmp_path / "a.csv", tmp_path / "b.csv", 2.0) == (1, 0.0)
+    assert (tmp_path / "b.csv").read_text().splitlines() == [NAMES, "2.0,0,1,0,0,0,8"]

@@ -125,6 +125,11 @@ def test_a_stretch_from_the_end_is_counted_from_the_start():
         reader.split_stretch(Stretch(made, 2.0))
 
 
+def test_a_log_without_samples_ends_at_its_beginning(tmp_path):
+    (tmp_path / "a.csv").write_text(NAMES + "\n")
+    assert reader._from_beginning(Stretch(tmp_path / "a.csv", None, -0.5)).to_s == -0.5
+
+
 # source.py
 
 

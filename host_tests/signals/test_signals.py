@@ -18,6 +18,7 @@ from kickstand_tools.signals import (
     moving_spread,
     peak_offset,
     peaks,
+    rotation_angle,
     rotation_matrix,
     rotation_vector,
     runs,
@@ -172,6 +173,14 @@ def test_rotation_vectors_and_matrices_are_each_others_inverse():
     assert np.allclose(rotation_vector(matrices), vectors, atol=1e-12)
     assert np.allclose(rotation_matrix(np.array([0.0, 0.0, np.pi / 2.0])) @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
     assert np.allclose(cross_matrix(vectors[2]) @ vectors[3], np.cross(vectors[2], vectors[3]))
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 1e-6, 44.0, 90.0, 179.99, 180.0])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_the_angle_of_a_rotation_is_known_up_to_half_a_turn(angle_deg, axis):
+    matrix = rotation_matrix(np.radians(angle_deg) * np.eye(3)[axis])
+    assert np.degrees(rotation_angle(matrix)) == pytest.approx(angle_deg, abs=1e-9)
+    assert np.degrees(rotation_angle(np.stack([matrix, matrix.T]))) == pytest.approx([angle_deg] * 2, abs=1e-9)
 
 
 @pytest.mark.parametrize(

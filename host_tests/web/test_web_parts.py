@@ -85,7 +85,7 @@ def test_the_65th_connection_ends_the_oldest_silent_one():
         threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
 
         def connect():
-            return opened.enter_context(socket.create_connection(server.server_address[:2], timeout=10.0))
+            return opened.enter_context(socket.create_connection((serve.HOST, server.server_port), timeout=10.0))
 
         connections = [connect() for _ in range(64)]
         connections[1].setblocking(False)

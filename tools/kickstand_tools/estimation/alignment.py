@@ -23,7 +23,7 @@ from ..logs.frozen import without_frozen
 from ..logs.log import Log
 from ..logs.reader import Source, read_log
 from ..logs.source import Progress
-from ..signals import Array, Bools, rotation_vector, stretches
+from ..signals import Array, Bools, rotation_angle, rotation_vector, stretches
 from ..signals.leaning import averaged
 from .first_guess import MIN_RIDING_S, MOUNTED_DEG, MOUNTED_S, Axes, RideContradicts, RideShort, axes, standing
 from .hypotheses import Hypotheses
@@ -307,4 +307,4 @@ def _mounting(phone: str, found: Array) -> Array:
 
 
 def _off_deg(found: Array, matrix: Array) -> float:
-    return float(np.degrees(np.linalg.norm(rotation_vector(found @ matrix.T))))
+    return float(np.degrees(rotation_angle(found @ matrix.T)))

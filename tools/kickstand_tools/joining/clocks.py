@@ -11,7 +11,7 @@ import numpy as np
 
 from ..calibration.file import CalibrationFile
 from ..common.errors import InputError
-from ..signals import Array, Bools, correlations, log_likelihood_ratio, moving_mean, peaks, rotation_vector
+from ..signals import Array, Bools, correlations, log_likelihood_ratio, moving_mean, peaks, rotation_angle
 from .fit import USUAL_DRIFT
 from .match import LEAST_EVIDENCE, LEAST_LEAD, LEAST_S, MOST_DRIFT
 from .motion import STEP_S, CellMotion
@@ -71,7 +71,7 @@ def clocks(a: CellMotion, b: CellMotion, axes_a: CalibrationFile, axes_b: Calibr
     # B's axes relative to A's, once from the rates and once from both calibrations
     turn = _rotation(a, b, made.later_s)
     said = np.asarray(axes_a.vehicle_from_sensor).T @ np.asarray(axes_b.vehicle_from_sensor)
-    apart = float(np.degrees(np.linalg.norm(rotation_vector(said @ turn.T))))
+    apart = float(np.degrees(rotation_angle(said @ turn.T)))
     if apart > _MOST_APART_DEG:
         raise InputError(
             f"they turn alike, but by their calibrations about axes that are {apart:.0f} degrees apart: is one of "

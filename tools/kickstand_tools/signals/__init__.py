@@ -394,10 +394,23 @@ def rotation_vector(matrix: Array) -> Array:
     matrix: shape (..., 3, 3).
     Returns an array of shape (..., 3), in rad.
     """
-    axis = np.stack([matrix[..., i, j] - matrix[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=-1)
-    sine = np.linalg.norm(axis, axis=-1, keepdims=True)  # twice the sine of the angle
-    angle = np.arctan2(sine, np.trace(matrix, axis1=-2, axis2=-1)[..., None] - 1.0)
-    return axis / np.maximum(sine, 1e-12) * angle
+    axis = _twice_the_sine(matrix)
+    return axis / np.maximum(np.linalg.norm(axis, axis=-1), 1e-12)[..., None] * rotation_angle(matrix)[..., None]
+
+
+def rotation_angle(matrix: Array) -> Array:
+    """Return the angles of rotation matrices, from 0 to pi. They are exact for 180 degrees, too.
+
+    matrix: shape (..., 3, 3).
+    Returns an array of shape (...), in rad.
+    """
+    sine = np.linalg.norm(_twice_the_sine(matrix), axis=-1)
+    return np.arctan2(sine, np.trace(matrix, axis1=-2, axis2=-1) - 1.0)
+
+
+def _twice_the_sine(matrix: Array) -> Array:
+    """Return the axes of rotation matrices, shape (..., 3). Their length is twice the sine of the angle."""
+    return np.stack([matrix[..., i, j] - matrix[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=-1)
 
 
 # At a standstill, the readings hardly change. Standstills are used for zero-velocity updates and for the gyro's bias.

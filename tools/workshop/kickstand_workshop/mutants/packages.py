@@ -57,12 +57,15 @@ PACKAGES = {
     ),
     "firmware": _package(  # the modules outside folders
         "firmware/kickstand/[!r]*.py",
-        "device/test_settings_limits device/test_boards device/test_who_is_there device/test_user_code",
+        "device/test_settings_limits device/test_state device/test_console_words device/test_diagnosis_cases"
+        " device/test_user_code_calls device/test_app_turns device/test_app_loop device/test_start_choices"
+        " device/test_status_lines device/test_opened_devices device/test_boards device/test_who_is_there",
     ),
     "published": _package("tools/kickstand_tools/calibration/published.py", "drive_alignment/test_published"),
     "aligning": _package(
         "tools/kickstand_tools/calibration/[!p]*.py tools/kickstand_tools/calibration/p[or]*.py",
-        "calibration/test_aligning_parts calibration/test_sensor_fit calibration/test_cli_calibration_file"
+        "calibration/test_aligning_parts calibration/test_poses_of_logs drive_alignment/test_drive_feed"
+        " calibration/test_sensor_fit calibration/test_cli_calibration_file"
         " calibration/test_cli_calibrate drive_alignment/test_drive_bins drive_alignment/test_cli_drive",
     ),
     "logs": _package(
@@ -79,11 +82,14 @@ PACKAGES = {
         " joining/test_matching joining/test_c* imports/test_joining",
     ),
     "estimation": _package(
-        "tools/kickstand_tools/estimation/*.py", "estimation/test_estimation_parts estimation/test_[esa]*"
+        "tools/kickstand_tools/estimation/*.py",
+        "estimation/test_smooth_steps estimation/test_ride_limits estimation/test_estimation_parts"
+        " estimation/test_[esa]*",
     ),
     "analysis": _package(
         "tools/kickstand_tools/analysis/*.py tools/kickstand_tools/analysis/plot/*.py",
-        "analysis/test_analysis_parts analysis/test_riding analysis/test_analysis_channels"
+        "analysis/test_analysis_parts analysis/test_report_words analysis/test_chart_parts analysis/test_ride_blocks"
+        " analysis/test_drawn_values analysis/test_riding analysis/test_analysis_channels"
         " analysis/test_al* analysis/test_c* analysis/test_map",
     ),
     "overlay": _package("tools/kickstand_tools/overlay/*.py", "overlay/test_[gosv]* overlay/test_c*"),
