@@ -8,7 +8,9 @@ from .units import __version__ as __version__
 
 
 def status(wirings=False):
-    """Print the board's status: versions, settings, sensor, display, calibration.
+    """Print a report of the board: versions, settings, sensor, display, button, speed, calibration, memory, flash.
+
+    Stop the app first, because the report opens sensor and display, and writes a file for a trial.
 
     Args:
         wirings: True to show the number of each known backpack wiring on the character display for some seconds.

@@ -28,8 +28,8 @@ def open_lcd(settings, wiring=None):
 
 
 def open_sensor(settings):
-    """Open the chip as a Sensor. The Sensor's fetch() raises SettingsError for pins that the I2C controller cannot
-    use."""
+    """Return the Sensor of the settings. The Sensor's first step opens the bus. This step raises SettingsError for pins
+    that the I2C controller cannot use."""
     ranges = settings.ACCEL_RANGE_G, settings.GYRO_RANGE_DPS
     rates = settings.DLPF, settings.SAMPLE_HZ
     chip = Mpu6050(None, settings.SENSOR_ADDRESS, *ranges, *rates, settings.ACCEPT_WHO_AM_I)

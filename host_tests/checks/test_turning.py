@@ -36,7 +36,7 @@ def reported(*left, windows=10, unbiased=True, swing=0.0):
 @pytest.mark.parametrize(
     ("left", "best"),
     [
-        # a residual counts 1.3 times if some axes are reversed, and 1.6 times if axes are exchanged
+        # A residual is multiplied by 1.3 if some axes are reversed, and by 1.6 if axes are exchanged
         ([(AS_IT_IS, 0.1), (OPPOSITE, 0.02), (ONE_REVERSED, 0.0155), (EXCHANGED, 0.0126)], OPPOSITE),
         ([(AS_IT_IS, 0.1), (OPPOSITE, 0.02), (ONE_REVERSED, 0.0153), (EXCHANGED, 0.0126)], ONE_REVERSED),
         ([(AS_IT_IS, 0.1), (OPPOSITE, 0.02), (ONE_REVERSED, 0.0155), (EXCHANGED, 0.0124)], EXCHANGED),

@@ -80,7 +80,8 @@ def test_a_faster_sensor_is_averaged():
     of 10 ms, or four at steps of 5 ms."""
     values = np.array([0.0, 1.0, 4.0, 9.0, 16.0, 25.0, 36.0])[:, None] * [1.0, 1.0, 1.0]
     fast = sensor(np.arange(7) * 10.0, values)
-    assert join.on_clock(fast, np.array([30 * MS]), 15.0 * MS)[0, 0] == 9.0  # not averaged if 1.5 times as fast
+    # Samples are not averaged if the step of the clock, here 15 ms, is at most 1.5 steps of the sensor
+    assert join.on_clock(fast, np.array([30 * MS]), 15.0 * MS)[0, 0] == 9.0
     assert join._averaged(fast, 20.0 * MS)[:, 0] == pytest.approx([0.5, 2.5, 6.5, 12.5, 20.5, 30.5, 36.0])
     assert (
         join.on_clock(fast, np.array([30 * MS]), 15.2 * MS)[0, 0]

@@ -79,7 +79,7 @@ def toggled(low, high):
     return lambda column: np.where(np.arange(len(column)) % 3 == 0, low, high)
 
 
-ILL = [  # pairs of the words of a notice and the fault
+ILL = [  # each entry has the text of a notice and the fault that causes this notice
     ("Gyro x dead", stuck(4, lambda column: 0 * column)),
     ("Gyro y dead", stuck(5, lambda column: 0 * column - 1)),
     ("Gyro z dead", stuck(6, lambda column: 0 * column + 317)),

@@ -150,8 +150,8 @@ def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
     turn = np.degrees(rotation_vector(other.frame @ one.frame.T))
     road = ROAD_DEG if before.log[-1] == after.log[0] else OTHER_ROAD_DEG
     variance = one.variance + other.variance + 2.0 * road**2
-    # The direction of the sway measures yaw independently. An error between the two yaws makes the sway seem to turn
-    # by the same angle
+    # The direction of the sway measures the yaw in another way than the frame. An error between the yaws of the two
+    # frames makes the sway seem to turn by the same angle
     swayed = one.sway_variance + other.sway_variance + 2.0 * SWAY_DEG**2
     error = (other.sway_deg - one.sway_deg + 90.0) % 180.0 - 90.0
     if swayed < SWAY_WORST_DEG**2 and error**2 < SWAY_SIGMAS**2 * (swayed + variance[1]):

@@ -51,7 +51,7 @@ class EventFinder:
             self._straight_change[lag] = 0.0
 
     def update(self, change_mps, seconds, straight):
-        """Take the change of speed in one interval.
+        """Add one interval with its change of speed.
 
         Args:
             change_mps: the change of speed in m/s.

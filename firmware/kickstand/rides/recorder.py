@@ -131,7 +131,7 @@ class Recorder:
                 self._begin_block()
 
     def add_fix(self, speed_mps, place):
-        """Keep a speed and a position for the next turn. They replace earlier values since the previous turn.
+        """Keep a speed and a position until the next turn of the app's loop. They replace the values that were kept.
 
         Args:
             speed_mps: a new speed in m/s, or None.

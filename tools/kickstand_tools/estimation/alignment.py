@@ -192,11 +192,13 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
 def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) -> Estimate:
     """Estimate the motion, and the misalignment relative to a first guess.
 
-    The alignment is the result's matrix times the guess's matrix. All blocks of the result have the same parameters.
+    The alignment is the result's matrix times the guess's matrix. The accelerometer's offset may change from block to
+    block. The other parameters are almost the same in all blocks of the result.
 
     windows: along the sensor's axes.
     expected: rotation from sensor to vehicle axes of the mounting that the user named, shape (3, 3); None if unknown.
-    Raises RefusedInput if no alignment fits.
+        This rotation is the prior, with the standard deviation PHONE_SIGMA_DEG.
+    Raises RefusedInput if the equations have no solution, or if the estimate does not converge.
     """
     sigma, mean = Prior.of_pose(six_done=False).sigma, MEAN.copy()
     sigma[ROTATION], sigma[ACCEL], sigma[BESIDE] = ROTATION_SIGMA, AXES_SIGMA, BESIDE_SIGMA_G

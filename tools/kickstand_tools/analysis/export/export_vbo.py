@@ -55,7 +55,9 @@ _SAME_M = 1e-3  # a larger movement between two rows, which are 0.01 s apart, gi
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
     """Write the file. Lines end in CR and LF. Date and times are UTC.
 
-    blocks: should have positions in as many rows as possible.
+    blocks: at least one block. They should have positions in as many rows as possible. A channel that is NaN in the
+        whole first block is left out of the file.
+    start_s: time of the log's t_s = 0, in s since 1970.
     """
     first = next(blocks)  # the first block shows which channels the log has; a missing channel is NaN in all blocks
     other = [column for column in OTHER if not np.all(np.isnan(getattr(first, column[2])))]

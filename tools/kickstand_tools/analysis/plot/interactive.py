@@ -19,7 +19,8 @@ _MARGIN = {"l": 80, "r": 80, "t": 100, "b": 80}
 _NARROW_MARGIN = {"l": 52, "r": 12, "t": 160, "b": 60}
 _ASIDE = 0.085  # space between charts side by side, as a share of the width of the window
 _SMALL = {"font": {"size": 12}}
-_OWN_WORDS: dict[str, Any] = {"hoverinfo": "none"}  # page.js writes the words for each trace, found by the trace's name
+# Plotly shows no text where the pointer is. page.js finds the trace by its name, and shows a text of its own
+_OWN_WORDS: dict[str, Any] = {"hoverinfo": "none"}
 _INK = "rgb(36,36,36)"
 # Colours from rare to frequent. The first colour is visible on white and, with inverted colours, on a dark background.
 _OFTEN = [[0.0, "#5aabab"], [0.35, "#2f93b4"], [0.7, "#235fa5"], [1.0, "#0b1f5c"]]

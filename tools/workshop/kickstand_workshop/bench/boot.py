@@ -55,7 +55,7 @@ def boot(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes], c
     files: Calibration files of the board.
     compiled: True to install the firmware as .mpy files.
 
-    Raises NotReached if the display shows no lean within 10 s.
+    Raises NotReached if one of these parts takes over 10 s.
     """
     board_files = flash_image.firmware(compiled, kind.MPY) | files
     with kind(world, board_files) as device:
