@@ -232,7 +232,7 @@ print(attempt(use), len(made))
 
 
 def test_a_report_that_cannot_be_worded_gives_its_code(board, monkeypatch, capsys):
-    """After a failure of flash or heap, the module with the words may not load. This must not end the ride."""
+    """After a failure of flash or heap, the module with the words may not load. The ride continues nevertheless."""
     errors.report(errors.StoreError("not-written", "EIO"))
     monkeypatch.setitem(sys.modules, "kickstand.console", None)
     errors.report(errors.StoreError("not-written", "EIO"))

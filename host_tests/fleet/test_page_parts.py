@@ -81,7 +81,7 @@ def test_the_page_says_how_many_results_are_missing():
 
 @pytest.mark.parametrize(("at_s", "written"), [(14.9, 1), (15.1, 2)])
 def test_results_are_written_during_a_run_every_15_seconds(tmp_path, monkeypatch, at_s, written):
-    """The last writing is that of the end."""
+    """The results are also written once at the end of the run."""
     times = iter([0.0, at_s, at_s, at_s, *[at_s] * 50])
     monkeypatch.setattr(run.time, "monotonic", lambda: next(times))
     count = []

@@ -83,9 +83,9 @@ def test_a_trend_is_subtracted_by_weight():
 
 
 def test_an_outlier_weighs_less_by_students_distribution():
-    """The sizes of four errors of weight 1 are 1, 1, 1 and 4. Their usual size is their median divided by 0.6745, which
-    is 1.4826. In units of this size an error is e = error / 1.4826. With f degrees of freedom its weight is
-    (1 + 1 / f) / (1 + e^2 / f) / 1.4826^2."""
+    """Four errors have a weight of 1. Their sizes are 1, 1, 1 and 4, with the median 1. The standard deviation s is the
+    median divided by 0.6745, so s is 1.4826. With f degrees of freedom, the new weight of an error e is
+    (1 + 1 / f) / (1 + (e / s)^2 / f) / s^2."""
     f, usual = fit._FREEDOM, 1.0 / 0.6745
     error = np.array([[1.0, -1.0, 1.0, 4.0, 9.0]])
     weight = np.array([[1.0, 1.0, 1.0, 1.0, 0.0]])

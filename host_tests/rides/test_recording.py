@@ -198,7 +198,7 @@ def test_a_turn_that_fills_a_block_waits_for_the_previous_one(recorder, keeper):
 @pytest.mark.parametrize(("ms", "slow"), [(9, False), (12, True)])
 @pytest.mark.parametrize(("step", "fails"), [("begin", ""), ("begin", "begin"), ("abandon", "begin"), ("write", "")])
 def test_a_step_of_over_10_ms_was_an_erase_of_the_flash(step, fails, ms, slow, stops_interrupts, recorder, keeper):
-    """The recorder also reports the erase if the ride could not begin."""
+    """The recorder reports the erase even if the ride could not begin."""
     keeper.stops_interrupts, keeper.fails = stops_interrupts, fails
     keeper.takes_ms = {step: ms}
     start(recorder)

@@ -8,7 +8,7 @@ class PageTurner:
 
     def __init__(self):
         self._wanted = []
-        self._seen = []  # the views shown at the presses so far, in the search for _wanted[0]
+        self._seen = []  # the view at each press since the search for _wanted[0] began
 
     def turn_to(self, name):
         """Add a view to the wanted views. The names are in kickstand/state.py."""

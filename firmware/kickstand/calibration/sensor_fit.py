@@ -39,7 +39,7 @@ _MAX_CROSS_ERROR = const(0.06)
 _MAX_MISFIT = const(0.012)  # largest misfit of a turn after the fit, in rad
 # Largest misfit of a turn before the fit, in rad. The errors in the data sheet add up to 0.2 in half a turn.
 _GROSS_MISFIT = const(0.25)
-# Factors between the reading of a faulty axis and the true rate. They are tried to find a single wrong axis.
+# An axis of a faulty gyro may read the true rate times one of these factors. Each factor is tried on each axis.
 _READS = const((-1.0, 0.25, 0.5, 0.75, 1.3, 2.0, 4.0))
 _DEAD_RAD = const(0.2)  # an axis that measured less than this angle in every turn is dead
 # Largest standard error of a measured scale. With a larger standard error, no turn about this axis has measured the

@@ -179,7 +179,7 @@ class Consistency:
         return False
 
     def rest(self, seconds):
-        """Take a window at rest.
+        """Process a window at rest. seconds: its length.
 
         A doubt that comes only from a gap ends here at once, because at rest the force shows the lean."""
         if self.doubt and self._in_rest and self.doubts <= MILD:

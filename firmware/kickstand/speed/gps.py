@@ -69,7 +69,7 @@ class Gps:
         # A fix is stored as (ticks_ms() at its arrival, its time of day in ms).
         self._reference = None  # the fix from which delays are counted
         self._earliest = None  # the fix with the smallest delay since the reference was set
-        self._earliest_delay_ms = 0  # the delay of the fix _earliest
+        self._earliest_delay_ms = 0  # the delay of this fix
         self._fixes = 0  # number of fixes with a delay since the reference was set
         self._since_ms = 0  # ticks_ms() when the reference was set
         self.age_ms = 0

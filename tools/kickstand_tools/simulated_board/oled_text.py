@@ -12,7 +12,7 @@ _DIGIT_ROWS = 5  # height of a large digit, in pages
 _DIGIT_COLUMNS = 24
 _SPREAD = [sum([3 << 2 * bit for bit in range(4) if nibble >> bit & 1]) for nibble in range(16)]
 _LETTERS = {bytes(FONT[8 * i : 8 * i + 8]): chr(32 + i) for i in range(95)}
-# The driver's pictures for codes of an HD44780's ROM that are not ASCII
+# The driver draws these three characters itself, because they are not ASCII
 _LETTERS[bytes((0, 15, 9, 9, 15, 0, 0, 0))] = "\u00b0"
 _LETTERS[bytes((0, 0, 127, 62, 28, 8, 0, 0))] = "\u2192"
 _LETTERS[b"\xff" * 8] = "\u2588"
