@@ -58,7 +58,7 @@ def rested(force=(0.0, 0.0, 1.0), rate=(0.0, 0.0, 0.0), noise_g=0.005, noise_dps
 
 def test_a_sound_sensor_at_rest_is_good():
     """The messages contain the noise by the data sheet, which is computed from its noise density and the bandwidth. The
-    rounding to counts adds a third of a count.
+    rounding to counts is another noise, of a third of a count. The squares of both noises are added.
 
     * Accelerometer: 0.0004 g times the root of 1.57 x 44 Hz is 3.325 mg, with the rounding 3.326 mg.
     * Gyro: 0.005 deg/s times the root of 1.57 x 42 Hz is 0.0406 deg/s, with the rounding 0.0409 deg/s.

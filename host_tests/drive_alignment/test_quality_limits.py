@@ -196,11 +196,11 @@ def test_bias_and_vertical_are_means_over_the_stop():
     assert standing.up and np.degrees(np.arcsin(standing.up[2])) == pytest.approx(20 / 41, rel=0.03)
 
 
-def test_a_same_stop_differs_by_less_than_15_degrees():
+def test_a_tilt_of_up_to_1_5_degrees_does_not_end_a_stop():
     for pitch, standing_still in ((1.3, True), (2.9, False)):
         standing = StandingVertical()
         stand(standing, pitched(0.0), 4.0)
-        for _ in range(3):  # the pitch changes slowly, so the force counts as still
+        for _ in range(3):  # calls with the same pitch
             stand(standing, pitched(pitch), 1.5)
         assert standing.standing is standing_still and not standing.moved
 

@@ -59,7 +59,7 @@ TIGHT_DPS = 20.0
 
 @dataclass
 class Intervals:
-    """n intervals between two consecutive speeds of a log.
+    """n intervals of a log. Each lasts from one speed to the next speed.
 
     t_s: Middle of each interval, shape (n), in s from the log's beginning.
     force: Mean force of each interval, shape (n, 3), in g along the sensor's axes.

@@ -16,7 +16,9 @@ TRIM_MAX_VARIANCE = radians(0.5) ** 2  # largest variance of a trim that is kept
 _TRIM_STEP_DEG = const(0.3)  # smallest change of the trim that is saved, to protect the flash from wear
 FALLEN_DEG = 65.0  # the bike has fallen after _FALLEN_US of at least this lean
 _FALLEN_US = const(1_000_000)
-HELD_US = 75_000  # a maximum must last for twice this time, because the jerk of a pothole is shorter
+# Half of the time for which a lean must last to count as a maximum. The jerk of a pothole is shorter than the whole
+# time
+HELD_US = 75_000
 _WHEELIE_DEG = const(20.0)  # pitch. No road is so steep, and the filter's equations do not hold in a wheelie.
 
 

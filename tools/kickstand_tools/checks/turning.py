@@ -6,8 +6,9 @@ plus the acceleration. The acceleration follows from the velocity V, which is gi
 
     C f = up + C (dV/dt + rate x V) / g
 
-V is the log's speed times a constant direction. Without a speed, V is a velocity that changes slowly. Least squares fit
-`up`, V and the gyro's bias, with a prior for V and the bias. The residual shows how well the rates fit the forces.
+V is the log's speed times a constant direction. Without a speed, V is a velocity that changes slowly. The method of
+least squares estimates `up`, V and the gyro's bias, with a prior for V and the bias. The residual shows how well the
+rates fit the forces.
 """
 
 from dataclasses import dataclass

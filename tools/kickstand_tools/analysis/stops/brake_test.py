@@ -108,7 +108,11 @@ def find_stops(channels: Channels) -> list[Stop]:
 
 
 def stops_of(ride: Channels, still: NDArray[np.bool_]) -> list[Stop]:
-    """Find the stops of a whole ride averaged over RATE_S. still: True where the vehicle stands still, shape (n)."""
+    """Find the stops of a whole ride.
+
+    ride: means over RATE_S each.
+    still: True where the vehicle stands still, shape (n).
+    """
     delay_s = speed_delay_s(ride)
     found, after = [], 0
     for start, end in stretches(still):
