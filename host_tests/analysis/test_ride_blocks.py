@@ -1,4 +1,4 @@
-"""What is read of a ride, what is left out, and what is said about it."""
+"""The data that a report reads from a ride, the parts that it leaves out, and its messages."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""How display, sensor and button are opened on the pins of config.py, and what is said about pins and faults."""
+"""Display, sensor and button are opened on the pins of config.py. Wrong pins and faults are reported."""
 
 import sys
 from types import SimpleNamespace

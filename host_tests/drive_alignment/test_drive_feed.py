@@ -1,4 +1,4 @@
-"""What an alignment by driving gets from several logs, and what is found from a known drive."""
+"""The data that an alignment by driving gets from several logs, and its result for a known drive."""
 
 from array import array
 from typing import Any
@@ -81,7 +81,7 @@ def test_a_gap_interrupts_but_the_stop_continues():
 
 
 def test_the_next_log_interrupts_and_ends_the_stop():
-    """The end of a stop is told to StandingVertical as a motion, without a duration."""
+    """StandingVertical gets the end of a stop as a motion without a duration."""
     calls, looks, watch = fed(steady(0.1, {}), steady(0.1, {3: 9.0}, "b"))
     assert calls == [
         ("update", 90_000), ("update", 10_000), ("interrupt",), ("update", 4.0, 0.0),

@@ -1,4 +1,4 @@
-"""How a ride is cut for its smoothing, which values come out, and what is said about it. The estimate is replaced."""
+"""A ride is cut for its smoothing. The result has known values and messages. The estimate is replaced."""
 
 from types import SimpleNamespace
 from typing import Any

@@ -16,7 +16,7 @@ from kickstand_workshop.evaluation import estimators, real_ride, runs
 from kickstand_workshop.evaluation.estimators import Samples
 from support.command import refused, works
 
-pytestmark = pytest.mark.long  # the rides of a fixture are computed anew in each process that gets one of its tests
+pytestmark = pytest.mark.long  # each process that gets one of its tests computes the rides of a fixture
 
 THERE = [name for name in estimators.OTHERS if estimators.PACKAGES.get(name) not in estimators.missing()]
 

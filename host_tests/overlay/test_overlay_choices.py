@@ -1,4 +1,4 @@
-"""Which files and options an overlay accepts, what it says about others, and what is shown at the ends of a ride."""
+"""Files and options that an overlay accepts, messages about others, and the picture at the ends of a ride."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""An app whose parts are replaced by objects that record what is called."""
+"""An app whose parts are replaced by objects that record the calls."""
 
 from types import SimpleNamespace
 from typing import Any

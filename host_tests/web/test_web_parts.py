@@ -243,16 +243,16 @@ def test_npm_installs_the_packages_of_the_lists_once(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("told", "message"),
+    ("npm", "message"),
     [
         ({"code": 1, "said": "npm error 404 Not Found: x"}, "npm says: 404 Not Found: x"),
         ({"error": subprocess.TimeoutExpired("npm", 300)}, "npm took too long"),
         ({"error": OSError(28, "No space left on device")}, "kickstand cannot be written: No space left"),
     ],
 )
-def test_a_failed_installation_leaves_nothing(tmp_path, monkeypatch, told, message):
+def test_a_failed_installation_leaves_nothing(tmp_path, monkeypatch, npm, message):
     monkeypatch.setattr(npm_packages.Path, "home", lambda: tmp_path)
-    Npm(monkeypatch, **told)
+    Npm(monkeypatch, **npm)
     with pytest.raises(InputError, match=message):
         npm_packages.find()
     assert list((tmp_path / ".cache" / "kickstand").iterdir()) == []

@@ -37,7 +37,7 @@ of d, see (8) in dive.py. h is the height of the sensor above the roll axis.
 (4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a steady turn they cannot separate lean from speed. The
 reason is that the derivatives by lean and by speed have the same ratio in (4) and (5). In such a turn the ratio of two
 rates gives the lean: by (6) the pitch does not change, so by (2) w_x / w_y is tan t. At the beginning of a turn the
-speed from before the turn is still valid, and with this speed (4) gives the lean.
+speed measured before the turn is still valid, and with this speed (4) gives the lean.
 """
 
 from math import cos, radians, sin, sqrt, tan
