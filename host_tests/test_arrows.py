@@ -8,6 +8,7 @@ options.
 """
 
 import ast
+import functools
 from graphlib import TopologicalSorter
 
 from kickstand_tools.common import firmware_path
@@ -317,6 +318,7 @@ def tool_imports(text, within):
         yield from (name for name in names if name.partition(".")[0] in tool_packages())
 
 
+@functools.cache
 def tool_modules():
     """Return {full name: the full names of its imports} of each module of the tools."""
     found = {}

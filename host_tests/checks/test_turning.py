@@ -22,12 +22,15 @@ def reported(*left, windows=10, unbiased=True, swing=0.0):
         AS_IT_IS.
     """
 
-    def unexplained(exchange):
+    def residual(exchange):
         found = next((g2 for one, g2 in left if np.array_equal(one, exchange)), 9.0)
         sway = swing * (-1.0) ** np.arange(windows) if np.array_equal(exchange, AS_IT_IS) else 0.0
         return np.full(windows, found) + sway
 
-    rough = lambda exchanges: [float(np.mean(unexplained(one))) for one in exchanges]  # noqa: E731
+    def unexplained(exchanges):
+        return np.array([residual(one) for one in exchanges])
+
+    rough = lambda exchanges: np.mean(unexplained(exchanges), axis=1)  # noqa: E731
     fit = SimpleNamespace(unbiased=unbiased, unexplained=unexplained, rough=rough)
     place = better_exchange(fit)  # type: ignore[arg-type]
     return None if place is None else EXCHANGES[place]

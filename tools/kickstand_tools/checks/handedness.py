@@ -118,8 +118,8 @@ def better_exchange(turning: Turning) -> int | None:
     """Return the index in EXCHANGES of an exchange that fits clearly better than the identity; None without one."""
     near = np.argsort(turning.rough(EXCHANGES))[:TRIED]
     # Always fit the identity, and all axes reversed, which is the likeliest mistake.
-    places = {0, 1, *(int(k) for k in near)}
-    left = {k: turning.unexplained(EXCHANGES[k]) for k in places}
+    places = sorted({0, 1, *(int(k) for k in near)})
+    left = dict(zip(places, turning.unexplained(EXCHANGES[places])))
     best = min(left, key=lambda k: float(np.mean(left[k])) * _penalty(EXCHANGES[k]))
     least = min(left.values(), key=np.mean)
     gain = left[0] - least

@@ -63,7 +63,7 @@ class Turning:
         sizes = np.mean(np.sum(self._force**2, axis=2))
         left = np.empty(len(exchanges))
         for sign in 1.0, -1.0:
-            turn = _turn(sign * np.radians(self._rate - self._bias))
+            turn = _turn(self._signed(sign, self._bias))
             both = np.einsum("wnij,wnk->wijk", turn, self._force) / turn.shape[1]
             right = np.linalg.det(exchanges) * sign > 0.0
             # Rotating the gyro's readings has the same effect as rotating the forces by the inverse rotation.
@@ -71,79 +71,101 @@ class Turning:
             left[right] = sizes - np.mean(np.sum(up**2, axis=2), axis=1)
         return left
 
-    def unexplained(self, exchange: Array) -> Array:
-        """Compute the residual of one exchange in each window. The rate is exchange @ reading.
+    def unexplained(self, exchanges: Array) -> Array:
+        """Compute the residual of each of k exchanges in each window.
 
-        Returns the mean square of the force that the rates do not explain, shape (w), in g2.
+        exchanges: shape (k, 3, 3). The rate is exchange @ reading.
+        Returns the mean square of the force that the rates do not explain, shape (k, w), in g2.
         """
-        sign = np.linalg.det(exchange)
-        # permute the force instead of the rates. Only the sign of the permutation is applied to the rates
-        force = self._force @ (sign * exchange)
-        bias, velocity = self._bias, self._velocities[0]
-        if len(self._velocities) > 1:
-            turned = self._turned(force, sign, bias)
-            velocity = min(self._velocities, key=lambda each: np.mean(self._fit(*turned, each).left))
+        left = np.empty((len(exchanges), len(self._force)))
+        for sign in 1.0, -1.0:
+            # Exchanges of one sign have the same rates until each corrects the bias
+            first = self._models(sign, self._bias, self._velocities)
+            for k in np.flatnonzero(np.linalg.det(exchanges) * sign > 0.0):
+                # permute the force instead of the rates. Only the sign of the permutation is applied to the rates
+                left[k] = self._unexplained(sign, self._force @ (sign * exchanges[k]), first)
+        return left
+
+    def _unexplained(self, sign: float, force: Array, first: list["_Model"]) -> Array:
+        """Choose the delay of the speed, then correct the gyro's bias. Returns the residual, shape (w), in g2.
+
+        first: a model for each delay of the speed, with the first guess of the bias.
+        """
+        model, bias = min(first, key=lambda each: np.mean(each.fit(force).left)), self._bias
         for _ in range(BIAS_STEPS):
-            turned = self._turned(force, sign, bias)
-            bias = bias + self._bias_change(sign, *turned, self._fit(*turned, velocity))
-        return self._fit(*self._turned(force, sign, bias), velocity).left
+            bias = bias + model.bias_change(sign, model.fit(force))
+            (model,) = self._models(sign, bias, [model.velocity])
+        return model.fit(force).left
 
-    def _turned(self, force: Array, sign: float, bias: Array) -> tuple[Array, Array, Array]:
-        """Integrate the rates minus a bias, and rotate the force.
+    def _signed(self, sign: float, bias: Array) -> Array:
+        """Return the rates minus a bias, shape (w, n, 3), in rad/s."""
+        return sign * np.radians(self._rate - bias)
 
-        Returns:
-            rate: shape (w, n, 3), in rad/s.
-            turn: the rotation C, integrated from the rate, shape (w, n, 3, 3).
-            turned: C times the force, shape (w, n, 3).
-        """
-        rate = sign * np.radians(self._rate - bias)
+    def _models(self, sign: float, bias: Array, velocities: list[tuple[Array, Array]]) -> list["_Model"]:
+        rate = self._signed(sign, bias)
         turn = _turn(rate)
-        return rate, turn, np.einsum("wnij,wnj->wni", turn, force)
-
-    def _fit(self, rate: Array, turn: Array, turned: Array, velocity: tuple[Array, Array]) -> "_Fit":
-        values, changes = (part[..., None, None] for part in velocity)
-        parts = turn @ (cross_matrix(rate) * values + np.eye(3) * changes)  # shape (k, w, n, 3, 3)
-        along = _evened(np.concatenate(list(parts), axis=-1) / STANDARD_GRAVITY)
-        moved = _evened(turned)
-        square = np.einsum("wnij,wnik->wjk", along, along)
-        square += (FORCE_G / self._usual) ** 2 * np.eye(square.shape[-1])
-        inverse, seen = np.linalg.inv(square), np.einsum("wnij,wni->wj", along, moved)
-        found = np.einsum("wij,wj->wi", inverse, seen)
-        left = (np.sum(moved**2, axis=(1, 2)) - np.sum(found * seen, axis=1)) / moved.shape[1]
-        return _Fit(along, moved, inverse, found, left)
-
-    def _bias_change(self, sign: float, rate: Array, turn: Array, turned: Array, fit: "_Fit") -> Array:
-        """Return the correction of the bias by one step of linear least squares, shape (3), in deg/s.
-
-        A change of the bias rotates the force by the integral of this change from the middle of the window.
-        """
-        angle = np.cumsum(turn, axis=1) * CELL_S
-        angle -= angle[:, rate.shape[1] // 2, None]
-        by_bias = _evened(-sign * np.radians(1.0) * cross_matrix(turned) @ angle)
-        mixed = np.einsum("wnij,wnik->wjk", fit.along, by_bias)
-        # Eliminate the velocities of the windows from the normal equations (Schur complement).
-        square = np.einsum("wnij,wnik->jk", by_bias, by_bias) - np.einsum("wji,wjk,wkl->il", mixed, fit.inverse, mixed)
-        vector = np.einsum("wnij,wni->j", by_bias, fit.moved) - np.einsum("wji,wj->i", mixed, fit.found)
-        change = np.linalg.solve(square + (FORCE_G / BIAS_DPS) ** 2 * np.eye(3), vector)
-        return np.clip(change, -MOST_DPS, MOST_DPS)
+        moving = turn @ cross_matrix(rate)
+        return [_Model(turn, moving, velocity, FORCE_G / self._usual) for velocity in velocities]
 
 
 @dataclass
 class _Fit:
     """The result of the least squares in each of w windows. The velocity has k coefficients.
 
-    along: derivatives of the force by the coefficients, shape (w, m, 3, k).
+    turned: the force, rotated to the axes at the beginning of the window, shape (w, n, 3).
     moved: the averaged force, shape (w, m, 3).
-    inverse: inverse of the normal matrix of the coefficients, shape (w, k, k).
     found: the coefficients, shape (w, k).
     left: mean square of the residual, shape (w).
     """
 
-    along: Array
+    turned: Array
     moved: Array
-    inverse: Array
     found: Array
     left: Array
+
+
+class _Model:
+    """How the force in w windows depends on the k coefficients of the velocity, for given rates.
+
+    turn: the rotation C, integrated from the rate, shape (w, n, 3, 3).
+    moving: C times the cross matrix of the rate, shape (w, n, 3, 3).
+    velocity: functions of time and their derivatives, see Turning.
+    prior: standard deviation of the noise divided by that of the prior of a coefficient.
+    """
+
+    def __init__(self, turn: Array, moving: Array, velocity: tuple[Array, Array], prior: float) -> None:
+        self.velocity = velocity
+        self._turn = turn
+        values, changes = (part[..., None, None] for part in velocity)
+        parts = moving * values + turn * changes  # shape (k, w, n, 3, 3)
+        # Derivatives of the averaged force by the coefficients, shape (w, m, 3, k)
+        self._along = _evened(np.concatenate(list(parts), axis=-1) / STANDARD_GRAVITY)
+        square = np.einsum("wnij,wnik->wjk", self._along, self._along)
+        self._inverse = np.linalg.inv(square + prior**2 * np.eye(square.shape[-1]))
+
+    def fit(self, force: Array) -> _Fit:
+        turned = np.einsum("wnij,wnj->wni", self._turn, force)
+        moved = _evened(turned)
+        seen = np.einsum("wnij,wni->wj", self._along, moved)
+        found = np.einsum("wij,wj->wi", self._inverse, seen)
+        left = (np.sum(moved**2, axis=(1, 2)) - np.sum(found * seen, axis=1)) / moved.shape[1]
+        return _Fit(turned, moved, found, left)
+
+    def bias_change(self, sign: float, fit: _Fit) -> Array:
+        """Return the correction of the bias by one step of linear least squares, shape (3), in deg/s.
+
+        A change of the bias rotates the force by the integral of this change from the middle of the window.
+        """
+        angle = np.cumsum(self._turn, axis=1) * CELL_S
+        angle -= angle[:, angle.shape[1] // 2, None]
+        by_bias = _evened(-sign * np.radians(1.0) * cross_matrix(fit.turned) @ angle)
+        mixed = np.einsum("wnij,wnik->wjk", self._along, by_bias)
+        # Eliminate the velocities of the windows from the normal equations (Schur complement).
+        square = np.einsum("wnij,wnik->jk", by_bias, by_bias)
+        square -= np.einsum("wji,wjl->il", mixed, self._inverse @ mixed)
+        vector = np.einsum("wnij,wni->j", by_bias, fit.moved) - np.einsum("wji,wj->i", mixed, fit.found)
+        change = np.linalg.solve(square + (FORCE_G / BIAS_DPS) ** 2 * np.eye(3), vector)
+        return np.clip(change, -MOST_DPS, MOST_DPS)
 
 
 def _turn(rate: Array) -> Array:
