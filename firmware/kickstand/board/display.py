@@ -132,7 +132,7 @@ class Display:
 
     def _probe(self):
         """Look for the display at each address."""
-        if self._probes % _REOPEN_PROBES == 0:  # not at every search, because freeing a stuck bus takes long
+        if self._probes % _REOPEN_PROBES == 0:  # only at some searches, because freeing a stuck bus takes long
             self._i2c = self._reopen(self._bus_hz or LCD_HZ)
         self._probes += 1
         for address in self._addresses:
@@ -141,7 +141,7 @@ class Display:
         other = _FAMILY[self._probes % len(_FAMILY)]
         if self._addresses is ADDRESSES and self._kind in ("auto", "lcd") and self._answers(other):
             return
-        # Not found. A display that answers later has just been powered, and may be another display
+        # No display was found. A display that answers later has just been powered, and may be another display
         self._fresh = True
         self._wait_ms = _PROBE_MS
 

@@ -12,12 +12,12 @@ from time import ticks_diff, ticks_ms
 
 from micropython import const
 
-# Index: LCD_WIRING - 1. The bits of RS, E and the backlight, then True if D4 to D7 are P0 to P3
+# Index: LCD_WIRING - 1. Each row has the bits of RS, E and the backlight, then True if D4 to D7 are wired to P0 to P3
 WIRINGS = (
-    (0x01, 0x04, 0x08, False),  # the usual wiring: P0 RS, P2 E, P3 light
-    (0x40, 0x10, 0x00, True),  # MJKDZ, GY-IICLCD: P6 RS, P4 E, P7 light, on while low
-    (0x10, 0x40, 0x80, True),  # P4 RS, P6 E, P7 light
-    (0x01, 0x04, 0x00, False),  # like the first wiring, but the light is on while P3 is low
+    (0x01, 0x04, 0x08, False),  # the usual wiring: RS at P0, E at P2, backlight at P3
+    (0x40, 0x10, 0x00, True),  # MJKDZ, GY-IICLCD: RS at P6, E at P4, backlight at P7, on while P7 is low
+    (0x10, 0x40, 0x80, True),  # RS at P4, E at P6, backlight at P7
+    (0x01, 0x04, 0x00, False),  # like the first wiring, but the backlight is on while P3 is low
 )
 _LINE_ADDRESSES = (0x80, 0xC0)  # instruction "set DDRAM address" for the beginning of each line (table 6)
 _CGRAM_ADDRESS = const(0x40)  # instruction "set CGRAM address" (table 6)
@@ -68,7 +68,7 @@ class Lcd:
         self._wanted = [bytearray(b" " * _COLUMNS), bytearray(b" " * _COLUMNS)]
         self._shown = [bytearray(_COLUMNS), bytearray(_COLUMNS)]
         self._texts = [_NO_TEXT, _NO_TEXT]  # the last text of each line, if it was a str
-        self._changed = True  # a line may need sending
+        self._changed = True  # True if a line may still have to be sent
         self._packed = bytearray(4 * (_BEHIND + 1))
         self._port = bytearray(1)
         self._glyphs = _bar_glyphs()
@@ -76,7 +76,7 @@ class Lcd:
     def begin(self, i2c, address, hz, fresh):
         self._i2c = i2c
         self._address = address
-        # Step of the initialisation. It is negative while the display powers up
+        # Number of the next step of the initialisation, negative while the display powers up
         self._step = _POWER_UP if fresh else 0
         self._acted_ms = ticks_ms()  # time of the last transfer
         self._seen_ms = 0  # time of the display's last answer

@@ -121,8 +121,8 @@ class Oled:
         return not self._lit or self._changed or self._drawn is not self._wanted
 
     def show(self, line1, line2, picture=None):
-        """Set the picture. Without a picture, set the two lines, in letters of double height. The lines have the
-        character codes of hd44780.py."""
+        """Set what tick() shows: the picture or, without a picture, the two lines in letters of double height. The
+        lines have the character codes of hd44780.py."""
         wanted = (self.draws and picture) or tuple(
             [line if isinstance(line, str) else bytes(line) for line in (line1, line2)]
         )

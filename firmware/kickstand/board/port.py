@@ -24,7 +24,7 @@ if IS_ESP32:
     GPS_UART, GPS_PINS, WHEEL_PIN = 2, (17, 16), 27  # (TX, RX)
     if "SPIRAM" in MACHINE:  # MicroPython's image for PSRAM uses pins 16 and 17 itself, and has no Pin for them
         GPS_PINS = None, None
-    # Extra arguments of Pin.irq(). This port has only soft interrupts, and SoftI2C transfers delay them
+    # Extra arguments of Pin.irq(). An ESP32 has only soft interrupts, and transfers by SoftI2C delay them
     PIN_IRQ = {}
     I2C_NUMBERED = False  # see open_i2c()
     SD_SPI = (2, 3)  # the slots of machine.SDCard that are SPI
@@ -42,7 +42,7 @@ else:  # Raspberry Pi Pico and Pico 2, and other makers' boards with the same pi
     SENSOR_PINS, LCD_PINS, BUTTON_PIN = (4, 5), (6, 7), 15
     GPS_UART, GPS_PINS, WHEEL_PIN = 1, (8, 9), 14
     PIN_IRQ = {"hard": True}  # soft interrupts would be lost during a transfer to the display
-    I2C_NUMBERED = True  # two buses must have two different numbers
+    I2C_NUMBERED = True  # two I2C buses must have two different controller numbers
     SD_SPI = (0, 1)  # the numbers of machine.SPI
     TAKEN_PINS = INPUT_PINS = ()
 if not _KNOWN:  # an unknown board may lack these pins or use them for something else
@@ -56,7 +56,7 @@ _SOFT_I2C_HZ = 250_000
 _TURN_BYTES = 2000  # bytes of heap that one pass of the app's loop uses; 3000 while aligning by driving
 _FEWEST_TURNS = 3
 
-_WATCHDOG_MS = 8000  # a Pico allows at most 8388
+_WATCHDOG_MS = 8000  # the watchdog of a Pico allows at most 8388 ms
 _WEEK_MS = 604_800_000  # a week. An ESP32 counts a time-out in 32 bits, with four counts per ms, so it allows 12 days
 
 _watchdog = None

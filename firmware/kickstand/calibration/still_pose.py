@@ -9,16 +9,16 @@ The sums are integers, because 32-bit floats would lose the digits that averagin
 from ..errors import CaptureError, SickSensor
 from ..units import AXES, const
 
-# Largest difference between a sample and the first sample. A larger difference is a knock. These limits are ten times
-# the chip's noise with its widest filter.
+# Largest difference between a sample and the first sample. A larger difference is a knock. The limits of force and rate
+# are ten times the chip's noise with its widest filter.
 _PEAK_G = const(0.08)
 _PEAK_DPS = const(5.0)
 # Largest noise of a gyro axis, fifteen times the chip's noise with its usual filter. The noise is computed from the
 # differences between successive samples. A slow sway of the hand hardly changes these differences.
 _NOISE_DPS = const(0.6)
 _SPREAD_G = const(0.02)  # largest standard deviation of an axis of the accelerometer
-_DRIFT_G = const(0.007)  # largest difference between the means of the two halves, equal to a tilt of 0.4 degrees
-_MAX_REST_RATE_DPS = const(45.0)  # the data sheet allows 20 deg/s of gyro offset, plus 20 over temperature
+_DRIFT_G = const(0.007)  # largest change of force between the two halves of the pose, equal to a tilt of 0.4 degrees
+_MAX_REST_RATE_DPS = const(45.0)  # the data sheet allows 20 deg/s of gyro offset, plus 20 deg/s over temperature
 _MIN_SAMPLES = const(20)
 
 _AXES = (0, 1, 2, 4, 5, 6)  # indices of accelerometer and gyro in a sample; index 3 is the temperature

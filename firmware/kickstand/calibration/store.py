@@ -1,4 +1,4 @@
-"""Stores the calibration in flash. Two files are written alternately, so one is still valid after a power cut.
+"""Stores the calibration in flash. Two files are written alternately, so one file is still valid after a power cut.
 
 Each file holds a record with these parts:
 * magic, version, length, sequence number
@@ -25,7 +25,7 @@ _VERSION = const(1)
 _WHOLE_VERSION = const(2)  # version of a record with the matrices
 _MAGIC = b"KSTD"
 _HEAD = "<4sHHI"  # magic, version, length of the whole record in bytes, sequence number
-_BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, how aligned; the 19 numbers of parameters()
+_BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, how aligned; 19 numbers of Calibration.parameters()
 _NOT_ALIGNED, _BY_POSES, _BY_DRIVE = 0, 1, 2  # the values of "how aligned"
 _WHOLE = "<27f"  # accel_matrix, gyro_matrix, gyro_sigma
 BODY_LENGTH = struct.calcsize(_BODY)

@@ -15,7 +15,7 @@ from math import cos, radians, sin
 
 from ..units import const
 
-# a step ends when the sensor has turned by this angle about one axis; a smaller angle is more exact
+# a step of the integration ends when the sensor has turned by this angle about one axis; a smaller angle is more exact
 _STEP_RAD = const(0.02)
 _STEP_US = const(60_000)  # a step also ends after this time
 # 0.95 of the gyro's range, in counts. It is less than the full range, because the low-pass of the chip hides single
@@ -29,7 +29,7 @@ class Turn:
     Args:
         lsb_per_dps: counts per deg/s.
         period_us: nominal time between two samples.
-        quick: absolute counts of a rate that is too fast.
+        quick: a rate with this absolute value in counts, or more, is too fast.
 
     Attributes:
         quick: True if the rate was too fast at any time since start().

@@ -19,10 +19,10 @@ _FEED_TURNS = const(2)
 _GAP_MS = const(300)  # a longer time between two readings means that readings are missing
 _LOOK_MS = const(1000)  # time between two calls of _look()
 _FRESH_MS = const(3000)  # a speed older than this does not prove a standstill
-_AWAY_MPS = const(2.0)  # a faster vehicle has driven off
+_AWAY_MPS = const(2.0)  # a vehicle that is faster than this has driven off
 
-# The remaining bias in the corrected rates of an aligned sensor. It is 0, because the bias of the poses is already
-# subtracted.
+# The gyro's bias that remains in the rates of an aligned sensor. It is 0, because the bias measured in the poses is
+# already subtracted.
 _KNOWN_BIAS = (0.0, 0.0, 0.0)
 STAND_SIDE, MOUNT_MOVED = "other-side", "mount-moved"
 _QUESTIONS = (STAND_SIDE, MOUNT_MOVED)  # codes of the messages that hide the lean until the rider answers
@@ -31,8 +31,8 @@ _QUESTIONS = (STAND_SIDE, MOUNT_MOVED)  # codes of the messages that hide the le
 class BackgroundAlignment:
     """Runs the alignment by driving.
 
-    The loop calls poll() and feed() in each turn, and begin() after a change of calibration. The menu calls ask(), and
-    a press calls answer().
+    The app's loop calls poll() and feed() in each pass, and begin() after a change of calibration. The menu calls
+    ask(), and a press calls answer().
 
     Args:
         leans: True for a motorcycle, False for a car.

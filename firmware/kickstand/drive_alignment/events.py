@@ -10,7 +10,8 @@ from ..units import STANDARD_GRAVITY, const
 from .history import COLUMNS, difference
 from .regression import LAG_STEP_US, LAGS, Fit, ForwardRegression
 
-# An event begins above BEGIN_MPS2, ends below END_MPS2, and changes the speed by at least _CHANGE_MPS.
+# An event begins when the absolute acceleration exceeds BEGIN_MPS2, and ends when it falls below END_MPS2. It must
+# change the speed by at least _CHANGE_MPS.
 BEGIN_MPS2, END_MPS2 = 0.8, 0.4
 _CHANGE_MPS = const(1.5)
 _MAX_ACCELERATION_EVENTS = const(2)  # most acceleration events that count, because braking shows forward better

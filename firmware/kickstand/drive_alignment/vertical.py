@@ -24,11 +24,11 @@ _STILL_G = const(0.06)
 _STILL_DPS = const(3.0)
 _AVERAGE_S = const(0.5)
 _SAME_STOP_DEG = const(1.5)  # doors and passengers tilt a standing vehicle by less than this angle
-# If the sensor stays still at another angle for longer than this, the sensor was rotated. While a vehicle drives again
-# but a late speed is still zero, the angle also differs, but not for this long.
+# If the sensor stays still at another angle for longer than this, the sensor was rotated. The angle also differs for a
+# short time when the vehicle drives again but the late speed is still zero.
 _TURNED_S = const(6.0)
 # If a rate differs by more than this from the bias at the last stop, the vehicle drives in a bend and a speed of zero
-# is wrong. Warming up changes the bias by less.
+# is wrong. A gyro that warms up changes its bias by less than this.
 TURNING_DPS = 10.0
 _MEAN_S = const(60.0)  # time constant of the mean force, which is used until a better vertical is known
 # Largest difference of two verticals that the road's slope can cause (14 %). If it is larger, the mount moved.

@@ -22,10 +22,10 @@ _HIGH_BYTE = const(0x10000)
 _WRAPPED = const(0x20000)
 
 # The number of successive quiet looks that make an axis faulty. A look is quiet if the counts had at most two values,
-# or if their lowest bit did not change. The columns are dlpf 1 to 6. The gyro has a row for each range, from 250 deg/s
-# up. The limits are for the noise of the quietest chip: 100 ug/sqrt(Hz) of the accelerometer, at 16 g, and 0.004
-# deg/s/sqrt(Hz) of the gyro. With this noise a working axis at rest reaches its limit only once in 1e12 looks. 0 means
-# that the noise is too far below one count to decide.
+# or if their lowest bit did not change. The columns are for dlpf 1 to 6. The gyro has one row per range, from 250 to
+# 2000 deg/s. The limits are for the noise of the quietest chip: 100 ug/sqrt(Hz) of the accelerometer, at 16 g, and
+# 0.004 deg/s/sqrt(Hz) of the gyro. With this noise a working axis at rest reaches its limit only once in 1e12 looks. A
+# limit of 0 means that the noise is too far below one count to decide.
 _ACCEL_LOOKS = (1, 1, 1, 4, 15, 80)
 _GYRO_LOOKS = (
     (1, 1, 1, 3, 5, 11),

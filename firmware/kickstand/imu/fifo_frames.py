@@ -30,9 +30,9 @@ _DIFFER = const(8)  # bits of pairs of axes that differed: x and y (bits 1 and 5
 DUE = const(9)  # number of samples until the next look
 _HARD = const(10)  # absolute counts of the accelerometer that show hard vibration
 _SHAKEN = const(11)  # number of frames that reached _HARD since the last look
-# Each of the next three is the index of the first of seven entries, in the order of a frame
+# The next three are indices of the first of seven entries, which have the order of a frame
 _LAST = const(12)  # counts of the last frame
-_SEEN = const(19)  # bits 0 to 15; bit n is set if the lowest four bits of the counts were n since the last look
+_SEEN = const(19)  # bits 0 to 15; bit n is set if the lowest four bits of the counts have been n since the last look
 _PEAK = const(26)  # largest absolute counts since power-on
 _HIGH_BYTE = const(0x10000)  # bit in _SEEN that is set when the high byte changes
 _WRAPPED = const(0x20000)  # bit in _SEEN that is set when the counts jump by _JUMP or more within one high byte

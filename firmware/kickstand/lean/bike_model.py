@@ -13,7 +13,7 @@ State                                       Measured (a vector with [3] has the 
     s_x, c_xy        SCALE_LEFT, CROSS_LEFT_UP: scale error of the gyro's left axis, and its reading of a rate about up
     c_zx, c_zy, s_z  CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD: errors of the gyro's forward axis
 The data sheet allows 3 % of scale error and 2 % of cross-axis sensitivity. A filter without these states would mistake
-these errors for bias in a long turn, and for lean in a quick roll. The up axis has no such states: without a measured
+these errors for bias in a long bend, and for lean in a quick roll. The up axis has no such states: without a measured
 speed its scale error cannot be distinguished from an error of the speed.
 
 Equations, with ' for the derivative by time
@@ -34,10 +34,10 @@ tan(lean of the bike) = tan t / cos psi.
 d is the part of the pitch rate q' that the springs cause. The wheels do not rise with this pitch. Braking causes most
 of d, see (8) in dive.py. h is the height of the sensor above the roll axis.
 
-(4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a steady turn they cannot separate lean from speed. The
-reason is that the derivatives by lean and by speed have the same ratio in (4) and (5). In such a turn the ratio of two
-rates gives the lean: by (6) the pitch does not change, so by (2) w_x / w_y is tan t. At the beginning of a turn the
-speed measured before the turn is still valid, and with this speed (4) gives the lean.
+(4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a steady bend they cannot separate lean from speed,
+because the derivatives by lean and by speed have the same ratio in (4) and (5). In a steady bend the ratio of two rates
+gives the lean: by (6) the pitch does not change, so by (2) w_x / w_y is tan t. At the beginning of a bend the speed
+estimated before the bend is still valid, and with this speed (4) gives the lean.
 """
 
 from math import cos, radians, sin, sqrt, tan
@@ -59,11 +59,11 @@ MIN_PITCH = -MAX_PITCH  # stored as a constant, because a negation for each samp
 # turn_rates() uses the yaw rate of a bike in balance if the speed is above _BALANCE_MIN_SPEED, the lean's standard
 # deviation is below BALANCE_SIGMA, and the measured rate differs by less than
 # _BALANCE_RATE + _BALANCE_SHARE x |balanced rate|. The form of the comments is explained in measurements.py.
-_BALANCE_MIN_SPEED = const(4.0)  # m/s. Larger: the balanced rate is not used in slow turns.
+_BALANCE_MIN_SPEED = const(4.0)  # m/s. Larger: the balanced rate is not used in slow bends.
 _BALANCE_RATE = const(0.1)  # rad/s. Larger: the balanced rate is used with a wrong lean or speed.
 _BALANCE_SHARE = const(0.5)  # ratio. Larger: the balanced rate is used with a wrong lean or speed.
 BALANCE_SIGMA = radians(20.0)  # rad. Larger: the balanced rate is used with a more uncertain lean.
-# ratio: lower bound of cos(lean). Larger: in deep leans the rate about left is too small.
+# ratio: lower bound of cos(lean) in a division. Larger: in deep leans the rate about left is too small.
 _BALANCE_MIN_COS = const(0.3)
 
 

@@ -32,19 +32,19 @@ from ..units import const
 
 # The comment of each parameter has its unit, its meaning and, after "Larger:", the effect of a larger value.
 
-# s: time constant of the short means. Larger: fewer right leans are hidden, and wrong leans are hidden later.
+# s: time constant of the short means. Larger: fewer correct leans are hidden, and wrong leans are hidden later.
 _SHORT_S = const(3.0)
-# s: time constant of all other means. Larger: fewer right leans are hidden, and wrong leans are hidden later.
+# s: time constant of all other means. Larger: fewer correct leans are hidden, and wrong leans are hidden later.
 _LONG_S = const(10.0)
 # standard deviations: larger innovations are reduced to this value. Larger: a single blow counts for more.
 _MOST = const(4.0)
-# Limits of the means. Larger: fewer right leans and fewer wrong leans are hidden. Each comment gives the largest mean
-# in rides without a fault, on good and bad roads and mounts.
+# Limits of the means. Larger: fewer correct leans and fewer wrong leans are hidden. "Largest without a fault" is the
+# largest mean in rides without a fault, on good and bad roads, with good and bad mounts.
 LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations. Largest without a fault: 0.4 and 0.25
 UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations. Largest without a fault: 0.7 and 0.25
-# ratio: factor on the limits of up if the six positions were not done. The data sheet allows the accelerometer a scale
-# error of 3 % and an offset of 80 mg. Without the six positions, these errors show only at rest. Larger: fewer leans
-# are hidden.
+# ratio: factor on UP_SHORT and UP_LONG if the six positions were not done. The data sheet allows the accelerometer a
+# scale error of 3 % and an offset of 80 mg. Without the six positions, the filter notices these errors only at rest.
+# Larger: fewer leans are hidden.
 _UNMEASURED = const(2.0)
 # ratio: force to the side divided by force up, minus the trim. Largest without a fault: 0.12
 _SIDEWAYS = const(0.15)
@@ -52,22 +52,24 @@ _STEEP = const(0.21)  # rad: pitch. Largest without a fault: 0.14
 # rad: root mean square of the pitch that the forward force does not confirm. Largest on a recorded ride without a
 # fault: 0.096
 _SLOPE = const(0.12)
-# square of standard deviations: above this spread, the limits of left and up grow with the root of the spread. The
-# spread is the mean of half the squared change of the innovation from window to window. Larger: more leans are hidden
-# on the roughest roads.
+# squared standard deviations: above this spread of the innovations, the limits of left and up grow with the root of the
+# spread. The spread is the mean of half the squared change of the innovation from window to window. Larger: more leans
+# are hidden on the roughest roads.
 _SPREAD = const(0.4)
-# rad: limit of a steady mean lean after a doubt. Larger: fewer leans are hidden in bends, and on straights that look
-# like bends.
+# rad: after a doubt, a larger steady mean lean is hidden. Larger: fewer leans are hidden in bends, and on straights
+# that look like bends.
 _ONE_SIDE = const(0.13)
 # rad: a steady lean above this value is hidden only after _LONG_S, because the upward force confirms it. Smaller:
 # fewer leans are hidden.
 _SURE_LEAN = const(0.3)
-# ratio: the lean is steady if its squared mean exceeds this share of its mean square. Larger: fewer leans are hidden.
+# ratio: the lean is steady if the square of its mean exceeds this share of the mean of its square. Larger: fewer leans
+# are hidden.
 _STEADY = const(0.75)
 # ratio: larger forces to the side are reduced to this value. Larger: a single blow counts for more.
 _MOST_SIDEWAYS = const(0.5)
 _STRICT = const(0.85)  # ratio: factor on the limits after a doubt. Larger: a lasting fault is detected later.
-# ratio: share of the limits below which the means fit again during a doubt. Larger: the lean is shown again sooner.
+# ratio: during a doubt, the means fit again when they are below this share of their limits. Larger: the lean is shown
+# again sooner.
 _FIT = const(0.6)
 # s: time for which everything must fit after the first doubt, after the second doubt, and so on. Larger: after a fault
 # the lean stays hidden for longer.
@@ -75,12 +77,12 @@ HOLDS_S = (3.0, 4.0, 4.0, 20.0, 60.0)
 # s: time for which everything must fit after a gap in the readings. Larger: after a gap the lean stays hidden for
 # longer.
 _GAP_S = const(4.5)
-# After more doubts than this, only time in turns counts as fitting, because on a straight nearly everything fits.
+# After more doubts than this, only time in bends counts as fitting, because on a straight nearly everything fits.
 MILD = 3
-# s: shortest time between two doubts after more than MILD doubts, so that rest can be detected. Larger: errors that
-# have changed are found later.
+# s: shortest time between two doubts after more than MILD doubts. In this time rest can be detected. Larger: errors of
+# the sensor that have changed are found later.
 _AGAIN_S = const(12.0)
-_TURNING = const(0.05)  # rad/s: smallest yaw rate of a turn. Larger: the lean stays hidden for longer.
+_TURNING = const(0.05)  # rad/s: smallest yaw rate of a bend. Larger: the lean stays hidden for longer.
 # s: after this time of fitting, one doubt is forgotten. Larger: after a repeated fault the lean is hidden for longer.
 FORGET_S = 60.0
 

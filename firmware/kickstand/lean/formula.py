@@ -34,7 +34,7 @@ def formula_lean_deg(force, yaw_rate):
 
     force: left, up, forward in g. yaw_rate: in any unit, because only its sign counts.
 
-    In turns it is right on average. Near upright it is noisy: 1 % of vibration causes an error of 8 degrees, always to
+    In bends it is right on average. Near upright it is noisy: 1 % of vibration causes an error of 8 degrees, always to
     the side of the yaw rate.
     """
     left, up = force[0], force[1]

@@ -259,7 +259,7 @@ class LeanFilter:
     def _start(self, means):
         """Set the first state and its covariance from the means of the first window."""
         wx, wy, wz, fx, fy, fz = means[2:8]
-        # A long turn is as calm as a standstill and has no force to the side. Only the yaw rate shows the difference.
+        # A long bend is as calm as a standstill and has no force to the side. Only the yaw rate shows the difference.
         turning = max(abs(wx), abs(wy), abs(wz)) > measurements.START_MAX_RATE
         moving = turning or abs(sqrt(fx * fx + fy * fy + fz * fz) - 1.0) > measurements.START_MAX_FORCE
         variances = [sigma * sigma for sigma in measurements.SIGMA_START]

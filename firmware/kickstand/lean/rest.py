@@ -8,10 +8,10 @@ from ..units import const
 # Largest deviation of a window's mean from the recent average at rest. Larger: smooth roads are mistaken for rest.
 _MAX_FORCE_G = const(0.010)  # g
 _MAX_RATE_RADPS = const(0.009)  # rad/s (0.5 deg/s)
-# rad/s (1.2 deg/s): largest mean rate that may be bias. Larger: smooth turns are mistaken for rest.
+# rad/s (1.2 deg/s): largest mean rate that may be bias. Larger: smooth bends are mistaken for rest.
 MAX_BIAS_RADPS = 0.02
 # rad/s: largest mean rate that may be bias before the first rest, because the bias has drifted since the calibration.
-# Larger: more turns are mistaken for rest.
+# Larger: more bends are mistaken for rest.
 _MAX_FIRST_BIAS_RADPS = const(0.1)
 _REST_S = const(1.5)  # s: duration of stillness that counts as rest. Larger: rest is detected later, but more reliably.
 # s: duration of stillness that counts as rest if the bike seems to move or brake. No road is smooth for this long.

@@ -17,16 +17,16 @@ The head has these fields:
 * firmware version, number of positions
 * delay of the gyro's low-pass in tenths of a millisecond; 0 in rides up to version 0.3.0
 
-An entry describes one pass of the main loop, App.turn(), called "a turn" here. It has the number of samples (n), the
-microseconds since the previous turn, and the sums of the samples' six counts (ax ay az gx gy gz). From these numbers a
-replay computes the same mean as the board. An entry can also be a speed. Then n is 0, and the speed in cm/s follows.
+An entry describes the samples of one pass of the main loop. It has the number of samples (n), the microseconds since
+the previous samples (dt_us), and the sums of the samples' six counts (ax ay az gx gy gz). From these numbers a replay
+computes the same mean as the board. An entry can also be a speed. Then n is 0, and the speed in cm/s follows.
 
-A position is the index of an entry (the turn that follows the fix) and the four numbers of Gps.place(). Readers up to
-version 0.4.0 do not know positions. They skip these bytes like the zeros and read the rest.
+A position has five numbers: the index of the entry with the next samples after the fix, and the four numbers of
+Gps.place(). Readers up to version 0.4.0 do not know positions. They skip these bytes like the zeros and read the rest.
 
-Each number is stored as its difference from a prediction. The prediction of the time is n sample periods. The
-prediction of the other numbers is their value in the previous turn. The difference is written in an adaptive Rice code
-(R. F. Rice, JPL publication 79-22), most significant bit first:
+Each number is stored as its difference from a prediction. The prediction of dt_us is n sample periods. The prediction
+of each other number is its value in the previous entry. The difference is written in an adaptive Rice code (R. F. Rice,
+JPL publication 79-22), most significant bit first:
 1. Zigzag coding turns the difference into a size >= 0. The differences 0, -1, 1, -2, ... become 0, 1, 2, 3, ...
 2. k is log2 of the mean of the last sizes, rounded down.
 3. The code is (size >> k) ones, a zero, and the low k bits of the size.
@@ -58,11 +58,11 @@ RAW_BITS = 31
 MEAN_SHIFT = 4  # a mean covers about the last 16 sizes, and is stored multiplied by 16
 START_MEAN = 128 << MEAN_SHIFT
 MAX_SIZE = 1 << 20  # larger sizes count as this size in the mean, because the mean must fit in 32 bits
-MAX_DT_US = 1 << 29  # the longest time between two turns that an entry can hold
+MAX_DT_US = 1 << 29  # the longest time between two passes that an entry can hold
 _HEAD_LENGTH = struct.calcsize(HEAD)
 _TAIL_LENGTH = struct.calcsize(TAIL)
 _PLACE_LENGTH = struct.calcsize(PLACE)
-_WORST = (FIELDS + 1) * (LIMIT + RAW_BITS) // 8 + 2  # the most bytes that a turn and a speed can take
+_WORST = (FIELDS + 1) * (LIMIT + RAW_BITS) // 8 + 2  # the most bytes that an entry with samples and a speed can take
 # Indices in the state of the coder, an array('i', 22). The first FIELDS values are the previous entry. The others are:
 # * from _MEANS on, the mean size of each of the FIELDS values
 # * _PENDING: the bits that do not yet fill a byte; _BITS: the number of these bits
@@ -119,7 +119,7 @@ def encode_python(entry, state, out):
             _append(state, out, (1 << LIMIT) - 1, LIMIT)
             _append(state, out, size, RAW_BITS)
         state[_MEANS + i] = mean + min(size, MAX_SIZE) - (mean >> MEAN_SHIFT)
-        if i or n:  # a speed (n = 0) does not replace the n of the previous turn
+        if i or n:  # an entry with a speed (n = 0) does not replace the n of the previous samples
             state[i] = value
 
 
@@ -165,7 +165,7 @@ class RideBlock:
         self._state = array("i", [0] * (_PERIOD + 1))
         self._state[_PERIOD] = period_us
         self._entry = array("i", [0] * FIELDS)
-        self._temperature = 0  # temperature of the last turn, in counts
+        self._temperature = 0  # temperature of the last entry, in counts
         self._reserved = 0  # bytes kept free for the next position; 0 before the first position
 
     def begin(self, length, ride, sequence, time_us, chip, sample_hz, body):
@@ -184,7 +184,7 @@ class RideBlock:
         for i in range(FIELDS):
             state[i] = 0
             state[_MEANS + i] = START_MEAN
-        state[0] = 1  # not 0, because the prediction divides by the n of the previous turn
+        state[0] = 1  # not 0, because the prediction divides by the n of the previous samples
         state[_PENDING] = state[_BITS] = 0
         state[_AT] = _HEAD_LENGTH + len(body)
         # close() replaces the two zeros by the temperature and the number of positions
@@ -199,12 +199,12 @@ class RideBlock:
         self._end = length - _TAIL_LENGTH  # where the positions begin
 
     def add(self, sums, n, dt_us):
-        """Append a turn.
+        """Append the samples of a pass of the loop.
 
         Args:
             sums: the sums of the samples' seven counts.
             n: number of samples.
-            dt_us: microseconds since the previous turn.
+            dt_us: microseconds since the previous samples.
         """
         entry = self._entry
         entry[0] = n
@@ -220,14 +220,14 @@ class RideBlock:
         self.count += 1
 
     def add_speed(self, cm_per_s):
-        """Append a speed in cm/s. It belongs to the next turn."""
+        """Append a speed in cm/s. It belongs to the next samples."""
         self._entry[0] = 0
         self._entry[_SPEED] = cm_per_s
         encode(self._entry, self._state, self.buffer)
         self.count += 1
 
     def add_place(self, place):
-        """Append a position. It belongs to the next turn.
+        """Append a position. It belongs to the next samples.
 
         Args:
             place: the result of Gps.place().
@@ -242,7 +242,7 @@ class RideBlock:
         self._places += 1
 
     def full(self):
-        """Return True if a turn, a speed and a position of the largest size would no longer fit."""
+        """Return True if samples, a speed and a position of the largest size would no longer fit."""
         return self._state[_AT] + _WORST + self._reserved > self._end
 
     def close(self):

@@ -42,7 +42,7 @@ class Speed:
         """Return a new speed in m/s and set age_us. Return None without a new speed, or if it is rejected.
 
         A speed outside 0 to _MAX_MPS is rejected. A speed that no vehicle could have reached from the last accepted
-        speed is also rejected, but only for _GIVE_UP_MS. Call this in each turn of the loop.
+        speed is also rejected, but only for _GIVE_UP_MS. Call this in each pass of the loop.
 
         Args:
             now_ms: ticks_ms().
