@@ -28,10 +28,10 @@ CAR, MOTORCYCLE = "car", "motorcycle"
 
 # state
 WAITING_FOR_SPEED = 0  # there is no speed yet, or no new speed for STALE_US
-WAITING_FOR_STOP = 1  # only for a car, because its vertical and the gyro's bias are measured at a stop
-WAITING_FOR_BRAKING = 2  # braking must be in a straight line
+WAITING_FOR_STOP = 1  # only in a car, whose vertical and gyro bias are measured at a stop
+WAITING_FOR_BRAKING = 2  # the next braking must be in a straight line
 BRAKING = 3  # during a braking event
-TURNING = 4  # during a braking event in a bend, which will not count
+TURNING = 4  # during a braking event in a bend, so the event will not count
 READY = 5  # matrix() gives the alignment; more events improve it
 REFUSED = 6  # matrix() raises `problem`
 
@@ -67,13 +67,13 @@ class DriveAlignment:
         self.quality = DrivingQuality(self.events, self.vertical)
         self._speed_check = SpeedCheck()
         self._bias_given = bias is not None
-        self._judged = (0, 0)  # numbers of events and stops at the last judgement of the quality
+        self._judged = (0, 0)  # numbers of events and stops when the quality was last judged
         self._sums = [0.0] * 6  # integrals of force and rate over the current bin
         self._sums_us = 0
         self._speed_mps = -1.0  # negative before the first speed
         self._top_mps = 0.0
         self._silent_us = 0  # time since the last speed
-        self._means = None  # means of the last bin, None after they are processed
+        self._means = None  # means of force and rate over the last bin, None after they are processed
         self._work = None  # the generator _follow(), None when it has finished
 
     @property

@@ -144,7 +144,7 @@ class DrivingEvents:
         self._history = history
         self._finder = EventFinder(LAGS)
         self._fit = Fit()
-        # The next three lists describe the last interval. Each list has one entry per lag.
+        # The next three lists describe the last interval between two speeds. Each list has one entry per lag.
         self._ends = [[0] * COLUMNS for _ in range(LAGS)]  # the history's integrals at the end of the interval
         self._known = [False] * LAGS  # True if these integrals were known
         self._straight = [False] * LAGS  # True if the vehicle drove straight

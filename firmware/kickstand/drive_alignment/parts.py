@@ -97,7 +97,7 @@ class DriveParts:
             yield
             scatter += self._scatter(angle_two, split, self.count)
             yield
-            freedom = self.count - 2  # two means were computed from the blocks
+            freedom = self.count - 2  # two degrees of freedom less, because the scatter is about two means
             variance = STRETCH_DEG * STRETCH_DEG * (one[6] / (one[4] * one[4]) + two[6] / (two[4] * two[4]))
             sampled = blend_prior(scatter / one[4] / freedom, one[4], freedom)
             sampled += blend_prior(scatter / two[4] / freedom, two[4], freedom)

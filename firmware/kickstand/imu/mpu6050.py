@@ -24,12 +24,12 @@ from micropython import const
 
 from .fifo_frames import FRAME, SATURATED, AxisWatch, add_up, decode
 
-# setup() writes the registers one after another, beginning with SMPLRT_DIV: SMPLRT_DIV (p. 11), CONFIG with DLPF_CFG
-# (p. 13), GYRO_CONFIG (p. 14), ACCEL_CONFIG (p. 15) and, if the chip has it, ACCEL_CONFIG2. ACCEL_CONFIG2 sets the
-# low-pass of the accelerometer alone.
+# The registers that setup() writes follow one another: SMPLRT_DIV (p. 11), CONFIG with DLPF_CFG (p. 13), GYRO_CONFIG
+# (p. 14), ACCEL_CONFIG (p. 15) and, if the chip has it, ACCEL_CONFIG2. ACCEL_CONFIG2 sets the low-pass of the
+# accelerometer alone.
 _SMPLRT_DIV = const(0x19)
 _FIFO_EN = const(0x23)  # p. 16
-_ACCEL_XOUT_H = const(0x3B)  # p. 29; the fourteen bytes from this register on belong to one sampling instant
+_ACCEL_XOUT_H = const(0x3B)  # p. 29; the fourteen bytes from this register on are one sample
 _USER_CTRL = const(0x6A)  # p. 38
 _PWR_MGMT_1 = const(0x6B)  # p. 40
 _FIFO_COUNT_H = const(0x72)  # p. 43; reading this register latches the low byte in the next register
@@ -139,11 +139,11 @@ class Mpu6050:
         self._one, self._two, self._three = bytearray(1), bytearray(2), bytearray(3)
         self._readback = bytearray(_FIFO_EN - _SMPLRT_DIV + 1)
         self._frames = bytearray(FRAME * _MAX_FRAMES)
-        # Entry n holds the first n frames. The views are created once, because each slice takes heap.
+        # Entry n is a view of the first n frames. The views are created once, because each slice takes heap.
         self._some_frames = [memoryview(self._frames)[: FRAME * n] for n in range(_MAX_FRAMES + 1)]
         self.frames_left = self.overflows = 0
         self._most = 0  # largest number of bytes found in the FIFO
-        self._odd = False  # the last fetch() found an incomplete frame
+        self._odd = False  # True if the last fetch() found an incomplete frame
         self._settled = False  # True once a chip was started at this address, so the other address is not tried
         self._started = False  # True once setup() is complete and the FIFO fills
         self._full = 0  # if the FIFO holds more bytes than this, it may have overflowed
@@ -262,7 +262,7 @@ class Mpu6050:
             return 0
         self._odd = odd
         n = waiting // FRAME
-        if odd:  # the chip may be writing a frame; if the next count is also odd, an overflow has cut a frame
+        if odd:  # the chip may be writing a frame; if the next fetch() also finds part of a frame, an overflow has cut it
             self.frames_left = n + 1
             return 0
         taken = _MAX_FRAMES if n >= _MAX_FRAMES else _FEW_FRAMES if n > _FEW_FRAMES else n

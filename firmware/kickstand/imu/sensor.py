@@ -9,15 +9,15 @@ from .fifo_frames import DUE, LOST
 from .mpu6050 import UnknownChip
 
 _RETRY_MS = const(50)  # time between two attempts to set the chip up
-_FAILURES = const(3)  # number of successive failed transfers that are a fault; one or two NACKs are tolerated
+_FAILURES = const(3)  # number of successive failed transfers that are a fault; one or two are tolerated
 _SILENT_MS = const(100)  # longest time without a sample; a longer time is a fault
 # Longest time without a sample while the FIFO overflows, because the board has no time to read the FIFO
 _STALE_MS = const(500)
-_SETTLED_MS = const(1000)  # if a fault returns within this time, the set-up did not help
+_SETTLED_MS = const(1000)  # if a fault returns within this time after a set-up, the set-up did not help
 _FRUITLESS = const(3)  # number of successive set-ups that did not help before the FIFO is tested
 # The fault is explained after EXPLAINED successive failed set-ups, and again every EXPLAINED_EVERY set-ups (about 1 s)
 EXPLAINED, EXPLAINED_EVERY = 3, 20
-_CORRECTION_SHIFT = const(4)  # SampleClock.emptied() corrects by 1/16 of the difference between the two clocks
+_CORRECTION_SHIFT = const(4)  # SampleClock.emptied() corrects by 1/16 of the difference between the clocks of chip and board
 
 
 class Sensor:

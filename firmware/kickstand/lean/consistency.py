@@ -149,7 +149,7 @@ class Consistency:
         self._up_long += long_gain * (up - self._up_long)
         self._side += long_gain * (max(-_MOST_SIDEWAYS, min(_MOST_SIDEWAYS, sideways)) - self._side)
         self._pitch += long_gain * (pitch - self._pitch)
-        # pitch * pitch if none of the pitch is in the forward force
+        # `square` is pitch * pitch if the forward force confirms none of the pitch
         square = -pitch * max(-abs(pitch), min(abs(pitch), push))
         self._slope_square += gain * (square - self._slope_square)
         change = left - self._left_before

@@ -12,7 +12,8 @@ from ..errors import NO_MACHINE_CODE, checked
 from ..units import const
 
 _MIN_VARIANCE = const(1e-10)  # a lower bound, because rounding in 32-bit floats could make a variance negative
-# Terms of a Jacobian's row between two yields. Without machine code three terms take a millisecond.
+# Number of terms of a Jacobian's row that are processed between two yields. Without machine code three terms take a
+# millisecond.
 _TERMS_PER_STEP = const(3)
 # Largest squared innovation, in variances, with full weight (5 sigma). Larger innovations get less weight. They are not
 # rejected, because the state may be wrong.
@@ -117,8 +118,8 @@ class Covariance:
         """Apply one scalar measurement: K = P H^T / (H P H^T + R), correction += K innovation, P -= K H P. A generator.
 
         derivatives: H, ((state, d measurement / d state), ...). innovation: the measured value minus the value expected
-        from the states before this window's corrections. variance: R, in the measurement's unit squared. Beyond _GATE
-        the innovation's expected variance is raised until the innovation is at the gate.
+        from the states before this window's corrections. variance: R, in the measurement's unit squared. If the squared
+        innovation exceeds _GATE times its expected variance, this variance is raised until they are equal.
         """
         p, rows, column, gain, factor = self._p, self.rows, self._column, self._gain, self._factor
         correction, n = self.correction, self.n

@@ -69,7 +69,7 @@ class LeanFilter:
         self._good = self._next_good = [0.0] * (STATES - BIAS_LEFT)
         self._good_s = 0.0
         self._kept_speed = None  # (speed, variance) for the next start
-        self._gap = False  # True if readings were missing before the next start
+        self._gap = False  # True if the next start follows missing readings
         self.restart()
 
     def restart(self):
@@ -87,8 +87,9 @@ class LeanFilter:
         self._p = None
         self._upright = self.trim.angle  # value of the state LEAN while the bike is upright
         self._rest = RestDetector(not self._kept)
-        # _speed: the latest measured speed, until a window uses it. _last_speed: the speed used last. _speed_s: seconds
-        # since then. _straight_s: seconds since straight_or_prior_speed() was used.
+        # _speed: the latest measured speed, until a window uses it. _last_speed: the measured speed that a window used
+        # last. _speed_s: seconds since the use of _last_speed. _straight_s: seconds since straight_or_prior_speed() was
+        # used.
         self._speed = self._last_speed = None
         self._speed_s = self._straight_s = 0.0
         self._moving_s = 0.0  # remaining time for which the last measured speed proves that the bike moves
@@ -242,7 +243,7 @@ class LeanFilter:
         self._rest.update(means[2:5], means[5:8], bias, seconds, self.rolling or pushed, moving)
         if self._rest.resting and not rested:
             self._stand(means)
-            return  # this window's innovations belong to the state before _stand()
+            return  # without an update, because this window's innovations belong to the state before _stand()
         self._work = self._process(means, seconds, roll_acceleration)
 
     def _impossible(self, means, seconds):
@@ -346,7 +347,7 @@ class LeanFilter:
         if abs(means[7]) < measurements.MOST_FORWARD * abs(means[6]):  # otherwise the sensor is not on a bike
             up_misfit = p.misfit
             if abs(x[PITCH]) > 2 * measurements.STEEP:
-                misfit = up_misfit = 0.0  # the equations do not hold in a wheelie, so only its duration is judged
+                misfit = up_misfit = 0.0  # the equations do not hold in a wheelie, so only the duration of the pitch is judged
             lean = x[LEAN] - self._upright
             pitch, turning = x[PITCH], model.yaw_rate
             self._failed = self.consistency.add(misfit, up_misfit, sideways, pitch, push, lean, turning, seconds)
@@ -356,9 +357,8 @@ class LeanFilter:
         self._speed_s += seconds
         self._straight_s = min(self._straight_s, seconds) + seconds
         if measured is not None and (self._last_speed is None or self._speed_s > measurements.MEASURED_SPEED_EVERY_S):
-            # The acceleration comes from measured speeds only, because a pitch error would bias the estimated
-            # acceleration
-            acceleration, since = 0.0, 2 * measurements.SPEED_SCALE_S  # the noise of the first speed is not raised
+            # The acceleration is computed from measured speeds only, because an error of the pitch biases `push`
+            acceleration, since = 0.0, 2 * measurements.SPEED_SCALE_S  # with this value measured_speed() does not raise the noise of the first speed
             if self._last_speed is not None:
                 acceleration, since = (measured - self._last_speed) / self._speed_s, self._speed_s
             self._speed, self._last_speed, self._speed_s = None, measured, 0.0
@@ -384,7 +384,8 @@ class LeanFilter:
             x[i] += p.take_correction(i)
         x[SPEED] = max(0.0, x[SPEED])
         x[PITCH] = possible_pitch(x[PITCH])
-        # Not needed at rest, where the force shows the lean. The yaw error is meaningless for a sensor in the hand.
+        # At rest the force shows the lean, so no correction for the yaw error is needed. The yaw error is meaningless
+        # for a sensor in the hand.
         if not self._rest.resting:
             self._upright = self.trim.angle + model.lean_by_pitch(x)
         if x[LEAN] > pi:

@@ -13,7 +13,7 @@ _SMOOTH_US = const(300_000)  # time constant of smooth_force
 MAX_VARIANCE = (SIGMA_SHARE * radians(3.0)) ** 2
 DOUBTED_VARIANCE = (SIGMA_SHARE * radians(2.0)) ** 2  # largest variance of a lean that is shown after repeated misfits
 TRIM_MAX_VARIANCE = radians(0.5) ** 2  # largest variance of a trim that is kept
-_TRIM_STEP_DEG = const(0.3)  # smallest change of the trim that is saved; a limit protects the flash from wear
+_TRIM_STEP_DEG = const(0.3)  # smallest change of the trim that is saved; saving smaller changes would wear the flash
 FALLEN_DEG = 65.0  # the bike has fallen after _FALLEN_US of at least this lean
 _FALLEN_US = const(1_000_000)
 # Half of the time for which a lean must last to count as a maximum. The jerk of a pothole is shorter than the whole

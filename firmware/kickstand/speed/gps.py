@@ -28,7 +28,7 @@ _LATE_MS = const(2000)  # a fix that waited in the receiver for longer than this
 _LOOK_MS = const(1500)  # if no sentence with a speed arrives for this time, other kinds of sentences are examined
 # Older times are replaced by times of this age, because after 6 days ticks_diff() is negative
 _CARRY_MS = const(60_000)
-_TIME_JUMP_MS = const(5000)  # a larger difference is not a delay, but a correction of the receiver's clock
+_TIME_JUMP_MS = const(5000)  # a fix that seems later than this is not late: the receiver has corrected its clock
 # The delay of a fix is measured against a reference, which is a fix without a delay. If all fixes are late for longer
 # than _TIME_JUMP_MS, the receiver has set its clock back. Then the fix with the smallest delay becomes the new
 # reference, after at least this number of fixes.

@@ -55,8 +55,8 @@ class Wheel:
         self.count = 0  # number of pulses that the interrupt has counted
         self._pulse_us = ticks_us()  # time of the last pulse
         self._opened_us = ticks_us()  # time when the contact last opened
-        self._seen = 0  # the count at the last report
-        self._seen_us = None  # time of the last pulse at the last report; None if no period begins with that pulse
+        self._seen = 0  # `count` when poll() last returned a speed
+        self._seen_us = None  # time of the last pulse that _seen counts; None if no period begins with that pulse
         self._report_ms = None  # time when poll() last returned a speed
         self._moved_ms = None  # time when poll() last found a new pulse
         self.age_ms = 0

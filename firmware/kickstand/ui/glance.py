@@ -44,7 +44,7 @@ _ARC = bytes(2 + _ARC_RADIUS - int((_ARC_RADIUS**2 - x * x) ** 0.5 + 0.5) for x 
 
 
 def _scale():
-    """Return the arc without a lean. It is drawn only once, because this takes 6 ms."""
+    """Return the arc without a lean. The arc is drawn only once, because drawing takes 6 ms."""
     scale = framebuf.FrameBuffer(bytearray(128 * 4), 128, 32, framebuf.MONO_VLSB)
     for x in range(_ARC_DEG + 1):
         for column in (64 + x, 64 - x):
