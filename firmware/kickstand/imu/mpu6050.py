@@ -262,7 +262,7 @@ class Mpu6050:
             return 0
         self._odd = odd
         n = waiting // FRAME
-        if odd:  # the chip may be writing a frame; if the next fetch() also finds part of a frame, an overflow has cut it
+        if odd:  # the chip may be writing a frame; if the next fetch() finds a part too, an overflow has cut a frame
             self.frames_left = n + 1
             return 0
         taken = _MAX_FRAMES if n >= _MAX_FRAMES else _FEW_FRAMES if n > _FEW_FRAMES else n

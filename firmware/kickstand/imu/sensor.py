@@ -17,7 +17,7 @@ _SETTLED_MS = const(1000)  # if a fault returns within this time after a set-up,
 _FRUITLESS = const(3)  # number of successive set-ups that did not help before the FIFO is tested
 # The fault is explained after EXPLAINED successive failed set-ups, and again every EXPLAINED_EVERY set-ups (about 1 s)
 EXPLAINED, EXPLAINED_EVERY = 3, 20
-_CORRECTION_SHIFT = const(4)  # SampleClock.emptied() corrects by 1/16 of the difference between the clocks of chip and board
+_CORRECTION_SHIFT = const(4)  # SampleClock.emptied() corrects by 1/16 of the clocks' difference
 
 
 class Sensor:

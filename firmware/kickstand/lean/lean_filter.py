@@ -347,7 +347,8 @@ class LeanFilter:
         if abs(means[7]) < measurements.MOST_FORWARD * abs(means[6]):  # otherwise the sensor is not on a bike
             up_misfit = p.misfit
             if abs(x[PITCH]) > 2 * measurements.STEEP:
-                misfit = up_misfit = 0.0  # the equations do not hold in a wheelie, so only the duration of the pitch is judged
+                # The equations do not hold in a wheelie, so only the duration of the pitch is judged
+                misfit = up_misfit = 0.0
             lean = x[LEAN] - self._upright
             pitch, turning = x[PITCH], model.yaw_rate
             self._failed = self.consistency.add(misfit, up_misfit, sideways, pitch, push, lean, turning, seconds)
@@ -357,9 +358,10 @@ class LeanFilter:
         self._speed_s += seconds
         self._straight_s = min(self._straight_s, seconds) + seconds
         if measured is not None and (self._last_speed is None or self._speed_s > measurements.MEASURED_SPEED_EVERY_S):
-            # The acceleration is computed from measured speeds only, because an error of the pitch biases `push`
-            acceleration, since = 0.0, 2 * measurements.SPEED_SCALE_S  # with this value measured_speed() does not raise the noise of the first speed
+            # With these values measured_speed() does not raise the noise of the first speed
+            acceleration, since = 0.0, 2 * measurements.SPEED_SCALE_S
             if self._last_speed is not None:
+                # The acceleration is computed from measured speeds only, because an error of the pitch biases `push`
                 acceleration, since = (measured - self._last_speed) / self._speed_s, self._speed_s
             self._speed, self._last_speed, self._speed_s = None, measured, 0.0
             yield from p.update(*measurements.measured_speed(measured, speed, acceleration, since))

@@ -9,7 +9,8 @@ from struct import pack_into, unpack_from
 from ..units import const
 
 VERSION = 1  # version of our own packets
-LEAN, MOTION, SPEED, OWN = range(4)  # kinds of packets, the indices in `intervals`; RaceChrono's packet ids are higher by 1
+# Kinds of packets, which are also the indices in `intervals`. RaceChrono's packet ids are higher by 1
+LEAN, MOTION, SPEED, OWN = range(4)
 _FASTEST_MS = const(40)  # shortest interval between two packets of the same kind
 UNKNOWN, UNKNOWN_SPEED, UNKNOWN_SIGMA = -0x8000, 0xFFFF, 0xFF
 
