@@ -76,7 +76,7 @@ def exchanged(sda, scl, addresses):
 
 
 def scan(sda, scl, reopen, addresses):
-    """Examine a bus. This takes 0.1 s and leaves the bus open.
+    """Examine a bus. The scan takes 0.1 s and leaves the bus open.
 
     Args:
         addresses: the addresses at which the missing device may answer.

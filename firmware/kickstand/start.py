@@ -1,7 +1,7 @@
 """Starts the lean meter. main.py runs it when the board gets power.
 
 Safe mode: if the button is held at power-on, nothing is started. So new firmware can always be copied. After a reset
-the button is ignored. Otherwise a press while an error is shown could leave the rider without a display.
+the button is ignored. Without this rule a press while an error is shown could leave the rider without a display.
 """
 
 import gc
@@ -92,8 +92,7 @@ def main(loop=None):
 def _last_words(lcd, line1, line2):
     """Show two lines when the firmware ends.
 
-    Args:
-        lcd: the Display, or None if it is not open yet. Then it is opened on the default pins.
+    Args: lcd: the Display, or None if it is not open yet. Without a Display one is opened on the default pins.
     """
     try:
         if lcd is None:

@@ -15,6 +15,6 @@ LOST_US = 170_000
 def const(value):
     """Return the value.
 
-    MicroPython's compiler recognises _NAME = const(value) at the top level of a module. It puts the value into the
-    code, and the name takes no heap. This module defines const() because CPython has no module micropython."""
+    MicroPython's compiler recognises _NAME = const(value) at the top level of a module. The compiler puts the value
+    into the code, and the name takes no heap. This module defines const() because CPython has no module micropython."""
     return value

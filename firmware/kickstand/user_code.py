@@ -1,4 +1,5 @@
-"""Runs the owner's code, the file user.py on the board. Updates do not touch this file. It may define these functions:
+"""Runs the owner's code, the file user.py on the board. Updates do not touch this file. The file may define these
+functions:
 
 setup(app)                          is called once, before the lean meter runs
 page(app), page_battery(app) ...    is called while its page is shown. It returns two lines of 16 characters and, for a

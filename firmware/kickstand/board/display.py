@@ -11,8 +11,8 @@ driver.
 
 begin(i2c, address, hz, fresh)  prepares for a display that has just answered. fresh: True if the display may have been
                                 powered just now.
-show(line1, line2, picture)     stores the lines and the picture to show. A line has 16 characters. It is bytes, or a
-                                str with codes below 256.
+show(line1, line2, picture)     stores the lines and the picture to show. A line is bytes, or a str with codes below
+                                256, of 16 characters.
 tick(now_ms)                    does one step and uses the bus for 3 ms (OLED) or at most 13 ms (LCD). Raises OSError if
                                 the display does not answer.
 busy                            True while something must still be sent.

@@ -1,8 +1,9 @@
 """Driver for an HD44780 character display, 16x2 or larger, behind a PCF8574 port expander (the usual I2C backpack).
 display.py finds it and describes its methods.
 
-Sources: data sheets Hitachi HD44780U (ADE-207-272) and NXP PCF8574. The driver uses the 4-bit mode. It sends the
-changed part of a line in two transfers: first dashes, then the text. A transfer of a whole line takes 6 ms at 100 kHz.
+Sources: data sheets Hitachi HD44780U (ADE-207-272) and NXP PCF8574. The driver uses the 4-bit mode. The driver sends
+the changed part of a line in two transfers: first dashes, then the text. A transfer of a whole line takes 6 ms at 100
+kHz.
 
 Different backpacks connect the pins of the PCF8574 in different ways, see WIRINGS. The bit of R/W is between the bits
 of RS and E, and stays low.
@@ -89,7 +90,7 @@ class Lcd:
     def show(self, line1, line2, picture=None):
         """Set the two lines that tick() sends.
 
-        A line is str or bytes. It is padded or cut to 16 characters. Codes 0 to 7 show the patterns of _bar_glyphs().
+        A line is str or bytes, and is padded or cut to 16 characters. Codes 0 to 7 show the patterns of _bar_glyphs().
         Other codes show the characters of the display's ROM. picture: not used."""
         self._put(0, line1)
         self._put(1, line2)

@@ -53,7 +53,7 @@ class Canvas(framebuf.FrameBuffer):
         self._pixels = pixels
 
     def tall(self, line, page, inverted=False):
-        """Write up to 16 letters of 8x16 pixels across the display. Their top is at row 8 * page.
+        """Write up to 16 letters of 8x16 pixels across the display. The letters' top is at row 8 * page.
 
         line: str or bytes, as in show()."""
         for i in range(min(16, len(line))):

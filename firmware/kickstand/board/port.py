@@ -10,8 +10,8 @@ import sys
 import machine
 
 # Collect garbage often while the other modules are loaded. Otherwise lasting objects would be placed behind the
-# garbage, far along the heap. Then every later collection would scan all of that heap. App resets the threshold before
-# its loop begins.
+# garbage, far along the heap. Then every later collection would scan the heap up to those objects. App resets the
+# threshold before its loop begins.
 gc.threshold(80_000)
 
 IS_ESP32 = sys.platform == "esp32"
@@ -81,7 +81,7 @@ def open_i2c(controller, sda, scl, frequency, timeout_us):
 
 
 def turns_to_collect(most):
-    """Return the number of passes of the app's loop between two garbage collections. It is `most` or smaller.
+    """Return the number of passes of the app's loop between two garbage collections, at most `most`.
 
     An ESP32's heap starts with 64 KB and grows only after a collection that frees too little. In such a small heap,
     `most` passes would use up the heap, and collections would often run in the middle of a pass."""

@@ -24,9 +24,9 @@ class PoseTaker:
         seconds: duration of the average.
 
     Attributes:
-        settled: the mean reading of the accelerometer (3 values, in g) in the half second before averaging. It is
-            available from SETTLED on.
-        pose: the StillPose. It is finished at DONE.
+        settled: the mean reading of the accelerometer (3 values, in g) in the half second before averaging. This mean
+            is available from SETTLED on.
+        pose: the StillPose, which is finished at DONE.
     """
 
     def __init__(self, chip, rate_hz, seconds):

@@ -2,8 +2,8 @@
 
 The closed form, equations 16-17, assumes that each axis points exactly up or down. A pose that is 10 degrees off causes
 an error of 0.6 degrees of lean. fit() uses the same six mean readings, but only assumes that each calibrated reading
-has a length of 1 g. That is true in any pose. The fit starts from the closed form and takes a few Gauss-Newton steps.
-The error of the fit is about 0.1 degrees.
+has a length of 1 g, as it has in any pose. The fit starts from the closed form and takes a few Gauss-Newton steps. The
+error of the fit is about 0.1 degrees.
 
 Six poses determine six numbers exactly, so their residual proves nothing. Only a seventh, free pose can verify the
 result.

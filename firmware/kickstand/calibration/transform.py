@@ -14,7 +14,8 @@ from math import radians
 from ..errors import NO_MACHINE_CODE, checked
 from ..units import const
 
-# The integer that represents the largest scale. Its product with the sum of eight samples still fits in 32 bits.
+# The integer that represents the largest scale. The product of this integer and the sum of eight samples still fits in
+# 32 bits.
 _ONE = const(2048)
 
 

@@ -18,7 +18,7 @@ from ..units import const
 # a step of the integration ends when the sensor has turned by this angle about one axis; a smaller angle is more exact
 _STEP_RAD = const(0.02)
 _STEP_US = const(60_000)  # a step also ends after this time
-# 0.95 of the gyro's range, in counts. It is less than the full range, because the low-pass of the chip hides single
+# 0.95 of the gyro's range, in counts. The limit is below the full range, because the low-pass of the chip hides single
 # readings at the end of the range.
 _QUICK = const(31_000)
 
@@ -68,8 +68,8 @@ class Turn:
             sums: sums of the samples' counts in the chip's order, 7 values.
             n: number of samples.
             dt_us: microseconds since the previous samples.
-            hold: True if the samples belong to a still pose that may end the turn. They are added to the turn only if
-                that pose fails.
+            hold: True if the samples belong to a still pose that may end the turn. The samples are added to the turn
+                only if that pose fails.
         """
         if not self.running:
             return

@@ -44,10 +44,10 @@ class DriveAlignment:
 
     Args:
         vehicle: CAR or MOTORCYCLE.
-        up: for a motorcycle, the vertical from two poses, a unit vector in the sensor's axes. If it is None, the
+        up: for a motorcycle, the vertical from two poses, a unit vector in the sensor's axes. If `up` is None, the
             vertical comes from riding straight.
-        bias: the gyro's bias, 3 values in deg/s, or None. It is subtracted until a stop measures a newer bias. Pass
-            zeros if the rates are already corrected. Without a bias no braking event counts before the first stop.
+        bias: the gyro's bias, 3 values in deg/s, or None. This bias is subtracted until a stop measures a newer bias.
+            Pass zeros if the rates are already corrected. Without a bias no braking event counts before the first stop.
 
     Attributes:
         standing: the StandingVertical, which also has the gyro's bias.
@@ -88,7 +88,7 @@ class DriveAlignment:
 
     @property
     def quality_deg(self):
-        """The standard error of forward's direction in degrees. It is 180 before the first estimate."""
+        """The standard error of forward's direction in degrees. The value is 180 before the first estimate."""
         return self.quality.quality_deg
 
     @property
@@ -122,8 +122,7 @@ class DriveAlignment:
 
     @property
     def reason(self):
-        """The reason why matrix() gives no alignment, an AlignmentError. It is the problem, or else the result of
-        missing()."""
+        """The reason why matrix() gives no alignment, an AlignmentError: `problem`, or else the result of missing()."""
         return self.problem or self.missing(self.counted, self.needed, self.turned)
 
     def missing(self, counted, needed, turned):

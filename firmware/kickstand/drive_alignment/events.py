@@ -10,8 +10,8 @@ from ..units import STANDARD_GRAVITY, const
 from .history import COLUMNS, difference
 from .regression import LAG_STEP_US, LAGS, Fit, ForwardRegression
 
-# An event begins when the absolute acceleration exceeds BEGIN_MPS2, and ends when it falls below END_MPS2. It must
-# change the speed by at least _CHANGE_MPS.
+# An event begins when the absolute acceleration exceeds BEGIN_MPS2, and ends when it falls below END_MPS2. An event
+# must change the speed by at least _CHANGE_MPS.
 BEGIN_MPS2, END_MPS2 = 0.8, 0.4
 _CHANGE_MPS = const(1.5)
 _MAX_ACCELERATION_EVENTS = const(2)  # most acceleration events that count, because braking shows forward better
@@ -36,8 +36,8 @@ class EventFinder:
 
     Attributes:
         going_on: True during an event.
-        change: the change of speed in the current event or, between events, in the last event. It is in m/s and
-            negative for braking.
+        change: the change of speed in the current event or, between events, in the last event. The change is in m/s,
+            and negative for braking.
     """
 
     def __init__(self, lags):
@@ -146,7 +146,7 @@ class DrivingEvents:
         self._fit = Fit()
         # The next three lists describe the last interval between two speeds. Each list has one entry per lag.
         self._ends = [[0] * COLUMNS for _ in range(LAGS)]  # the history's integrals at the end of the interval
-        self._known = [False] * LAGS  # True if these integrals were known
+        self._known = [False] * LAGS  # True if the integrals at the end of the interval were known
         self._straight = [False] * LAGS  # True if the vehicle drove straight
         self._end = [0] * COLUMNS
         self._before = (0.0, 0)  # speed and time at the end of the last interval
@@ -199,8 +199,8 @@ class DrivingEvents:
         """Process the next interval, as a generator of short steps.
 
         Args:
-            use: True if the gyro's bias is known. Otherwise the interval is not used, because straight driving and
-                bends cannot be distinguished.
+            use: True if the gyro's bias is known. If not, the interval is not used, because straight driving and bends
+                cannot be distinguished.
         """
         before, before_us = self._before
         speed, time_us = self._before = self._waiting.pop(0)

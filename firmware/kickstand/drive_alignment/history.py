@@ -22,7 +22,7 @@ class ForceHistory:
     """A ring of running integrals of force and yaw rate, with one entry for the end of each bin.
 
     Attributes:
-        now: the time at the end of the newest bin in us. It is the sum of all bins' lengths and wraps at MASK.
+        now: the time at the end of the newest bin in us. This time is the sum of all bins' lengths, and wraps at MASK.
     """
 
     def __init__(self):

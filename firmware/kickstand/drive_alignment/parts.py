@@ -15,7 +15,8 @@ from .regression import BLOCKS
 
 PRIOR_DEG = 1.0  # prior of the standard deviation of forward, at a weight of 1 g^2 s
 PRIOR_FREEDOM = 4
-# Standard deviation of forward that camber and wind cause on one stretch of road. It does not depend on the weight.
+# Standard deviation of forward that camber and wind cause on one stretch of road. This part does not depend on the
+# weight.
 STRETCH_DEG = 1.5
 _MIN_WEIGHT = const(0.1)  # smallest weight of a part whose forward is compared, in g^2 s
 _MIN_S = const(20.0)  # shortest straight driving in a part whose vertical is compared
@@ -59,7 +60,7 @@ class DriveParts:
         self.clear()
 
     def clear(self):
-        """Drop all blocks. Call it before the first add()."""
+        """Drop all blocks. Call this method before the first add()."""
         self.count = 0
         self.forward_deg = self.sigmas = self.roll_deg = self.pitch_deg = 0.0
 
@@ -120,8 +121,8 @@ class DriveParts:
             sums[6] += block[4] * block[4]
 
     def _scatter(self, angle, first, last):
-        """Return the scatter of forward about an angle, over the blocks from first to last - 1. It is the sum of weight
-        times squared deviation in deg^2."""
+        """Return the scatter of forward about an angle: the sum of weight times squared deviation in deg^2, over the
+        blocks from first to last - 1."""
         total = 0.0
         for k in range(first, last):
             block = self._blocks[k]

@@ -10,8 +10,8 @@ _NEGATIVE_MPS = const(-0.5)  # speeds from this value up to zero are noise of a 
 # second is lively. While driving, most seconds are lively.
 _LIVELY_G = const(0.03)
 _TURNING_DPS = const(5.0)  # a second with a larger yaw rate is ignored, because a bend is lively at constant speed too
-# The speed is stuck if two conditions hold. It has not changed for at least _STUCK_S lively seconds, and at least
-# _STUCK_SHARE of all seconds since its last change are lively. Four braking events together have 8 lively seconds.
+# The speed is stuck if it has not changed for at least _STUCK_S lively seconds, and at least _STUCK_SHARE of all
+# seconds since its last change are lively. Four braking events together have 8 lively seconds.
 _STUCK_S = const(8)
 _STUCK_SHARE = const(0.15)
 # Limits of the ratio between the change of force and the change of speed. The ratio should be 1. The pitch of a braking
@@ -44,7 +44,7 @@ def fit_problem(lag_s, force_ratio):
 
 
 class SpeedCheck:
-    """Finds a negative or stuck speed. It does not need to know forward.
+    """Finds a negative or stuck speed. The check does not need to know forward.
 
     Attributes:
         problem: an AlignmentError, or None.

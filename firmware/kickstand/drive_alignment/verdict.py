@@ -2,7 +2,7 @@
 
 If SIDE in the settings is not the side of the kickstand, forward and backward are exchanged. The poses cannot show this
 error, but the first braking events do. A change of pitch between the poses causes a yaw error of a few degrees. This
-error is corrected after enough braking events. Any other difference means that the mount has moved.
+yaw error is corrected after enough braking events. Any other difference means that the mount has moved.
 """
 
 from math import atan2, degrees
@@ -53,8 +53,8 @@ def compare(drive, matrix):
 def yaw_deg(fit, matrix):
     """Return the yaw error of a matrix in degrees.
 
-    It is the angle from the matrix's forward to the Fit's forward, about the matrix's up. It is positive if the Fit's
-    forward is farther to the left."""
+    The yaw error is the angle from the matrix's forward to the Fit's forward, about the matrix's up. It is positive if
+    the Fit's forward is farther to the left."""
     return degrees(atan2(dot(matrix[0:3], fit.forward), dot(matrix[6:9], fit.forward)))
 
 

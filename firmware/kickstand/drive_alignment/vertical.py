@@ -31,7 +31,8 @@ _TURNED_S = const(6.0)
 # is wrong. A gyro that warms up changes its bias by less than this.
 TURNING_DPS = 10.0
 _MEAN_S = const(60.0)  # time constant of the mean force, which is used until a better vertical is known
-# Largest difference of two verticals that the road's slope can cause (14 %). If it is larger, the mount moved.
+# Largest difference of two verticals that the road's slope can cause (14 %). If two verticals differ more, the mount
+# moved.
 MAX_CHANGE_DEG = 8.0
 
 

@@ -1,4 +1,4 @@
-"""Finds faulty axes from the notes of add_up(). It is imported only when an axis looks suspicious.
+"""Finds faulty axes from the notes of add_up(). This module is imported only when an axis looks suspicious.
 
 An axis is faulty in three cases:
 * Its counts have at most two values, or their lowest bits do not change. The axis is dead, or its low byte is stuck.
@@ -136,8 +136,8 @@ class AxisJudge:
 
 
 def _ill(axes, how=None):
-    """Return the Notice for faulty axes. It names the gyro's faulty axes or, if the gyro has none, the accelerometer's
-    faulty axes.
+    """Return the Notice for faulty axes. The Notice names the gyro's faulty axes or, if the gyro has none, the
+    accelerometer's faulty axes.
 
     Args:
         axes: one bit per column of a frame.

@@ -38,7 +38,8 @@ _WHO_AM_I = const(0x75)  # p. 45
 
 _RESET = const(0x80)  # bit of PWR_MGMT_1
 _STANDBY = const(0x3F)  # bits of PWR_MGMT_2 (p. 42), the register after PWR_MGMT_1; each bit turns an axis off
-# Value of PWR_MGMT_1. This clock is accurate to 1 %. The oscillator that runs after a reset is off by up to 5 %.
+# Value of PWR_MGMT_1 that selects the gyro's clock, which is accurate to 1 %. The oscillator that runs after a reset is
+# off by up to 5 %.
 _CLOCK_PLL_GYRO_X = const(0x01)
 _FIFO_ALL = const(0xF8)  # value of FIFO_EN for the fourteen bytes of temperature, gyro and accelerometer
 _FIFO_ENABLE = const(0x40)  # bit of USER_CTRL
@@ -103,7 +104,7 @@ class Mpu6050:
         accel_range_g: 2, 4, 8 or 16.
         gyro_range_dps: 250, 500, 1000 or 2000.
         dlpf: DLPF_CFG, the low-pass, from 1 (184 Hz) to 6 (5 Hz).
-        rate_hz: samples per second. It must be 1000 divided by an integer from 1 to 256.
+        rate_hz: samples per second. The rate must be 1000 divided by an integer from 1 to 256.
         accept: a WHO_AM_I that is not in CHIPS. A chip with this number is treated as an MPU6500.
 
     Attributes:
@@ -244,8 +245,7 @@ class Mpu6050:
         increments overflows and returns 0. It also returns 0 while the chip is writing a frame.
 
         Returns:
-            The number of samples read. It is _MAX_FRAMES if the FIFO holds at least that many, else at most
-            _FEW_FRAMES.
+            The number of samples read: _MAX_FRAMES if the FIFO holds at least that many, else at most _FEW_FRAMES.
 
         Raises:
             OSError: a transfer on the bus failed, or restart_fifo() failed.
@@ -316,8 +316,9 @@ class Mpu6050:
         self._read_into(_FIFO_COUNT_H, self._two)
         return self._two[0] << 8 | self._two[1]
 
-    # A failed transfer of a register is tried once more. Otherwise a moment of bad contact would require a whole set-up
-    # of the chip. A failed read of the FIFO is not repeated, because the chip has already dropped the bytes.
+    # A failed transfer of a register is tried once more. Without this second attempt a moment of bad contact would
+    # require a whole set-up of the chip. A failed read of the FIFO is not repeated, because the chip has already
+    # dropped the bytes.
 
     def read_register(self, register):
         """Return the content of a register. Raises OSError from the bus."""

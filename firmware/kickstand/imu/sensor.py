@@ -27,7 +27,7 @@ class Sensor:
         chip: an Mpu6050.
         reopen: reopen() frees the bus and returns it as a machine.I2C.
         explain: a function, or None. explain(chip, error) returns a Notice with the reason for a failed set-up, and
-            the addresses that answer. explain(chip, None) tests the FIFO. It returns a Notice if the FIFO is broken,
+            the addresses that answer. explain(chip, None) tests the FIFO, and returns a Notice if the FIFO is broken,
             else None, and the addresses.
 
     Attributes:
@@ -74,7 +74,7 @@ class Sensor:
             now_ms: ticks_ms().
 
         Returns:
-            The number of samples, at most eight. It is 0 while an axis is faulty or the chip does not run.
+            The number of samples, at most eight. The number is 0 while an axis is faulty or the chip does not run.
 
         Raises:
             SettingsError: the pins cannot be used. This method raises nothing else.
@@ -161,13 +161,13 @@ class Sensor:
             self.fault = fault
 
     def _named_fifo(self):
-        """Return the current fault if it says that the FIFO is broken, else None. This fault stays until a sample
+        """Return the current fault if it says that the FIFO is broken, else None. Such a fault stays until a sample
         arrives."""
         return self.fault if self.fault is not None and self.fault.code == "sensor-fifo" else None
 
     def _fifo_fault(self):
-        """Return a Notice if the chip measures but its FIFO does not work, else None. The test takes up to 0.3 s. It
-        is skipped if the current fault already says that the FIFO is broken."""
+        """Return a Notice if the chip measures but its FIFO does not work, else None. The test takes up to 0.3 s. The
+        test is skipped if the current fault already says that the FIFO is broken."""
         return self._named_fifo() or (self.explain(self.chip, None)[0] if self.explain else None)
 
     def check(self, now_ms):

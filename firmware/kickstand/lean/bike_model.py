@@ -132,9 +132,9 @@ def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
     """Return the rates about left and up, in rad/s, to use in derivatives that multiply a rate by a state.
 
     A bike in balance has the rate v w_y / g = -cos q sin t about up. If the measured rate about up is close to this
-    rate, the function returns the rates of a bike in balance. Otherwise, and with a speed of 0, it returns the measured
-    rates. In a product of rate and state, the noise of a measured rate would be squared. This would make the estimated
-    speed and lean too small (errors in variables).
+    rate, the function returns the rates of a bike in balance. If the rates differ more, or the speed is 0, the function
+    returns the measured rates. In a product of rate and state, the noise of a measured rate would be squared. This
+    would make the estimated speed and lean too small (errors in variables).
     """
     if speed > _BALANCE_MIN_SPEED:
         balanced = -STANDARD_GRAVITY * cos_pitch * sin_lean / speed
@@ -216,6 +216,6 @@ class Linearisation:
         self.pitching = per_rate * self.pitch_rate  # in g
 
     def lean_by_pitch(self, x):
-        """Return the part of the state's lean that (7) subtracts, in rad. In this part, the yaw error makes pitch of
-        the bike look like lean."""
+        """Return the part of the state's lean that (7) subtracts, in rad. This part is pitch of the bike that looks
+        like lean because of the yaw error."""
         return x[YAW_ERROR] * self.cos_lean * (tan(x[PITCH]) + 0.5 * x[YAW_ERROR] * self.sin_lean)

@@ -1,20 +1,20 @@
 """Checks that the readings fit the lean filter's model, by the innovations of the filter.
 
 A filter's covariance does not reveal a partly failed sensor, but its innovations do. An innovation is a measured value
-minus the expected value. Its square divided by its expected variance is called the normalised innovation squared. The
-mean of this value is 1 if everything fits (Y. Bar-Shalom and others, Estimation with Applications to Tracking and
-Navigation, section 5.4). This module averages the root of this value, with the innovation's sign. In this mean,
-vibration and bumps cancel. A dead or mirrored axis, a halved scale, a jump of the bias and a slipped mount do not
-cancel. The forces to the left and up have two means each. The short mean shows large errors within two seconds. The
-long mean shows small errors after some seconds.
+minus the expected value. The square of an innovation divided by its expected variance is called the normalised
+innovation squared. The mean of this value is 1 if everything fits (Y. Bar-Shalom and others, Estimation with
+Applications to Tracking and Navigation, section 5.4). This module averages the root of this value, with the
+innovation's sign. Vibration and bumps cancel in the mean. A dead or mirrored axis, a halved scale, a jump of the bias
+and a slipped mount do not cancel. The forces to the left and up have two means each. The short mean shows large errors
+within two seconds. The long mean shows small errors after some seconds.
 
 Three more means are of quantities that never stay large for long on a real ride:
     the force to the side, because a bike is in balance
     the pitch
     the part of the pitch that the forward force does not confirm
-On a real slope the forward force contains a part of gravity, sin(pitch). If this part is missing, the pitch is wrong,
-because wrong rates were integrated. The filter then mistakes the missing force for an acceleration. So the bike seems
-to brake uphill or to accelerate downhill for longer than a real bike does.
+On a real slope the forward force contains a part of gravity, sin(pitch). If the forward force lacks this part, the
+pitch is wrong, because wrong rates were integrated. The filter then mistakes the missing force for an acceleration. So
+the bike seems to brake uphill or to accelerate downhill for longer than a real bike does.
 
 Each mean is compared with its own spread, as in Student's t-test. On a road rougher than the filter expects, single
 innovations are large, and their means vary more.
@@ -22,8 +22,8 @@ innovations are large, and their means vary more.
 A misfit is a mean above its limit. After a misfit the lean is doubted: it is hidden until everything has fitted for a
 while. Repeated misfits mean a faulty sensor.
 
-There is one more check after a doubt. If the gyro's rate about up is wrong, a straight can look like an endless bend,
-with all forces as expected. So a lean that stays on one side for long is not shown.
+After a doubt the lean itself is checked too. If the gyro's rate about up is wrong, a straight can look like an endless
+bend, with all forces as expected. So a lean that stays on one side for long is not shown.
 """
 
 from math import sqrt
@@ -79,8 +79,8 @@ HOLDS_S = (3.0, 4.0, 4.0, 20.0, 60.0)
 _GAP_S = const(4.5)
 # After more doubts than this, only time in bends counts as fitting, because on a straight nearly everything fits.
 MILD = 3
-# s: shortest time between two doubts after more than MILD doubts. In this time rest can be detected. Larger: errors of
-# the sensor that have changed are found later.
+# s: shortest time between two doubts after more than MILD doubts. The time between two doubts is needed to detect rest.
+# Larger: errors of the sensor that have changed are found later.
 _AGAIN_S = const(12.0)
 _TURNING = const(0.05)  # rad/s: smallest yaw rate of a bend. Larger: the lean stays hidden for longer.
 # s: after this time of fitting, one doubt is forgotten. Larger: after a repeated fault the lean is hidden for longer.

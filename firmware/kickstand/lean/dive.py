@@ -19,7 +19,7 @@ from ..units import STANDARD_GRAVITY, const
 PRIOR_SHARE = 0.026
 # (g/s)^2: weight of PRIOR_SHARE, as a part of the sum of a'^2. Larger: the share is found later, and varies less.
 _PRIOR_SQUARE = const(5.3)
-_MIN_SHARE = const(-0.035)  # rad per g: smallest share. It is negative, because an anti-dive fork may lift the nose
+_MIN_SHARE = const(-0.035)  # rad per g: smallest share, negative because an anti-dive fork may lift the nose
 _MAX_SHARE = const(0.14)  # rad per g: largest share, 8 degrees per g, as with soft, long forks
 _MIN_SPEED = const(5.0)  # m/s: lowest speed of a window that counts. Larger: the share is found later.
 _MAX_JERK = const(3.0)  # g/s: largest a' that counts. Larger: bumps and lost readings count as braking.

@@ -12,8 +12,8 @@ _TOO_SMALL = 0.01  # (0.1 g)^2: smallest squared force that has a direction. In 
 
 
 def static_lean_deg(force):
-    """Return the lean of a standing bike in degrees, > 0 to the right. This is equation (21) with a sign. It is exact
-    near upright.
+    """Return the lean of a standing bike in degrees, > 0 to the right. This lean is equation (21) with a sign, and is
+    exact near upright.
 
     force: left, up, forward in g.
     """

@@ -1,8 +1,8 @@
 """The covariance of a Kalman filter, updated in steps short enough for the time of one sample.
 
-Nearly all of the work is sums of products. On a board a product of floats takes 12 us and 32 bytes of heap. There,
-machine code computes these sums on arrays, without heap. The long methods are generators, which yield where the work
-may be interrupted. Rows of Jacobians are written as ((state, value), ...), because most of their values are zero.
+Nearly all of the work is sums of products. On a board a product of floats takes 12 us and 32 bytes of heap. So on a
+board machine code computes these sums on arrays, without heap. The long methods are generators, which yield where the
+work may be interrupted. Rows of Jacobians are written as ((state, value), ...), because most of their values are zero.
 """
 
 from array import array
@@ -15,8 +15,8 @@ _MIN_VARIANCE = const(1e-10)  # a lower bound, because rounding in 32-bit floats
 # Number of terms of a Jacobian's row that are processed between two yields. Without machine code three terms take a
 # millisecond.
 _TERMS_PER_STEP = const(3)
-# Largest squared innovation, in variances, with full weight (5 sigma). Larger innovations get less weight. They are not
-# rejected, because the state may be wrong.
+# Largest squared innovation, in variances, with full weight (5 sigma). Larger innovations get less weight. No
+# innovation is rejected, because the state may be wrong.
 _GATE = const(25.0)
 
 

@@ -6,8 +6,8 @@ linearise   five times per second: compute the model's partial derivatives at th
 update      propagate the covariance over the window, and apply each measurement of the window
 inject      add the corrections to the state
 
-The steps from linearise to inject take longer than one sample. They are a generator, spread over the samples of the
-next window. Each sample runs the generator to its next yield. Forces are in g, speeds in m/s, angles in rad.
+The steps from linearise to inject take longer than one sample. These steps are a generator, spread over the samples of
+the next window. Each sample runs the generator to its next yield. Forces are in g, speeds in m/s, angles in rad.
 """
 
 from math import atan2, degrees, pi, sin, sqrt
@@ -59,8 +59,8 @@ class LeanFilter:
         self._posed = posed
         self._gyro_variances = gyro_variances
         self._p = None
-        # Relative error of the force's magnitude, caused by the accelerometer's bias and scale error. It is measured at
-        # rest, where the magnitude should be 1 g.
+        # Relative error of the force's magnitude, caused by the accelerometer's bias and scale error. This error is
+        # measured at rest, where the magnitude should be 1 g.
         self._force_error = 0.0
         self.dive = Dive()
         self.consistency = Consistency(six_done)

@@ -229,8 +229,8 @@ def forces(model, means, roll_acceleration, force_error, dive=0.0):
 
 
 def level_road(model, x, seconds):
-    """Return the measurement of (6), which assumes that roads are level on average. Its noise grows with the pitch,
-    because a large pitch may be a wheelie."""
+    """Return the measurement of (6), which assumes that roads are level on average. The measurement's noise grows with
+    the pitch, because a large pitch may be a wheelie."""
     innovation = -x[PITCH] - x[YAW_ERROR] * model.sin_lean
     steep = innovation / STEEP
     return model.level_row, innovation, SIGMA_SLOPE**2 * (1.0 + steep * steep) * 2 * _SLOPE_S / seconds
@@ -244,9 +244,9 @@ def straight_or_prior_speed(lean, speed, yaw_rate, seconds):
 
 
 def measured_speed(measured, speed, acceleration, seconds):
-    """Return the measurement of speed by a receiver or a wheel sensor. acceleration: in m/s^2. It adds noise, because
-    the speed may be late. seconds: time since the previous measured speed. Ten speeds in a second count as much as one
-    speed."""
+    """Return the measurement of speed by a receiver or a wheel sensor. acceleration: in m/s^2, which adds noise,
+    because the speed may be late. seconds: time since the previous measured speed. Ten speeds in a second count as much
+    as one speed."""
     late = _MEASURED_SPEED_LATE_S * acceleration
     scale = _SIGMA_SPEED_SCALE * measured
     variance = (_SIGMA_MEASURED_SPEED**2 + late * late) * max(1.0, 2 * _MEASURED_SPEED_S / seconds)

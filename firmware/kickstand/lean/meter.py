@@ -169,7 +169,7 @@ class LeanMeter:
                 self.filter.inflate_covariance(dt_us * 1e-6)
         if self._fresh:
             self._fresh = False
-            # There is no previous sample. So ignore dt_us, because the board and a replay must compute the same lean
+            # Without a previous sample ignore dt_us, because the board and a replay must compute the same lean
             dt_us, gain = 0, 1.0
         else:
             gain = dt_us / (_SMOOTH_US + dt_us)

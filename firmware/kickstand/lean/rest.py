@@ -1,5 +1,5 @@
-"""Standstill detector for zero-velocity updates. It uses means over a fifth of a second, in which an idling engine
-averages out."""
+"""Standstill detector for zero-velocity updates. The detector uses means over a fifth of a second, in which an idling
+engine averages out."""
 
 from ..units import const
 
@@ -51,7 +51,7 @@ class RestDetector:
         average = self._average
         gain = min(1.0, seconds / _AVERAGE_S)
         # The average rate must be small after subtracting either the estimated bias or only the calibrated bias.
-        # Otherwise a wrong estimate, as after moving the sensor by hand, would never be corrected.
+        # With only the estimated bias, a wrong estimate, as after moving the sensor by hand, would never be corrected.
         still = near_estimate = near_calibration = True
         for i in range(6):
             deviation = readings[i] - average[i]

@@ -11,7 +11,7 @@ from math import radians, sin
 
 from ..units import const
 
-# rad: largest trim. It is the sum of 2 degrees for an inexact upright pose, and the accelerometer's remaining errors
+# rad: largest trim, the sum of 2 degrees for an inexact upright pose, and the accelerometer's remaining errors
 MAX_TRIM = radians(3.5)
 # The comment of each parameter has its unit, its meaning and, after "Larger:", the effect of a larger value.
 
@@ -45,7 +45,7 @@ class UprightTrim:
         angle: the trim found on earlier rides, in rad, or 0.
 
     Read-only attributes:
-        angle: the trim in rad, within MAX_TRIM. It is subtracted from the lean.
+        angle: the trim in rad, within MAX_TRIM. The trim is subtracted from the lean.
         variance: the variance of the trim in rad^2.
     """
 

@@ -10,7 +10,7 @@ class Bonds:
     """The stored keys.
 
     Args:
-        pin: the PIN. If it differs from the stored PIN, all phones must pair again.
+        pin: the PIN. If this PIN differs from the stored PIN, all phones must pair again.
     """
 
     def __init__(self, pin):

@@ -188,7 +188,7 @@ class Live:
             self._put(radio.chrono, packets.speed(buffer, speed))
 
     def lines(self):
-        """Return the two lines of the page Live. They show the receiver and the number of packets per second."""
+        """Return the two lines of the page Live. The lines show the receiver and the number of packets per second."""
         who = self.asked or ("a phone" if self.radio.phone is not None else "no phone")
         return "BLE %12s" % who, "%4d packets/s" % self.per_second
 

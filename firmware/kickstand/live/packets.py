@@ -59,7 +59,7 @@ def now(buffer, ms, lean_deg, sigma_deg, force, rate_dps, speed_mps, state):
         ms: ticks_ms().
         lean_deg, sigma_deg: the lean and its standard deviation; both None if unknown.
         force: force to the left, up and forward, in g, or None.
-        rate_dps: rate about left, up and forward, in deg/s. It is not sent if force is None.
+        rate_dps: rate about left, up and forward, in deg/s. The rate is not sent if force is None.
         speed_mps: the speed, or None.
         state: the bits ALIGNED to NO_READINGS.
     """

@@ -7,7 +7,7 @@ from ..errors import LiveError
 from ..units import __version__, const
 from . import packets
 
-# UUID of our own service. Its characteristics have 0001 to 0004 in place of the first 0000.
+# UUID of our own service. The service's characteristics have 0001 to 0004 in place of the first 0000.
 SERVICE = "7b6f0000-3c1e-4d5a-9a55-6b69636b7374"
 _ADVERTISE_US = const(150_000)
 MOST_WRITES = 16  # most writes that can wait for the loop; further writes are ignored

@@ -17,12 +17,13 @@ The head has these fields:
 * firmware version, number of positions
 * delay of the gyro's low-pass in tenths of a millisecond; 0 in rides up to version 0.3.0
 
-An entry describes the samples of one pass of the main loop. It has the number of samples (n), the microseconds since
-the previous samples (dt_us), and the sums of the samples' six counts (ax ay az gx gy gz). From these numbers a replay
+An entry describes the samples of one pass of the main loop by the number of samples (n), the microseconds since the
+previous samples (dt_us), and the sums of the samples' six counts (ax ay az gx gy gz). From these numbers a replay
 computes the same mean as the board. An entry can also be a speed. Then n is 0, and the speed in cm/s follows.
 
 A position has five numbers: the index of the entry with the next samples after the fix, and the four numbers of
-Gps.place(). Readers up to version 0.4.0 do not know positions. They skip these bytes like the zeros and read the rest.
+Gps.place(). Readers up to version 0.4.0 do not know positions. These readers skip the positions like the zeros, and
+read the rest.
 
 Each number is stored as its difference from a prediction. The prediction of dt_us is n sample periods. The prediction
 of each other number is its value in the previous entry. The difference is written in an adaptive Rice code (R. F. Rice,
@@ -30,7 +31,7 @@ JPL publication 79-22), most significant bit first:
 1. Zigzag coding turns the difference into a size >= 0. The differences 0, -1, 1, -2, ... become 0, 1, 2, 3, ...
 2. k is log2 of the mean of the last sizes, rounded down.
 3. The code is (size >> k) ones, a zero, and the low k bits of the size.
-4. If there would be LIMIT ones or more, the code is LIMIT ones and then the size in RAW_BITS bits.
+4. If the code would begin with LIMIT ones or more, it is LIMIT ones and then the size in RAW_BITS bits.
 """
 
 import struct
@@ -75,9 +76,9 @@ def block_length(index):
     """Return the number of bytes in ride block `index` of a file. A ride block fills the littlefs block of the same
     index.
 
-    Each block of littlefs except the first begins with 4-byte pointers to earlier blocks. It has one pointer, and one
-    more pointer for each time that the block's index can be halved (littlefs, SPEC.md, CTZ skip-lists). A ride block
-    that ends together with a block of littlefs is never copied when the file grows."""
+    Each block of littlefs except the first begins with 4-byte pointers to earlier blocks. A block has one pointer, and
+    one more pointer for each time that its index can be halved (littlefs, SPEC.md, CTZ skip-lists). A ride block that
+    ends together with a block of littlefs is never copied when the file grows."""
     if index == 0:
         return BLOCK
     length = BLOCK - 4
@@ -141,7 +142,7 @@ except NO_MACHINE_CODE:
     encode = encode_python
 else:
     _ENTRY = array("i", (2, 9999, -30000, 30000, -1, 0, 255, -256, 0))
-    # A state to compare encode() with encode_python(). It has a previous entry, small and large means, and three
+    # A state to compare encode() with encode_python(). The state has a previous entry, small and large means, and three
     # pending bits.
     _STATE = array("i", (3, 1, -1, 29000, 70, -7, 254, 77, 0) + tuple(range(16, 160, 16)) + (5, 3, 0, 5000))
     encode = checked(encode, encode_python, _ENTRY, _STATE, bytearray(40))
@@ -220,14 +221,14 @@ class RideBlock:
         self.count += 1
 
     def add_speed(self, cm_per_s):
-        """Append a speed in cm/s. It belongs to the next samples."""
+        """Append the speed at the next samples, in cm/s."""
         self._entry[0] = 0
         self._entry[_SPEED] = cm_per_s
         encode(self._entry, self._state, self.buffer)
         self.count += 1
 
     def add_place(self, place):
-        """Append a position. It belongs to the next samples.
+        """Append the position at the next samples.
 
         Args:
             place: the result of Gps.place().

@@ -124,7 +124,7 @@ class RideRing:
         return 0 if self._wrapped else max(0, self._free + self._others - self.needed)
 
     def ready(self):
-        """Return True if a block can be written now. Otherwise do one step to make that possible, and return False.
+        """Return True if a block can be written now. If not, do one step to make writing possible, and return False.
         Raises OSError."""
         if self._file:
             return True

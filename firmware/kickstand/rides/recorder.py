@@ -43,8 +43,8 @@ class Recorder:
         """End the current ride and begin a new one. Raises nothing. Afterwards `active` and `problem` show if a ride is
         being recorded.
 
-        A replay begins with a new filter. So the caller must restart the meter's filter too. Otherwise the replay's
-        lean will differ.
+        A replay begins with a new filter. So the caller must restart the meter's filter too, or the replay's lean will
+        differ.
 
         Args:
             chip: a running Mpu6050.
@@ -132,7 +132,7 @@ class Recorder:
                 self._begin_block()
 
     def add_fix(self, speed_mps, place):
-        """Keep a speed and a position until the next samples are added. They replace the values that were kept.
+        """Keep a speed and a position until the next samples are added. The new values replace earlier kept values.
 
         Args:
             speed_mps: a new speed in m/s, or None.

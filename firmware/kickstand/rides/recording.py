@@ -23,8 +23,8 @@ class Recording:
         chip: the Mpu6050.
         meter: the LeanMeter.
         calibration: the meter's ActiveCalibration.
-        keeper: the writer of the blocks, as for Recorder, or None for flash or SD card. If it is not None, recording
-            begins with the first readings.
+        keeper: the writer of the blocks, as for Recorder, or None for flash or SD card. With a keeper, recording begins
+            with the first readings.
 
     Attributes:
         recorder: the Recorder, or a NoRecorder until the Recorder is created.

@@ -87,7 +87,7 @@ def next_ride(directory):
 
 
 def parts(directory):
-    """Yield (ride, part, bytes) of every part, in any order. This takes 5 ms per ride in flash, and 20 ms on a card.
+    """Yield (ride, part, bytes) of every part, in any order. Listing takes 5 ms per ride in flash, and 20 ms on a card.
     Raises OSError."""
     for group in groups(directory):
         for ride in rides(directory, group):

@@ -21,7 +21,7 @@ class RideStream:
     stops_interrupts = False
 
     def begin(self):
-        """Begin a ride. Its number is always 0."""
+        """Begin a ride. The number of the ride is always 0."""
         self._slow_ms = None
         return 0
 

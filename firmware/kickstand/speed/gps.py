@@ -51,8 +51,8 @@ class Gps:
         uart: a machine.UART with a time-out of 0.
 
     Attributes:
-        age_ms: the age of the speed that poll() last returned. It is the delay of its sentence relative to the sentence
-            with the smallest delay.
+        age_ms: the age of the speed that poll() last returned. The age is the delay of the speed's sentence relative to
+            the sentence with the smallest delay.
     """
 
     problem = None  # always None for a Gps; a Wheel has the same attribute and sets it

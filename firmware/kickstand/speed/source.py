@@ -16,7 +16,7 @@ _MAX_MPS = const(100.0)
 _MAX_CHANGE_MPS2 = const(15.0)  # largest change of speed per second; no tyre has enough grip for more
 _NOISE_MPS = const(2.0)  # noise of a speed; a change of speed may exceed the limit by this much
 _GIVE_UP_MS = const(3000)  # if all speeds are rejected for this time, the last accepted speed was wrong
-# Bytes of half a second at 9600 baud. That is enough while flash is written or the sensor is set up.
+# Bytes of half a second at 9600 baud. This buffer is large enough while flash is written or the sensor is set up.
 _RX_BUFFER = const(512)
 
 
@@ -50,7 +50,7 @@ class Speed:
         speed = self.source.poll(now_ms)
         if self._last is not None:
             waited_ms = ticks_diff(now_ms, self._last_ms)
-            # This check is needed even without a new speed, because after 6 days ticks_diff() is negative
+            # Checked even without a new speed, because after 6 days ticks_diff() is negative
             if waited_ms >= _GIVE_UP_MS:
                 self._last = None
         if speed is None or not 0.0 <= speed <= _MAX_MPS:

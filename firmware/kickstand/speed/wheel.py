@@ -1,8 +1,8 @@
 """Measures speed from pulses of a reed contact or Hall switch at a wheel, or of a vehicle's speed signal.
 
-The interrupt only counts pulses and stores the time of the last pulse. It uses integers, because a hard interrupt must
-take no heap. A storm of pulses, for example from an ignition cable, would leave no time for anything else. In a storm
-the interrupt turns itself off, and poll() turns it on again later.
+The interrupt only counts pulses and stores the time of the last pulse. The interrupt uses integers, because a hard
+interrupt must take no heap. A storm of pulses, for example from an ignition cable, would leave no time for anything
+else. In a storm the interrupt turns itself off, and poll() turns it on again later.
 
 >>> wheel = Wheel(machine.Pin(14, machine.Pin.IN, machine.Pin.PULL_UP), 0.5, {"hard": True})
 >>> speed_mps = wheel.poll(time.ticks_ms())     # None if there is no new speed

@@ -132,7 +132,7 @@ def not_aligned(meter, seconds, todo="On stand: press"):
 
 
 def sensor_info(sensor, lost, meter, seconds):
-    """The page with information about the sensor. It changes every two seconds.
+    """The page with information about the sensor. The page changes every two seconds.
 
     The first line has the chip's name and temperature. The second line shows these in turn:
     * which parts are calibrated

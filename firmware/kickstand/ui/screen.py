@@ -214,8 +214,8 @@ class Screen:
         self._begin_align(True)
 
     # The wizards are imported only when needed, because with their own imports they take 12 KB of heap. Garbage is
-    # collected before the import. Otherwise the new modules, which stay loaded, would be placed at the far end of the
-    # heap and make each later collection longer.
+    # collected before the import. Without this collection the new modules, which stay loaded, would be placed at the
+    # far end of the heap and make each later collection longer.
 
     def _begin_align(self, pressed):
         gc.collect()
