@@ -1,4 +1,4 @@
-"""Make the firmware's drivers importable in every test, and find recorded data. Without the data its tests are
+"""Make the firmware's drivers importable in every test, and find recorded data. Tests that need missing recordings are
 skipped."""
 
 import functools
@@ -115,7 +115,7 @@ def pytest_runtest_setup() -> None:
     """Make garbage collections skip the objects that exist before a test.
 
     The app collects garbage often, and CPython needs half a second to scan the objects of earlier tests. Occasionally
-    these objects are scanned, too, to free their garbage.
+    the older objects are scanned, too, to free their garbage.
     """
     if next(_tests) % TESTS_PER_COLLECTION == 0:
         gc.unfreeze()

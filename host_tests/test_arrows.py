@@ -50,8 +50,8 @@ ARROWS = {
     "start": {"board", "devices", "settings"},
     "__init__": {"status_report"},
 }
-# {part: the parts that it imports only in the function that needs them}. They cost memory, and most boards never need
-# them.
+# {part: the parts that it imports only in the function that needs them}. These parts cost memory, and most boards never
+# need them.
 LATE = {
     "settings": {"setting_table"},  # the module is unloaded after use
     "errors": {"console"},  # report() prints a refusal in words

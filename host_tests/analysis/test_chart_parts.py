@@ -53,7 +53,7 @@ def test_the_chart_of_shares_is_cut_above_small_leans():
 
 
 def test_the_chart_of_g_against_g_counts_seconds():
-    """For 30 s the bike has a force of 0.26 g to the right and brakes with 0.51 g. Then it is at rest."""
+    """For 30 s the bike has a force of 0.26 g to the right and brakes with 0.51 g. Then the bike is at rest."""
     course = made(6000, lateral_g=-0.26, forward_g=-0.51, resting=np.arange(6000) >= 3000)
     cells, *rings = charts.charts(seen(course)).below[0].traces
     assert isinstance(cells, charts.CellMap)

@@ -25,7 +25,7 @@ pytest.importorskip("plotly")
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory) -> Overview:
-    """Return a ride with gentle acceleration, one left turn and a hard stop. Its calibration has a yaw error of 10
+    """Return a ride with gentle acceleration, one left turn and a hard stop. The calibration has a yaw error of 10
     degrees on purpose."""
     ride = analysis_rides.write(
         tmp_path_factory.mktemp("ride"),
@@ -233,8 +233,8 @@ def luminance(rgb):
 
 
 def test_rarest_g_is_visible_on_white_and_on_dark_paper(seen):
-    """The rarest value has the first colour of the scale. This colour must also be visible in dark mode, where the page
-    inverts the charts."""
+    """The rarest value has the first colour of the scale. The first colour must also be visible in dark mode, where the
+    page inverts the charts."""
     (cells,) = [trace for trace in interactive.figure(charts(seen))["data"] if trace["type"] == "heatmap"]
     logs = np.array([[np.nan if value is None else value for value in row] for row in cells["z"]])
     assert cells["zmin"] == pytest.approx(np.nanmin(logs), abs=0.001)

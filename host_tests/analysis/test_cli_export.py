@@ -33,7 +33,7 @@ def export(ride, form, out, *more) -> Path:
 
 @pytest.mark.parametrize("form", ["parquet", "csv.gz"])
 def test_csv_and_parquet_have_every_sample(ride, shown, tmp_path, form):
-    """`export` computes forces, rates and formula with numpy. They equal the values of the firmware in `replay`."""
+    """`export` computes forces, rates and formula with numpy. These values equal the firmware's values in `replay`."""
     read = pandas.read_parquet if form == "parquet" else pandas.read_csv
     got = read(export(ride, form.partition(".")[0], tmp_path / f"out.{form}", "--live"))
     given = analysis_rides.table(ride)

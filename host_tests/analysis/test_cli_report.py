@@ -59,7 +59,7 @@ def test_unknown_figures_are_not_reported(ride, tmp_path):
     seen = overview(open_ride(ride, up_is_back))
     assert [notice.code for notice in seen.notices] == ["up-off"]
     total = seen.summary
-    # no values, as if none was certain enough
+    # no maxima, as if no lean and no force was certain enough
     total.left_deg = total.right_deg = total.brake_g = total.accel_g = Peak()
     rows = {name: value for name, value, _ in report.words(seen).ride}
     names = "Max left", "Max right", "Over 30°", "Over 40°", "Max braking", "Max acceleration"

@@ -191,7 +191,7 @@ def test_log_in_memory_without_a_clock_ends_now(tmp_path, monkeypatch, form, sta
 
 
 def test_every_row_of_a_vbo_has_a_speed(tmp_path):
-    """The log has a speed at 0.5 s and at 1.5 s. Between these times the speed is interpolated."""
+    """The log has a speed at 0.5 s and at 1.5 s. Between 0.5 s and 1.5 s the speed is interpolated."""
     speed = np.full(200, np.nan)
     speed[[50, 150]] = 10.0, 20.0
     ride = open_ride(squarely(speed_mps=speed), SQUARE)
@@ -220,8 +220,8 @@ def test_vbo_has_at_most_100_rows_per_second(tmp_path, form, rows):
 @pytest.mark.parametrize("start_s", [1e8, 1e8 + 0.0043, 1e8 + 0.00065])
 @pytest.mark.parametrize(("form", "step_s", "columns"), [("racechrono", 0.001, (0, 3)), ("vbo", 0.01, (1,))])
 def test_no_time_is_written_twice(tmp_path, form, step_s, columns, start_s):
-    """Some samples are closer together than the smallest time step of the format. They are just before or after a step,
-    or in the middle between two steps. The returned number still includes every sample."""
+    """Some samples are closer together than the smallest time step of the format. Their times are just before or after
+    a time step, or in the middle between two steps. The returned number of rows still includes every sample."""
     t_s = step_s * np.array([0.0, 0.96, 1.04, 2.5, 3.5, 4.5, 5.49, 5.51, 6.4, 7.0, 8.0, 9.96, 10.04, 10.5])
     log = Log(t_s, np.tile([0.0, 1.0, 0.0], (len(t_s), 1)), np.zeros((len(t_s), 3)), start_s=start_s)
     notices = []

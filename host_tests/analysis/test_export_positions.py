@@ -25,7 +25,7 @@ DEGREE_M = np.radians(app_exports._EARTH_M)
 
 @functools.cache
 def log(start_s: float = 0.0) -> api.Log:
-    """Return a log of half a minute with a position every 0.2 s and a speed every second. There are no positions before
+    """Return a log of half a minute with a position every 0.2 s and a speed every second. Positions are missing before
     1 s and from 10 to 20 s. start_s: the start time by the log's own clock."""
     ride = app_exports.riding().every(2)  # 100 samples per second
     row = np.arange(len(ride.t_s))

@@ -106,7 +106,8 @@ def test_the_free_pose_is_the_one_further_from_its_axis():
             with pytest.raises(InputError, match=r"side \+z exists twice \(e and g\)"):
                 poses._sides([*named, pose("g", slanted(deg))])
     with pytest.raises(InputError, match="exists twice"):
-        poses._sides([*tilted, pose("g", slanted(24.4))])  # tilted under 3 degrees more than the side pose
+        # The slanted pose is tilted under 3 degrees more than the side pose
+        poses._sides([*tilted, pose("g", slanted(24.4))])
     assert poses._sides([*tilted, pose("g", slanted(24.6))])[1] is not None
     with pytest.raises(InputError, match=r"side -z is missing, and side \+z is there 2 times"):
         poses._sides([*named[:5], pose("g", slanted(25.0))])
@@ -152,7 +153,8 @@ def moving_log(stretches_s, hz=100.0, size_g=0.5, between_s=1.0) -> Log:
 def test_stillness_lasts_a_second_between_margins():
     found = procedure._still_stretches(moving_log([1.15, 1.35, 3.0]))
     assert [last - first for first, last in found] == pytest.approx([115, 280], abs=6)
-    assert found[0][0] == pytest.approx(325, abs=6)  # begins after 1 + 1.15 + 1 s and a margin of 0.1 s
+    # The second stretch begins after 1 + 1.15 + 1 s and a margin of 0.1 s
+    assert found[0][0] == pytest.approx(325, abs=6)
     with pytest.raises(InputError, match="too short for the six positions"):
         procedure._still_stretches(Log(np.arange(40) / 100.0, np.zeros((40, 3)), np.zeros((40, 3))))
 
@@ -168,7 +170,8 @@ def test_stillness_lasts_a_second_between_margins():
     + [("drift", 0.0065, True), ("drift", 0.0075, False), ("rate", 5.9, True), ("rate", 6.1, False)],
 )
 def test_a_still_window_has_limits(what, amount, still):
-    """A window has 50 samples. Its halves may differ by 0.007 g, and its standard deviation is at most 0.02 g."""
+    """A window has 50 samples. The halves of a window may differ by 0.007 g, and its standard deviation is at most 0.02
+    g."""
     n = 300
     force, rates = np.tile([0.0, 1.0, 0.0], (n, 1)), np.zeros((n, 3))
     k = np.arange(n)
@@ -332,7 +335,7 @@ def test_stops_are_found_in_each_log_of_its_own():
     for seconds, stops in ((6.1, 1), (4.0, 1), (2.9, 0)):
         assert drive_feed.standing([log(seconds)], CalibrationFile(), drive_feed.Steps(None, 1)).stops == stops
     late = drive_feed.standing([log(4.0, (250,))], CalibrationFile(), drive_feed.Steps(None, 1))
-    assert late.stops == 0  # only 1.5 s of the log come after its only speed, at 2.5 s
+    assert late.stops == 0  # the log's only speed is at 2.5 s, and the log ends 1.5 s later
 
 
 def test_a_speed_counts_as_known_for_5_s(monkeypatch):

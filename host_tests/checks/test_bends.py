@@ -52,7 +52,7 @@ def straight_on(time, forward, up):
 
 @pytest.mark.parametrize("slope", [0.2, 0.0, -0.2])
 def test_braking_and_dips_are_no_bends(slope):
-    """The vehicle brakes hard on a level road, uphill and downhill. Such forces must not look like a bend."""
+    """The vehicle brakes hard on a level road, uphill and downhill. The forces of braking must not look like a bend."""
     time = np.arange(0.0, 300.0, 0.02)
     brake = np.where(time % 20.0 < 5.0, -0.9, 0.0)
     assert straight_on(time, slope + brake, 1.0 + 0.1 * np.sin(time)) == ""

@@ -1,4 +1,5 @@
-"""A command warns if its calibration belongs to another mount. It never warns about a right calibration."""
+"""A command warns if its calibration belongs to another mount. A command never warns about the calibration of the log's
+own mount."""
 
 import json
 import re
@@ -57,7 +58,7 @@ def test_right_calibrations_are_never_reported(profile):
     log, calibration = made(profile)
     for each in log, silent(log):
         assert said(each, calibration) == ""
-        assert said(each, other(calibration, up=8.0)) == ""  # the error that two poses may have
+        assert said(each, other(calibration, up=8.0)) == ""  # an alignment by two poses may have this error
 
 
 @pytest.mark.parametrize(("profile", "speed"), [("street", True), ("city", False), ("track", False), ("hills", True)])
@@ -145,9 +146,9 @@ def exchanged_line(car, side, roll_deg=None):
 
 
 def test_what_is_reported():
-    """Forward and backward are exchanged. The message suggests another side of the kickstand. It also asks whether the
-    log's accelerations have the opposite sign, because then another side would only give a plausible, mirrored
-    report."""
+    """Forward and backward are exchanged. The message suggests another side of the kickstand. The message also asks
+    whether the log's accelerations have the opposite sign, because then another side would only give a plausible,
+    mirrored report."""
     assert exchanged_line(False, "left", 0.0).endswith("exchanged: calibrate two --side right?" + SIGN)
     assert exchanged_line(False, "right", -3.9).endswith("exchanged: calibrate two --side left?" + SIGN)
     assert exchanged_line(False, "", 0.0).endswith("calibrate two with the other --side?" + SIGN)

@@ -84,4 +84,4 @@ def test_an_unknown_velocity_is_linear_between_its_knots():
         assert knots_s @ changes[:, window] == pytest.approx(np.ones(100))
         assert values[:, window].sum(axis=0) == pytest.approx(np.ones(100))
         assert changes[:, window].sum(axis=0) == pytest.approx(np.zeros(100))
-    assert values[:, 0, 62] == pytest.approx([0.0, 0.75, 0.25])  # at 6.25 s, between the knots at 5 and 10 s
+    assert values[:, 0, 62] == pytest.approx([0.0, 0.75, 0.25])  # values at 6.25 s, between the knots at 5 and 10 s

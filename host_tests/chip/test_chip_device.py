@@ -106,9 +106,9 @@ def test_bus_errors_are_shown_while_they_last(riding, fault):
 
 @pytest.mark.parametrize("riding", ["pico"], indirect=True)
 def test_stalled_processor_keeps_the_lean_right(riding):
-    """A stall of 45 ms loses no sample. It is as long as a flash erase, during which interrupts are off. A stall of
-    seconds overflows the FIFO. The firmware then counts the lost samples, does not restart the sensor, and the lean
-    stays correct."""
+    """A stall of 45 ms loses no sample. The erase of a flash block takes 45 ms, during which interrupts are off. A
+    stall of seconds overflows the FIFO. The firmware then counts the lost samples, does not restart the sensor, and the
+    lean stays correct."""
     samples = SampleCount(riding.board.sensor)
     samples.begin()
     for stall_s in (0.045, 0.3):

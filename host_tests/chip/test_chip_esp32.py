@@ -183,7 +183,7 @@ def test_ride_removes_the_oldest_parts_first():
         device.exec("recorder.start(Chip(), Calibration())\nfeed(2)\nrecorder.stop()", 30.0)
         files = device.files()
     gone = [path for path in parts if path not in files]
-    short = needed - (before - 2 * BLOCK)  # bytes to be freed, after the ride has created its directory
+    short = needed - (before - 2 * BLOCK)  # bytes that must be freed after the ride has created its directory
     assert short > 0
     assert gone == parts[: math.ceil(short / (PART_BLOCKS * BLOCK))]
     assert FILES.items() <= files.items()

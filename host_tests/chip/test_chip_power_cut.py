@@ -58,7 +58,7 @@ def test_old_or_new_wherever_a_save_is_cut(at_prompt, tmp_path):
         assert set(found) == {value - 1, value}
         assert found[0] == value - 1
         assert found[len(states) - 1] == value
-    assert operations >= SAVES + 2  # at least one block was erased
+    assert operations >= SAVES + 2  # the saves include the erase of at least one block
 
 
 @pytest.mark.parametrize("operation", [8, *(pytest.param(n, marks=pytest.mark.nightly) for n in (1, 9, 10))])

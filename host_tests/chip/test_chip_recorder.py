@@ -1,5 +1,5 @@
-"""The recorder on the emulated Pico. This board has littlefs, a flash that stalls the processor, and 32-bit floats. The
-tests also cut the power and use mpremote."""
+"""The recorder on the emulated Pico. The emulated Pico has littlefs, a flash that stalls the processor, and 32-bit
+floats. The tests also cut the power and use mpremote."""
 
 import ast
 import re
@@ -166,8 +166,8 @@ def test_board_records_again_after_a_power_cut(at_prompt, operation):
 @pytest.mark.nightly
 @pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_pull_and_record_through_mpremote(tmp_path, monkeypatch, chip):
-    """A ride ends and is pulled, then a log is streamed. The ESP32 also has a GPS receiver. Both logs can be
-    replayed."""
+    """A ride ends and is pulled, then a log is streamed. The ESP32 also has a GPS receiver. The logs of the ride and of
+    the stream can be replayed."""
     config = "RECORD = True\n" + {"pico": "", "esp32": 'SPEED = "gps"\n'}[chip]
     files = firmware(chip) | calibrated() | {"config.py": config.encode()}
     board: Any = CHIPS[chip](PART.world(RIDE.motion), files)

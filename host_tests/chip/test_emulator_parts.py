@@ -198,7 +198,8 @@ def test_a_closed_server_disconnects_its_client():
 
 @pytest.mark.parametrize(("name", "start", "end"), [("PICO", 0xA0000, 0x200000), ("ESP32", 0x200000, 0x400000)])
 def test_the_file_system_fills_the_flash_and_keeps_files(name, start, end):
-    """The Pico has 2 MB of flash, the ESP32 4 MB. Both official images put the file system at its end."""
+    """The Pico has 2 MB of flash, the ESP32 4 MB. MicroPython's images for both boards put the file system at the end
+    of the flash."""
     flash_image = pytest.importorskip("kickstand_emulator.flash_image")
     system = getattr(flash_image, name)
     assert (system.start, system.start + system.size) == (start, end)
@@ -254,7 +255,7 @@ def test_a_missing_package_of_the_emulator_is_named(cached, monkeypatch):
 
 
 class PlainDevice(EmulatedDevice):
-    """A board without a chip. Its console answers from a list, one answer per line of code."""
+    """A board without a chip. The console answers from a list, one answer per line of code."""
 
     NAME = "plain board"
 

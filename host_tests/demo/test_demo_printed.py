@@ -95,7 +95,7 @@ def test_a_device_that_ends_otherwise_is_an_error(monkeypatch, capsys):
 
 
 def test_the_device_steered_by_commands():
-    """The device sends a state every 50 ms of its time. It executes each command, and pauses."""
+    """The device sends a state every 50 ms of its time. The device executes each command, and pauses."""
     with DeviceProcess("cpython", "hand", 20.0) as device:
         states, new = [], []
 

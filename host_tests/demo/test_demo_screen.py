@@ -84,7 +84,7 @@ def columns(picture, style):
 
 @pytest.mark.parametrize(("shown_deg", "side"), [(-30.0, -1), (30.0, 1)])
 def test_a_dashed_line_shows_the_shown_lean(shown_deg, side):
-    """The bike is upright. The line begins at its wheel and ends at the side of the lean."""
+    """The bike is upright. The line begins at the bike's wheel and ends at the side of the lean."""
     rows = columns(bike(0.0, shown_deg), "yellow")
     upper = [column - 18.5 for row in rows[:5] for column in row]
     assert upper and all(column * side > 3.0 for column in upper)

@@ -24,7 +24,7 @@ BUILT_IN = types.SimpleNamespace(device="/dev/ttyS0", vid=None, pid=None)
 
 @pytest.fixture
 def board(tmp_path, monkeypatch):
-    """Return the only connected board. It contains only MicroPython's own boot.py."""
+    """Return the only connected board, which contains only MicroPython's own boot.py."""
     (tmp_path / "flash").mkdir()
     board = fake_board.FakeBoard(tmp_path / "flash")
     board.path("boot.py").write_text("# boot\n")

@@ -1,5 +1,5 @@
-"""A used board may contain files of other projects. They are renamed and kept. A config.py that would stop the firmware
-is refused."""
+"""A used board may contain files of other projects. `flash` renames and keeps these files. A config.py that would stop
+the firmware is refused."""
 
 import sys
 

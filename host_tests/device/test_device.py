@@ -13,8 +13,8 @@ from support.device_plans import ALIGNED, LEFT_S, PRESSES, RIDE, RIGHT_S, STRAIG
 
 @pytest.mark.parametrize(("engine", "seed"), [("cpython", None), ("micropython", 3)])
 def test_two_presses_and_a_ride(engine, seed, tmp_path):
-    """With seed None the sensor is perfect, and its axes are the bike's. With seed 3 it has the data sheet's errors and
-    a random mounting, and is not calibrated."""
+    """With seed None the sensor is perfect, and its axes are the bike's. With seed 3 the sensor has the data sheet's
+    errors and a random mounting, and is not calibrated."""
     record = device_plans.run(engine, tmp_path, {**ALIGNED, "seed": seed})
     assert record.at(1.9)[0].startswith("Raw")
     assert record.first("On stand: press") < 2.5
@@ -38,7 +38,7 @@ def test_the_calibration_outlives_the_power(engine, tmp_path):
     device_plans.align(tmp_path)
     again = device_plans.run(engine, tmp_path, {"lean": [[0, 25]], "until": 3})
     assert again.lean_at(2.5) == 25
-    assert again.first("Lean +25") < 1.5  # the first reading after power-on
+    assert again.first("Lean +25") < 1.5  # the lean is shown with the first readings after power-on
     assert again.first("Not aligned") == math.inf
 
 
@@ -80,7 +80,7 @@ def test_a_refused_alignment_leaves_the_old_one(tmp_path):
         "cpython", tmp_path, {"lean": [[0, 20]], "presses": [*menu_align, [17, 1.2]], "until": 20}
     )
     assert record.at(16)[0].startswith("Same pose twice")
-    assert record.lean_at(19.5) == 20  # the old alignment is in use
+    assert record.lean_at(19.5) == 20  # the old alignment is still in use
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == files
 
 
@@ -100,7 +100,8 @@ def test_pages_and_menu(tmp_path):
         of_page = [lines for start_s, *lines in record.frames if begin_s < start_s < begin_s + 1.0]
         return any(re.match(line1, first) and re.match(line2, second) for first, second in of_page)
 
-    assert record.first("Max left +(29|3[0-3])°") == pytest.approx(46.3, abs=0.2)  # the plan changes the lean instantly
+    # In the plan the lean changes instantly
+    assert record.first("Max left +(29|3[0-3])°") == pytest.approx(46.3, abs=0.2)
     assert record.first("Max right +(39|4[0-3])°") == pytest.approx(46.3, abs=0.2)
     assert shows("acceleration", "Accel|Brake", r"pk \+0\.")
     assert shows("formula", "Formula", "Filter")

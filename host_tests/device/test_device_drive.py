@@ -63,7 +63,7 @@ def forward_error_deg(calibration, seed=None):
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
 def test_a_car_finds_its_alignment_and_shows_the_next_step(engine, tmp_path):
-    """This drive runs on MicroPython, to test its floats and its heap. The other drives run on CPython."""
+    """The first drive runs on MicroPython, to test its floats and its heap. The other drives run on CPython."""
     record = device_plans.run(engine, tmp_path, car("gps", 5, presses=[[60, SHORT], [65, SHORT]]))
     assert record.at(3.0) == ["Brakings   0/5  ", "stop needed     "]
     assert record.first("brake straight") < 8.0

@@ -1,5 +1,5 @@
 """Faults of sensor, bus, display and flash on the whole device. The display shows a fault while it lasts and soon
-recovers. It never shows a wrong value as good."""
+recovers. The display never shows a wrong value as good."""
 
 import math
 import time
@@ -41,7 +41,7 @@ def test_a_lasting_fault_is_shown_until_it_ends(faults, said, aligned):
     assert record.lean_at(FAULT_S - 0.1) == STATIC
     assert record.first(said, FAULT_S) < FAULT_S + 0.4
     back = record.first("Lean +25° right", END_S)
-    assert back < END_S + RECOVERY_S + 0.1  # the record has a frame every 0.1 s
+    assert back < END_S + RECOVERY_S + 0.1  # frames of the record are 0.1 s apart
     assert set(record.leans(0, 10)) == {STATIC}  # no other value was shown as the lean
 
 

@@ -12,7 +12,7 @@ from kickstand_tools.simulated_board.simulator import Board
 
 
 def world(t_s):
-    """Readings that change, so that no axis looks dead. Their means are 0.5 g, 0.25 g and 0.75 g."""
+    """Readings that change, so that no axis looks dead. The mean forces are 0.5 g, 0.25 g and 0.75 g."""
     a, b, c = (t_s * k % 1 - 0.5 for k in (977, 577, 433))
     return (0.5 + 0.004 * a, 0.25 + 0.004 * b, 0.75 + 0.004 * c, 0.4 * b, 0.4 * c, 0.4 * a, 31.0)
 

@@ -14,7 +14,7 @@ def said(problem):
 def background(real=False, leans=True, speed=None, **given: Any) -> Any:
     """Return a BackgroundAlignment with stand-ins for the meter and the drive. The list `calls` collects their calls.
 
-    real: True to keep the real _adopt() and _restart(). Otherwise stand-ins replace them.
+    real: True to keep the real _adopt() and _restart(), False to replace them by stand-ins.
     given: values of the stand-ins, and of attributes.
     """
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):

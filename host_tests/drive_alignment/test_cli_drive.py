@@ -13,8 +13,8 @@ from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 from support import command, driving_runs
 from support.driving_runs import RATE_HZ, STAND, around, mounted
 
-# For each recording, the matrix from the sensor's axes to the vehicle's, with the rows left, up, forward. It was
-# measured with the recording's own receiver and has an error of 1 to 2 degrees.
+# For each recording, the matrix from the sensor's axes to the vehicle's, with the rows left, up, forward. The matrix
+# was measured with the recording's own receiver and has an error of 1 to 2 degrees.
 RECORDED = {
     "car-urban-short-turn-loop-nominal-001": [
         [0.0124, 0.9995, 0.0302],

@@ -145,7 +145,7 @@ def test_only_usable_speeds_align(source, fine):
 @pytest.mark.parametrize(
     ("axis", "degrees", "from_s", "words"),
     [
-        (1, 180.0, 130.0, "no longer where it was"),  # only one braking event follows
+        (1, 180.0, 130.0, "no longer where it was"),  # the rotation is followed by only one braking event
         (1, 12.0, 100.0, "two parts of the drive"),
         (0, 1.3 * quality.PITCH_DEG, 82.0, "vertical"),
         (2, 1.3 * quality.ROLL_DEG, 82.0, "vertical"),
@@ -156,7 +156,7 @@ def test_only_usable_speeds_align(source, fine):
 def test_a_mount_that_moved(axis, degrees, from_s, words):
     """The sensor is rotated by these degrees at the time from_s. The drive has ten braking events in a straight line;
     the last begins at 137 s."""
-    legs = [*around(10), [4.0, 1.5, 20.0], [4.0, -1.5, 20.0]]  # events in turns at the end do not hide the move
+    legs = [*around(10), [4.0, 1.5, 20.0], [4.0, -1.5, 20.0]]  # events in bends at the end do not hide the move
     result = drive(legs, moved=[from_s, turned(MOUNT, axis, degrees)])
     assert result["ready"] is (words is None), result
     assert words is None or words in engines.words(result)
@@ -168,7 +168,7 @@ def test_the_first_braking_counts_after_any_late_first_speed(silent_s):
     wrap must not lose a braking event."""
     legs = [[silent_s, 0.0, 0.0], *around(6)]
     result = drive(legs, source={"every_s": 1.0, "silent": (-1.0, silent_s)})
-    assert result["counted"] == 6  # the six braking events; the vehicle only speeds up in turns
+    assert result["counted"] == 6  # the six braking events; the vehicle speeds up only in bends
     assert result["ready"]
 
 

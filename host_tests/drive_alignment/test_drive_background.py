@@ -13,8 +13,8 @@ from kickstand_tools.simulated_board.simulator import Board
 
 
 def device(leans=True, counted=9, problem=None, speed_problem=None, state=alignment.TURNING, speed_mps=0.0):
-    """Return a BackgroundAlignment whose drive has these values. Its list `passed` collects the speeds that it passes
-    to the lean filter."""
+    """Return a BackgroundAlignment whose drive has these values. The list `passed` collects the speeds that the
+    alignment passes to the lean filter."""
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):  # imported here because the module needs a board's clock
         from kickstand.drive_alignment.background import BackgroundAlignment
     made: Any = object.__new__(BackgroundAlignment)

@@ -101,7 +101,7 @@ def test_a_refusal_is_in_the_result_with_its_counts():
 
 def test_another_slope_in_the_next_log_is_no_moved_mount():
     """The vehicle is parked at the end of the first log on one slope, and at the beginning of the second log on the
-    opposite slope. Both slopes are 4.5 degrees."""
+    opposite slope. Each slope is 4.5 degrees."""
     mount = np.reshape(random_mounting(5), (3, 3))
     logs = []
     for slope_deg, first in ((-4.5, False), (4.5, True)):

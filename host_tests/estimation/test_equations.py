@@ -32,8 +32,8 @@ def found(rate, force, states=(), parameters=(), speed=np.nan, warm=0.0):
 @pytest.mark.parametrize("lean", [-0.9, 0.0, 0.6])
 @pytest.mark.parametrize("yaw_rate", [-0.4, 0.5])
 def test_steady_turn_is_constant(lean, yaw_rate):
-    """Nicolae's equations (22) and (23) give the force in a steady turn, whether the lean is balanced or not. With this
-    force the states stay constant."""
+    """Nicolae's equations (22) and (23) give the force in a steady turn, whether the lean is balanced or not. With the
+    force of (22) and (23) the states stay constant."""
     speed, s, c = 17.0, np.sin(lean), np.cos(lean)
     across = speed * yaw_rate / G
     rate, force = [yaw_rate * s, yaw_rate * c, 0.0], [across * c + s, c - across * s, 0.0]
@@ -114,7 +114,8 @@ def test_a_yaw_of_eight_degrees_is_no_error_of_scale():
         found(a, b, states, p)
         for a, b, p in ((rate, force, {}), (turn.T @ rate, turn.T @ force, {of.ROTATION.start + 1: np.radians(8.0)}))
     )
-    assert np.allclose(turned[:LEFT], right[:LEFT], atol=1e-3)  # equations of first order would differ by 15e-3
+    # With equations of first order the residuals would differ by 15e-3
+    assert np.allclose(turned[:LEFT], right[:LEFT], atol=1e-3)
 
 
 def test_a_measured_gyro_is_not_estimated_again():

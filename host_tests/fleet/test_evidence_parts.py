@@ -61,7 +61,8 @@ def test_a_bias_of_the_gyro_is_removed():
 
 
 def test_the_beginning_of_a_bend_swings_the_sensor():
-    """The fourth term is the change of the yaw rate in rad/s2. It is 0 at the end of a log that ends in a bend."""
+    """The fourth term is the change of the yaw rate in rad/s2. The term is 0 at the end of a log that ends in a
+    bend."""
     found = intervals(log_of(20.0, 10.0, lambda t_s: np.clip(t_s - 10.0, 0.0, 4.0) * 2.0))
     swung = (found.t_s > 11.0) & (found.t_s < 13.0)
     assert found.terms[swung, 3] == pytest.approx(np.radians(2.0), rel=0.01)

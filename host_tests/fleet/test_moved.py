@@ -83,8 +83,8 @@ def test_move_between_logs_is_not_found_during_them():
 
 
 def test_one_road_counts_once_for_all_its_intervals():
-    """The slope of the road gives all intervals of one standstill the same error. Together these intervals therefore
-    count about as much as one interval. Intervals on different roads count separately."""
+    """The slope of the road gives all intervals of one standstill the same error. All intervals of a standstill
+    together therefore count about as much as one interval. Intervals on different roads count separately."""
     count = 50
     standing = evidence.Intervals(
         np.arange(count, dtype=float),

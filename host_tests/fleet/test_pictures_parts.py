@@ -90,8 +90,8 @@ def test_the_picture_of_a_vehicle_says_how_well_it_is_known():
     ("kind", "left"), [("car", ((0.2, 0.21), (0.0, 0.02))), ("motorcycle", ((0.1, 0.21), (-0.3, 0.02)))]
 )
 def test_measured_forces_are_over_the_expected_ones(kind, left):
-    """Both scales of a panel are equal, so the dots of a good alignment are on the diagonal. A motorcycle has no force
-    to the left, so this force is shown over the change of speed."""
+    """The two scales of a panel are equal, so the dots of a good alignment are on the diagonal. A motorcycle has no
+    force to the left, so this force is shown over the change of speed."""
     found = dots(plot.draw(result(kind)))
     assert len(found) == 4
     for (one, other), ((x0, y0), (x1, y1)) in zip((found[:2], found[2:]), (((0.1, 0.11), (-0.3, -0.29)), left)):

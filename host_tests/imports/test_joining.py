@@ -72,7 +72,7 @@ def test_fix_is_only_in_the_nearest_row():
 
 
 def test_markers_of_unknown_speed_and_position_are_dropped():
-    """A phone writes -1 for an unknown speed. It may write 0, 0 for an unknown position, which is in the sea."""
+    """A phone writes -1 for an unknown speed. A phone may write 0, 0 for an unknown position, which is in the sea."""
     t_ns = np.arange(4) * 10**9
     track = ReceiverTrack(
         t_ns, np.array([-1.0, 3.0, -1.0, 4.0]), np.array([0.0, 52.0, 91.0, 52.1]), np.array([0.0, 13.0, 13.0, 13.1])

@@ -54,8 +54,8 @@ def test_labels_before_the_values():
 
 
 def test_labels_of_under_half_of_the_rows_are_left_out():
-    """The label u is in two or three of five rows, and then in two of four rows. It becomes a column only in a majority
-    of rows."""
+    """The label u is in two or three of five rows, and then in two of four rows. A label becomes a column only if the
+    majority of rows has it."""
     full, short = "t: {0} x: 2 y: 3 z: 4 u: 5", "t: {0} x: 2 y: 3 z: 4"
     for count, there in ((2, False), (3, True)):
         text = "\n".join((full if k < count else short).format(k) for k in range(5)) + "\n"
@@ -67,7 +67,7 @@ def test_labels_of_under_half_of_the_rows_are_left_out():
 
 
 def test_lines_with_labels_are_the_majority():
-    """Seven of ten lines are labelled. There are at least 1.5 labels per line."""
+    """Seven of ten lines are labelled. The lines have at least 1.5 labels each on average."""
     row = "t: 1 x: 2 y: 3 z: 4"
     assert layout._labelled("n", "\n".join([row] * 7 + ["text"] * 3)) is not None
     assert layout._labelled("n", "\n".join([row] * 6 + ["text"] * 4)) is None

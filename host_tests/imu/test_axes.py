@@ -126,8 +126,8 @@ def test_the_quietest_chip_at_rest_is_not_faulty(gyro_range, dlpf):
 
 
 def test_no_axis_is_faulty_in_a_ride(monkeypatch):
-    """In a ride the axes look so good that the driver does not import the module that judges them. This saves 2 KB of
-    heap."""
+    """In a ride the axes look so good that the driver does not import the module that judges them. The missing import
+    saves 2 KB of heap."""
     monkeypatch.setattr(AxisWatch, "_load", lambda watch: pytest.fail("not well"))
     for seed in range(4):
         assert judged(ride(20, seed)) == []

@@ -100,7 +100,7 @@ def test_a_sample_at_the_end_of_the_range_is_left_out(engine):
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_a_watch_records_the_low_bits_wraps_and_differences(engine):
     """For each axis the watch records the values of the lowest four bits, a change of the high byte, and a jump of the
-    low byte. It also records which axes differ from each other."""
+    low byte. The watch also records which axes differ from each other."""
     samples = np.full((8, 7), 700) + np.arange(7)
     samples[:, 0] = 5, 6, 5, 6, 5, 6, 5, 6  # only two values
     samples[:, 1] = 2, 194, 5, 6, 7, 198, 9, 8  # the low byte jumps, and the high byte stays the same

@@ -244,7 +244,7 @@ def test_how_many_frames_are_read_and_left(frames, read, left):
 
 @pytest.mark.parametrize(("who_am_i", "most"), [(0x68, 72), (MPU6500, 35), (0x98, 35), (MPU6886, 35)])
 def test_a_fifo_that_may_have_overflowed_is_emptied(who_am_i, most):
-    """The FIFO has 1024 bytes, or 512 bytes (MPU-6500 register map p. 31). It is full if fewer than 14 bytes are
+    """The FIFO has 1024 bytes, or 512 bytes (MPU-6500 register map p. 31). The FIFO is full if fewer than 14 bytes are
     free."""
     wires = Wires(who_am_i)
     chip = started(wires)
@@ -347,8 +347,8 @@ def test_a_write_or_a_read_that_fails_is_repeated_once():
 
 
 def test_the_low_pass_of_a_rate_is_the_widest_under_half_of_it():
-    """The values of DLPF_CFG are from the register map, p. 13. They select the gyro's bandwidth; the value 0 selects
-    256 Hz."""
+    """The values of DLPF_CFG are from the register map, p. 13. DLPF_CFG selects the gyro's bandwidth; the value 0
+    selects 256 Hz."""
     from kickstand.imu.mpu6050 import MIN_DLPF
 
     hz = [256, 188, 98, 42, 20, 10, 5]

@@ -1,4 +1,4 @@
-"""The class Sensor keeps the chip working. In these tests the chip is replaced by a class that the test controls."""
+"""The class Sensor keeps the chip working. A class that the test controls replaces the chip."""
 
 import pytest
 from kickstand_tools.simulated_board.simulator import Board

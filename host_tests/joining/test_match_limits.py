@@ -48,8 +48,8 @@ def matched(monkeypatch):
 
 
 def test_a_match_by_hand(matched):
-    """The ride lasts 80 s, the track 99 s. If the ride begins at 10 s of the track, 80 s are in common. If it begins at
-    40 s, 59 s are in common."""
+    """The ride lasts 80 s, the track 99 s. If the ride begins at 10 s of the track, 80 s are in common. If the ride
+    begins at 40 s, 59 s are in common."""
     found = matched(None, found_fit(), found_fit(30.0, 43.9))
     assert (found.start_utc_s, found.drift, found.sigma_s, found.correlation) == (1010.0, 0.0, 0.1, 0.95)
     assert found.common_s == pytest.approx(80.0)

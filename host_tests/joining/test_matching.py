@@ -99,7 +99,8 @@ def test_another_rides_track_is_refused(rides, profile, other):
 
 @pytest.mark.parametrize(("profile", "differs"), [("street", 0.03), ("track", 0.08), ("city", 0.08), ("hills", 0.03)])
 def test_the_same_roads_on_another_day_are_refused(rides, profile, differs):
-    """The other ride has the same bends. Its speed differs by some per cent, and this difference changes every 20 s."""
+    """The other ride has the same bends. The speed of the other ride differs by some per cent, and this difference
+    changes every 20 s."""
     ride = rides[profile]
     knots_s = np.arange(0.0, ride.time[-1] + 40.0, 20.0)
     faster = np.interp(ride.time, knots_s, 1.0 + np.random.default_rng(6).normal(0.0, differs, len(knots_s)))

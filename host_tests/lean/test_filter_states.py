@@ -146,7 +146,8 @@ def test_a_lean_beyond_half_a_turn_comes_from_the_other_side():
 
 def test_a_large_correction_is_made_once():
     """The power is switched on in a turn of 30 degrees. The first measured speed then shows the lean. During the
-    computation, more innovations are summed up. They still contain the old error, which must not be corrected twice."""
+    computation, more innovations are summed up. These innovations still contain the old error, which must not be
+    corrected twice."""
     estimator, leans = LeanFilter(), []
     force, rate = force_and_rate(30.0, 20.0)
     for k in range(400):

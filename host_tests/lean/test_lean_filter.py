@@ -43,7 +43,7 @@ def held_turns(seconds):
 
 
 def weaving(seconds):
-    """Return lean and speed of a ride at 8 to 22 m/s. It has turns of up to 40 degrees, and straights."""
+    """Return lean and speed of a ride at 8 to 22 m/s. The ride has bends of up to 40 degrees, and straights."""
     t = np.arange(int(seconds * HZ)) / HZ
     riding = 1.0 - np.exp(-np.maximum(t - 10.0, 0.0))
     lean = riding * (0.5 * np.sin(0.31 * t) + 0.2 * np.sin(0.83 * t + 1.0)) * (np.sin(0.021 * t) > -0.3)
@@ -228,7 +228,8 @@ def test_the_stated_sigma_fits_the_error_of_the_lean():
 
 @pytest.mark.parametrize("doubts", [1, 2])
 def test_a_doubt_keeps_what_the_six_positions_measured(doubts):
-    """The six positions have measured the gyro's scale and cross-axis errors. These errors stay known after a doubt."""
+    """The six positions have measured the gyro's scale and cross-axis errors. The measured errors stay known after a
+    doubt."""
     tested = lean_filter.LeanFilter(gyro_variances=[1e-5] * 5)
     for _ in range(HZ):
         tested.update((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), DT_US)

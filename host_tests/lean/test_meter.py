@@ -149,7 +149,8 @@ def test_a_lean_shorter_than_150_ms_is_not_a_maximum():
 
 
 def test_only_a_long_gap_restarts_the_filter():
-    """The filter bridges a short gap. It computes the movement during the gap from the rate at its end."""
+    """The filter bridges a short gap. The filter computes the movement during the gap from the rate at the end of the
+    gap."""
     shown = ride(meter(), 3.0)
     shown.update(reading(*force_and_rate(4.0, roll_dps=10.0)), 400_000)
     near(shown.lean_deg, 4.0, 0.3)

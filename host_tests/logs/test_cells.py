@@ -1,4 +1,5 @@
-"""Tests the largest values that a log may have. Both readers refuse slightly larger values and name the unit."""
+"""Tests the largest values that a log may have. Both readers of logs refuse slightly larger values and name the
+unit."""
 
 import contextlib
 import io

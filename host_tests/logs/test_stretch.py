@@ -99,8 +99,8 @@ def test_replay_and_report_accept_a_stretch(tmp_path):
 
 @pytest.mark.parametrize("name", ["replay", "smooth", "export"])
 def test_lean_of_a_stretch_equals_that_of_the_whole_ride(tmp_path, name):
-    """The firmware also uses the readings before and after the stretch. Without them the lean would be wrong or
-    unknown."""
+    """The firmware also uses the readings before and after the stretch. Without the other readings the lean would be
+    wrong or unknown."""
     ride = analysis_rides.short(tmp_path, rate_hz=50)
     whole, part = tmp_path / "whole.csv", tmp_path / "part.csv"
     form = ("--to", "csv") if name == "export" else ()

@@ -124,7 +124,7 @@ def offset(monkeypatch):
     """Return a function that returns the offset, or the refusal, for a given match at some shifts. The first argument
     is {index of the shift: (correlation, evidence)}.
 
-    The video has 200 cells of 50 ms. Its readings begin 0.3 s after its first picture.
+    The video has 200 cells of 50 ms. The camera's readings begin 0.3 s after the video's first picture.
     """
 
     def result(given, common=160):

@@ -165,8 +165,8 @@ def test_lean_of_a_real_recording_matches_gravity(tmp_path, shared_data):
 
 
 def test_calibration_beside_the_log_is_used(tmp_path):
-    """The commands report, plot and export also use this calibration. These commands refuse the output of replay as a
-    log."""
+    """The commands report, plot and export also use this calibration. The three commands refuse the output of replay as
+    a log."""
     log = analysis_rides.short(tmp_path)
     beside = log.with_name(log.name.split(".")[0] + ".cal.json")
     beside.unlink(missing_ok=True)

@@ -42,7 +42,7 @@ class Clocks:
 class Stream(fake_board.Serial):
     """A serial port with the board's output.
 
-    end: the event after this output. It is "ctrl-c" or another signal, "error", "unplug", "silence" or "asleep".
+    end: the event after this output: "ctrl-c" or another signal, "error", "unplug", "silence" or "asleep".
     last: the board's output after Ctrl-C.
     """
 
@@ -273,8 +273,8 @@ def test_the_data_before_a_broken_stream_are_kept(end, words, streaming, tmp_pat
 
 
 def test_a_computer_that_slept_is_reported(streaming, tmp_path, monkeypatch):
-    """While the computer slept, the board stopped streaming. The command notices this quickly. It waits longer for a
-    board whose sensor is off."""
+    """While the computer slept, the board stopped streaming. The command notices this quickly. The command waits longer
+    for a board whose sensor is off."""
     monkeypatch.setattr(board_console, "_AWAY_SILENT_S", 0.1)
     data, turns = half_seconds(3)
     streaming(data, "asleep")

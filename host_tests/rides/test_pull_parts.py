@@ -236,7 +236,7 @@ def test_a_stream_ends_with_a_full_disk_or_a_new_calibration():
 
 @pytest.mark.parametrize("car", [False, True])
 def test_the_live_readings_of_a_block(car):
-    """The sensor is not aligned, so neither lean nor force is shown. There are 2 turns in 20 ms."""
+    """The sensor is not aligned, so neither lean nor force is shown. The block has 2 entries in 20 ms."""
     seen: list = []
     streamed([whole_block(car=car), whole_block(1, 1_020_000, 0)], seen.append)
     first, second = seen

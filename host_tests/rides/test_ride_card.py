@@ -9,7 +9,7 @@ from support.mpy import run_mpy
 SECTOR_S = 3.1e-3  # time to transfer a sector at 1.32 MHz, including the commands
 TURN_S, BEGIN_S = 0.1, 1.0
 
-# A card of 32 GB. Only its sectors that are not zero are kept in RAM. Its clusters have the usual 32 KB.
+# A card of 32 GB. Only its sectors that are not zero are kept in RAM. The card's clusters have the usual 32 KB.
 _CARD = """
 import json, os
 from kickstand.rides import flash_ring, ride_paths

@@ -1,4 +1,4 @@
-"""The format of recorded rides. It is exact on both engines. A reader skips damaged blocks, but no other blocks."""
+"""The format of recorded rides is exact on both engines. A reader skips damaged blocks, but no other blocks."""
 
 import io
 import math
@@ -28,8 +28,8 @@ _EXTREMES = [
     ([1, -1, 4096, 0, 0, -1, 1], 2, 9999),
 ]
 
-# Encode random entries with machine code and with Python. Most entries are typical. Both must give the same states and
-# bytes.
+# Encode random entries with machine code and with Python. Most entries are typical. Machine code and Python must give
+# the same states and bytes.
 _BOTH = """
 import random
 from array import array

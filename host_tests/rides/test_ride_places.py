@@ -107,8 +107,8 @@ def test_a_log_has_no_empty_columns(tmp_path):
 
 
 def test_an_older_reader_finds_all_but_the_positions():
-    """An older reader takes the number of positions for a byte of the version's name. It ignores the positions' bytes,
-    where it expects zeros."""
+    """An older reader takes the number of positions for a byte of the version's name. The older reader ignores the
+    positions' bytes, where it expects zeros."""
     data, _ = ride_writer.blocks(3, places_every=10)
     for content in data:
         fields = struct.unpack_from("<4sHHIIqhHHH11sB", content)

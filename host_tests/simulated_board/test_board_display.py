@@ -256,7 +256,7 @@ def test_a_status_that_is_never_on_leaves_no_oled_dark(board, display):
 
 def test_no_status_leaves_an_oled_dark():
     """The driver recognises the two kinds of controller by their status. The driver sends the supply commands of both
-    kinds to every controller. If it mistakes one kind for the other, the picture is only two columns off."""
+    kinds to every controller. If the driver mistakes one kind for the other, the picture is only two columns off."""
     for kind in OLEDS:
         for identity in range(16):
 

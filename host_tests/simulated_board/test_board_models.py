@@ -385,7 +385,7 @@ def test_pins_are_those_of_the_controllers(board):
 
 
 def test_a_sentence_ends_with_its_check_sum():
-    """This is a real receiver's sentence."""
+    """The sentence is from a real receiver."""
     body = "GPGGA,092750.000,5321.6802,N,00630.3372,W,1,8,1.03,61.7,M,55.2,M,,"
     assert sentence(body) == f"${body}*76\r\n"
 

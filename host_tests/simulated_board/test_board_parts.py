@@ -149,7 +149,7 @@ def test_any_fault_of_the_cards_driver_is_a_card_error(error, reason, monkeypatc
 
 
 def oled():
-    """Return the driver's module. Its import needs a board's `time`."""
+    """Return the driver's module. The import of the module needs a board's `time`."""
     found = []
 
     def program(board):

@@ -33,7 +33,7 @@ def speeds_of(text, piece=1000, step_ms=10, steps=60):
 
 
 def busy_with_transfers():
-    """Return turn(number), which simulates an ESP32's SoftI2C transfers. Call it in each turn of the loop.
+    """Return turn(number), which simulates an ESP32's SoftI2C transfers. Call turn(number) in each pass of the loop.
 
     The sensor's transfer takes 1.3 ms in each turn. The display's transfers take 12 ms every 100 ms.
     """
@@ -387,7 +387,7 @@ def test_sentences_without_a_speed_are_named():
 
 
 def test_u_blox_s_binary_protocol_is_named():
-    """The message is a NAV-PVT of 92 bytes. Its bytes may contain line ends anywhere."""
+    """The message is a NAV-PVT of 92 bytes. The message's bytes may contain line ends anywhere."""
     for filler in (b"\x00", b"\x0a", b"\x24"):
         assert fault_of(b"\xb5b\x01\x07\x5c\x00" + filler * 92 + b"\x12\x34") == ("gps-other", "UBX")
     assert fault_of(bytes(range(256))) == ("gps-garbled",)

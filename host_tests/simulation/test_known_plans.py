@@ -18,7 +18,8 @@ def figures(name: str) -> list[float]:
     """Return seven figures of a profile's plans, each summed over all seeds.
 
     The first is the number of legs. The next five are sums over the legs: duration, speed, lean, roll time, and all
-    other values. In these sums each value is multiplied by the number of its leg. The last is a sum of the conditions.
+    other values. In the sums over the legs each value is multiplied by the number of its leg. The last is a sum of the
+    conditions.
     """
     found = np.zeros(7)
     for seed in SEEDS:

@@ -279,8 +279,8 @@ def test_the_road_has_the_roughness_of_its_class():
 
 
 def test_the_chassis_moves_as_two_masses_on_two_springs():
-    """A mass of 120 kg is on a spring of 17 kN/m with a damper of 1100 Ns/m. Below it a mass of 15 kg is on a tyre of
-    150 kN/m. The equations of motion of both masses are solved at four frequencies."""
+    """A mass of 120 kg is on a spring of 17 kN/m with a damper of 1100 Ns/m. Below the spring a mass of 15 kg is on a
+    tyre of 150 kN/m. The equations of motion of both masses are solved at four frequencies."""
     for hz in (0.0, 0.1, 1.8, 15.0):
         w = 2.0 * np.pi * hz
         strut = 17e3 + 1j * w * 1100.0
@@ -443,7 +443,7 @@ def test_a_hash_gives_numbers_of_mean_0_and_rms_1():
 
 
 def test_a_scripted_ride_knows_its_distance():
-    """The ride covers 20 m while it accelerates from 0 to 10 m/s in 4 s. Then it continues at 10 m/s."""
+    """The ride covers 20 m while it accelerates from 0 to 10 m/s in 4 s. Then the ride continues at 10 m/s."""
     made = script.Ride([script.upright(1), script.accelerate(10, 4), script.straight(2)], 0.0)
     assert made.seconds == 7.0  # the bike is upright from the beginning, so no time is needed to raise it
     assert made.state(5.0)[8] == pytest.approx(20.0) and made.state(7.0)[8] == pytest.approx(40.0)
@@ -461,7 +461,7 @@ def test_feet_help_below_4_mps():
 
 
 def test_the_motion_of_a_body_by_hand():
-    """The vehicle turns left with 0.5 rad/s at 10 m/s, so its lateral acceleration is 5 m/s2. First it is
+    """The vehicle turns left with 0.5 rad/s at 10 m/s, so its lateral acceleration is 5 m/s2. First the vehicle is
     upright on a road that rises by 0.1 rad. Then it leans by 30 degrees on a level road."""
     left, up, forward, w_left, w_up, w_forward = script.body_motion(0.0, 0.2, 10.0, 2.0, 0.5, 0.1, 0.03)
     assert left * G == pytest.approx(5.0 * np.cos(0.1)) and up * G == pytest.approx(G * np.cos(0.1) + 0.3)

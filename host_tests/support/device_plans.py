@@ -15,8 +15,8 @@ from support.mpy import BOARD_HEAP, run_mpy
 
 SCRIPT = Path(device_runs.__file__)
 
-# The bike is on the stand until 8 s and upright until 18 s. Then it turns at 15 m/s, with a lean of 30 degrees to the
-# left and of 40 degrees to the right.
+# The bike is on the stand until 8 s and upright until 18 s. Then the bike rides two bends at 15 m/s, with a lean of 30
+# degrees to the left and of 40 degrees to the right.
 RIDE = [
     ["kickstand", 8.0],
     ["upright", 8.0],
@@ -93,7 +93,8 @@ def run(engine, flash, plan, capsys=None):
 
 @functools.cache
 def _aligned_once():
-    """Return a directory with the content of the flash after a run of ALIGNED. It exists until this process ends."""
+    """Return a directory with the content of the flash after a run of ALIGNED. The directory exists until this process
+    ends."""
     directory = tempfile.TemporaryDirectory()
     run("cpython", directory.name, ALIGNED)
     return directory

@@ -20,7 +20,8 @@ PRESS_EVERY_S = 0.4  # while searching a page
 
 
 class CarRide(script.Ride):
-    """A ride by car. The car has the yaw rate of a motorcycle with the same lean. Its body rolls a little outwards."""
+    """A ride by car. The car has the yaw rate of a motorcycle with the same lean. The car's body rolls a little
+    outwards."""
 
     ROLL_SHARE = -0.08  # the car's roll as a share of the motorcycle's lean
 
@@ -33,7 +34,8 @@ RAISE_S = 0.3  # duration of the change from one lean of standing() to the next
 
 
 def standing(plan):
-    """Return motion(t_s) of a bike at rest, held at one lean after the other. It moves to each lean within RAISE_S.
+    """Return motion(t_s) of a bike at rest, held at one lean after the other. The bike moves to each lean within
+    RAISE_S.
 
     plan: [[from_s, lean_deg], ...].
     """
@@ -52,7 +54,8 @@ def standing(plan):
 
 
 def poses_of(seed, steps):
-    """Return world(t_s) of a sensor that is held in the hand. It is shaken before the first pose and after the last.
+    """Return world(t_s) of a sensor that is held in the hand. The sensor is shaken before the first pose and after the
+    last.
 
     steps: [[from_s, up], ...]. `up` is the direction up in the sensor's axes, or None while the sensor is turned.
     """

@@ -32,7 +32,7 @@ class FakeBoard(Transport):
     root: the directory that simulates the flash.
     mpy: value of sys.implementation._mpy.
     written: paths in the order in which they were opened for writing. A renamed file has its new name.
-    on_write(path, data): called before each write. It returns the bytes that are really written.
+    on_write(path, data): called before each write. on_write() returns the bytes that are really written.
     before_change(): called before each change of the flash.
     """
 

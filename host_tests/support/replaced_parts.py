@@ -12,7 +12,7 @@ class Calls(list):
     """A list of (name, arguments) of all calls of its parts."""
 
     def part(self, name, **given) -> Any:
-        """Return a part of the app. Its methods, other than `given`, add their calls to this list."""
+        """Return a part of the app. The methods of the part, other than `given`, add their calls to this list."""
         calls = self
 
         class Part:

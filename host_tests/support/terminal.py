@@ -11,7 +11,7 @@ DRAWN = 4_000_000  # longest output to wait for, in characters: more than a minu
 
 
 class Terminal:
-    """A context manager that runs a command. It kills the process at its end."""
+    """A context manager that runs a command, and kills the process at the end."""
 
     def __init__(self, command: list[str]) -> None:
         import pty  # not on Windows

@@ -1,5 +1,6 @@
 """Connects the simulated board's radio, as a peripheral, to bumble's virtual radio, with a central on the other side.
-Both sides have a whole Bluetooth LE stack. The stacks use the board's clock and run when its time advances."""
+Peripheral and central each have a whole Bluetooth LE stack. The stacks use the board's clock and run when its time
+advances."""
 
 import asyncio
 import contextlib

@@ -10,7 +10,7 @@ SHORT, LONG = 1, 2  # as in board/button.py
 
 
 class Drive:
-    """Replaces alignment by driving. It has a question until the rider answers."""
+    """Replaces alignment by driving. The alignment has a question until the rider answers."""
 
     shown = False
 

@@ -56,12 +56,13 @@ def first_minute(rider):
     assert true_deg < 4 - LEAN_DEG
     assert shown_deg == pytest.approx(true_deg, abs=2.0)
     # Chromium cannot slow down workers. So convert the workers' processor time to the time of the reference computer.
-    # This time must leave room for a processor that is SLOWED times slower.
+    # The converted time must leave room for a processor that is SLOWED times slower.
     assert 0.0 < used_s * REFERENCE_LOOP_S / _loop_s() < RIDING_S / SLOWED
 
 
 def _loop_s():
-    """Return the processor time of a loop of a million sums on this computer, in s. It is the median of five runs."""
+    """Return the processor time of a loop of a million sums on this computer, in s. The result is the median of five
+    runs."""
     times_s = []
     for _ in range(5):
         begin_s = time.process_time()

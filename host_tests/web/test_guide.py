@@ -217,7 +217,7 @@ def test_a_disarmed_save_is_whole(drive):
     assert said[0][2].startswith("Done")
 
 
-# In messages.py each kind of refusal or fault is one paragraph of lines. This list has the codes of each paragraph.
+# In messages.py each kind of refusal or fault is one paragraph of lines. The list has the codes of each paragraph.
 _PARAGRAPHS = [[line.split("|")[0] for line in part.split("\n")] for part in messages._LINES.strip().split("\n\n")]
 SPOILT, _, UNLIKE, FLASH, _, FAULTS = _PARAGRAPHS[:6]
 

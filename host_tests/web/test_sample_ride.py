@@ -11,7 +11,8 @@ from kickstand_tools.web import sample_ride
 
 
 def test_the_sample_ride_is_a_log_with_an_aligned_calibration(tmp_path, monkeypatch):
-    """The ride of the page is longer. Its log has the means of two readings each, as a recording of a board has."""
+    """The ride of the page is longer. The log of the ride has the means of two readings each, as a recording of a board
+    has."""
     monkeypatch.setattr(sample_ride, "SECONDS", 20.0)
     sample_ride._ride.cache_clear()
     made = sample_ride._ride()

@@ -11,7 +11,7 @@ from kickstand_tools.web.device import STATE, WHOLE_TICKS, PageDevice, display
 
 @pytest.fixture
 def board(tmp_path, monkeypatch):
-    """Return the board of the page Try. Its flash is a new folder."""
+    """Return the board of the page Try. The board's flash is a new folder."""
     monkeypatch.chdir(tmp_path)
     device = PageDevice()
     yield device
@@ -125,7 +125,7 @@ def test_a_record_has_the_true_motion_in_its_unit(board):
 
 
 def test_the_meter_is_sent_with_its_digits(board):
-    """The lean has one digit, the forward force three. Both are missing before the alignment."""
+    """The lean has one digit, the forward force three. Lean and forward force are missing before the alignment."""
     assert last(ticks(board, 2.0), "meter") == [None, None]
     sent = [tick["meter"] for tick in align(board)]
     lean_deg, forward_g = sent[-1]

@@ -52,9 +52,9 @@ def share(ride: Channels) -> float:
 @pytest.mark.parametrize(
     ("stands", "does_not"),
     [
-        ({"pitch_rate_dps": 0.14}, {"pitch_rate_dps": 0.16}),  # 15 % of the shaking while riding
+        ({"pitch_rate_dps": 0.14}, {"pitch_rate_dps": 0.16}),  # the limit is 15 % of the shaking while riding
         ({"yaw_rate_dps": 0.14}, {"yaw_rate_dps": 0.16}),
-        ({"up_g": 0.19}, {"up_g": 0.21}),  # 20 % of the shaking while riding
+        ({"up_g": 0.19}, {"up_g": 0.21}),  # the limit is 20 % of the shaking while riding
         ({"engine": 3.0}, {"pitch_rate_dps": 1.0}),  # an idling engine shakes as strongly as the road, but faster
         ({"pitching": 0.95}, {"pitching": 1.05}),  # the limit of the mean pitch rate is 1 deg/s
         ({"pitching": -0.95}, {"pitching": -1.05}),
@@ -78,7 +78,7 @@ def test_each_condition_of_a_standstill_has_its_limit(stands, does_not):
 
 @pytest.mark.parametrize("ridden_s", [(0.0, 24.0), (8.0, 15.0)])
 def test_standstill_is_found_within_half_a_second(ridden_s):
-    """The standstill is found within this time even if most of the log is standstill."""
+    """The standstill is found within half a second even if most of the log is standstill."""
     ride = maybe()
     ride = ride.part((ride.t_s >= ridden_s[0]) & (ride.t_s < ridden_s[1]))
     times = ride.t_s[standing(ride)]

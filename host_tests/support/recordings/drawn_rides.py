@@ -1,8 +1,8 @@
 """Rides whose road, bike, rider, mount and sensor are drawn at random from realistic values.
 
-The rides come from the second simulator (other_bike.py). It shares only one part with kickstand_tools.simulation, on
-request: the sensor with the data sheet's errors and its calibration by six positions. Parameters of the estimators are
-fitted with even seeds only, and figures are reported for odd seeds:
+The rides come from the second simulator (other_bike.py). On request, a ride uses one part of
+kickstand_tools.simulation: the sensor with the data sheet's errors and its calibration by six positions. Parameters of
+the estimators are fitted with even seeds only, and figures are reported for odd seeds:
 
     OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.drawn_rides odd 100
 """

@@ -1,8 +1,8 @@
 """Measures how often the gyro check of the two presses refuses a sound sensor, and how often it misses a faulty sensor.
 
 The simulated sensors have all errors of the data sheet and any mounting. Some are calibrated by the six positions.
-Hands raise the bike from its stand at once or after a while. They shake it and turn it about the vertical. The program
-prints the shares:
+Hands raise the bike from its stand at once or after a while. The hands shake the bike and turn it about the vertical.
+The program prints the shares:
 
     OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.press_check 1000
 """

@@ -1,5 +1,5 @@
-"""A simulated board on the virtual radio, for a page with a fake navigator.bluetooth. It runs in a thread, in real
-time."""
+"""A simulated board on the virtual radio, for a page with a fake navigator.bluetooth. The board runs in a thread, in
+real time."""
 
 import asyncio
 import base64

@@ -10,8 +10,8 @@ PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile":
 LAPTOP: dict[str, Any] = {"viewport": {"width": 1440, "height": 900}}
 READ_S = 120  # longest wait for the page to show something, long enough for a busy machine
 
-# This script keeps the messages of the board's worker, so that tests can check and repeat them. It also makes the page
-# draw less often.
+# This script keeps the messages of the board's worker, so that tests can check and repeat them. The script also makes
+# the page draw less often.
 KEEP = Path(__file__).with_name("keep.js").read_text()
 
 # This script replaces the page's fetch(). Files whose address has the passed ending get the passed status, until the
