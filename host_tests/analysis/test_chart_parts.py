@@ -89,7 +89,7 @@ def test_an_envelope_breaks_the_line_in_the_middle_of_a_gap():
     assert x.tolist() == [0.0, 1.0, 2.5, 4.0, 5.0] and y[:2].tolist() == [1.0, 2.0] and np.isnan(y[2])
     assert len(charts.envelope(time, values, 10, gap_s=3.0)[0]) == 4
     few = charts.envelope(np.arange(8.0), np.array([0.0, 9.0, 1.0, -9.0, 2.0, 2.0, 5.0, 1.0]), 4)
-    assert few[0].tolist() == [1.0, 3.0, 6.0, 7.0]  # the smallest and the largest of each four values
+    assert few[0].tolist() == [1.0, 3.0, 6.0, 7.0]  # of each four values the smallest and the largest are kept
 
 
 def test_numbers_of_a_page_are_rounded_and_nan_is_none():

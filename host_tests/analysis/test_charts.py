@@ -172,7 +172,7 @@ def test_labels_of_the_lean_histogram_do_not_overlap(seen, most):
         assert min(box.x0 for box in boxes) > inside.x0
     (corner,) = (text.get_window_extent() for text in axes.texts if "upright" in text.get_text())
     tops = [line.get_window_extent().y1 for line in axes.lines]
-    assert len(tops) == 2 and max(tops) < corner.y0  # no line crosses the words
+    assert len(tops) == 2 and max(tops) < corner.y0  # no line crosses the words "upright"
 
 
 def test_doubtful_lean_and_warnings_are_drawn(seen, tmp_path):

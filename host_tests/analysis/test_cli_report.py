@@ -127,7 +127,7 @@ def test_a_kickstand_on_the_other_side_is_noticed(ride, tmp_path):
     assert line in said.err
     assert "do all accelerations have the opposite sign?" in said.err
     assert "Stops: not known" in said.out
-    assert "MFDD" not in said.out  # with reversed axes no figure is right
+    assert "MFDD" not in said.out  # with reversed axes the stops have no correct MFDD
     data = report.as_data(overview(open_ride(ride, cal)))
     assert data["remark"].startswith(line)
     assert data["stops"] == []
@@ -135,7 +135,7 @@ def test_a_kickstand_on_the_other_side_is_noticed(ride, tmp_path):
     car = turned_round(tmp_path, vehicle="car")
     said = command.works("report", ride, "--calibration", car, "--live")
     assert "exchanged: calibrate drive again?" in said.err
-    assert "Max left" not in said.out and "Max braking" in said.out  # a car has no lean
+    assert "Max left" not in said.out and "Max braking" in said.out  # the report of a car shows no lean
 
 
 def test_stop_shown_only_by_the_speed_is_reported(ride, tmp_path):

@@ -81,7 +81,7 @@ def test_vbo_to_the_letter(tmp_path):
     are in minutes, positive to the west."""
     evening = EVENING_S + 6400.0 - 0.25  # the ride begins in the last second before midnight
     moved = block(0.25, 61.5, 3661.75)
-    moved.lon_deg[0] += 1e-5  # this moves the position 0.68 m to the east
+    moved.lon_deg[0] += 1e-5  # a move by 0.68 m to the east
     moved.lat_deg[2] = moved.lon_deg[2] = np.nan
     text = written(export_vbo.write, tmp_path / "x", block(0.0), moved, start_s=evening)
     assert text == expected("ride.vbo").replace("\n", "\r\n")
@@ -146,11 +146,11 @@ def test_a_left_turn_under_braking_has_the_signs_of_each_format(tmp_path):
     expected = {"lateral_acc": 0.2, "longitudinal_acc": -0.4, "x_acc": 0.2, "y_acc": 1.0, "z_acc": -0.4}
     expected |= {f"{axis}_rate_of_rotation": dps for axis, dps in zip("xyz", (5.0, 7.0, 9.0))}
     assert found == pytest.approx(expected, abs=1e-3)
-    assert row["lean_angle"] == ""  # a car has no lean
+    assert row["lean_angle"] == ""  # a car has no lean to export
     export(ride, "vbo", out)
     cells = [float(cell) for cell in out.read_text().split("\n")[-2].split(" ")]
-    assert cells[7:9] == [-0.4, 0.2]  # long accel is positive forward, lat accel in a left turn
-    assert cells[9:] == pytest.approx([7.0, 9.0])  # yaw is positive in a left turn, roll to the right
+    assert cells[7:9] == [-0.4, 0.2]  # long accel is positive forward, lat accel is positive in a left turn
+    assert cells[9:] == pytest.approx([7.0, 9.0])  # yaw is positive in a left turn, roll is positive to the right
     export(ride, "csv", out)
     row = dict(zip(export_columns.COLUMNS, out.read_text().split("\n")[-2].split(",")))
     assert [float(row[f"{name}_rate_dps"]) for name in ("pitch", "yaw", "roll")] == pytest.approx([-5.0, 7.0, 9.0])
@@ -179,7 +179,8 @@ def first_time(path: Path, form: str) -> float:
     ("start_s", "now_s", "first_s"),
     [
         (1e8, EVENING_S, 1e8),  # a time after 3 March 1973 is a Unix time
-        (1e8 - 1.0, EVENING_S, EVENING_S - 2.0),  # an earlier time is the time since power-on: three years, two months
+        # An earlier time counts from power-on, here three years and two months ago
+        (1e8 - 1.0, EVENING_S, EVENING_S - 2.0),
         (0.0, EVENING_S + 0.985, EVENING_S - 2.0),  # the log begins 1.99 s before now, rounded to whole seconds
         (0.0, 1.0, 0.0),  # if the computer's clock was never set, no time before 1970 is written
     ],

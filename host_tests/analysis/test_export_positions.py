@@ -17,7 +17,7 @@ from support.recordings import app_exports
 
 gpxpy = pytest.importorskip("gpxpy")
 pandas = pytest.importorskip("pandas")
-START_S = app_exports.START_UTC_S + 0.004  # not a whole second, because exports must keep milliseconds
+START_S = app_exports.START_UTC_S + 0.004  # not a whole second, to test that exports keep milliseconds
 HZ = 5  # number of positions per second
 ALIGNED = api.CalibrationFile(aligned=True)
 DEGREE_M = np.radians(app_exports._EARTH_M)
@@ -62,7 +62,8 @@ def values(points, name: str) -> np.ndarray:
 def test_gpx_has_all_positions_with_time_speed_and_lean(tmp_path):
     gpx = gpxpy.parse(exported("gpx", tmp_path).read_text())
     (track,) = gpx.tracks
-    assert [len(segment.points) > 20 for segment in track.segments] == [True, True]  # no line across the gap
+    # The track has no line across the gap
+    assert [len(segment.points) > 20 for segment in track.segments] == [True, True]
     points = [point for segment in track.segments for point in segment.points]
     given = log()
     there = np.isfinite(given.lat_deg)

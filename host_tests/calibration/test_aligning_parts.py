@@ -346,7 +346,7 @@ def test_a_speed_counts_as_known_for_5_s(monkeypatch):
     speed[10] = -0.2
     log = Log(np.arange(801) / 100.0, np.tile([0.0, 1.0, 0.0], (801, 1)), np.zeros((801, 3)), speed)
     drive_feed.standing([log], CalibrationFile(), drive_feed.Steps(None, 1))
-    assert seen[0] == (2.0 * 2.0, 0.0)  # the pretended motion between two logs
+    assert seen[0] == (2.0 * 2.0, 0.0)  # a pretended motion separates the two logs
     assert seen[1:] == [(0.0, pytest.approx(0.1))] * 51
 
 

@@ -76,7 +76,7 @@ def test_a_turn_is_integrated_as_by_matrices_in_double():
             exact = exact @ (np.eye(3) + np.sin(size) / size * k + (1 - np.cos(size)) / size**2 * k @ k)
     turn.end()
     r = np.array(turn.attitude(bias.tolist(), 0.5)).reshape(3, 3)
-    assert np.max(np.abs(r - exact)) < 3e-4  # this is 0.02 degrees
+    assert np.max(np.abs(r - exact)) < 3e-4  # 3e-4 rad are 0.02 degrees
     assert turn.seconds == pytest.approx(1.0)
     s = np.array(turn.packed(bias.tolist())[9:]).reshape(3, 9)
     # a scale error that is the same on all axes makes the turn about the mean axis longer
@@ -205,7 +205,7 @@ def late(rates):
     [
         (lambda rates: 0.5 * rates, "gyro-scale"),
         (lambda rates: 2.0 * rates, "gyro-scale"),
-        (lambda rates: -rates, None),  # the axis is named if the turns were nearly about one axis
+        (lambda rates: -rates, None),  # if nearly all turns are about one axis, the error names this axis
         (lambda rates: 0.0 * rates, "dead-gyro"),
         # The axis is dead but still shows noise
         (lambda rates: np.where(np.abs(rates) > 5.0, 0.0, rates), "dead-gyro"),

@@ -100,9 +100,9 @@ def test_gaps():
 
 def test_a_log_that_cannot_show_the_mount_gets_no_remark():
     log, calibration = made("street")
-    assert said(log, CalibrationFile()) == ""  # an unaligned calibration has its own message
+    assert said(log, CalibrationFile()) == ""  # an unaligned calibration gets another message
     assert said(log.part(log.t_s < 10.0), other(calibration, up=90.0)) == ""
-    assert said(silent(log), other(calibration, "car", up=90.0)) == ""  # a car does not lean
+    assert said(silent(log), other(calibration, "car", up=90.0)) == ""  # a car has no lean to compare
 
 
 def test_the_commands_say_so_in_one_line(tmp_path):

@@ -18,10 +18,11 @@ NEAR_DEG = 2.0
 SENSOR = 0x68
 RECOVERY_S = 0.5
 FAULT_S = 0.6
-ON_A_PICO = ["pico", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])]  # nightly on both chips
+# The ESP32 is tested only in the nightly run
+ON_A_PICO = ["pico", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])]
 
 
-@pytest.mark.nightly  # takes minutes; host_tests/device has the same steps on MicroPython for Linux
+@pytest.mark.nightly  # takes minutes; the tests in host_tests/device do the same steps on MicroPython for Linux
 @pytest.mark.long
 @pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_two_presses_align_a_new_board_for_good(chip):

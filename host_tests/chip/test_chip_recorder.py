@@ -91,7 +91,7 @@ def rides(files):
     return found
 
 
-@pytest.mark.nightly  # host_tests/rides has similar tests: test_recorder.py, and test_slow_flash.py with a slow flash
+@pytest.mark.nightly  # host_tests/rides/test_recorder.py and test_slow_flash.py have similar tests
 def test_a_recorded_ride_replays_as_it_was_shown(at_prompt, tmp_path):
     """No sample is lost during the recording, and the display keeps working."""
     begun_s, world = at_prompt.time_s, PART.world(RIDE.motion)
@@ -118,7 +118,7 @@ def test_a_recorded_ride_replays_as_it_was_shown(at_prompt, tmp_path):
     assert max(leans) - min(leans) > 10
 
 
-@pytest.mark.nightly  # test_chip_power_cut.py is similar: it cuts each write of a calibration
+@pytest.mark.nightly  # test_chip_power_cut.py has a similar test, which cuts each write of a calibration
 def test_power_cut_loses_only_the_last_block(at_prompt):
     """The power is cut before, during and after each flash operation. The calibration always survives."""
     at_prompt.exec(FEED)

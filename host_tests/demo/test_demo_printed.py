@@ -57,7 +57,7 @@ def test_a_frame_is_printed_when_the_display_has_changed(monkeypatch, capsys):
         at(1.2, "Lean  28° left", ""),
         at(1.25, "Lean  29° left", "x"),
         at(1.3, "Max   29°", ""),
-        at(1.35, "?", ""),  # an OLED's picture that is not complete yet
+        at(1.35, "?", ""),  # a picture of an OLED that is not complete yet
         at(1.4, "Lean  30° left", ""),
         {"ended": "off"},
     ]
@@ -289,6 +289,6 @@ def test_the_bike_by_hand_keeps_its_limits():
 def test_each_key_leans_the_bike_five_degrees():
     bike = HandBike(vibration_g=0.0)
     bike.command("upright")
-    for name in ("right", "right", "right", "left"):  # the first sets off
+    for name in ("right", "right", "right", "left"):  # the first command only sets the bike off
         bike.command(name)
     assert bike.truth(12.0)[0] == pytest.approx(5.0, abs=0.6)

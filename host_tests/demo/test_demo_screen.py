@@ -57,7 +57,7 @@ def test_the_first_line_has_the_title_and_the_time(paused, of_s, end):
     lines = drawn(paused, of_s=of_s)
     assert lines[0].startswith("a title") and lines[0].rstrip().endswith(end)
     assert lines[-1].startswith("the keys")
-    assert len(lines) == len(drawn()) - (of_s is None)  # a ride without an end has no bar of its progress
+    assert len(lines) == len(drawn()) - (of_s is None)  # without an end of the ride, the picture has no progress bar
 
 
 def test_the_picture_of_an_oled_has_its_pixels_and_no_bike():

@@ -87,7 +87,8 @@ def test_the_rider_sways_with_0_4_hz(pose, amplitude_deg):
     bike.truth(25.0)  # ten periods of the sway, of 2.5 s each
     quarters = [bike.truth(25.0 + 0.625 * k)[0] for k in range(8)]
     assert quarters == pytest.approx([0.0, amplitude_deg, 0.0, -amplitude_deg] * 2, abs=0.03 * amplitude_deg)
-    assert bike.motion(30.0)[5] == pytest.approx(amplitude_deg * 0.8 * 3.14159, rel=0.03)  # the fastest roll rate
+    # The largest roll rate of the sway
+    assert bike.motion(30.0)[5] == pytest.approx(amplitude_deg * 0.8 * 3.14159, rel=0.03)
 
 
 @pytest.mark.parametrize(("cruise_mps", "leans"), [(3.9, False), (4.2, True)])

@@ -41,7 +41,7 @@ def test_a_compiled_module_has_the_boards_format():
     for second, third in ((5, 0x13), (6, 0x12)):
         with pytest.raises(bytecode.CannotCompile, match="another format"):
             made(second, third)
-    assert made(6, 0x13, 0x5306)  # bits 14 and above do not belong to the format
+    assert made(6, 0x13, 0x5306)  # bits 14 and above do not belong to the .mpy format
 
 
 # check.py

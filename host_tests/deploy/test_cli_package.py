@@ -23,7 +23,7 @@ def test_mip_installs_every_module_and_nothing_else():
     firmware = ROOT / "firmware"
     modules = {path.relative_to(firmware).as_posix() for path in (firmware / "kickstand").rglob("*.py")}
     assert {target for target, _ in listed["urls"]} == modules
-    assert all(target == source for target, source in listed["urls"])  # relative targets need no network
+    assert all(target == source for target, source in listed["urls"])  # targets without a host need no network
     assert listed == firmware_files.mip_package(), "python -m kickstand_tools.deploy.firmware_files writes it again"
 
 

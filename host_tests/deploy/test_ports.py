@@ -49,7 +49,7 @@ def stubs(request):
             if done.returncode != 0:
                 said = done.stderr.strip() or "pip failed"
                 pytest.skip(f"no {wanted[0]}: it cannot be installed: {said.splitlines()[-1]}")
-            with contextlib.suppress(OSError):  # another process has already installed the stubs
+            with contextlib.suppress(OSError):  # OSError: another process has already installed the stubs
                 os.rename(f"{scratch}/stubs", directory)
     return request.param, directory
 

@@ -123,7 +123,7 @@ def test_readings_that_wait_too_long_make_a_page_late(looped, frames_left, draws
     ms more."""
 
     def use(app, calls, board):
-        app._page_ms = 10**6  # the next page is due later
+        app._page_ms = 10**6  # show no page yet
         app.turn()
         app.sensor.chip.frames_left, app.lcd.draws = frames_left, draws
         from time import ticks_ms  # pyright: ignore[reportAttributeAccessIssue]

@@ -75,7 +75,7 @@ def test_the_refusal_is_shown_where_the_display_s_pins_are_set(config, lines, tm
     [
         *[
             ("esp32", "BUTTON_PIN", pin) for pin in (1, 6, 11, 34, 39)
-        ],  # pins of the console and the flash, and input-only pins
+        ],  # pins of the console, pins of the flash, and pins that are only inputs
         *[("esp32", name, 6) for name in ("SENSOR_SDA", "SENSOR_SCL", "WHEEL_PIN", "GPS_TX", "SD_CS")],
         ("esp32 unicore", "BUTTON_PIN", 11),
     ],

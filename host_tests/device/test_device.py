@@ -59,7 +59,7 @@ def test_unusable_poses_are_refused_and_repeated(lean, complaint, tmp_path):
     )
     assert record.at(13.5)[0].startswith(complaint)
     assert record.last[0] == "On the stand,   "
-    assert list(tmp_path.iterdir()) == []  # no file was stored
+    assert list(tmp_path.iterdir()) == []  # nothing was stored in flash
 
 
 def test_a_knock_during_the_pose(tmp_path):
@@ -87,7 +87,8 @@ def test_a_refused_alignment_leaves_the_old_one(tmp_path):
 def test_pages_and_menu(tmp_path):
     source = (firmware_path.PACKAGE / "ui" / "page_ring.py").read_text(encoding="utf-8")
     ring = re.findall(r"pages\.(\w+)", source.partition("MOTORCYCLE = (")[2].partition(")")[0])
-    turns_s = [46.0 + k for k in range(len(ring))]  # times of the presses through all pages, back to the first page
+    # Times of the presses that show all pages and return to the first page
+    turns_s = [46.0 + k for k in range(len(ring))]
     menu_s = turns_s[-1] + 1.0
     short = [*turns_s, *(menu_s + after_s for after_s in (2, 3, 7.5, 11, 12, 13, 19))]
     long = [menu_s + after_s for after_s in (0, 4, 9, 14)]

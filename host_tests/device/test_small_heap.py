@@ -113,7 +113,7 @@ def test_a_part_that_uses_heap_shortens_the_next_wait(part, tmp_path, monkeypatc
     """The part uses heap in the first pass, when four collections are already planned. Only the first collection is
     still made as planned."""
     monkeypatch.chdir(tmp_path)
-    turns = [0]  # between two collections
+    turns = [0]  # number of passes between two collections
     with Board(sensor_errors.resting(sensor_errors.Sensor(), (0, 1, 0))) as board:
         from kickstand import app, devices, settings
 

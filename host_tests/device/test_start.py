@@ -122,7 +122,7 @@ def test_a_failed_import_of_the_menu_is_reported(module, place, without, board, 
         choose(board, at_s, place)
     assert board.run(start.main, 28.0) == "off"
     shown_s = [t_s for t_s, lines in seen if lines == said]
-    for t_s in shown_s:  # the message is shown for two seconds, and one sample may be a half-written line
+    for t_s in shown_s:  # tolerance of 2 s: the message is shown for 2 s, and one sample may be a half-written line
         assert min(abs(t_s - (at_s + 4 + place)) for at_s in (3, 15)) < 2
     assert min(shown_s) < 12 < max(shown_s)
     assert seen[-1][1][0].startswith("Raw")

@@ -54,7 +54,7 @@ def test_each_function_is_called(run, engine):
     record = run(WHOLE, POSES, engine)
     console = record.console
     assert "setup left" in console and console.count("press 1") == 2
-    assert "lean 100 False" in console  # not aligned yet
+    assert "lean 100 False" in console  # the sensor is not aligned yet
     assert re.search(r"lean 280 True -\d\d? True", console)
     assert goes_on(record, device_plans.LEFT_S)
 

@@ -95,7 +95,7 @@ def test_a_calibrated_accelerometer_keeps_its_parameters(tmp_path):
     data = json.loads(out.read_text())
     assert data["accel_offset_g"] == [0.2, 0.0, 0.0]
     assert data["gyro_bias_dps"] == pytest.approx([1.0, -2.0, 3.0], abs=0.02)
-    assert errors(matrix_in(out), MOUNT)[1] > 5.0  # the wrong offset of 0.2 g was used
+    assert errors(matrix_in(out), MOUNT)[1] > 5.0  # the alignment is wrong, because the wrong offset of 0.2 g was used
     assert "no six-position" not in result.out
     assert result.out.count("car, method improved") == 1
 

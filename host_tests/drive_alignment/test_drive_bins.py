@@ -110,7 +110,7 @@ def test_another_slope_in_the_next_log_is_no_moved_mount():
         standing_g = np.array([0.0, np.cos(np.radians(slope_deg)), np.sin(np.radians(slope_deg))]) @ mount
         noise_g = np.random.default_rng(1).normal(0.0, 0.002, log.accel_g.shape)
         log.accel_g = np.where(at[:, None], standing_g + noise_g, log.accel_g)
-        if not first:  # the simulated drive ends before the vehicle stands
+        if not first:  # in the second log the simulated drive ends before the vehicle stands
             log.gyro_dps = np.where(at[:, None], [0.5, -1.0, 0.3], log.gyro_dps)
             log.speed_mps = np.where(at & ~np.isnan(log.speed_mps), 0.0, log.speed_mps)
         logs.append(log)

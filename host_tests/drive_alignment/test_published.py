@@ -205,10 +205,10 @@ def test_a_shaking_of_ten_times_a_second_is_averaged_away():
 @pytest.mark.parametrize(
     ("seconds", "mps2", "counted"),
     [
-        (2.0, -0.74, 0),  # a deceleration below 1 m/s2 is not braking, whatever the force
+        (2.0, -0.74, 0),  # a deceleration below 1 m/s2 is not braking, whatever the force is
         (2.0, -0.99, 0),
         (2.0, -1.01, 1),
-        (1.0, -1.45, 0),  # this reduces the speed by less than 1.5 m/s
+        (1.0, -1.45, 0),  # braking that reduces the speed by less than 1.5 m/s does not count
         (1.0, -1.55, 1),
         (0.5, -2.9, 0),
         (0.5, -3.1, 1),

@@ -132,7 +132,7 @@ def test_the_upright_pose_gives_the_sum_of_rotation_and_offset():
     right, the force at rest is right too."""
     prior, p = Prior.of_pose(six_done=False), np.zeros(PARAMETERS)
     p[of.ROTATION.stop - 1] = p[of.OFFSET.start] = 0.03  # rotation and offset to the side
-    p[of.ROTATION.start], p[of.OFFSET.stop - 1] = 0.02, -0.02  # rotation and offset forward
+    p[of.ROTATION.start], p[of.OFFSET.stop - 1] = 0.02, -0.02  # rotation and offset along forward
     motion = found([0.0] * 3, [0.0, 1.0, 0.0], parameters=enumerate(p))[MOTION]
     assert np.allclose(motion[[LEFT, FORWARD]], 0.0, atol=1e-9)
     apart = p.copy()

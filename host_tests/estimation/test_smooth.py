@@ -123,7 +123,8 @@ def test_pose_that_was_not_upright_is_reported(street, wrong_deg):
     calibration = replace(street.calibration, vehicle_from_sensor=turned)
     (notice,) = (n for n in smooth(street.log, calibration).notices if isinstance(n, PoseOff))
     assert np.sign(notice.angle_deg) == np.sign(wrong_deg)
-    assert abs(abs(notice.angle_deg) - 4.0) < 2.1  # the ride's own pose is 1.5 degrees off
+    # The mount moved by 4 degrees, and the ride's own pose is 1.5 degrees off
+    assert abs(abs(notice.angle_deg) - 4.0) < 2.1
     assert ("right" if wrong_deg > 0.0 else "left") in sentence(notice)
 
 
@@ -287,6 +288,6 @@ def test_long_ride_is_estimated_in_parts(street, monkeypatch):
     assert len(sizes) > 2
     assert len(added) > 1 and sum(added) == pytest.approx(street.log.t_s[-1], abs=0.3 * len(added))
     assert max(sizes) <= 7 * 2000
-    assert sizes[-1] > 5 * 2000  # the end is estimated together with earlier parts
+    assert sizes[-1] > 5 * 2000  # the end of the ride is estimated together with earlier parts
     assert np.array_equal(parts.t_s, whole.t_s)
     assert rms((parts.lean_deg - street.lean_deg)[street.riding]) < 0.8

@@ -81,11 +81,11 @@ def test_a_motorcycle_has_no_force_to_the_left():
 @pytest.mark.parametrize(
     ("kind", "speed", "weight"),
     [
-        ("car", 0.0, 0.3),  # a standstill counts less
+        ("car", 0.0, 0.3),  # a standstill has a smaller weight
         ("car", 1.0, 1.0),
         ("car", 2.1, 1.0),
         ("motorcycle", 0.0, 0.0),
-        ("motorcycle", 1.99, 0.0),  # the rider has a foot on the ground
+        ("motorcycle", 1.99, 0.0),  # below 2 m/s the rider may have a foot on the ground
         ("motorcycle", 2.01, 1.0),
     ],
 )

@@ -8,7 +8,7 @@ from kickstand_fleet.evidence import Blocks, Intervals
 from made_fleet import turn_of
 
 LEFT, UP, FORWARD = np.eye(3)
-MOUNT = turn_of(50.0, (1.0, 2.0, 3.0))  # from the sensor's axes to left, up, forward
+MOUNT = turn_of(50.0, (1.0, 2.0, 3.0))  # rotation from the sensor's axes to left, up, forward
 NO_SWAY = np.zeros((3, 3))
 
 

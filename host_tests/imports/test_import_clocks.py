@@ -36,7 +36,8 @@ def test_a_single_wrong_time_is_damaged():
     assert damaged(0, 600, 20, 30) == [1] and damaged(600, 1200, 50, 1300) == [2]
     assert damaged(511, 10, 20, 30) == [0] and damaged(509, 10, 20, 30) == []
     assert damaged(1000, 1010, 1020, 519) == [3] and damaged(1000, 1010, 1020, 521) == []
-    assert damaged(0, 2000, 1001, 1011) == []  # not judged, because the times around it are a second apart
+    # These times are not judged, because the times around them are a second apart
+    assert damaged(0, 2000, 1001, 1011) == []
 
 
 def test_late_samples_are_sorted_up_to_half_a_second():

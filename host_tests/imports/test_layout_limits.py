@@ -17,7 +17,7 @@ def test_the_layout_of_rows_is_found():
     comma = ["t;a;b;c", *[f"{k};1,5;2,5;3" for k in range(5)]]
     assert layout.find_grid(comma) == layout.Grid(0, 1, ";", True, 4)
     assert layout.find_grid(["1 2 3 4", "5 6 7 8"]) == layout.Grid(None, 0, " ", False, 4)
-    assert layout.find_grid(["a,b,c", "1,2,3", "4,5,6"]) is None  # three numbers are too few
+    assert layout.find_grid(["a,b,c", "1,2,3", "4,5,6"]) is None  # a table needs more than three numbers per row
     assert layout.find_grid(["1,2,3,4"]) is None and layout.find_grid(["t,a,b,c", "1,2,3,4"]) is not None
     units_below = ["t,a,b,c", "(s),(g),(g),(g)", "1,2,3,4", "2,2,3,4"]
     found = layout.sheet_in(file("\n".join(units_below)))

@@ -102,8 +102,8 @@ def test_a_watch_records_the_low_bits_wraps_and_differences(engine):
     """For each axis the watch records the values of the lowest four bits, a change of the high byte, and a jump of the
     low byte. The watch also records which axes differ from each other."""
     samples = np.full((8, 7), 700) + np.arange(7)
-    samples[:, 0] = 5, 6, 5, 6, 5, 6, 5, 6  # only two values
-    samples[:, 1] = 2, 194, 5, 6, 7, 198, 9, 8  # the low byte jumps, and the high byte stays the same
+    samples[:, 0] = 5, 6, 5, 6, 5, 6, 5, 6  # axis 0 has only two values
+    samples[:, 1] = 2, 194, 5, 6, 7, 198, 9, 8  # on axis 1 the low byte jumps, and the high byte stays the same
     samples[:, 2] = -1, 0, 1, 2, 3, 4, 5, 6
     samples[:, 4] = samples[:, 6] = np.arange(8) * 3 - 8
     chosen, python = engines.run(engine, [("add_up", ([frames(samples[:1]), frames(samples)], LIMIT))])[0]

@@ -23,7 +23,7 @@ class Chip:
         from kickstand.imu.fifo_frames import AxisWatch
 
         self.axes = AxisWatch(200, 3, 1, 3, 20)
-        self.axes.notes[9] = 1 << 29  # the next check of the axes is never reached
+        self.axes.notes[9] = 1 << 29  # let the next check of the axes never come
         self.waiting, self.setups, self.states = [], [], []
         self.bad = 0
         self.overflows = self.frames_left = 0
@@ -268,7 +268,7 @@ def test_the_fifo_is_tested_if_set_ups_do_not_help(board):
         said.append(code(sensor))
         now_ms = set_up(sensor, now_ms)
     assert said == ["sensor-silent", "sensor-silent", "sensor-fifo", "sensor-fifo"]
-    assert asked == [None]  # the test takes 0.3 s, so it runs only once
+    assert asked == [None]  # the test of the FIFO runs only once, because it takes 0.3 s
     chip.waiting = []
     sensor.fetch(now_ms + 5)
     assert code(sensor) is None

@@ -217,14 +217,15 @@ def test_a_tracks_change_of_course_is_over_four_seconds():
     whose cosine is 0.98741."""
     change, known = match._changes_of_track(steps(30))
     assert change[20] == pytest.approx(36.0 * 0.98741, abs=0.001)
-    assert len(change) == 60 and np.flatnonzero(known)[[0, -1]].tolist() == [4, 56]  # the cells from 2 to 28 s
+    # The change is known in the cells from 2 to 28 s
+    assert len(change) == 60 and np.flatnonzero(known)[[0, -1]].tolist() == [4, 56]
     known = match._changes_of_track(steps(30, bad=[15]))[1]  # the bad step is from 15 to 16 s
     assert known[25] and not known[27:36].any() and known[37]  # the 4 s around 12.5 and 18.5 s exclude the bad step
 
 
 def test_a_rides_change_of_course_is_over_four_seconds():
     there = np.ones(600, dtype=bool)
-    there[300:307] = False  # a gap of 0.35 s; up to 0.4 s of 4 s may be missing
+    there[300:307] = False  # a gap of 0.35 s is allowed, because up to 0.4 s of 4 s may be missing
     moved = cells(np.tile([0.0, 9.0, 0.0], (600, 1)), there)
     change, known = match._changes_of_ride(moved)
     assert change[20] == pytest.approx(36.0)

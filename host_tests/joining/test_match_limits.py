@@ -71,7 +71,8 @@ def test_the_evidence_and_correlation_that_a_match_needs(matched):
 def test_another_shift_needs_six_less_evidence(matched):
     assert matched(found_fit(40.0, 44.1), found_fit()).startswith("the track fits at two times, 30 s apart")
     assert matched(found_fit(40.0, 44.0), found_fit()).start_utc_s == 1010.0
-    assert matched(found_fit(16.0, 49.0), found_fit()).start_utc_s == 1010.0  # still the same shift 6 s away
+    # A fit 6 s away still counts as the same shift
+    assert matched(found_fit(16.0, 49.0), found_fit()).start_utc_s == 1010.0
     assert matched(found_fit(3.9, 49.0), found_fit()).startswith("the track fits at two times, 6 s apart")
 
 

@@ -11,7 +11,8 @@ from kickstand_tools.signals import EARTH_M
 from support.recordings import phone_tracks
 
 PROFILES = ("street", "track", "sweeper", "city", "hills")
-SECONDS = {"sweeper": 450.0, "city": 300.0, "street": 300.0}  # rides with few bends must be longer
+# Duration of the ride; rides with few bends must be longer
+SECONDS = {"sweeper": 450.0, "city": 300.0, "street": 300.0}
 
 
 @pytest.fixture(scope="module")
@@ -153,7 +154,7 @@ def test_frozen_readings_and_gaps_are_left_out(rides):
     joined = api.join_track(broken, phone_tracks.track(ride))
     assert [notice.code for notice in joined.notices] == ["frozen-readings"]
     assert abs(error_s(joined, 0.5)) < 0.2
-    assert joined.match.correlation > 0.97  # with the frozen readings, the correlation would be 0.8
+    assert joined.match.correlation > 0.97  # if the frozen readings counted, the correlation would be 0.8
 
 
 def test_course_turns_are_scaled_by_the_lean():

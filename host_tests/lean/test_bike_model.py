@@ -21,7 +21,7 @@ from kickstand.lean.bike_model import (
 from kickstand.units import STANDARD_GRAVITY
 
 STEP_S = 0.01
-DISTANCE = 1e-4  # change of a state for a numerical derivative
+DISTANCE = 1e-4  # step of a state for a numerical derivative
 TOLERANCE = 1e-6
 MOTION = ("lean_row", "pitch_row", "speed_row")
 FORCES = ("left_row", "up_row")

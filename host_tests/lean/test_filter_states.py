@@ -34,8 +34,8 @@ def test_before_the_first_window_nothing_is_known():
 def test_power_on_under_way_leaves_lean_and_speed_uncertain():
     """At rest the force shows the vertical. A rate, or a force other than 1 g, shows that the bike moves."""
     for force, rate, moves in (
-        (LEVEL, [0.0, 0.0, 0.015], False),  # this small rate can be the gyro's bias
-        ([0.0, 0.96, 0.0], NO_RATE, False),  # this small difference can be the accelerometer's error
+        (LEVEL, [0.0, 0.0, 0.015], False),  # a rate of 0.015 rad/s can be the gyro's bias
+        ([0.0, 0.96, 0.0], NO_RATE, False),  # a difference of 0.04 g can be the accelerometer's error
         (LEVEL, [0.0, 0.03, 0.0], True),
         ([0.0, 1.08, 0.0], NO_RATE, True),
     ):

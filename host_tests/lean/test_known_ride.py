@@ -37,7 +37,7 @@ LEGS = (
     (4, 0, 0, 0, False),
     (6, 0, 0, 0, False),
     (4, 0, 14, 0, False),
-    (2, -35, 14, 0, False),  # the filter is restarted in this leg
+    (2, -35, 14, 0, False),  # the filter restarts in this leg
     (6, -33, 15, 0, False),
     (2, 7, 16, 0, False),
     (12, 7, 16, 0, False),

@@ -151,7 +151,7 @@ def test_power_on_in_the_hand_and_laid_down(seed):
     rate, push, up, lean = np.zeros(3), np.zeros(3), np.array([0.0, 1.0, 0.0]), 0.0
     for k in range(60 * HZ):
         moving = k < 20 * HZ
-        rate = 0.98 * rate + math.radians(8.0) * rng.normal(size=3) if moving else np.zeros(3)  # 40 deg/s rms
+        rate = 0.98 * rate + math.radians(8.0) * rng.normal(size=3) if moving else np.zeros(3)  # rates of 40 deg/s rms
         push = 0.95 * push + 0.06 * rng.normal(size=3) if moving else np.zeros(3)  # 0.2 g
         up = up - np.cross(rate, up) / HZ
         up /= np.linalg.norm(up)

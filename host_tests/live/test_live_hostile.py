@@ -58,7 +58,7 @@ def act(dice, phone, radio):
     elif kind == 3:  # a phone writes faster than the loop reads
         for _ in range(40):
             phone.write("filter", nonsense(dice))
-    elif kind == 4:  # the phone disconnects and connects again between two turns of the loop
+    elif kind == 4:  # the phone disconnects and connects again between two passes of the loop
         phone.leave()
         radio.found = radio.found or b""
         phone.connect(dice.randrange(256))

@@ -205,7 +205,7 @@ def test_the_temperature_does_not_count():
     found = marks(readings)[0]
     assert np.flatnonzero(found).tolist() == list(range(101, 180))
     readings[140, 3] = 1e9
-    readings[140, 6] = 1e-10  # the smallest change of a reading counts as a change
+    readings[140, 6] = 1e-10  # even the smallest change of a reading counts
     assert not marks(readings)[0].any()
     assert frozen.FrozenFinder().notices() == []
 

@@ -127,7 +127,7 @@ def test_stretch_warns_of_another_mounts_calibration(tmp_path):
 def test_exported_stretch_keeps_its_time_of_day(tmp_path):
     """A log without a time of day is assumed to end when its file was written. A stretch that ends before the log does
     must get an earlier end."""
-    ride = analysis_rides.short(tmp_path)  # lasts 34 s
+    ride = analysis_rides.short(tmp_path)  # a ride of 34 s
     os.utime(ride, (1_700_000_100, 1_700_000_100))
     out = tmp_path / "out.csv"
     api.export(api.open_ride(Stretch(ride, 10.0, 20.0)), "racechrono", out)

@@ -215,7 +215,7 @@ def test_a_closed_terminal_loses_nothing(streaming, tmp_path, monkeypatch):
     streaming(data, "ctrl-c")
     terminal = Watched()
     terminal.closed_after = 300
-    with contextlib.suppress(OSError):  # the command cannot write its last output
+    with contextlib.suppress(OSError):  # OSError: the command cannot write its last output
         watched(monkeypatch, terminal, "record", "--out", tmp_path / "ride.csv")
     assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
 

@@ -115,8 +115,10 @@ def test_a_file_is_copied_again_if_its_check_sum_is_wrong(monkeypatch):
     found, came = sent(monkeypatch, lines_of(b"abc", b"deX", crc=1), lines_of(b"abcdef"))
     assert found == (b"abcdef", True) and len(came) == 3  # the second attempt is not reported
     assert sent(monkeypatch, lines_of(b"abcd", crc=1), lines_of(b"ab", crc=1))[0] == (b"abcd", False)
-    assert sent(monkeypatch, lines_of(b"abcde"), lines_of(b"abcde"))[0] == (b"abcde", False)  # shorter than announced
-    assert sent(monkeypatch, lines_of(b"abcdefg"))[0] == (b"abcdefg", True)  # a ride may grow
+    # The content is shorter than announced
+    assert sent(monkeypatch, lines_of(b"abcde"), lines_of(b"abcde"))[0] == (b"abcde", False)
+    # The content is longer, because a ride may grow
+    assert sent(monkeypatch, lines_of(b"abcdefg"))[0] == (b"abcdefg", True)
     assert sent(monkeypatch, [b"YWJj", b"YWJ"], [b"YWJj"])[0] == (b"abc", False)
 
 

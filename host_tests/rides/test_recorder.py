@@ -160,7 +160,7 @@ def test_the_menu_starts_and_ends_a_ride(tmp_path):
     assert record.at(15.9)[0].startswith("Rec         0:0") or record.at(15.9)[0].endswith("*")
     assert record.at(20.8)[0] in ("Rec         0:05", "Rec         0:06")
     assert record.at(20.8)[1].startswith("room ")
-    assert record.at(27)[0] == "Lean  10° right*"  # the filter has settled
+    assert record.at(27)[0] == "Lean  10° right*"  # by now the filter has settled
     assert 34 < record.first("Stop recording") < 36
     assert record.first("Recording ended") < 38
     assert record.at(39.5)[0] == "Lean  10° right "

@@ -128,7 +128,7 @@ def test_a_ride_after_an_alignment_begins_like_its_replay(keeper):
 
     recording = Recording(settings, ride_writer.CHIP, None, Calibration(), keeper)
     recording.calibration_changed()
-    assert keeper.steps == []  # nothing is being recorded
+    assert keeper.steps == []  # no ride is being recorded
     start(recording.recorder)
     recording.calibration_changed()
     assert keeper.steps == ["begin", "restart", "end", "begin"]
@@ -161,13 +161,13 @@ def test_a_block_is_written_256_bytes_per_turn(recorder, keeper):
     while not keeper.taken:
         before = len(keeper.steps)
         add(recorder, 1)
-        assert len(keeper.steps) == before + 2  # one call of ready(), and one other step
+        assert len(keeper.steps) == before + 2  # the recorder called ready() and did one other step
         written.append(len(keeper.begun))
     assert written == [256, 512, 700, 0]
     assert [len(data) for data in keeper.taken] == [700]
     before = len(keeper.steps)
     recorder.tick()
-    assert len(keeper.steps) == before  # no data wait to be written
+    assert len(keeper.steps) == before  # tick() does nothing, because no block waits to be written
 
 
 def test_all_blocks_have_their_ride_and_sequence(recorder, keeper, clock):

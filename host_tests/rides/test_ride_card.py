@@ -85,7 +85,7 @@ def test_no_turn_waits_long_for_a_card(rides, parts):
     script = _CARD + _MANY.replace("RIDES", str(rides)).replace("PARTS", str(parts))
     took = json.loads(run_mpy(script))
     worst = {name: max(sectors) for name, sectors in took.items() if name != "begin"}
-    print(rides, parts, "sectors:", took["begin"], worst)  # for pytest -s
+    print(rides, parts, "sectors:", took["begin"], worst)  # printed with pytest -s
     assert took["begin"] * SECTOR_S < BEGIN_S
     assert all(sectors * SECTOR_S < TURN_S for sectors in worst.values()), worst
 

@@ -11,7 +11,7 @@ from support import device_plans, engines
 from support.recordings import ride_writer
 from test_recorder import rides
 
-MIDNIGHT_S = 1_798_761_600.0  # 1 January 2027
+MIDNIGHT_S = 1_798_761_600.0  # 1 January 2027 in Unix time
 DEGREE = 6_000_000  # one degree in units of 0.00001 minutes
 
 
@@ -43,7 +43,8 @@ def test_no_turn_is_lost_and_positions_keep_their_turn(every, length):
     assert [turn.speed_mps for block in blocks for turn in block.turns][:101:100] == [0.0, 1.0]
     for block, content in zip(blocks, data):
         free = content[: -6 - 16 * sum(bool(turn.place) for turn in block.turns)]
-        assert len(free) - len(free.rstrip(b"\0")) < 16 + 60  # the unused bytes have room for one turn only
+        # The unused bytes have room for the samples of one pass only
+        assert len(free) - len(free.rstrip(b"\0")) < 16 + 60
 
 
 def said(*values: int) -> list:

@@ -17,7 +17,7 @@ def test_the_deadline_stops_the_clock_and_stays():
     clock.set_deadline(None)
     clock.advance(1)
     assert clock.now_us == 501
-    assert not issubclass(PowerOff, Exception)  # so PowerOff also ends firmware that catches every Exception
+    assert not issubclass(PowerOff, Exception)  # firmware that catches every Exception cannot catch PowerOff
 
 
 def test_pace_follows_the_host():

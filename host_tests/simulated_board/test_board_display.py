@@ -11,7 +11,7 @@ OLEDS = ("ssd1306", "sh1106")
 KINDS = ("lcd",) + OLEDS
 BUS_HZ = (None, 100_000)
 TURN_MS = 10
-LONGEST_US = 7500  # longest time of the transfers in a turn of 10 ms
+LONGEST_US = 7500  # longest time of the transfers in a pass of 10 ms
 OLD, NEW = ("Lean  19\xdf right", "first"), ("Lean  28\xdf left", "second line")
 
 
@@ -81,7 +81,8 @@ def test_no_turn_delays_the_loop(board, display):
     for k in range(20):
         display.show(f"{k * 1234567:016d}", f"{k * 7654321:016d}")
         longest = turns(board, display, 10)
-        limit = LONGEST_US if not board.lcd.address == 0x27 else 12_800  # dashes first, then the new line
+        # An LCD needs longer: dashes first, then the new line
+        limit = LONGEST_US if not board.lcd.address == 0x27 else 12_800
         assert longest <= limit, longest
 
 
@@ -116,7 +117,8 @@ def test_after_any_unplug_it_returns_and_shows_nothing_old(board, display):
         turns(board, display, 40)
         display.show(*NEW)
         turns(board, display, gap_turns % 7)  # the display may be removed during a transfer of the new lines
-        for begun in (0, 12) if isinstance(board.lcd, Lcd) else (0,):  # again during the initialisation
+        # An LCD is also removed during its initialisation
+        for begun in (0, 12) if isinstance(board.lcd, Lcd) else (0,):
             turns(board, display, begun)
             board.remove_lcd()
             board.clock.advance(1000 * gone_ms)

@@ -245,7 +245,7 @@ def fresh_port(monkeypatch, machine):
         assert on_board(program, machine="tested")[0] == "returned"
         return types.SimpleNamespace(**vars(found[0]))
     finally:
-        assert on_board(program)[0] == "returned"  # the other tests' board is a Pico
+        assert on_board(program)[0] == "returned"  # the board of the other tests is a Pico
 
 
 CLASSIC = (1, 3, 6, 7, 8, 9, 10, 11)
@@ -293,7 +293,8 @@ def test_known_boards_have_usual_pins(machine, sensor, gps, button, monkeypatch)
     ("entries", "opened"),
     [
         ([("lib", 0x4000, 0, 0), ("sd", 0x4000, 0)], 0),
-        ([("sd", 0x4000, 0, 0), ("other", 0x4000, 0)], 1),  # a folder in flash, and another mounted file system
+        # The listing has a folder in flash, and another mounted file system
+        ([("sd", 0x4000, 0, 0), ("other", 0x4000, 0)], 1),
     ],
 )
 def test_a_card_is_mounted_once(entries, opened, monkeypatch):

@@ -153,8 +153,8 @@ def test_damaged_lines_are_refused_and_the_next_is_read():
         # A sentence whose first two letters are damaged is still read. Every speed that is read is true.
         assert (10000 in speeds_of(bad)) <= (at in (1, 2)), bad
     for at in range(1, len(good) - 3):
-        assert speeds_of(good[at:] + later) == [5000]  # the beginning is missing
-        assert speeds_of(good[:at] + later) == [5000]  # the end is missing
+        assert speeds_of(good[at:] + later) == [5000]  # the beginning of the first sentence is missing
+        assert speeds_of(good[:at] + later) == [5000]  # the end of the first sentence is missing
     assert speeds_of("$" * 1000 + good) == [10000]
     assert speeds_of("\x00\xff".encode() * 500 + b"\n" + good.encode()) == [10000]
 
@@ -182,9 +182,9 @@ def test_a_delayed_fix_is_rejected_or_has_its_age():
         assert hear(gps, 1, 1300) == ([True], 0)
         assert hear(gps, 2, 2200) == ([True], 0)
         assert hear(gps, 3, 3700) == ([True], 500)
-        assert hear(gps, 4, 6700)[0] == []  # 2.5 s late
+        assert hear(gps, 4, 6700)[0] == []  # the fix is 2.5 s late
         assert hear(gps, 7, 7210) == ([True], 10)
-        assert hear(gps, 30, 8210) == ([True], 0)  # the receiver's clock was corrected
+        assert hear(gps, 30, 8210) == ([True], 0)  # the receiver has corrected its clock
         assert hear(gps, 31, 9210) == ([True], 0)
 
 
@@ -236,7 +236,8 @@ def ride(t_s):
 
 
 def check_wheel(got, tolerance):
-    assert not [1 for t_s, _, _ in got if t_s < 5.0]  # a wheel that has never turned may be unplugged
+    # Before the first pulse there is no speed, because the wheel may be unplugged
+    assert not [1 for t_s, _, _ in got if t_s < 5.0]
     for t_s, speed, age_us in got:
         true = ride(t_s - age_us / 1e6)
         assert abs(speed - true) < tolerance or true < 1.5 or t_s > 45.0, (t_s, speed, true)

@@ -89,7 +89,7 @@ def test_a_plan_goes_on_until_45_s_before_its_end():
     assert plan.going_on
     plan.add("a", 0.2)
     assert not plan.going_on and plan.seconds == pytest.approx(55.1)
-    short = a_plan(30.0)  # a plan continues for at least 20 s
+    short = a_plan(30.0)  # the plan continues for at least 20 s
     short.add("a", 19.9)
     assert short.going_on
     short.add("a", 0.1)
@@ -265,7 +265,8 @@ def test_bumps_are_added_to_the_road():
     road.add_bumps(slope, [2.0, 3.5], 0.015, 1.0)
     height = np.cumsum(slope) * 0.02
     assert height[99] == pytest.approx(0.0) and height[124] == pytest.approx(0.015, rel=0.02)
-    assert height[149] == pytest.approx(0.0, abs=1e-9) and np.all(slope[150:] == 0.0)  # the second bump does not fit
+    # The road ends before the second bump
+    assert height[149] == pytest.approx(0.0, abs=1e-9) and np.all(slope[150:] == 0.0)
 
 
 def test_the_road_has_the_roughness_of_its_class():

@@ -96,7 +96,7 @@ def test_each_profile_has_its_special_condition():
     assert np.ptp(ride_of("temperature").readings[:, 3]) > 5.0
     windy = ride_of("crosswind")
     straight = (windy.phase == "straight") & (windy.truth["speed_mps"] > 10.0)
-    straight[: len(straight) // 2] = False  # the wind turns in the middle of the ride
+    straight[: len(straight) // 2] = False  # leave out the first half, because the wind turns in the middle of the ride
     assert np.abs(np.mean(windy.truth["lean_deg"][straight])) > 1.8
 
 

@@ -25,7 +25,7 @@ RIDE = [
     ["turn", 40.0, 5.0],
     ["straight", 6.0],
 ]
-LEFT_S, RIGHT_S, STRAIGHT_S = 30.0, 38.0, 44.0  # a time near the end of each turn, and in the straight after the turns
+LEFT_S, RIGHT_S, STRAIGHT_S = 30.0, 38.0, 44.0  # times near the end of each bend, and on the straight after the bends
 PRESSES = [[2, 0.15], [12, 0.15]]
 ALIGNED = {"ride": RIDE, "presses": PRESSES, "until": 46}
 
@@ -78,7 +78,8 @@ def run(engine, flash, plan, capsys=None):
     if engine == "cpython":
         before = os.getcwd()
         os.chdir(flash)
-        gc.freeze()  # the app collects garbage often; scanning the objects of other tests would take minutes
+        # Exclude the objects of earlier tests, because the app collects garbage often and scanning them takes minutes
+        gc.freeze()
         try:
             answer = json.loads(json.dumps(device_runs.run_device(plan)))
         finally:

@@ -16,7 +16,7 @@ from support import sd_cards, simulated_phones
 from support.page_turner import PageTurner
 
 FRAME_S = 0.1
-PRESS_EVERY_S = 0.4  # while searching a page
+PRESS_EVERY_S = 0.4  # time between two presses while a page is searched
 
 
 class CarRide(script.Ride):

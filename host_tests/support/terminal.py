@@ -14,7 +14,7 @@ class Terminal:
     """A context manager that runs a command, and kills the process at the end."""
 
     def __init__(self, command: list[str]) -> None:
-        import pty  # not on Windows
+        import pty  # imported here, because Windows has no pty
 
         self._master, slave = pty.openpty()
         environment = os.environ | {"TERM": "xterm", "COLUMNS": "80", "LINES": "24"}
@@ -60,7 +60,7 @@ class Terminal:
         return self.process.returncode
 
     def _read(self) -> str:
-        with contextlib.suppress(OSError):  # there is no process, or it has ended
+        with contextlib.suppress(OSError):  # OSError: the process never existed, or it has ended
             return os.read(self._master, 1 << 20).decode(errors="replace")
         return ""
 

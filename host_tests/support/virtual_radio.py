@@ -14,7 +14,7 @@ from bumble.host import Host
 from kickstand_tools.simulated_board import radio as model
 
 PUMP_S = 0.005
-ROUNDS = 12  # turns of the event loop per call of pump(), because a packet passes several layers
+ROUNDS = 12  # rounds of the event loop per call of pump(), because a packet passes several layers
 ADDRESSES = "F0:00:00:00:00:01", "F1:00:00:00:00:02"
 ASKED = {model.READ_PAIRED: "READ", model.WRITE_PAIRED: "WRITE"}
 

@@ -11,7 +11,7 @@ from support.web.rider import Rider
 
 LEAN_DEG = 30
 RIDING_S = 6
-SLOWED = 4  # factor by which a slow phone is slower than the reference computer
+SLOWED = 4  # a slow phone is slower than the reference computer by this factor
 # result of _loop_s() on the reference computer, for which the limit of the processor time is set
 REFERENCE_LOOP_S = 0.06
 
@@ -78,7 +78,7 @@ def pull_the_wire(rider):
     rider.guide_says("wire is out")
     rider.reads("No sensor")
     rider.page.wait_for_selector("#shown-lean:has-text('a fault')")
-    rider.click("#do")  # plug it in
+    rider.click("#do")  # the guide's button: plug the board in
     rider.reads("Lean")
     rider.wait(1)
 

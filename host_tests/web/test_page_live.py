@@ -23,7 +23,7 @@ PLAYED = """async () => {
 }"""
 REFUSED = "() => Object.defineProperty(window, 'indexedDB', { value: { open() { throw new Error('refused'); } } })"
 
-half_seconds = functools.partial(ride_writer.blocks, length=lambda _: 512)  # blocks as short as the blocks of a stream
+half_seconds = functools.partial(ride_writer.blocks, length=lambda _: 512)  # blocks of half a second, as in a stream
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +98,7 @@ def test_failed_loading_of_tools_can_be_repeated(chromium, address, board):
     line = SerialLine(chromium, address + "live.html", service_workers="block")
     rider = line.rider
     line.plug_in(RawPrompt(board, half_seconds(3)[0]))
-    for name in ("python.mjs", "pyodide.asm.wasm"):  # Pyodide itself does not report that the second file is missing
+    for name in ("python.mjs", "pyodide.asm.wasm"):  # Pyodide itself does not report that pyodide.asm.wasm is missing
         rider.page.route(f"**/{name}", lambda route: route.abort())
         rider.page.click("#start")
         rider.page.wait_for_selector("#live-said:has-text('Is there a network? Press the button again')")

@@ -195,7 +195,8 @@ def test_brief_standstill_shows_no_slope(samples, counts):
     road = braking(20.0, 5.0)
     still = (road.t_s >= 18.0 - 1e-6) & (road.t_s < 18.0 + samples / RATE_HZ - 1e-6)
     found = stops_of(road.channels(forward_g=road.mps2 / STANDARD_GRAVITY - 0.1), still)
-    assert [stop.mfdd_mps2 for stop in found] == pytest.approx([5.0 - 2.5 / 11] * counts, rel=0.002)  # its first brakes
+    # The braking that is found first
+    assert [stop.mfdd_mps2 for stop in found] == pytest.approx([5.0 - 2.5 / 11] * counts, rel=0.002)
 
 
 def test_dive_is_not_braking():
@@ -220,7 +221,7 @@ def test_bend_is_not_a_dive(side):
     road = braking(20.0, 5.0)
     turning = (road.t_s >= 14.5) & (road.t_s < 16.5)
     lean = np.where(turning, 30.0 * side, 0.0)
-    rate = np.where(turning, -8.0 * side, 0.0)  # a yaw rate is positive to the left
+    rate = np.where(turning, -8.0 * side, 0.0)  # the yaw rate is positive to the left
     ride = road.channels(
         lean_deg=lean, pitch_rate_dps=-rate * np.sin(np.radians(lean)), yaw_rate_dps=rate * np.cos(np.radians(lean))
     )

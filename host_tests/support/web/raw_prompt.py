@@ -43,7 +43,7 @@ class RawPrompt:
                     self.heard(b"\x04\x04>")
             elif byte == _CTRL_A and self._typed + b"\x01" == _RAW_PASTE:
                 self._typed = b""
-                self.heard(b"R\x00")  # MicroPython's answer: raw paste mode is known, but not supported
+                self.heard(b"R\x00")  # MicroPython's answer if it knows raw paste mode but does not support it
             elif byte == _CTRL_A:
                 self._typed = b""
                 self.heard(_PROMPT)

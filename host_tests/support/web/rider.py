@@ -70,7 +70,7 @@ class Rider:
         self.page.keyboard.down("Space")
         self.wait(seconds)
         self.page.keyboard.up("Space")
-        self.wait(0.3)  # like a finger, which does not press again at once
+        self.wait(0.3)  # wait as a finger does, which does not press again at once
 
     def click(self, selector):
         self.page.click(selector)
@@ -100,7 +100,7 @@ class Rider:
         self.guide_says("Press the button")
         self.click("#press")
         self.reads("Now upright")
-        self.click("#do")  # hold the bike upright
+        self.click("#do")  # the guide's button: hold the bike upright
         self.guide_says("Press the button once more")
         self.click("#press")
 
