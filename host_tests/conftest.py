@@ -20,8 +20,8 @@ from kickstand_tools.simulated_board.fakes import cpython
 
 cpython.supplement()
 
-# Set this before numpy is imported. The matrices are small, so several threads would only wait for each other. If every
-# processor already runs a test, these threads make a test several times slower.
+# Set before numpy is imported. The matrices are small, so several threads of numpy would only wait for each other. If
+# every processor already runs a test, more threads make a test several times slower.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 # The time that an example takes depends on how busy the machine is.

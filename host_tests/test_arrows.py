@@ -1,6 +1,6 @@
 """Checks which modules may import which, in the firmware and in the tools. A sample takes the path imu -> calibration
--> lean -> ui. drive_alignment, speed and rides are beside this path. The app connects them all. Only start, which
-main.py runs, imports the app.
+-> lean -> ui. The folders drive_alignment, speed and rides are beside this path. The app connects all folders. Only
+start, which main.py runs, imports the app.
 
 In the tools, kickstand_fleet, kickstand_emulator and the workshop are leaves: they import the core, kickstand_tools.
 The core imports none of them, and finds their commands by entry points. Only these commands import cli, for shared
@@ -261,7 +261,7 @@ def test_no_arrow_is_left_over():
 
 
 def test_no_module_imports_itself_by_way_of_others():
-    """This includes imports within functions."""
+    """The test includes imports within functions."""
     package = firmware_path.PACKAGE
     found = {".".join(path.relative_to(package).with_suffix("").parts): imports(path) for _, path in modules()}
     graph = TopologicalSorter({name: {target or "__init__" for target, _ in seen} for name, seen in found.items()})
@@ -371,7 +371,7 @@ def test_the_core_may_import_no_leaf():
 
 
 def test_no_tool_imports_itself_by_way_of_others():
-    """This includes imports within functions and for type checking only."""
+    """The test includes imports within functions and for type checking only."""
     TopologicalSorter(tool_modules()).prepare()  # raises CycleError
 
 

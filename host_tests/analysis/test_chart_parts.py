@@ -155,8 +155,8 @@ def test_points_of_a_map_that_hardly_move_are_left_out():
 
 
 def test_the_tiles_are_placed_by_mercator():
-    """The world is 40 030 km wide at the equator, and half as wide at 60 degrees north. In the Mercator projection this
-    latitude is 1.3170 radii from the equator."""
+    """The world is 40 030 km wide at the equator, and half as wide at 60 degrees north. In the Mercator projection, 60
+    degrees north is 1.3170 radii from the equator."""
     none = np.zeros(1)
     found = page.tiles_at(track_map.MapPoints(none, none, none, none, none, 60.0, 90.0))
     assert found["world_m"] == pytest.approx(40_030_174.0 / 2.0, rel=1e-3)

@@ -125,8 +125,8 @@ def test_charts_of_car_and_speed_are_drawn_only_if_present(seen, car, speed):
 
 
 def test_charts_are_stacked_in_a_narrow_window(seen):
-    """In a wide window the last three charts are side by side. In a narrow window they are below each other. They never
-    overlap."""
+    """In a wide window the last three charts are side by side. In a narrow window the last three charts are below each
+    other. They never overlap."""
     for kind, last_row in (("layout", 3), ("narrow", 1)):
         drawn = interactive.figure(charts(seen))[kind]
         axes = [name.removeprefix("xaxis") for name in drawn if name.startswith("xaxis")]

@@ -20,7 +20,7 @@ from kickstand_tools.logs.log import Log
 from support import command
 from support.recordings import analysis_rides
 
-EVENING_S = 1_700_000_000.0  # this Unix time is 22:13:20 UTC on 14/11/2023
+EVENING_S = 1_700_000_000.0  # Unix time of 22:13:20 UTC on 14/11/2023
 VALUES = {
     "lean_deg": -12.34567,
     "lean_formula_deg": 23.4567,
@@ -115,7 +115,7 @@ def test_vbo_has_a_channel_with_gaps(tmp_path):
 
 def test_vbo_keeps_the_heading_at_standstill(tmp_path):
     """The vehicle goes north and then east, and then stands. At standstill the position moves 0.8 mm north, like the
-    noise of a receiver. The heading must not follow this movement."""
+    noise of a receiver. The heading must not follow this small movement of the position."""
     ridden, stood = block(0.0, 1.0, 2.0), block(3.0, 4.0)
     ridden.lat_deg[1:] += 1e-5
     ridden.lon_deg[2] += 1e-5
@@ -166,7 +166,7 @@ def test_exported_lean_is_smoothed_unless_live(tmp_path):
 
 
 def first_time(path: Path, form: str) -> float:
-    """Return the Unix time of the first row. For vbo it is the time of day."""
+    """Return the Unix time of the first row or, for vbo, its time of day."""
     lines = path.read_text().split("\n")
     if form == "racechrono":
         return float(lines[lines.index("") + 4].partition(",")[0])

@@ -207,8 +207,8 @@ def test_the_least_tilted_pose_is_a_sides():
     ("most", "used"), [(240.0, True), (246.0, True), (246.3, False), (252.4, False), (252.6, True)]
 )
 def test_turns_at_the_end_of_a_range_are_left_out(most, used):
-    """A rate of 98.5 to 101 % of 250 deg/s is treated as the end of a range of 250 deg/s. Then all rates over 237.5
-    deg/s are left out."""
+    """A rate of 98.5 to 101 % of 250 deg/s is treated as the end of a range of 250 deg/s. In a range of 250 deg/s, all
+    rates over 237.5 deg/s are left out."""
     rates = np.zeros((100, 3))
     rates[50] = [0.0, most, 0.0]
     log = Log(np.arange(100) / 100.0, np.tile([0.0, 1.0, 0.0], (100, 1)), rates)
@@ -319,7 +319,8 @@ def test_the_vehicle_follows_from_the_calibration():
 
 
 def test_stops_are_found_in_each_log_of_its_own():
-    """In each log the vehicle stands for 4 s, so there are two stops. A speed of over 5 s ago is not known any more."""
+    """In each of the two logs the vehicle stands for 4 s, which makes two stops. A speed of over 5 s ago is not known
+    any more."""
     seen: list = []
     steps = drive_feed.Steps(lambda *done: seen.append(done), 800)
 

@@ -174,8 +174,8 @@ def test_the_fit_is_numpys_and_so_is_its_covariance():
 
 
 def test_micropython_finds_the_same():
-    """MicroPython gets the same poses and turns, and computes the fit step by step. All its results are compared with
-    CPython's."""
+    """MicroPython gets the same poses and turns, and computes the fit step by step. All results of MicroPython are
+    compared with CPython's."""
     fit = fitted()
     script = (
         "from array import array\nfrom kickstand.calibration.sensor_fit import SensorFit\n"

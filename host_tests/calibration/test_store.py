@@ -229,7 +229,7 @@ def test_a_flash_that_loses_writes_is_reported(store, tmp_path, monkeypatch):
 
 
 def test_a_trim_may_be_stored_beside_a_foreign_record(store, tmp_path):
-    """A foreign record is from another chip, or is empty after a power cut. A trim may be saved in spite of such a
+    """A foreign record is from another chip, or is empty after a power cut. A trim may be saved in spite of a foreign
     record."""
     store.save(calibration(1))
     store.save(calibration(2))

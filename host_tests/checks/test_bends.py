@@ -33,7 +33,7 @@ def test_a_short_ride_shows_it_too():
 
 def test_one_long_steady_bend_is_not_the_gyros_bias():
     """The bend takes 60 s of a ride of 92 s, so it contains most of the calmest seconds. The check measures the gyro's
-    bias in these seconds, and must not take the bend's yaw rate for a bias."""
+    bias in the calmest seconds, and must not take the bend's yaw rate for a bias."""
     log = drawn_ride(1036, mounts=["firm"], kind="sweepers").logs[0]
     assert words(handedness(cells_of(log)) or bends(cells_of(log))) == ""
     log.gyro_dps = -log.gyro_dps

@@ -224,8 +224,8 @@ def test_seconds_without_a_speed_or_without_samples():
 
 
 def swaying(yaw_dps: float, seconds: float) -> Log:
-    """Return a log whose yaw rate swings with a period of 4 s and an amplitude of yaw_dps. The roll rate has half this
-    amplitude and a quarter period of delay, similar to a motorcycle."""
+    """Return a log whose yaw rate swings with a period of 4 s and an amplitude of yaw_dps. The roll rate has half the
+    amplitude of the yaw rate and a quarter period of delay, similar to a motorcycle."""
     time = np.arange(0.0, seconds, 0.02)
     yaw, roll = yaw_dps * np.sin(np.pi / 2 * time), -0.5 * yaw_dps * np.cos(np.pi / 2 * time)
     return Log(time, np.tile([0.0, 1.0, 0.0], (len(time), 1)), np.column_stack((0 * yaw, yaw, roll)))
@@ -235,8 +235,8 @@ def swaying(yaw_dps: float, seconds: float) -> Log:
     ("yaw_dps", "seconds", "shown"), [(1.16, 90.0, False), (1.24, 90.0, True), (3.0, 61.0, False), (3.0, 63.0, True)]
 )
 def test_small_or_short_bends_show_no_forward(yaw_dps, seconds, shown):
-    """The check needs changes of the yaw rate with a standard deviation of 1 deg/s. Here the standard deviation is
-    0.832 yaw_dps:
+    """The check needs changes of the yaw rate with a standard deviation of 1 deg/s. In this log the standard deviation
+    of these changes is 0.832 yaw_dps:
 
     * Means over 0.5 s keep 0.974 of the amplitude.
     * The changes of these means over a second have 1.414 times the amplitude.

@@ -58,8 +58,8 @@ def test_the_likelier_mistake_wins_unless_another_fits_better(left, best):
 
 def test_windows_that_differ_require_a_factor_of_two():
     """The gain differs by +s or -s in ten windows, where s is `swing`. The standard error of the mean gain is s / root
-    10. Three standard errors are 0.95 s. If the mean gain is not larger than this, the residual must fall to below
-    half."""
+    10. Three standard errors are 0.95 s. If the mean gain is not larger than three standard errors, the residual must
+    fall to below half."""
     for g2, swing, clear in ((0.0195, 0.011, False), (0.0195, 0.0099, True), (0.0201, 0.011, True)):
         assert (reported((AS_IT_IS, g2), (OPPOSITE, 0.01), swing=swing) is not None) is clear, (g2, swing)
 

@@ -35,7 +35,8 @@ def torn(before, after, share):
 
 
 def loaded(system, image, directory):
-    """Return the gyro bias that the firmware loads from this flash. Fail if it finds no complete calibration."""
+    """Return the gyro bias that the firmware loads from this flash. Fail if the firmware finds no complete
+    calibration."""
     for name, content in system.read(image).items():
         if name.endswith(".cal"):
             (directory / name).write_bytes(content)

@@ -132,7 +132,8 @@ def test_the_device_steered_by_commands():
 
 
 def test_the_scripted_rider_aligns_a_board_with_12_6_volts(tmp_path):
-    """The user's program measures the battery through a divider of 11. The rider also turns to its page."""
+    """The user's program measures the battery through a divider of 11. The rider also turns to the page of the
+    program."""
     user = tmp_path / "my.py"
     user.write_text(
         "import machine\nprint('battery', round(machine.ADC(26).read_u16() * 3.3 / 65535 * 11, 1))\n"

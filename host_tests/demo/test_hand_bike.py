@@ -146,7 +146,7 @@ def test_it_accelerates_until_1_mps_below_its_goal(t_s, accelerates):
 
 @pytest.mark.parametrize(("after_s", "phase"), [(1.5, "roll"), (1.68, "held turn")])
 def test_a_turn_is_held_when_the_roll_rate_is_under_0_02_rad_per_s(after_s, phase):
-    """A roll to 25 degrees has this rate after 1.58 s, and is then within 0.006 rad of its goal."""
+    """In a roll to 25 degrees, the lean has the tested rate after 1.58 s, and is then within 0.006 rad of its goal."""
     bike = riding()
     bike.lean_to(25.0)
     assert bike.truth(20.0 + after_s)[3] == phase
@@ -154,7 +154,7 @@ def test_a_turn_is_held_when_the_roll_rate_is_under_0_02_rad_per_s(after_s, phas
 
 @pytest.mark.parametrize(("after_s", "phase"), [(1.1, "roll"), (1.3, "straight")])
 def test_a_bike_is_straight_below_a_lean_of_0_02_rad(after_s, phase):
-    """A roll from 25 degrees back to 0 reaches this lean after 1.21 s."""
+    """A roll from 25 degrees back to 0 reaches the tested lean after 1.21 s."""
     bike = riding()
     bike.lean_to(25.0)
     bike.truth(30.0)

@@ -136,7 +136,7 @@ def test_a_moved_checkout_gets_a_new_venv(dev, steps):
 
 
 def test_working_venv_of_another_python_is_kept(dev, steps, monkeypatch, capsys):
-    """The user may have made this .venv on purpose and installed other packages in it."""
+    """The user may have made the .venv on purpose, and installed other packages in it."""
     dev.prepare("")
     stamp = Path(dev.STAMP)
     stamp.write_text(stamp.read_text().replace("Python ", "Python 0.", 1))

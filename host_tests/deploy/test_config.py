@@ -53,8 +53,8 @@ def test_installed_package_uses_config_of_the_current_folder(board, tmp_path, mo
 
 @pytest.mark.parametrize("arguments", [["flash"], ["flash", "--config"]])
 def test_setting_behind_a_mark_is_reported(arguments, board, config):
-    """A setting behind a '#' has no effect. The message gives its line, also if config.py is not copied. The file as
-    shipped has only examples behind a '#', which are not reported."""
+    """A setting behind a '#' has no effect. The message gives the line of the setting, also if config.py is not copied.
+    The file as shipped has only examples behind a '#', which are not reported."""
     shipped = (firmware_path.directory() / "config.py").read_text()
     config.write_text(shipped.replace('# SIDE = "left" ', '# SIDE = "right"'))
     said = f"note: {config}, line 4: SIDE = \"right\" is not used, because a '#' is in front of it"

@@ -36,7 +36,7 @@ UNTYPED = '"None"', 'for class "NoRec', 'for class "Settings', 'of type "ptr', "
 
 @pytest.fixture(scope="module", params=["rp2", pytest.param("esp32", marks=pytest.mark.nightly)])
 def stubs(request):
-    """Return a port and the directory with the stubs of its MicroPython. The first use installs them in .venv."""
+    """Return a port and the directory with the stubs of its MicroPython. The first use installs the stubs in .venv."""
     groups = tomllib.loads((ROOT / "pyproject.toml").read_text())["dependency-groups"]
     wanted = groups[f"stubs-{request.param}"]
     directory = Path(sys.prefix) / f"stubs-{request.param}-{hashlib.sha256(repr(wanted).encode()).hexdigest()[:8]}"

@@ -204,15 +204,15 @@ def on_board(files, free_blocks=0):
 
 @pytest.mark.parametrize("which", ["flat .mpy", "flat .py", "nested .mpy", "nested .py"])
 def test_a_board_full_of_rides_has_room_for_an_update(which):
-    """The recorder always keeps RESERVE bytes of flash free. Compiled firmware fits in them, so no ride must be pulled
-    before an update."""
+    """The recorder always keeps RESERVE bytes of flash free. Compiled firmware fits in the reserve, so no ride must be
+    pulled before an update."""
     board = on_board(before(which))
     assert needed_blocks(plan(wanted(".mpy"), board, True), board) * BLOCK <= flash_ring.RESERVE
 
 
 def test_sources_may_need_rides_to_be_pulled_first():
-    """Computers without mpy-cross copy .py files, which take twice the space. If they do not fit, the message says what
-    to do."""
+    """Computers without mpy-cross copy .py files, which take twice the space. If the .py files do not fit, the message
+    says what to do."""
     board = on_board(before("nested .mpy"), flash_ring.RESERVE // BLOCK)
     with pytest.raises(InputError, match="kickstand pull --delete, then flash again"):
         refuse_without_room(plan(wanted(".py"), board, True), board)

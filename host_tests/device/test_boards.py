@@ -139,8 +139,8 @@ def test_a_bus_that_stalls_never_stops_the_loop_of_an_esp32(driver, tmp_path):
 
 @pytest.mark.parametrize("bits", [8, 60])
 def test_a_device_that_hangs_on_an_esp32_is_freed(bits, tmp_path):
-    """SoftI2C does not notice that a device holds SDA. The clock pulses of SoftI2C free the device. If they do not, the
-    firmware rejects the readings."""
+    """SoftI2C does not notice that a device holds SDA. The clock pulses of SoftI2C free the device. If the clock pulses
+    do not help, the firmware rejects the readings."""
     faults = [["stuck_sda", [3.0, bits]], ["stuck_sda", [3.0, bits, True]]]
     plan = {"lean": [[0, 25], [3.2, 35]], "board": {"machine": "esp32"}, "faults": faults, "until": 5}
     record = device_plans.run("cpython", tmp_path, plan)
@@ -163,7 +163,7 @@ def on(machine, function, until_s):
 
 @pytest.mark.parametrize("machine", ["pico", "esp32", "s3"])
 def test_a_stopped_watchdog_allows_an_open_console_for_days(machine):
-    """An ESP32's watchdog cannot be stopped, even by a soft reset. So the firmware must feed it."""
+    """An ESP32's watchdog cannot be stopped, even by a soft reset. So the firmware must feed the watchdog."""
 
     def use_the_console(board):
         from time import sleep_ms  # pyright: ignore[reportAttributeAccessIssue]

@@ -20,7 +20,8 @@ def test_two_presses_and_a_ride(engine, seed, tmp_path):
     assert record.first("On stand: press") < 2.5
     assert record.at(6)[0] == "Now upright:    "
     assert record.first("Aligned!") < 16.0
-    # The error of an uncalibrated sensor differs between the two poses. So the alignment is wrong by some degrees.
+    # The error of an uncalibrated sensor differs between the two poses. So without the six positions the alignment is
+    # wrong by some degrees.
     tolerance = 2 if seed is None else 7
     for t_s, lean in ((LEFT_S, -30), (RIGHT_S, 40), (STRAIGHT_S, 0)):
         assert record.lean_at(t_s) == pytest.approx(lean, abs=tolerance)

@@ -284,7 +284,7 @@ def test_status_shows_the_speed(config, fitted, said, capsys, monkeypatch, tmp_p
 
 
 def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
-    """Other code keeps the processor busy for 0.25 s. The status then reports this longest turn of the loop, and the
+    """Other code keeps the processor busy for 0.25 s. The status then reports the longest pass of the loop, and the
     room that was left in the FIFO."""
     monkeypatch.chdir(tmp_path)
 

@@ -102,7 +102,7 @@ def test_each_address_for_devices_is_asked():
 
 
 class FifoChip:
-    """Replaces an Mpu6050. `waiting` and `readings` are the successive results of the calls of these names."""
+    """Replaces an Mpu6050. waiting: successive results of waiting(). readings: successive results of the readings."""
 
     period_ms = 5
 

@@ -204,7 +204,8 @@ def test_settings_that_cannot_be_loaded_end_on_the_display(missing, board, monke
 
 
 def test_a_failed_import_can_be_repeated(tmp_path):
-    """If an import is interrupted, MicroPython keeps the incomplete module. The next import must load it again."""
+    """If an import is interrupted, MicroPython keeps the incomplete module. The next import must load the module
+    again."""
     (tmp_path / "outer.py").write_text("import inner\n\n\nclass Outer:\n    inner = inner.Inner\n")
     (tmp_path / "inner.py").write_text("import memory\n\nmemory.take()\n\n\nclass Inner:\n    pass\n")
     (tmp_path / "memory.py").write_text(

@@ -1,4 +1,5 @@
-"""The firmware calls the owner's code in user.py at the right times. The lean continues, whatever this code does."""
+"""The firmware calls the owner's code in user.py at the right times. The lean continues, whatever the owner's code
+does."""
 
 import re
 import sys
@@ -30,7 +31,7 @@ def page_two(app):
 
 @pytest.fixture
 def run(tmp_path, monkeypatch, capsys):
-    """Return run(source of user.py, plan), which returns the Record. By default it runs on MicroPython, to test its
+    """Return run(source of user.py, plan), which returns the Record. By default the run is on MicroPython, to test its
     exceptions, memory and printing."""
 
     def run(source, plan=PLAN, engine="micropython"):

@@ -129,7 +129,8 @@ def test_the_other_address_is_tried(mine, tmp_path, monkeypatch):
 
 
 def test_a_clock_that_has_the_sensors_address_is_not_set(tmp_path, monkeypatch):
-    """The driver only reads at this address. The driver writes nothing but the number of the register to read."""
+    """The driver only reads from a device that is not the sensor. The driver writes nothing but the number of the
+    register to read."""
     clocks = []
 
     def fit(board):

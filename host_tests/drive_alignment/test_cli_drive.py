@@ -222,7 +222,7 @@ UPSIDE_DOWN = [0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0]  # rows left, up, 
 
 
 def test_a_log_of_opposite_sign_looks_upside_down(tmp_path):
-    """All accelerations of this log have the opposite sign. In the log of a car only this notice shows the mistake."""
+    """All accelerations of this log have the opposite sign. In the log of a car only a notice shows the mistake."""
     log, out = record(tmp_path / "drive.csv", around(8), UPSIDE_DOWN), tmp_path / "CAL.json"
     said = command.works("calibrate", "drive", log, "--out", out)
     assert "the sensor's z points down: if it is not mounted upside down, all accelerations are of the" in said.err

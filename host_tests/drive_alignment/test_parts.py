@@ -181,7 +181,7 @@ def test_a_late_speed_is_no_rotated_sensor():
 
 def test_each_vehicle_has_its_source_of_the_vertical():
     """A car uses the vertical of its stops. With a fit, the car uses the mean of the verticals from stops and fit. A
-    motorcycle uses its upright pose. Without the pose it uses the fit, or straight riding."""
+    motorcycle uses its upright pose. Without the upright pose a motorcycle uses the fit, or straight riding."""
     standing = types.SimpleNamespace(up=None)
     fit = types.SimpleNamespace(level=[2.0 * part for part in level(4.0)])
 

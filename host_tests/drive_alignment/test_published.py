@@ -9,7 +9,7 @@ The article rotates a unit vector a to a unit vector b with this matrix:
     t: the angle between a and b
     u.L: the cross product matrix of u; L_x, L_y and L_z are those of the three axes
 
-In the article z points down and x forward. Here the axes are left, up, forward. A vehicle at rest therefore reads
+In the article z points down and x forward. The tests use the axes left, up, forward. A vehicle at rest therefore reads
 (0, 1, 0), and the force of braking is along (0, 0, -1).
 """
 

@@ -87,7 +87,7 @@ def test_ride_alignment_is_as_good_as_two_poses():
 
 
 def test_the_offset_across_the_bike_is_found():
-    """The accelerometer has an additional offset of 50 mg across the bike. Half of this offset would be 1.4 degrees of
+    """The accelerometer has an additional offset of 50 mg across the bike. An offset of 25 mg would be 1.4 degrees of
     roll. The fit must find the offset to within 20 mg."""
     made = simulated()
     log = log_of(made)

@@ -103,7 +103,7 @@ def test_the_jacobian_is_that_of_the_equations():
 
 def test_a_yaw_of_eight_degrees_is_no_error_of_scale():
     """The sensor is rotated by 8 degrees about the bike's up, while the bike leans, rolls and turns. If the parameters
-    contain this rotation, the residuals do not change."""
+    contain the sensor's rotation, the residuals do not change."""
     lean, speed, yaw_rate, roll = 0.7, 25.0, -0.3, 1.5
     s, c = np.sin(lean), np.cos(lean)
     across = speed * yaw_rate / G

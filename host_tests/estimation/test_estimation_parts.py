@@ -106,8 +106,8 @@ def test_outliers_weigh_less():
 
 
 def test_roughness_follows_the_residuals():
-    """Residuals of the expected size give a roughness of 1. Residuals of half this size give a roughness of 0.5. The
-    roughness is kept between 0.1 and 4."""
+    """Residuals of the expected size give a roughness of 1. Residuals of half the expected size give a roughness of
+    0.5. The roughness is kept between 0.1 and 4."""
     expected = np.zeros((400, eq.ROWS))
     expected[:, [of.LEAN, of.PITCH, of.LEFT, of.UP, of.FORWARD]], expected[:, [eq.SLIDING, eq.CLIMBING]] = 0.38, 0.5
     for factor, roughness in ((1.0, 1.0), (0.5, 0.5), (0.01, 0.1), (9.0, 4.0)):

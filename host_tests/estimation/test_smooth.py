@@ -76,8 +76,8 @@ def test_forces_that_are_not_the_bikes_count_less():
 
 @pytest.mark.parametrize(("seed", "mount"), [(2018, "drifting"), (98, "holder")])
 def test_steady_ride_on_a_straight_is_not_a_standstill(seed, mount):
-    """At 22 m/s and at 12 m/s, the two bikes ride so steadily for 2 s that the readings resemble a standstill. When
-    the smoother treated this as a standstill, its rms errors were 0.56 and 0.37 degrees."""
+    """At 22 m/s and at 12 m/s, the two bikes ride so steadily for 2 s that the readings resemble a standstill. When the
+    smoother treated the 2 s as a standstill, its rms errors were 0.56 and 0.37 degrees."""
     live, off, _ = judged(drawn_ride(seed, mounts=[mount]))
     assert rms(off) < 0.8 * rms(live)
 
@@ -97,8 +97,8 @@ def test_side_force_of_tyres_grows_with_the_force_up():
 
 
 def test_wheelies_do_not_count_as_a_soft_mount():
-    """When wheelies were treated as a soft mount, the error was 0.4 degrees. When they were treated as slopes, it was
-    0.16 degrees."""
+    """When wheelies were treated as a soft mount, the error was 0.4 degrees. When wheelies were treated as slopes, the
+    error was 0.16 degrees."""
     ride, found = known("wheelie"), smoothed("wheelie")
     assert not np.any(found.doubtful)
     assert rms((found.lean_deg - ride.lean_deg)[ride.riding]) < 0.155
@@ -129,8 +129,8 @@ def test_pose_that_was_not_upright_is_reported(street, wrong_deg):
 
 
 def test_slipping_mount_has_little_effect_afterwards(street):
-    """The mount slips by 1.5 degrees about forward within 0.3 s. The gyro measures this rotation. From then on the bike
-    seems to lean on straights."""
+    """The mount slips by 1.5 degrees about forward within 0.3 s. The gyro measures the rotation of the mount. From then
+    on the bike seems to lean on straights."""
     log, calibration = street.log, street.calibration
     angle = np.radians(1.5) * np.clip((log.t_s - 65.0) / 0.3, 0.0, 1.0)
     about = calibration.vehicle_from_sensor

@@ -56,7 +56,7 @@ def test_a_short_ride_is_estimated_as_a_whole(estimated):
 )
 def test_a_long_ride_is_estimated_in_parts_of_eight_segments(estimated, segments, calls, monkeypatch):
     """A part has one more segment before and after it. The rest of the ride has earlier segments, up to eight in all.
-    Each call has the first and the last segment, and those of them whose lean is wanted."""
+    Each call has the first and the last segment, and the segments whose lean is wanted."""
     monkeypatch.setattr(smooth, "SEGMENT_S", 1.0)
     found = smooth.smooth(standing(float(segments)), ALIGNED)
     assert len(found.t_s) == 10 * segments and found.lean_deg == pytest.approx(found.t_s)

@@ -207,8 +207,8 @@ def test_bands_of_a_recording_without_riding_are_refused(tmp_path):
 
 
 def test_simulate_states_both_leans_on_the_stand(tmp_path):
-    """The two poses are not taken where the ride starts. The ground there differs, so the stand leans the bike
-    differently."""
+    """The two poses are not taken where the ride starts. The two places have different ground, so the stand leans the
+    bike differently."""
     arguments = "--profile", "street", "--seconds", "20", "--pitch-change", "0", "--out", tmp_path
     said = works("simulate", *arguments).out.splitlines()[-1]
     pose, begin = (float(number) for number in re.findall(r"-\d+\.\d", said))

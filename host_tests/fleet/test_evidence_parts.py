@@ -131,7 +131,7 @@ def test_the_vertical_is_the_mean_force_over_20_seconds(reach_s):
 
 
 def test_the_sway_is_sideways_if_the_body_shakes_sideways():
-    """The sway is the change of force within 0.3 s. At low speed it is not used."""
+    """The sway is the change of force within 0.3 s. At low speed the sway is not used."""
     log = log_of(20.0)
     log.accel_g[:, 0] += 0.1 * np.sin(2.0 * np.pi * 5.0 * log.t_s)
     found = intervals(log)

@@ -1,4 +1,4 @@
-"""Small rotations of a mount are found. The swaying of the car's body also shows these rotations. The tests use
+"""Small rotations of a mount are found. The swaying of the car's body also shows small rotations. The tests use
 simulated and recorded drives."""
 
 import copy

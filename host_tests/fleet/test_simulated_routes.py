@@ -97,7 +97,7 @@ def test_circles_are_tight_and_slow(share, choice, expected):
 
 
 def test_the_route_ends_some_seconds_after_the_wanted_time():
-    """New legs begin until 12 s before the wanted time. Then the vehicle brakes, and stands for 4.5 s."""
+    """New legs begin until 12 s before the wanted time. After the last leg the vehicle brakes, and stands for 4.5 s."""
     assert random_route(Fixed(0.0, 0.75), HANDLING, 18.9, RATE_HZ).time[-1] == pytest.approx(7.0 + 4.5, abs=0.03)
     longer = random_route(Fixed(0.0, 0.75), HANDLING, 19.1, RATE_HZ)
     assert longer.time[-1] == pytest.approx(7.0 + 8.0 + 8.0 / 1.3 + 4.5, abs=0.03)

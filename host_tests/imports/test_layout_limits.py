@@ -75,7 +75,7 @@ def test_lines_with_labels_are_the_majority():
 
 
 def test_a_joined_table_has_the_names_of_its_files():
-    """The first columns of the joined table are the times. Each of its rows comes from one file."""
+    """The first columns of the joined table are the times. Each row of the joined table comes from one file."""
     one = file("t,x,y,z\n" + "".join(f"{k},1,2,3\n" for k in range(5)), "acc.csv")
     other = file("t,x,y,z\n" + "".join(f"{k + 0.5},4,5,6\n" for k in range(4)), "gyro.csv")
     found = layout.joined_sheet([one, other])

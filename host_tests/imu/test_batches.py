@@ -48,7 +48,7 @@ def test_a_frame_is_seven_big_endian_numbers(engine):
 @pytest.mark.parametrize("dead", [0, -1])
 def test_all_zeros_or_ones_is_a_dead_frame(engine, dead):
     """A frame is dead if all three forces are zero or all bits are one. Only the frames before a dead frame count. A
-    frame with these values on only two axes is good."""
+    frame with zero force or all bits set on only two axes is good."""
     samples = noise(4)
     samples[2, 0:3] = dead
     alive = noise(1)

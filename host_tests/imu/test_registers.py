@@ -18,7 +18,7 @@ MPU6500, MPU6886 = 0x70, 0x19
 
 @pytest.fixture(autouse=True)
 def time():
-    """Return the clock of a simulated board. The driver waits by this clock."""
+    """Return the clock of a simulated board. The driver's waits advance the clock."""
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)) as board:
         yield board.clock
 

@@ -38,7 +38,8 @@ def test_times_are_converted_by_offset_and_drift():
 
 
 def test_up_is_the_force_weighted_by_the_rate():
-    """The weight is limited. So a rate of 40 deg/s has the same weight as a rate of 20 deg/s."""
+    """The weight is limited. Larger rates are limited, so a rate of 40 deg/s has the same weight as a rate of 20
+    deg/s."""
     moved = CellMotion(
         np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), np.array([[0.0, 0.0, 10.0], [0.0, 40.0, 0.0]]),
         np.ones(2, dtype=bool), False, False,

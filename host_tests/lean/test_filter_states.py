@@ -71,7 +71,8 @@ def test_a_changing_measured_speed_counts_less():
 
 
 def test_coming_to_rest_the_force_is_the_vertical():
-    """The earlier estimate does not matter. Here the bike has a lean of 10 degrees that the gyro did not measure."""
+    """At rest the force sets the lean, whatever the filter estimated before. In this test the bike has a lean of 10
+    degrees that the gyro did not measure."""
     estimator = LeanFilter()
     hold(estimator, 3.0)
     hold(estimator, 4.0, [0.0, 1.0, 2.0 / GRAVITY_MPS2])
@@ -173,7 +174,7 @@ def test_rest_corrects_a_large_bias_at_once():
 
 def test_a_sensor_pointing_up_or_down_comes_to_rest():
     """Before the alignment, the filter's forward axis may point straight up or down, for example with the board on a
-    table. Then lean has no meaning, but the filter must not fail."""
+    table. In this position lean has no meaning, but the filter must not fail."""
     for forward in (1.0, -1.0):
         for left, up in ((0.0, 0.0), (1e-5, 0.0), (1e-4, -1e-4), (0.01, 0.02), (0.0, -0.3)):
             estimator, rested = LeanFilter(), False

@@ -73,7 +73,8 @@ def slope(shown, true):
 
 
 def test_vibration_of_the_gyro_does_not_make_held_turns_read_low():
-    """The filter multiplies the yaw rate by the speed. Noise of the yaw rate must not bias this product."""
+    """The filter multiplies the yaw rate by the speed. Noise of the yaw rate must not bias the product of yaw rate and
+    speed."""
     lean, speed = held_turns(240.0)
     force, rate = shaken(*balanced(240.0, lean, speed))
     shown = leans(force.tolist(), rate.tolist())
@@ -83,8 +84,8 @@ def test_vibration_of_the_gyro_does_not_make_held_turns_read_low():
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_gyros_scale_and_cross_axis_errors_are_found(seed):
-    """The data sheet allows scale errors of 3 % and cross-axis errors of 2 %. After five minutes with these errors, the
-    lean is right within a degree."""
+    """The data sheet allows scale errors of 3 % and cross-axis errors of 2 %. After five minutes with errors of this
+    size, the lean is right within a degree."""
     chance = np.random.default_rng(seed)
     lean, speed = weaving(420.0)
     force, rate = shaken(*balanced(420.0, lean, speed))

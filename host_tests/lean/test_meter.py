@@ -261,8 +261,8 @@ def test_the_g_shown_follows_smoothly_whether_aligned_or_not():
 
 
 def test_a_smoothed_force_that_is_not_updated_is_nan():
-    """For an aligned motorcycle the smoothed forces left and up are not updated. With an unaligned calibration they are
-    updated."""
+    """For an aligned motorcycle the smoothed forces left and up are not updated. With an unaligned calibration the
+    forces left and up are updated."""
     aligned, other = Calibration(), Calibration()
     aligned.aligned = True
     shown = meter(aligned)

@@ -38,8 +38,8 @@ def test_a_movement_about_or_along_any_axis_ends_the_rest():
 
 
 def test_after_a_movement_the_count_begins_again():
-    """The detector's moving average has a time constant of half a second. So two windows exceed the limit after the
-    movement."""
+    """The detector's moving average has a time constant of half a second. So after the movement two windows still
+    exceed the limit."""
     detector = RestDetector()
     rested_after(detector, 1.25)
     assert rested_after(detector, 4.0, force=(0.0, 1.0, 0.03)) == 0.5 + 1.5
@@ -66,8 +66,8 @@ def test_the_known_bias_is_not_a_turn():
 
 
 def test_a_wrong_estimate_of_the_bias_does_not_hide_rest():
-    """Rest is also found if the rate is small before the estimated bias is subtracted. The calibration's bias is right
-    in this case."""
+    """Rest is also found if the rate is small before the estimated bias is subtracted. In this test the calibration's
+    bias is right, and the estimated bias is wrong."""
     assert rested_after(RestDetector(False), 3.0, bias=(0.05, 0.0, 0.0)) == 1.5
     assert rested_after(RestDetector(False), 12.0, rates=(0.03, 0.0, 0.0), bias=(0.06, 0.0, 0.0)) is None
 

@@ -67,7 +67,7 @@ def act(dice, phone, radio):
 
 
 def test_random_acts_of_a_phone_do_no_harm():
-    # An ESP32's radio drops the packets that it cannot send. A Pico W's radio keeps these packets.
+    # An ESP32's radio drops the packets that it cannot send. A Pico W's radio keeps the packets that it cannot send.
     for drops in (True, False):
         board = Board(Sensor(seed=3).world(standing([[0, 10]])))
         board.radio = radio = Radio(board.clock, drops)

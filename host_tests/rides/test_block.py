@@ -20,8 +20,8 @@ FORMAT_1 = 1672459265  # check sum of the bytes that the next test writes
 
 
 def test_the_bytes_of_a_block_are_those_of_format_1(monkeypatch):
-    """Rides of older firmware must stay readable. If you change these bytes, change the format's number and keep the
-    reader of the old format."""
+    """Rides of older firmware must stay readable. If you change the bytes that are written, change the format's number
+    and keep the reader of the old format."""
     monkeypatch.setattr(block_format, "__version__", "0.0.0")
     block = RideBlock(5000)
     block.begin(4092, 7, 3, 123456789012, ride_writer.CHIP, 200, bytes(range(80)))

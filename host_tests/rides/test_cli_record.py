@@ -107,7 +107,7 @@ def half_seconds(count):
 
 @pytest.fixture
 def signals():
-    """Restore the handlers after each test. With the default handlers these signals would end pytest itself."""
+    """Restore the handlers after each test. With the default handlers a signal of a test would end pytest itself."""
     numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
     before = [signal.signal(number, lambda *_: None) for number in numbers]
     yield
@@ -273,8 +273,8 @@ def test_the_data_before_a_broken_stream_are_kept(end, words, streaming, tmp_pat
 
 
 def test_a_computer_that_slept_is_reported(streaming, tmp_path, monkeypatch):
-    """While the computer slept, the board stopped streaming. The command notices this quickly. The command waits longer
-    for a board whose sensor is off."""
+    """While the computer slept, the board stopped streaming. The command notices quickly that the board has stopped.
+    The command waits longer for a board whose sensor is off."""
     monkeypatch.setattr(board_console, "_AWAY_SILENT_S", 0.1)
     data, turns = half_seconds(3)
     streaming(data, "asleep")

@@ -1,7 +1,7 @@
 """No command loses existing data if the power is cut, the disk is full or the cable is pulled at a random moment.
 
-Each case runs a command in a fork of this process. Then a timer's signal ends the fork without a handler, like kill -9,
-or the disk or the cable of the fork fails. The test then examines the remaining files.
+Each case runs a command in a fork of this process. A timer's signal ends the fork without a handler, like kill -9, or
+the disk or the cable of the fork fails. The test then examines the remaining files.
 """
 
 import contextlib

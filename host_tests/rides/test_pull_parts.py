@@ -47,7 +47,7 @@ def test_a_row_has_the_speed_and_the_place_of_its_turn():
 
 def test_a_turn_that_is_late_by_over_two_samples_is_a_gap():
     """The samples are 5 ms apart. If two samples arrive after 20 ms, they are late by 10 ms, which is exactly two
-    samples. After 20.001 ms they are late by a microsecond more."""
+    samples. If the two samples arrive after 20.001 ms, they are late by a microsecond more."""
     assert block([turn(1_020_000)]).missing_s() == []
     assert block([turn(1_020_001)]).missing_s() == [0.010001]
     assert block([turn(1_010_000), turn(1_520_000)]).missing_s() == [0.5]

@@ -115,7 +115,7 @@ def times(keeper):
 
 def test_a_ride_after_an_alignment_begins_like_its_replay(keeper):
     """After an alignment the meter knows that the bike is upright, but a replay does not know it. So the meter restarts
-    without this knowledge."""
+    without knowing that the bike is upright."""
     from kickstand.rides.recording import Recording
 
     settings = SimpleNamespace(SD_SPI=None, RECORD=True, SAMPLE_HZ=200)

@@ -74,7 +74,7 @@ def written(turns):
 
 
 def held(block):
-    """Return [(sums, n, dt_us), ...] of the loop turns in a block."""
+    """Return [(sums, n, dt_us), ...] of the entries in a block."""
     times = [block.time_us] + [turn.time_us for turn in block.turns]
     return [(t.sums, t.n, t.time_us - before) for t, before in zip(block.turns, times[:-1], strict=True)]
 
@@ -170,7 +170,7 @@ def test_a_block_with_impossible_values_is_bad(tmp_path):
     start = head + store.BODY_LENGTH
     forged = []
     fields = struct.unpack_from(block_format.HEAD, good)
-    for i in (7, 8, 9):  # these fields are the units of force and rate, and the samples per second
+    for i in (7, 8, 9):  # fields 7 to 9 are the units of force and rate, and the samples per second
         forged.append(struct.pack(block_format.HEAD, *fields[:i], 0, *fields[i + 1 :]) + good[head:])
     for value in (math.nan, math.inf, 1e38):
         at = start - 4 * len(ride_writer.calibration().parameters())

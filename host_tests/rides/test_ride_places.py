@@ -1,4 +1,4 @@
-"""Positions in recorded rides are exact, belong to the right turn, and displace no other data."""
+"""Positions in recorded rides are exact, belong to the right samples, and displace no other data."""
 
 import struct
 

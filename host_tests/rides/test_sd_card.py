@@ -82,8 +82,8 @@ def test_a_failing_card_ends_the_ride_without_a_restart(fault, tmp_path):
 
 
 def test_a_cards_room_is_counted_before_the_watchdog_runs(tmp_path):
-    """The card has no valid count of its free room (FSINFO). Reading its whole FAT takes longer than the watchdog's
-    time-out."""
+    """The card has no valid count of its free room (FSINFO). Reading the whole FAT of the card takes longer than the
+    watchdog's time-out."""
     record = run(tmp_path, {"sectors": 1 << 24, "read_s": 0.006, "fsinfo": False}, until=40)
     assert record.first("SD card") < 1.0
     assert record.first("Raw   20°") < 30

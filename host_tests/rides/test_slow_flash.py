@@ -84,8 +84,8 @@ def test_a_lean_that_is_wrong_after_a_loss_is_not_shown(run):
     rode = [turn for turn in turns if turn[0] > FROM_S]
     errors = [(t, abs(lean - ride.truth(t)[0]), trusted, dt) for t, lean, trusted, dt, _ in rode]
     assert max(error for _, error, _, _ in errors) > 4  # the gaps cause errors of the lean
-    # The time with a wrong shown lean depends on where in a bend the gaps are. A shift of ten microseconds changes this
-    # time. With the sensors of seeds 2 to 7 it is 0 to 1.6 s.
+    # The time with a wrong shown lean depends on where in a bend the gaps are. A shift of ten microseconds changes the
+    # time with a wrong shown lean. With the sensors of seeds 2 to 7 it is 0 to 1.6 s.
     assert sum(dt for _, error, trusted, dt in errors if trusted and error > 5) < 2.0
     assert max(error for _, error, trusted, _ in errors if trusted) < 12
     assert all(not trusted for _, _, trusted, dt in errors if dt > 0.3)

@@ -28,7 +28,7 @@ def open_display(board, hz=None, kind="auto", wiring=1):
 
 
 def turns(board, display, count, after=lambda: None):
-    """Run this many turns of the loop. Return the duration of the longest turn in us."""
+    """Run this many passes of the loop. Return the duration of the longest pass in us."""
     from time import sleep_us, ticks_diff, ticks_ms, ticks_us  # type: ignore[attr-defined]
 
     longest = 0
@@ -315,7 +315,7 @@ def test_each_wiring_of_a_backpack_works():
 
 def test_the_rows_of_a_larger_display_are_blanked():
     """The third and fourth row of a 20x4 display show the memory behind the first two rows. An earlier program may have
-    written to this memory."""
+    written to the memory behind the rows."""
 
     def run(board):
         board.lcd.ddram[0x10:0x28] = board.lcd.ddram[0x50:0x68] = b"x" * 24

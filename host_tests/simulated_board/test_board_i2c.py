@@ -93,8 +93,8 @@ def edges_in_a_transfer(machine, pulses_per_s):
 
 
 def test_interrupts_of_an_esp32_wait_for_the_end_of_a_transfer():
-    """During a transfer, an ESP32 keeps at most eight interrupts. The handlers of these interrupts run after the
-    transfer, and see the pin's level at that time. On a Pico the handlers run at once."""
+    """During a transfer, an ESP32 keeps at most eight interrupts. The interrupts' handlers run after the transfer, and
+    see the pin's level at that time. On a Pico the handlers run at once."""
     assert edges_in_a_transfer("pico", 300)[0] in (5, 6, 7)
     during, after = edges_in_a_transfer("esp32", 300)
     assert during == 0 and len(after) in (5, 6, 7) and len(set(after)) == 1

@@ -291,8 +291,8 @@ def test_a_panel_is_dark_without_its_own_supply(kind, supply, off):
 
 @pytest.mark.parametrize("kind", ["ssd1306", "sh1106"])
 def test_each_command_takes_its_arguments(kind):
-    """After each of these commands and its arguments, the next command is understood. So no command takes too many or
-    too few bytes."""
+    """After each of these commands and its arguments, the next command is understood. The test shows that no command
+    takes too many or too few bytes."""
     for code in (0x81, 0xA8, 0xD3, 0xD5, 0xD9, 0xDA, 0xDB):
         oled = Oled(Clock(), kind=kind)
         commands(oled, code, 0x12, 0x45)

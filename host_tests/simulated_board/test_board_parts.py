@@ -267,7 +267,8 @@ CLASSIC = (1, 3, 6, 7, 8, 9, 10, 11)
     ],
 )
 def test_pins_that_the_chip_needs_are_taken(chip, taken, monkeypatch):
-    """An output on one of these pins would stop the board. Only a classic chip has pins without outputs."""
+    """An output on a pin that the chip itself needs would stop the board. Only a classic chip has pins without
+    outputs."""
     port = fresh_port(monkeypatch, f"Some board with {chip}")
     assert port.IS_ESP32 and port.TAKEN_PINS == taken
     assert port.INPUT_PINS == ((34, 35, 36, 37, 38, 39) if taken == CLASSIC else ())

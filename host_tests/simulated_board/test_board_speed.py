@@ -259,8 +259,8 @@ def test_a_contact_that_bounces_is_counted_once():
 
 
 def test_a_storm_of_pulses_is_reported_and_the_speed_returns():
-    """The firmware disables the interrupt of the wheel for some time. Here the pulses last twice as long, so they still
-    come when the interrupt is enabled again."""
+    """The firmware disables the interrupt of the wheel for some time. The pulses of this test last twice as long, so
+    they still come when the interrupt is enabled again."""
     for port, pulses_per_s in (("rp2", 50_000), ("esp32", 6_000)):
 
         def fit(board, pulses_per_s=pulses_per_s):
@@ -297,8 +297,8 @@ def wheel_on_an_esp32(pulses_per_metre, speed_mps, seconds=21.0, **kind):
 
 
 def test_an_esp32_counts_pulses_that_fall_into_a_transfer():
-    """Interrupts wait during a transfer. If a contact closes and opens in that time, two interrupts see only the open
-    contact."""
+    """Interrupts wait during a transfer. If a contact closes and opens during a transfer, two interrupts see only the
+    open contact."""
     for pulses, hz in ((0.5, 13.3), (3.0, 149.3), (50.0, 290.0)):
         mean, deviation, faults = wheel_on_an_esp32(pulses, hz / pulses)
         assert abs(mean * pulses - hz) < 0.025 * hz, (pulses, hz, mean)

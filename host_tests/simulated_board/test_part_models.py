@@ -66,7 +66,8 @@ def test_a_capacitor_holds_the_pin_low():
     ("speed", "per_metre", "count"), [(10.0, 0.5, 5), (20.0, 0.5, 10), (10.0, 2.0, 20), (0.02, 50.0, 0)]
 )
 def test_a_wheel_closes_once_per_turn(speed, per_metre, count):
-    """The magnet closes the contact for a tenth of the way between two pulses. At first it is half a turn away."""
+    """The magnet closes the contact for a tenth of the way between two pulses. At first the magnet is half a turn
+    away."""
     clock = Clock()
     wheel = Wheel(clock, lambda t_s: speed, per_metre)
     found = edges(wheel, clock, 1_000_000)

@@ -1,6 +1,7 @@
 """A profile and a seed give the same ride as in earlier versions, because published figures depend on it.
 
-The figures here describe the plans of each profile, and one ride. If you change a profile on purpose, update its line.
+The figures in this file describe the plans of each profile, and one ride. If you change a profile on purpose, update
+its line.
 """
 
 import numpy as np

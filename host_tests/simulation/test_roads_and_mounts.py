@@ -70,8 +70,8 @@ def test_bad_mount_changes_readings_but_not_the_ride(rides, mount):
 
 
 def test_aliased_engine_vibration_appears_at_low_frequencies(rides):
-    """The road shakes the bike below 25 Hz. The additional vibration at these frequencies is engine vibration above 100
-    Hz, aliased."""
+    """The road shakes the bike below 25 Hz. The additional vibration below 25 Hz is engine vibration above 100 Hz,
+    aliased."""
     plain, aliased = (bands_of(*in_vehicle(rides("A", mount)), 200.0)[QUANTITIES[1]] for mount in (None, "aliasing"))
     assert aliased[4] > 1.05 * plain[4]
 

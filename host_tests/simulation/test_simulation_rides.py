@@ -158,7 +158,7 @@ def test_calibration_of_the_previous_ride_is_removed(tmp_path):
 
 
 def test_memory_of_a_ride_is_limited():
-    """An hour has 3.6 million rows at the chip's 1 kHz. The result keeps none of these rows in memory."""
+    """An hour has 3.6 million rows at the chip's 1 kHz. The result keeps none of the rows in memory."""
     seconds = 400.0
     column = seconds * RATE_HZ * 8  # bytes of a column with one number per row
     tracemalloc.start()

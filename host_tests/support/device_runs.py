@@ -141,7 +141,7 @@ class Device:
         self.board.every(FRAME_S, self._watch)
         self.board.every(PRESS_EVERY_S, self._turn_page)
         self.board.install()
-        # The firmware must be imported on the board. So first remove the modules that the host has imported.
+        # The firmware must be imported on the board. First remove the modules that the host has imported.
         before = take_firmware() if self.board.poses else {}
         try:
             from kickstand import settings, start

@@ -14,10 +14,10 @@ from kickstand_tools.common import firmware_path
 POSES = {"CaptureError", "SickSensor", "CalibrationError", "GyroError"}  # exceptions whose codes the tools raise, too
 
 CLASSES = {name for name in vars(errors) if name[0].isupper()}
-# The firmware passes these codes as a variable, so codes() does not find them.
+# Codes that the firmware passes as a variable, so codes() does not find them.
 INDIRECT = {"other-side", "mount-moved", "incomplete", "no-memory", "out-of-memory", "out-of-room"}
 INDIRECT |= {"sensor-lost", "sensor-frozen", "sensor-silent", "sensor-reset", "flash-fault", "card-fault", "usb-fault"}
-# For these codes the display shows the setting's name
+# Codes for which the display shows the setting's name
 OTHER_SETTINGS = {"not-allowed", "card-pins", "one-i2c", "no-such-pin", "i2c-pins", "uart-pins", "aliasing"}
 CONSOLE_ONLY = {"wrong-code"}  # codes that are reported during imports, before a display exists
 # Values for the words of each code. Some are long numbers and long names.

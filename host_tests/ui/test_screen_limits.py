@@ -18,7 +18,7 @@ def _board():
 
 
 def screen(leans=True, drive: Any = None, **given) -> Any:
-    """Return a Screen of an aligned vehicle. The list `calls` collects what its menu does."""
+    """Return a Screen of an aligned vehicle. The list `calls` collects what the screen's menu does."""
     from kickstand.ui.screen import Screen
 
     calls: list = []

@@ -55,8 +55,8 @@ def first_minute(rider):
     true_deg, shown_deg = rider.leans()
     assert true_deg < 4 - LEAN_DEG
     assert shown_deg == pytest.approx(true_deg, abs=2.0)
-    # Chromium cannot slow down workers. So convert the workers' processor time to the time of the reference computer.
-    # The converted time must leave room for a processor that is SLOWED times slower.
+    # Chromium cannot slow down workers. Instead, convert the workers' processor time to the time of the reference
+    # computer. The converted time must leave room for a processor that is SLOWED times slower.
     assert 0.0 < used_s * REFERENCE_LOOP_S / _loop_s() < RIDING_S / SLOWED
 
 

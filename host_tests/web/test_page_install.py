@@ -168,7 +168,7 @@ def test_unsuitable_board_is_not_changed(line, board, differs, platform, words):
 
 
 def test_file_that_is_no_esp32_image_is_not_written(line, board, tmp_path):
-    """The page also refuses an image for another chip. In this test no chip answers."""
+    """The page also refuses an image for another chip. No chip answers in this test."""
     page = line.rider.page
     page.click("a[href='#micropython']")
     page.click("text=ESP32: a file that ends in .bin")

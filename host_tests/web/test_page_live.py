@@ -48,8 +48,8 @@ def board(tmp_path):
 
 
 def test_pulled_cable_leaves_the_log(line, rider, board, tmp_path):
-    """After the cable is pulled, the gauge shows no lean. Before that, it shows "--" while the bike sways too much for
-    a certain lean."""
+    """After the cable is pulled, the gauge shows no lean. Before the cable is pulled, the gauge shows "--" while the
+    bike sways too much for a certain lean."""
     blocks, _ = half_seconds(3)
     line.plug_in(RawPrompt(board, blocks))
     rider.page.click("#start")
@@ -196,7 +196,7 @@ def test_port_without_signals_is_closed_again(line):
 
 
 def test_port_with_a_stuck_stream_is_closed(line):
-    """Without closing it, the page could not open the port again."""
+    """If the page did not close the port, it could not open the port again."""
     script = """async () => {
       const { SerialLine } = await import("./cable/cable.mjs");
       const said = [];

@@ -20,7 +20,7 @@ PULLED = Path(__file__).with_name("keep_pulled.js").read_text()
 
 
 def test_cut_gzip_file_is_shown_with_a_warning(page, ride, calibration, tmp_path):
-    """A recorder that loses power leaves such a file."""
+    """A recorder that loses power leaves a file that is cut off."""
     page.give()
     packed = gzip.compress(ride.read_bytes())
     files = [("RIDE.csv.gz", packed[: len(packed) // 2]), ("RIDE.cal.json", calibration.read_bytes())]

@@ -143,7 +143,7 @@ def test_the_pages_get_all_modules_that_they_import():
 
 
 def test_each_architecture_gets_its_machine_code(monkeypatch):
-    """Only files with machine code differ between the boards. The third byte of a file says if it has any."""
+    """Only files with machine code differ between the boards. The third byte of a file says if it has machine code."""
 
     def compiled(source, architecture):
         return b"M\x06" + bytes([source.stem.endswith("viper")]) + architecture.encode()

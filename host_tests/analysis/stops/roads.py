@@ -44,5 +44,5 @@ class Road:
 
 
 def braking(mps: float, mps2: float, before_s: float = 4.0) -> Road:
-    """Simulate a stand, acceleration to this speed at 4 m/s2, a straight, and a stop with this deceleration."""
+    """Simulate standing, acceleration at 4 m/s2 to this speed, a straight, and a stop with this deceleration."""
     return Road((REST_S, 0.0), (mps / 4.0, 4.0), (before_s, 0.0), (mps / mps2, -mps2), (REST_S, 0.0))

@@ -16,7 +16,7 @@ ROAD_HZ, ENGINE_HZ = RATE_HZ / 11.0, 3.0 * RATE_HZ / 7.0
 
 def maybe(**changed: float) -> Channels:
     """Simulate the log. The name of a channel sets its shaking in the middle part, as a share of its shaking while
-    riding; the default is 5 %. The code below shows what the other names change."""
+    riding; the default is 5 %. The code of this function shows what the other names change."""
     road = Road((24.0, 0.0))
     road.rests[:] = False
     ride = road.channels()

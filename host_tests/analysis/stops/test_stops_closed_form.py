@@ -70,8 +70,8 @@ def test_rebound_of_the_fork_does_not_change_the_end():
 
 
 def test_jerk_is_the_steepest_change_of_the_force():
-    """The deceleration rises to 6 m/s2 at a rate of 10 m/s3, and stays constant. At the end it falls at a rate of
-    20 m/s3, which is the larger jerk."""
+    """The deceleration rises to 6 m/s2 at a rate of 10 m/s3, and stays constant. At the end the deceleration falls at a
+    rate of 20 m/s3, which is the larger jerk."""
     t = np.arange(0.0, 30.0, 1.0 / RATE_HZ)
     braked = np.interp(t, [15.0, 15.6, 17.6, 17.9, 19.0], [0.0, 6.0, 6.0, 0.0, 0.0])
     lost = np.concatenate(([0.0], np.cumsum((braked[1:] + braked[:-1]) / 2.0 / RATE_HZ)))[-1]
@@ -118,7 +118,7 @@ def test_brief_pause_before_the_standstill_is_bridged(pause_s, counts):
 
 
 def test_no_stop_is_longer_than_a_minute():
-    """A stop from 67.6 m/s at 1.04 m/s2 takes 65 s. Only its last 60 s are used."""
+    """A stop from 67.6 m/s at 1.04 m/s2 takes 65 s. Only the last 60 s of a stop are used."""
     (stop,) = find_stops(braking(67.6, 1.04).channels())
     assert stop.initial_speed_mps == pytest.approx(1.04 * 60.0, rel=0.005)
 
@@ -190,7 +190,7 @@ def test_steep_road_does_not_change_the_figures(up):
 
 @pytest.mark.parametrize(("samples", "counts"), [(10, 0), (11, 1)])
 def test_brief_standstill_shows_no_slope(samples, counts):
-    """The road falls by 10 %. A brief standstill does not show this slope, so the stop does not count. A longer
+    """The road falls by 10 %. A brief standstill does not show the road's slope, so the stop does not count. A longer
     standstill shows the slope."""
     road = braking(20.0, 5.0)
     still = (road.t_s >= 18.0 - 1e-6) & (road.t_s < 18.0 + samples / RATE_HZ - 1e-6)
@@ -273,7 +273,7 @@ def test_rolling_out_is_not_braking():
 
 
 def test_speed_in_the_log_corrects_the_integral():
-    """The accelerometer's slope is 3 % too large. The log's speed corrects this error."""
+    """The accelerometer's slope is 3 % too large. The log's speed corrects the accelerometer's error."""
     road = braking(20.0, 5.0)
     ride = road.channels(forward_g=1.03 * road.mps2 / STANDARD_GRAVITY)
     (stop,) = find_stops(ride)
@@ -366,7 +366,8 @@ def test_full_deceleration_is_from_the_last_two_seconds(hard, easy, earlier_s):
 
 
 def test_rolling_out_after_braking_is_left_out():
-    """With released brakes the bike decelerates by 0.4 m/s2 at the end. The stop ends before this part."""
+    """With released brakes the bike decelerates by 0.4 m/s2 at the end. The stop ends before the brakes are
+    released."""
     legs = (REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (1.25, -0.4), (REST_S, 0.0)
     (stop,) = find_stops(Road(*legs).channels())
     assert stop.initial_speed_mps == pytest.approx(20.0, rel=1e-3)

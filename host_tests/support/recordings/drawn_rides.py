@@ -258,7 +258,7 @@ def _of_the_sheet(chance, time, force, rates, mounting):
 def _road(chance, v, wheelbase, roughness):
     """Return the height of the chassis over the rear and over the front wheel, in m.
 
-    The bike rides at the speed v over a road with waves as in ISO 8608. Springs and tyres filter these waves.
+    The bike rides at the speed v over a road with waves as in ISO 8608. Springs and tyres filter the waves.
     """
     at = np.cumsum(v) / FINE_HZ
     edges = np.geomspace(WAVES_PER_M[0], WAVES_PER_M[1], 241)
@@ -281,8 +281,10 @@ def _road(chance, v, wheelbase, roughness):
 def _spring(hz, damping, by_its_foot=False):
     """Return (hz, a, b): the spring's natural frequency in Hz and the coefficients of its transfer function.
 
-    The function is (1 + b s) / (1 + a s + s^2). Here s is the complex frequency divided by the natural frequency.
-    by_its_foot: True if the foot of the spring moves. The damper then passes on this movement, so b equals a.
+    The function is (1 + b s) / (1 + a s + s^2). The variable s is the complex frequency divided by the natural
+    frequency.
+    by_its_foot: True if the foot of the spring moves. The damper then passes on the movement of the foot, so b equals
+        a.
     """
     return hz, 2.0 * damping, 2.0 * damping if by_its_foot else 0.0
 

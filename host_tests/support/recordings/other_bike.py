@@ -2,9 +2,9 @@
 parameters that were fitted with kickstand_tools.simulation.
 
 The path and the attitude of the bike are random curves. Path and attitude determine the sensor's position. The force is
-the second derivative of this position plus gravity, and the rates are derivatives of the attitude's matrix. Both are
-computed numerically. The bike is in exact balance, except for the movements of its rider. The vibration is white noise.
-In the world's axes x and y are level and z is up. The vehicle's axes are left, up and forward.
+the second derivative of the sensor's position plus gravity, and the rates are derivatives of the attitude's matrix.
+Both are computed numerically. The bike is in exact balance, except for the movements of its rider. The vibration is
+white noise. In the world's axes x and y are level and z is up. The vehicle's axes are left, up and forward.
 """
 
 import numpy as np

@@ -49,7 +49,7 @@ def presses(chance, chip, mounting):
     hand = np.radians(0.05) * band_noise(chance, len(lean), 0.2, 0.6, RATE_HZ)
     lean[-still:] += hand[-still:]
     zero = np.zeros_like(lean)
-    # The axes are left, up, forward. In these axes, a lean to the right turns the direction up to the left.
+    # The axes are left, up, forward. In the bike's axes, a lean to the right turns the direction up to the left.
     body = (
         _rotations(np.column_stack((zero, yaw, zero)))
         @ _rotations(np.column_stack((-pitch, zero, zero)))

@@ -10,7 +10,7 @@ _RAW_PASTE = b"\x05A\x01"
 class RawPrompt:
     """Replaces emulator.pico.Pico for a SerialLine.
 
-    The app does not really run. Each time it is started, it sends the next blocks and waits for Ctrl-C.
+    The app does not really run. At each start the app sends the next blocks and waits for Ctrl-C.
 
     board: the FakeBoard on which the code runs.
     streams: lists of blocks that the app sends.

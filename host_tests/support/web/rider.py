@@ -23,8 +23,8 @@ class Rider:
     """A rider with a page of the site.
 
     browser: playwright's browser.
-    policy: True to enforce the page's content security policy. Then playwright's wait_for_function() works only on the
-        page Rides.
+    policy: True to enforce the page's content security policy. With the policy, playwright's wait_for_function() works
+        only on the page Rides.
     script: code that runs before each page's own scripts.
 
     asked: the addresses that the page has requested.
