@@ -19,8 +19,8 @@ def aligned(tmp_path):
 
 @pytest.fixture
 def spoilt(monkeypatch):
-    """Return spoilt(column, value, from_s, until_s), which sets this column of the readings to a value for this
-    time."""
+    """Return spoilt(column, value, from_s, until_s), which sets a column of the readings to a value from from_s to
+    until_s."""
 
     def spoil(column, value, from_s, until_s):
         def installed(board):

@@ -102,7 +102,7 @@ def test_each_address_for_devices_is_asked():
 
 
 class FifoChip:
-    """Replaces an Mpu6050. waiting: successive results of waiting(). readings: successive results of the readings."""
+    """Replaces an Mpu6050. waiting: the successive numbers of bytes in the FIFO. readings: the successive readings."""
 
     period_ms = 5
 

@@ -96,7 +96,7 @@ def test_one_road_counts_once_for_all_its_intervals():
     )
     weight = float(np.sum(evidence.blocks([standing]).square[:, 0, 0]))
     assert weight == pytest.approx(1.0 / (evidence.ROAD_SHARE + 1.0 / count), rel=1e-6)
-    standing.speed += 1000.0  # now each interval counts as on another road
+    standing.speed += 1000.0  # another place each second, so each interval counts as on another road
     weight = float(np.sum(evidence.blocks([standing]).square[:, 0, 0]))
     assert weight == pytest.approx(count / (evidence.ROAD_SHARE + 1.0), rel=0.01)
 

@@ -58,8 +58,8 @@ def test_without_a_card_nothing_waits_for_one(tmp_path):
 
 
 def test_a_card_busy_within_the_specification_loses_nothing(tmp_path):
-    """The card is busy for 250 ms at each block, once in eight seconds. The sensor's FIFO keeps readings for a longer
-    time."""
+    """The card is busy for 250 ms at each block, once in eight seconds. The sensor's FIFO keeps readings for more than
+    250 ms."""
     record = run(tmp_path, {"faults": [[5.0 + 8.0 * i, "busy_next_s", 0.25] for i in range(4)]})
     assert len(blocks(record)) >= 3
     assert missing_s(record) == []

@@ -230,7 +230,8 @@ class Npm:
 
 
 def test_npm_installs_the_packages_of_the_lists_once(tmp_path, monkeypatch):
-    """The home directory is new, so the folder for the packages is made. npm gets the two lists and five minutes."""
+    """The home directory is new, so the folder for the packages is created. npm gets the two lists, and a time limit of
+    five minutes."""
     monkeypatch.setattr(npm_packages.Path, "home", lambda: tmp_path / "new" / "home")
     npm = Npm(monkeypatch)
     found = npm_packages.find()
