@@ -40,7 +40,7 @@ from .esp32_machine import (
 
 _IMAGE_AT, _FLASH_SIZE = 0x1000, 4 << 20
 _ROM_STARTS = b"ets Jul 29 2019"  # the chip's ROM prints this first
-_READY = b">>> ", b"Ctrl-C stops it."  # the board prints one of these when MicroPython accepts input
+_READY = b">>> ", b"Ctrl-C stops it."  # the board prints one of these texts when MicroPython accepts input
 _BOOT_S = 5.0
 _CHUNK = 64  # number of bytes that are sent to the console at once, half of the chip's FIFO
 _CHUNK_US = 10 * _CHUNK * 1_000_000 // 115_200

@@ -1,9 +1,10 @@
 """Computes forward, with its standard error, from all braking and all bends in the logs of one mount.
 
 The firmware's regression cannot separate the slope of the road during braking from an error of forward. This module
-uses whole logs, from which the slope can be filtered out (see evidence.py). This halves the error on simulated buses,
-which brake gently and seldom. On recorded drives, neither method is always better. If the firmware finds an alignment,
-forward is therefore the mean of both results, weighted by their variances. Up is then always the firmware's.
+uses whole logs, from which the slope can be filtered out (see evidence.py). The filter halves the error on simulated
+buses, which brake gently and seldom. On recorded drives, neither method is always better. If the firmware finds an
+alignment, forward is therefore the mean of both results, weighted by their variances. The direction up is then always
+the firmware's.
 """
 
 from dataclasses import dataclass

@@ -46,7 +46,7 @@ class Journal:
                 if not self._note(line) and line.strip():
                     self.damaged += 1
                     self._file.seek(self._end)
-                    # Overwrite the damaged line with blanks. Otherwise the next run would count it again
+                    # Overwrite the damaged line with blanks. If the line stayed, the next run would count it again
                     self._file.write(b" " * (len(line) - 1) + b"\n")
                 self._end += len(line)
             self._file.flush()

@@ -152,7 +152,8 @@ def _drive(period: Period, logs: list[Log]) -> _Drive:
 
 
 def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
-    """Return the reason why the vehicle is not aligned, as a code and a sentence. Both are empty if it is aligned."""
+    """Return the reason why the vehicle is not aligned, as a code and a sentence. Both are empty if the vehicle is
+    aligned."""
     fit, found = drive.fit, drive.found
     if drive.moves:
         return MOVED, _moved_words(drive.moves, logs)
@@ -284,7 +285,8 @@ def _utc_s(log: Log, at_s: float) -> float | None:
 def _picture(drive: _Drive) -> list[list[float]]:
     """Compute the points of the picture (see PeriodResult).
 
-    If the mount moved, the alignment is a mean over several mountings. The scatter of the points then shows the move.
+    If the mount moved, the alignment is a mean over several mountings. If the mount moved, the scatter of the points
+    shows the move.
     """
     if not drive.found:
         return []

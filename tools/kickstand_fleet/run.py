@@ -33,7 +33,7 @@ class FleetRun:
     """The numbers of results in a run, and their summary.
 
     vehicles: Number of results, one for each mount of each vehicle.
-    new: Number of results that this run computed. An earlier run computed the other results.
+    new: Number of results that this run computed. Earlier runs computed the remaining results.
     damaged: Number of earlier results that could not be read and are recomputed.
     seen: Summary of all results.
     """

@@ -143,9 +143,9 @@ def _quality(values: Sequence[float]) -> Markup:
 
 
 def _braking(utc_s: Sequence[float], values: Sequence[float]) -> list[Markup]:
-    """Draw a histogram of the decelerations. If their times are known, also draw them over time.
+    """Draw a histogram of the decelerations. If the times are known, also draw the decelerations over time.
 
-    Returns the pictures. The list is empty without decelerations.
+    Returns the pictures. Without decelerations the list of drawings is empty.
     """
     if not values:
         return []

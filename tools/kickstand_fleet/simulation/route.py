@@ -53,7 +53,7 @@ def random_route(
 ) -> Route:
     """Simulate a route with stops, bends and braking in straight lines.
 
-    straight: False for a drive in circles only, as in a car park. Such a drive never brakes in a straight line.
+    straight: False for a drive in circles only, as in a car park. A drive in circles never brakes in a straight line.
     """
     legs = _Legs(chance, handling)
     legs.stand(chance.uniform(7.0, 14.0))

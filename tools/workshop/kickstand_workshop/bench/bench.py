@@ -133,7 +133,8 @@ def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = Non
 def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
     """Run the app's loop on the emulated board.
 
-    seconds: emulated time. detail: True to measure the stages of a turn too. chosen: values of settings, by name.
+    seconds: emulated time. detail: True to measure the stages of a pass of the loop too. chosen: values of settings, by
+        name.
 
     Returns the figures and arrays of bench_guest.py, and the numbers of samples that were taken and lost.
     """
@@ -177,11 +178,12 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
 
 
 def _stages(run: dict[str, Any]) -> dict[str, np.ndarray]:
-    """Return the times of each stage in us, one for each turn in which the stage ran."""
+    """Return the times of each stage in us, one for each pass of the loop in which the stage ran."""
     columns = dict(zip(run["figures"]["stages"], run["stages"].T, strict=True))
     sampled = columns["decode and sum"] > 0
     watch = run["figures"]["stopwatch_us"]
-    fetch = columns["fetch"] - 3 * watch  # this stage contains three timed calls: two transfers and add_up()
+    # The stage of the sensor contains three timed calls: two transfers and add_up()
+    fetch = columns["fetch"] - 3 * watch
     meter = columns["meter"] - 2 * watch
     stages = {
         "read": columns["read"],

@@ -68,7 +68,7 @@ def display_of(
 
     board.every(LOOK_S, look)
     config = {"SPEED": "gps"} if speed else {}
-    gc.freeze()  # the firmware often collects garbage. Scanning all earlier objects would take too long
+    gc.freeze()  # the firmware often collects garbage. Scanning the objects of earlier runs would take too long
     try:
         with tempfile.TemporaryDirectory() as flash, contextlib.chdir(flash):
             with board, contextlib.redirect_stdout(io.StringIO()):

@@ -18,7 +18,8 @@ import pytest
 
 WARM = ("numpy", "hypothesis", "click", "rich.console", "matplotlib.pyplot", "pandas", "plotly.graph_objects")
 WARM += ("pyarrow.parquet",)
-# These arguments skip the variants of tests on MicroPython. These variants are slow, and the same tests run on CPython.
+# Arguments of pytest that skip the variants of tests on MicroPython. These variants are slow, and the same tests run on
+# CPython.
 ARGUMENTS = ("-x", "-q", "-k", "not micropython", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0")
 KILLED, SURVIVED, TIMED_OUT = "killed", "survived", "timed out"
 # The tests of a change may use TIMES the processor time of the tests of the unchanged code, plus EXTRA_S
@@ -46,7 +47,8 @@ class Tests:
         for name in WARM:
             with contextlib.suppress(ImportError):
                 importlib.import_module(name)
-        gc.freeze()  # pytest collects garbage at its end. Scanning the imported modules each time would take too long
+        # The end of pytest collects garbage. Scanning the imported modules for each change would take too long
+        gc.freeze()
 
     def pass_unchanged(self) -> bool:
         """Run the tests of the unchanged code. Returns True if they pass. The copy keeps the bytecode."""
@@ -67,7 +69,7 @@ class Tests:
         file = self.root / path
         original = file.read_text("utf-8")
         for bytecode in file.parent.glob(f"__pycache__/{file.stem}.*"):
-            # Python would use this bytecode for a changed file of the same length that is written in the same second
+            # Python would use the old bytecode for a changed file of the same length that is written in the same second
             bytecode.unlink()
         try:
             file.write_text(mutant, "utf-8")

@@ -72,8 +72,8 @@ def make_trip(chance: random.Random, speed: str | None, aligned: bool) -> Trip:
     """Make a trip of some minutes.
 
     speed: The speed source, "gps", "wheel" or None.
-    aligned: True if the bike is aligned. Then some trips repeat the alignment. Otherwise the trip begins with an
-        alignment.
+    aligned: True if the bike is aligned. With an aligned bike some trips repeat the alignment. A trip with an unaligned
+        bike begins with an alignment.
     """
     kind = chance.choice(list(RIDES))
     ride = script.Ride(_manoeuvres(chance, kind), vibration_g=chance.uniform(0.01, 0.08))
