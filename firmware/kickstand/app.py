@@ -49,8 +49,8 @@ _FIRST_PAGE_MS = const(60)
 def fill_gaps(n):
     """Allocate n single blocks of the heap and drop them.
 
-    After a collection the heap has many single free blocks. Until they are in use, MicroPython scans past all of them
-    for each larger object. This function takes 2 ms. It saves 0.4 ms in each pass of the loop until the next
+    After a collection the heap has many single free blocks. Until these blocks are in use, MicroPython scans past all
+    of them for each larger object. This function takes 2 ms. It saves 0.4 ms in each pass of the loop until the next
     collection.
     """
     value = 0.5
@@ -290,7 +290,8 @@ class App:
         wizard.follow(chip.sums, n, dt_us, now_ms)
 
     def _sensor_started(self):
-        """Handle a chip that was set up at the start or after a fault. After a fault it may be another chip."""
+        """Handle a chip that was set up at the start or after a fault. After a fault the chip may be another one than
+        before."""
         self._restarts = self.sensor.restarts
         self.clock.restart()
         self.meter.restart()

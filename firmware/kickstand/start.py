@@ -1,7 +1,8 @@
 """Starts the lean meter. main.py runs it when the board gets power.
 
-Safe mode: if the button is held at power-on, nothing is started. So new firmware can always be copied. After a reset
-the button is ignored. Without this rule a press while an error is shown could leave the rider without a display.
+Safe mode: if the button is held at power-on, nothing is started. In safe mode new firmware can always be copied. After
+a reset the button is ignored. Without this rule a press while an error is shown could leave the rider without a
+display.
 """
 
 import gc

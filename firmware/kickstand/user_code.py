@@ -24,7 +24,7 @@ from .units import const
 
 _SLOW_MS = const(50)  # a call that takes longer is reported, once per function
 _TOO_SLOW_MS = const(300)  # longest time of a call, because the sensor does not keep its samples for longer
-# Number of successive calls longer than _SLOW_MS that disable a function. After more such calls the loop could not
+# Number of successive calls longer than _SLOW_MS that disable a function. After more slow calls the loop could not
 # catch up with the samples.
 _MOST_SLOW = const(5)
 _LEAST_FREE = const(20_000)  # smallest free heap in bytes; with less the lean meter would soon fail too

@@ -55,8 +55,8 @@ class HostLink(BasePeripheral):
     def write_uint32(self, offset: int, value: int) -> None:
         """Write a register.
 
-        COUNT sets the number of bytes. FILL copies this number of bytes from the source to the address `value` in RAM.
-        TAKE copies this number of bytes from the address `value` to the sink.
+        COUNT sets the number of bytes. FILL copies COUNT bytes from the source to the address `value` in RAM. TAKE
+        copies COUNT bytes from the address `value` to the sink.
         """
         start = value - RAM_START_ADDRESS
         if offset == _COUNT:

@@ -39,10 +39,10 @@ LCD_HZ, OLED_HZ = 100_000, 400_000  # fastest clocks of a PCF8574 and of the OLE
 STOPPED = "Kickstand", "stopped"  # shown after the firmware has ended
 KINDS = ("auto", "lcd", "ssd1306", "sh1106", "ssd1306-32")
 _PROBE_MS = const(200)  # time between two searches for a missing display
-# Longest time between two searches. While a driver cannot be loaded, the time doubles up to this limit
+# Longest time between two searches. While a driver cannot be loaded, the time is doubled, but not beyond MOST_WAIT_MS
 MOST_WAIT_MS = 60_000
-_REOPEN_PROBES = const(5)  # after this number of searches without a display, the bus is freed
-_POWER_UP_MS = const(40)  # a display found within this time may have been powered together with the board
+_REOPEN_PROBES = const(5)  # number of searches without a display after which the bus is freed
+_POWER_UP_MS = const(40)  # time after the start in which a found display may have been powered together with the board
 _FLUSH_STEPS = const(60)
 _STEP_MS = const(5)
 
@@ -151,7 +151,7 @@ class Display:
         except OSError:
             return False
         self._probes = 0
-        if attempt(self._begin, address):  # False if its driver is missing or memory is short
+        if attempt(self._begin, address):  # attempt() reports a missing driver or too little memory
             self._wait_ms = min(2 * self._wait_ms, MOST_WAIT_MS)
         else:
             self.address, self._wait_ms = address, _PROBE_MS

@@ -28,7 +28,7 @@ _DASHES = b"-" * _COLUMNS
 _NO_TEXT = "\n"
 _NEVER = b"\xfe" * _COLUMNS  # marks a line that was not written yet; no text uses this code
 # Time between two initialisations. After electrical noise the display may combine the wrong nibbles into bytes. Only an
-# initialisation repairs this.
+# initialisation repairs such a display.
 _REINIT_MS = const(10_000)
 _PROBE_MS = const(200)  # time between two checks that the display is connected
 _STEP_MS = const(5)  # time between two steps of the initialisation, which requires waits of up to 4.1 ms
@@ -41,8 +41,8 @@ _POWER_UP = const(-8)  # number of the first step after power-up, because the di
 _NIBBLES = (0x30, 0x30, 0x30, 0x20)
 _COMMANDS = b"\x28\x0c\x06\x02"
 _GLYPH_PARTS = const(4)  # the 64 bytes of character patterns are sent 16 at a time
-# Number of characters to blank behind each line, one line per step. A larger display (20x4 or 20x2) would show
-# characters from other memory there.
+# Number of characters to blank behind each line, one line per step. Without the blanks, a larger display (20x4 or 20x2)
+# would show characters from other memory.
 _BEHIND = const(24)
 _STEPS = len(_NIBBLES) + 1 + _GLYPH_PARTS + 2
 
@@ -149,8 +149,8 @@ class Lcd:
     def _kept_power(self):
         """Return False if the display has lost its power since the last transfer, even for a moment.
 
-        The PCF8574's pins are high after power-up, but every transfer leaves E low. So this check must run before the
-        next transfer. Raises OSError if the display does not answer."""
+        The PCF8574's pins are high after power-up, but every transfer leaves E low. So call this method before the next
+        transfer. Raises OSError if the display does not answer."""
         self._i2c.readfrom_into(self._address, self._port)
         return not self._port[0] & self._e
 
@@ -190,7 +190,7 @@ class Lcd:
         """Put a byte into _packed as two nibbles. Each nibble is sent with E high, then with E low, because the falling
         edge of E latches it.
 
-        RS changes together with the rise of E. At 100 kHz this is 90 us before E falls."""
+        RS changes together with the rise of E. At 100 kHz, RS changes 90 us before E falls."""
         packed, enable = self._packed, self._e
         if self._low:
             high = value >> 4 | control

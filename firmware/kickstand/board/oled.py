@@ -21,7 +21,7 @@ _PROBE_MS = const(200)  # time between two checks that the display has kept its 
 _REFRESH_MS = const(10_000)  # time until everything is sent again, to repair the effects of electrical noise
 _POWER_UP_MS = 40
 _OFF = 0x40  # bit of the status that is set while the panel is off
-# Low half of the status of an SH1106. An SSD1306 has 3 or 6 there, and a clone may have any value
+# Low half of the status of an SH1106. The low half of an SSD1306's status is 3 or 6, and a clone may have any value
 _SH1106_STATUS = (0x08, 0x00, 0x0C)
 _SH1106_OFFSET = 2  # first visible column of an SH1106
 # Numbers of rows by which the picture is shifted to avoid burn-in, one after the other. Each shift lasts for

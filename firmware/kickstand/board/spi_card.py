@@ -33,7 +33,7 @@ class CheckedCard(SDCard):
             raise OSError(self._fault)
 
     def write(self, token, buf):
-        """Write one sector. The driver calls this method for each sector. After a fault it skips the remaining
+        """Write one sector. The driver calls this method for each sector. After a fault the method skips the remaining
         sectors."""
         if self._fault:
             return

@@ -41,9 +41,9 @@ _MAX_MISFIT = const(0.012)  # largest misfit of a turn after the fit, in rad
 # Largest misfit of a turn before the fit, in rad. In a turn of 180 degrees the errors that the data sheet allows add up
 # to 0.2 rad.
 _GROSS_MISFIT = const(0.25)
-# An axis of a faulty gyro may read the true rate times one of these factors. Each factor is tried on each axis.
+# Factors by which the readings of a faulty gyro axis may differ from the true rate. Each factor is tried on each axis.
 _READS = const((-1.0, 0.25, 0.5, 0.75, 1.3, 2.0, 4.0))
-_DEAD_RAD = const(0.2)  # an axis that measured less than this angle in every turn is dead
+_DEAD_RAD = const(0.2)  # largest angle of a dead axis in any turn
 # Largest standard error of a gyro axis' scale. With a larger standard error, no turn about this axis has measured the
 # scale.
 _PROOF_SIGMA = const(0.025)

@@ -107,7 +107,8 @@ def check_plausible(offset, slope, poses):
 
 
 def check_free_pose(offset, slope, accel):
-    """Verify offset and slope with a seventh, slanted pose. Return by how much its force exceeds 1 g.
+    """Verify offset and slope with a seventh, slanted pose. Return by how much the calibrated force of this pose
+    exceeds 1 g.
 
     Args:
         offset, slope: as returned by fit().

@@ -1,7 +1,7 @@
 """Averages the readings of one pose, and checks that the sensor was still.
 
-A dead sensor must not be accepted as a still sensor. So each axis must change by a count from time to time, because a
-working axis has noise. A gyro axis must not be too noisy.
+A dead sensor must not be accepted as a still sensor. Because a working axis has noise, each axis must change by a count
+from time to time. A gyro axis must not be too noisy.
 
 The sums are integers, because 32-bit floats would lose the digits that averaging gains.
 """

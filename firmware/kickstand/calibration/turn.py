@@ -17,7 +17,7 @@ from ..units import const
 
 # a step of the integration ends when the sensor has turned by this angle about one axis; a smaller angle is more exact
 _STEP_RAD = const(0.02)
-_STEP_US = const(60_000)  # a step also ends after this time
+_STEP_US = const(60_000)  # longest duration of a step
 # 0.95 of the gyro's range, in counts. The limit is below the full range, because the low-pass of the chip hides single
 # readings at the end of the range.
 _QUICK = const(31_000)

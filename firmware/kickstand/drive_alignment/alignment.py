@@ -27,7 +27,7 @@ from .vertical import COUNTS_S, MAX_CHANGE_DEG, MOVED_MPS, SETTLE_S, StandingVer
 CAR, MOTORCYCLE = "car", "motorcycle"
 
 # state
-WAITING_FOR_SPEED = 0  # there is no speed yet, or no new speed for STALE_US
+WAITING_FOR_SPEED = 0  # no speed has come yet, or no new speed for STALE_US
 WAITING_FOR_STOP = 1  # only in a car, whose vertical and gyro bias are measured at a stop
 WAITING_FOR_BRAKING = 2  # the next braking must be in a straight line
 BRAKING = 3  # during a braking event

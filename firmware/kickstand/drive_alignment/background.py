@@ -18,8 +18,8 @@ from .verdict import MOVED, REFINED, REVERSED, SAME, compare, turn_round
 _FEED_TURNS = const(2)
 _GAP_MS = const(300)  # a longer time between two readings means that readings are missing
 _LOOK_MS = const(1000)  # time between two calls of _look()
-_FRESH_MS = const(3000)  # a speed older than this does not prove a standstill
-_AWAY_MPS = const(2.0)  # a vehicle that is faster than this has driven off
+_FRESH_MS = const(3000)  # largest age of a speed that proves a standstill
+_AWAY_MPS = const(2.0)  # speed above which the vehicle has driven off
 
 # The gyro's bias that remains in the rates of an aligned sensor: 0, because the bias measured in the poses is already
 # subtracted.
@@ -85,8 +85,8 @@ class BackgroundAlignment:
         self._clear_sums()
 
     def ask(self):
-        """Drop the current drive, and start a drive that replaces the alignment. The rider requests this after
-        remounting the sensor."""
+        """Drop the current drive, and start a drive that replaces the alignment. The rider requests a new alignment
+        after remounting the sensor."""
         self.shown = True
         self.begin(True)
 

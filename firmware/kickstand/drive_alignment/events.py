@@ -20,8 +20,8 @@ _MAX_ACCELERATION_EVENTS = const(2)  # most acceleration events that count, beca
 MIN_INTERVAL_US = 400_000
 MAX_INTERVAL_US = 2_200_000  # longest interval; it allows one missing value of a GPS at 1 Hz
 _MAX_WAITING = const(4)  # number of intervals that can wait while an earlier interval is processed
-# Largest yaw rate of straight driving. At 10 m/s this rate causes a lateral force of 0.036 g, a fifth of the force of
-# braking. The regression removes most of this lateral force.
+# Largest yaw rate of straight driving. At 10 m/s a yaw rate of 2 deg/s causes a lateral force of 0.036 g, a fifth of
+# the force of braking. The regression removes most of this lateral force.
 _STRAIGHT_DPS = const(2.0)
 # Lowest speed of an interval that is used. At lower speeds steering angles are large, and a stop ends with a jerk.
 _MIN_SPEED_MPS = const(1.0)

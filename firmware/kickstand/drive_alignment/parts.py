@@ -1,10 +1,10 @@
 """Compares forward and the vertical between two parts of a drive. If forward or the vertical differs, the mount may
 have moved between the two parts.
 
-The time of a move is unknown, so the drive is split in two after each block in turn. The scatter of forward between the
-blocks within each part shows which difference is likely by chance. The variance of a part's forward falls with the
-part's weight, but not below the effect of camber and wind on one long stretch of road. A few blocks give a poor sample
-variance, so it is averaged with a prior of PRIOR_FREEDOM degrees of freedom.
+The time of a move is unknown, so the drive is split in two after each block, one block after the other. The scatter of
+forward between the blocks within each part shows which difference is likely by chance. The variance of a part's forward
+falls with the part's weight, but not below the effect of camber and wind on one long stretch of road. A few blocks give
+a poor sample variance, so it is averaged with a prior of PRIOR_FREEDOM degrees of freedom.
 """
 
 from array import array

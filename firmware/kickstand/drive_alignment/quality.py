@@ -23,7 +23,7 @@ MIN_EVENTS_TO_CHECK_SPEED = 2
 READY_DEG, STAY_READY_DEG = 1.5, 2.5
 # Largest angle between the forward directions of the two halves. The same limits hold for the two parts of a drive
 AGREE_DEG, STAY_AGREE_DEG = 4.0, 6.0
-# A larger difference between two parts is also allowed, up to this number of standard deviations of the difference
+# Largest difference between two parts in standard deviations of the difference, if it exceeds the limit in degrees
 AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0
 # The mount moved if two parts differ by more than one of the next three limits
 # Difference of forward. A long banked motorway curve that was treated as straight caused a difference of 15 degrees
@@ -101,8 +101,8 @@ class DrivingQuality:
             yield
         if blocks < 2 or weights <= 0.0:
             return
-        # Jackknife. Each block in turn is left out, and the changes of forward give its variance. The formal error of
-        # the regression is not used, because it is too small early in a drive.
+        # Jackknife. One block after the other is left out, and the changes of forward give its variance. The formal
+        # error of the regression is not used, because it is too small early in a drive.
         freedom = blocks - 1
         variance = degrees(degrees(squares)) * freedom / blocks  # rad^2 to deg^2
         self.quality_deg = sqrt(blend_prior(variance, self.fit.weight, freedom))

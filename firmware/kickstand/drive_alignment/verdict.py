@@ -1,7 +1,7 @@
 """Checks whether an earlier alignment, from two poses or another drive, fits this drive.
 
 If SIDE in the settings is not the side of the kickstand, forward and backward are exchanged. The poses cannot show this
-error, but the first braking events do. A change of pitch between the poses causes a yaw error of a few degrees. This
+exchange, but the first braking events do. A change of pitch between the poses causes a yaw error of a few degrees. This
 yaw error is corrected after enough braking events. Any other difference means that the mount has moved.
 """
 
@@ -13,12 +13,12 @@ from .regression import Fit
 
 UNKNOWN = 0  # not enough events yet
 SAME = 1
-REFINED = 2  # there is a yaw error of a few degrees, and the DriveAlignment's matrix() is better
+REFINED = 2  # the earlier alignment has a yaw error of a few degrees, and the DriveAlignment's matrix() is better
 REVERSED = 3  # forward points backward, and turn_round() corrects the matrix
 MOVED = 4  # the mount has moved, and the sensor must be aligned again
 
 _MIN_EVENTS_TO_REVERSE = const(2)  # smallest number of straight events that can show REVERSED; all must agree
-_SAME_DEG = const(1.0)  # yaw errors below this limit are not corrected
+_SAME_DEG = const(1.0)  # smallest yaw error that is corrected
 # Largest yaw error of two poses. At the smallest allowed tilt, 2 degrees of pitch between the poses cause 22 degrees.
 _REFINED_DEG = const(30.0)
 _REVERSED_DEG = const(135.0)  # smallest yaw error that means REVERSED

@@ -14,8 +14,8 @@ from ..errors import AlignmentError
 from ..rotation import angle_deg, norm, normalize, vector
 from ..units import const
 
-_STANDING_MPS = const(0.5)  # lower speeds count as standing, because a GPS at rest shows speeds up to this value
-MOVED_MPS = 2.0  # if the speed was higher than this, the next stop is a new stop
+_STANDING_MPS = const(0.5)  # highest speed that counts as standing, because a GPS at rest shows speeds up to 0.5 m/s
+MOVED_MPS = 2.0  # speed that a vehicle must exceed between two stops
 SETTLE_S = 1.0  # time for which a vehicle rocks after braking
 COUNTS_S = 2.0  # time that a stop must last after SETTLE_S to count
 # Largest difference at a stop between a mean over 0.1 s and a mean with the time constant _AVERAGE_S. An idling diesel,
@@ -23,12 +23,12 @@ COUNTS_S = 2.0  # time that a stop must last after SETTLE_S to count
 _STILL_G = const(0.06)
 _STILL_DPS = const(3.0)
 _AVERAGE_S = const(0.5)
-_SAME_STOP_DEG = const(1.5)  # doors and passengers tilt a standing vehicle by less than this angle
-# If the sensor stays still at another angle for longer than this, the sensor was rotated. The angle also differs for a
-# short time when the vehicle drives again but the late speed is still zero.
+_SAME_STOP_DEG = const(1.5)  # largest angle by which doors and passengers tilt a standing vehicle
+# Longest time for which the angle of a sensor that was not rotated can differ from its angle at the last stop. The
+# angle also differs for a short time when the vehicle drives again but the late speed is still zero.
 _TURNED_S = const(6.0)
-# If a rate differs by more than this from the bias at the last stop, the vehicle drives in a bend and a speed of zero
-# is wrong. A gyro that warms up changes its bias by less than this.
+# Largest difference between a rate at a stop and the bias at the last stop. At a larger difference the vehicle drives
+# in a bend, and a speed of zero is wrong. A gyro that warms up changes its bias by less.
 TURNING_DPS = 10.0
 _MEAN_S = const(60.0)  # time constant of the mean force, which is used until a better vertical is known
 # Largest difference of two verticals that the road's slope can cause (14 %). If two verticals differ more, the mount
@@ -169,7 +169,7 @@ class Vertical:
     def known(self, out, fit=None):
         """Write the vertical into out, as a unit vector. Return False if it is not known yet.
 
-        In a car it is unknown until the first stop.
+        In a car the vertical is unknown until the first stop.
 
         Args:
             out: array of 3.

@@ -11,7 +11,7 @@ from micropython import const
 from ..errors import Notice
 from ..units import AXES
 
-# Indices in the notes of add_up(), as in fifo_frames.py. Names imported from there would take heap.
+# Indices in the notes of add_up(), as in fifo_frames.py. Imported names would take heap.
 _ENDS = const(5)
 _CLIPPED = const(6)
 _GYRO_CLIPPED = const(7)
@@ -36,9 +36,9 @@ _GYRO_LOOKS = (
 _COLUMNS = (0, 1, 2, 4, 5, 6)  # the axes' columns in a frame
 _WRAP_LOOKS = const(2)  # number of looks with a wrap that prove a stuck high byte
 _WELL_LOOKS = const(2)  # number of successive looks without a fault that clear the fault
-# If half of the samples are at the end of the range in this many successive looks, the axis is faulty
+# Number of successive looks with half of the samples at the end of the range that make an axis faulty
 _CLIP_LOOKS = const(2)
-# If all samples are at the end of the range in this many successive looks, the axis is the cause, not vibration
+# Number of successive looks with all samples at the end of the range that prove a faulty axis instead of vibration
 _RAIL_LOOKS = const(5)
 _SETUP_LOOKS = const(25)  # number of looks between two set-ups of a chip with a faulty axis
 _QUIET_LOOKS = const(150)  # number of looks before the same notice is shown again
@@ -110,7 +110,7 @@ class AxisJudge:
                 equal |= 1 << i | 1 << (i - 1 if i & 3 else i + 2)
             seen = notes[_SEEN + i]
             values = seen & 0xFFFF
-            more = values & (values - 1)  # clears the lowest bit; the result is 0 if there was only one value
+            more = values & (values - 1)  # clears the lowest bit; the result is 0 if the counts had only one value
             if not (more & (more - 1) and values & 0x5555 and values & 0xAAAA):
                 if quiet[i] < 255:
                     quiet[i] += 1

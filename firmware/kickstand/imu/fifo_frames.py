@@ -14,7 +14,7 @@ from micropython import const
 from ..errors import NO_MACHINE_CODE, Notice, checked, tried
 
 FRAME = const(14)  # bytes
-SATURATED = const(32700)  # a reading with this absolute value or more is at the end of its range
+SATURATED = const(32700)  # smallest absolute value of a reading at the end of its range
 LOOK_MS = const(400)  # time between two looks
 
 # Indices in the notes of add_up(), an array('i', 33). The machine code repeats these numbers.
@@ -40,8 +40,8 @@ _WRAPPED = const(0x20000)  # bit in _SEEN that is set when the counts jump by _J
 _JUMP = const(192)
 
 # Half of the range of 8 g or 16 g. The low-pass hides most of a vibration. If half of the range is left after the
-# low-pass, the vibration was clipped before the low-pass. Then the mean is wrong, because the readings are clipped
-# unevenly. A range below 8 g has no limit for vibration, because bends alone reach half of that range.
+# low-pass, the vibration was clipped before the low-pass. After clipping the mean is wrong, because the readings are
+# clipped unevenly. A range below 8 g has no limit for vibration, because bends alone reach half of that range.
 _HARD_COUNTS = const(16384)
 _COLUMNS = (0, 1, 2, 4, 5, 6)  # the axes' columns in a frame
 _ALL_DIFFER = const(0x77)
@@ -216,7 +216,7 @@ class AxisWatch:
             return False
         for i in _COLUMNS:
             seen = notes[_SEEN + i]
-            more = seen & (seen - 1) & 0xFFFF  # clears the lowest bit; the result is 0 if there was only one value
+            more = seen & (seen - 1) & 0xFFFF  # clears the lowest bit; the result is 0 if the counts had only one value
             if not (more & (more - 1) and seen & 0x5555 and seen & 0xAAAA and (seen & _HIGH_BYTE or seen < _WRAPPED)):
                 return False
         for i in _COLUMNS:

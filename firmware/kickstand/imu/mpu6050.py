@@ -83,7 +83,7 @@ _MAX_FRAMES = const(8)  # most frames in one transfer, which then takes 3 ms at 
 # Most frames in one transfer while fewer than _MAX_FRAMES are in the FIFO. Because of this limit, one slow pass of the
 # loop does not slow the next pass.
 _FEW_FRAMES = const(3)
-# Readings that stay equal for longer than this are a fault, because noise changes every sample of a working chip
+# Longest time for which readings may stay equal, because noise changes every sample of a working chip
 _FROZEN_MS = const(100)
 
 
@@ -147,7 +147,7 @@ class Mpu6050:
         self._odd = False  # True if the last fetch() found an incomplete frame
         self._settled = False  # True once a chip was started at this address, so the other address is not tried
         self._started = False  # True once setup() is complete and the FIFO fills
-        self._full = 0  # if the FIFO holds more bytes than this, it may have overflowed
+        self._full = 0  # number of bytes in the FIFO above which it may have overflowed
         self.counts, self.sums = array("h", [0] * 7), array("i", [0] * 7)
         self.axes = AxisWatch(rate_hz, accel_bits >> 3, gyro_bits >> 3, dlpf, rate_hz * _FROZEN_MS // 1000)
 
@@ -200,8 +200,8 @@ class Mpu6050:
     def configure(self):
         """Do the steps of setup() except start(), as a generator.
 
-        Before each pause the generator yields the milliseconds to wait. The caller can do other work meanwhile. Raises
-        the same errors as setup()."""
+        Before each pause the generator yields the milliseconds to wait. The caller can do other work during the pauses.
+        Raises the same errors as setup()."""
         self._started = False
         self.identify()
         self.write_register(_PWR_MGMT_1, _RESET)

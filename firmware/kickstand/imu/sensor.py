@@ -13,7 +13,7 @@ _FAILURES = const(3)  # number of successive failed transfers that are a fault; 
 _SILENT_MS = const(100)  # longest time without a sample; a longer time is a fault
 # Longest time without a sample while the FIFO overflows, because the board has no time to read the FIFO
 _STALE_MS = const(500)
-_SETTLED_MS = const(1000)  # if a fault returns within this time after a set-up, the set-up did not help
+_SETTLED_MS = const(1000)  # a set-up did not help if a fault comes within this time after it
 _FRUITLESS = const(3)  # number of successive set-ups that did not help before the FIFO is tested
 # The fault is explained after EXPLAINED successive failed set-ups, and again every EXPLAINED_EVERY set-ups (about 1 s)
 EXPLAINED, EXPLAINED_EVERY = 3, 20
@@ -35,7 +35,7 @@ class Sensor:
         fault: the Notice of a fault, or None.
         restarts: number of gaps in the samples. A gap is a set-up, _STALE_MS without a sample, or a faulty axis.
         clipped: number of samples that fetch() skipped because an axis was at the end of its range. The caller resets
-            it to 0.
+            clipped to 0.
     """
 
     def __init__(self, chip, reopen, explain=None):
@@ -254,8 +254,8 @@ class SampleClock:
     """Computes the times of the samples.
 
     The chip samples at a steady rate, independent of the program. The chip's clock may be off by 1 %. The board's clock
-    corrects this error. Times are integers in microseconds, because a 32-bit float would lose microseconds after 17
-    seconds.
+    corrects the error of the chip's clock. Times are integers in microseconds, because a 32-bit float would lose
+    microseconds after 17 seconds.
 
     Args:
         period_us: nominal time from one sample to the next.
@@ -277,7 +277,7 @@ class SampleClock:
         self._pending_us = self._skipped_us = 0
 
     def skip(self, n):
-        """Count n skipped samples. The next step() includes their time."""
+        """Count n skipped samples. The next step() includes the time of these samples."""
         self.lost += n
         if self._sample_us is not None:
             self._skipped_us += n * self._period_us

@@ -131,10 +131,10 @@ def possible_pitch(pitch):
 def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
     """Return the rates about left and up, in rad/s, to use in derivatives that multiply a rate by a state.
 
-    A bike in balance has the rate v w_y / g = -cos q sin t about up. If the measured rate about up is close to this
-    rate, the function returns the rates of a bike in balance. If the rates differ more, or the speed is 0, the function
-    returns the measured rates. In a product of rate and state, the noise of a measured rate would be squared. This
-    would make the estimated speed and lean too small (errors in variables).
+    A bike in balance has the rate v w_y / g = -cos q sin t about up. If the measured rate about up is close to the
+    balanced rate, the function returns the rates of a bike in balance. If the rates differ more, or the speed is 0, the
+    function returns the measured rates. In a product of rate and state, the noise of a measured rate would be squared.
+    Squared noise would make the estimated speed and lean too small (errors in variables).
     """
     if speed > _BALANCE_MIN_SPEED:
         balanced = -STANDARD_GRAVITY * cos_pitch * sin_lean / speed
@@ -167,7 +167,7 @@ class Linearisation:
         speed, yaw_error = x[SPEED], x[YAW_ERROR]
         st, ct, sq = sin(x[LEAN]), cos(x[LEAN]), sin(x[PITCH])
         cq = sqrt(1.0 - sq * sq)
-        yaw_rate = wx * st + wy * ct  # rate about the vertical if there is no pitch
+        yaw_rate = wx * st + wy * ct  # rate about the vertical at a pitch of 0
         per_rate = speed / STANDARD_GRAVITY  # centripetal acceleration in g per rad/s of yaw rate
         sideways = per_rate * wy
         acceleration = forward - sq + sideways * yaw_error

@@ -36,7 +36,7 @@ from ..units import const
 _SHORT_S = const(3.0)
 # s: time constant of all other means. Larger: fewer correct leans are hidden, and wrong leans are hidden later.
 _LONG_S = const(10.0)
-# standard deviations: larger innovations are reduced to this value. Larger: a single blow counts for more.
+# standard deviations: limit to which larger innovations are reduced. Larger: a single blow counts for more.
 _MOST = const(4.0)
 # Limits of the means. Larger: fewer correct leans and fewer wrong leans are hidden. "Largest without a fault" is the
 # largest mean in rides without a fault, on good and bad roads, with good and bad mounts.
@@ -65,7 +65,7 @@ _SURE_LEAN = const(0.3)
 # ratio: the lean is steady if the square of its mean exceeds this share of the mean of its square. Larger: fewer leans
 # are hidden.
 _STEADY = const(0.75)
-# ratio: larger forces to the side are reduced to this value. Larger: a single blow counts for more.
+# ratio: limit to which larger forces to the side are reduced. Larger: a single blow counts for more.
 _MOST_SIDEWAYS = const(0.5)
 _STRICT = const(0.85)  # ratio: factor on the limits after a doubt. Larger: a lasting fault is detected later.
 # ratio: during a doubt, the means fit again when they are below this share of their limits. Larger: the lean is shown
@@ -77,13 +77,13 @@ HOLDS_S = (3.0, 4.0, 4.0, 20.0, 60.0)
 # s: time for which everything must fit after a gap in the readings. Larger: after a gap the lean stays hidden for
 # longer.
 _GAP_S = const(4.5)
-# After more doubts than this, only time in bends counts as fitting, because on a straight nearly everything fits.
+# Number of doubts after which only time in bends counts as fitting, because on a straight nearly everything fits.
 MILD = 3
 # s: shortest time between two doubts after more than MILD doubts. The time between two doubts is needed to detect rest.
 # Larger: errors of the sensor that have changed are found later.
 _AGAIN_S = const(12.0)
 _TURNING = const(0.05)  # rad/s: smallest yaw rate of a bend. Larger: the lean stays hidden for longer.
-# s: after this time of fitting, one doubt is forgotten. Larger: after a repeated fault the lean is hidden for longer.
+# s: time of fitting after which one doubt is forgotten. Larger: after a repeated fault the lean is hidden for longer.
 FORGET_S = 60.0
 
 last_odd = None  # the last code of `odd`, for `kickstand status`
@@ -125,7 +125,7 @@ class Consistency:
     def one_sided(self):
         """True if a misfit is not yet forgotten, and the mean lean is steadily over _ONE_SIDE.
 
-        From _SURE_LEAN on, this must have lasted for _LONG_S."""
+        From _SURE_LEAN on, the lean must have been steady for _LONG_S."""
         lean = abs(self._lean)
         if not self.doubts or lean <= _ONE_SIDE or lean * lean <= _STEADY * self._lean_square:
             return False

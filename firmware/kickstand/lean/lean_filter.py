@@ -35,10 +35,10 @@ from .upright_trim import UprightTrim
 _WINDOW_US = const(200_000)
 _FIRST_WINDOW_US = const(50_000)
 WORK_STEPS = 21  # number of steps of the work on a window; a test checks this number
-_SLOW_STEP_US = const(12_000)  # if samples are further apart than this, there is time for all steps at once
+_SLOW_STEP_US = const(12_000)  # time between two samples above which all steps are done at once
 DELAY_S = 0.0048  # delay of the MPU6050's gyro at DLPF 3
-# m/s: above this speed the filter restarts. A board that lies on its nose seems to accelerate, but standstill is
-# detected long before the estimated speed is this high.
+# m/s: estimated speed above which the filter restarts. A board that lies on its nose seems to accelerate, but
+# standstill is detected long before the estimated speed is this high.
 _MAX_SPEED = const(250.0)
 
 
@@ -46,7 +46,7 @@ class LeanFilter:
     """Estimates lean from force and rate in the vehicle's axes, in fixed memory.
 
     Args:
-        delay_s: delay of the gyro's low-pass. The lean is extrapolated by this time.
+        delay_s: delay of the gyro's low-pass. The lean is extrapolated by delay_s.
         trim: in rad, see UprightTrim.
         posed: see LeanMeter.use().
         gyro_variances: see gyro_variances().
@@ -290,7 +290,7 @@ class LeanFilter:
 
     def _stand(self, means):
         """At the beginning of rest, set lean and pitch by the force, which is now vertical, and the speed to 0. Keep a
-        bias unless it is far off, for example after the sensor was moved about by hand."""
+        bias of the gyro unless it is far off, for example after the sensor was moved about by hand."""
         fx, fy, fz = means[5:8]
         x, p = self._x, self._p
         rates = [abs(means[2 + i] + x[BIAS_LEFT + i]) for i in range(3)]

@@ -64,8 +64,8 @@ class RestDetector:
                 still = still and abs(deviation) < _MAX_FORCE_G
         still = still and (near_estimate or near_calibration) and not moving
         self._still_s = self._still_s + seconds if still else 0.0
-        # Steady braking looks still, so there is a second timer. With one timer, braking would count as rest as soon as
-        # the estimated speed is low.
+        # Steady braking looks still, so a second timer counts only stillness without a sign of rolling. With one timer,
+        # braking would count as rest as soon as the estimated speed is low.
         self._not_rolling_s = self._not_rolling_s + seconds if still and not rolling else 0.0
         self.resting = self._not_rolling_s >= _REST_S or self._still_s >= _REST_ROLLING_S
         if self.resting:

@@ -62,7 +62,7 @@ class UprightTrim:
 
         Args:
             sideways: force to the left divided by force up.
-            lean: in rad. Like the yaw rate, it increases the noise in bends.
+            lean: in rad. Lean and yaw rate increase the noise in bends.
             yaw_rate: in rad/s.
             seconds: time since the previous update.
         """

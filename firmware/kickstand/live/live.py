@@ -10,14 +10,14 @@ from . import packets
 from .packets import LEAN, MOTION, OWN, SPEED
 
 _LOOK_MS = const(1000)
-# A phone that requests nothing for this time is disconnected, so that the next phone can connect. Typing a PIN takes
-# half of this time.
+# Time after which a phone that requests nothing is disconnected, so that the next phone can connect. Typing a PIN takes
+# up to half of this time.
 _IDLE_S = const(60)
 _SAMPLES = 8  # largest number of samples that Transform takes
 
 
 def attach(radio, app):
-    """Connect an App with a Radio. Then the app sends to phones."""
+    """Connect an App with a Radio, so that the app sends to phones."""
     app.live = app.screen.pages.live = Live(radio, app, app.settings.leans)
 
 

@@ -14,7 +14,7 @@ from ..units import GAP_US, const
 from .block import MAX_DT_US, RideBlock
 
 _PAGE = const(256)  # bytes in a page of the flash, the unit of writing
-_STALL_MS = const(10)  # if a write takes longer, it included an erase of the flash; a page alone takes 1 ms
+_STALL_MS = const(10)  # duration above which a write has included an erase of the flash; a page alone takes 1 ms
 
 
 class Recorder:
@@ -27,8 +27,8 @@ class Recorder:
     Attributes:
         active: True while a ride is being recorded.
         problem: None, or the reason why the recording stopped, a CardError or Notice. take_problem() clears it.
-        stalled: True if interrupts were off for longer than _STALL_MS. Then GPS bytes or wheel pulses may be lost. The
-            caller calls the speed source's after_stall() and resets stalled to False.
+        stalled: True if interrupts were off for longer than _STALL_MS. During such a stall GPS bytes or wheel pulses
+            may be lost. The caller calls the speed source's after_stall() and resets stalled to False.
     """
 
     def __init__(self, keeper, sample_hz):

@@ -97,9 +97,9 @@ class Recording:
     def start(self):
         """Begin to record a ride. Return None, or a Notice with the reason for a failure.
 
-        If the bike is at rest, the lean filter restarts too. Then a replay shows the same lean as the display, and the
-        filter estimates the gyro's errors again in the first bends. If the bike is moving, the filter does not restart.
-        Then the replay's filter at first knows the gyro's errors less well than the board's filter."""
+        If the bike is at rest, the lean filter restarts too. With this restart a replay shows the same lean as the
+        display, and the filter estimates the gyro's errors again in the first bends. If the bike is moving, the filter
+        does not restart, so the replay's filter at first knows the gyro's errors less well than the board's filter."""
         if self._meter.at_rest:
             self._calibration.restart()
         if self._refused and not self.on_card:  # a card must be tested before the watchdog runs

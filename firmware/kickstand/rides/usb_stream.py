@@ -12,7 +12,7 @@ from ..console import say
 from ..units import const
 
 _LENGTH = const(512)  # bytes in a ride block, about half a second of a ride
-_SLOW_APART_MS = const(60_000)  # two slow prints within this time end the ride
+_SLOW_APART_MS = const(60_000)  # time within which two slow prints end the ride
 
 
 class RideStream:

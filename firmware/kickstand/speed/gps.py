@@ -23,15 +23,15 @@ from ..units import const
 _MAX_SENTENCE = const(100)
 # Most bytes read per pass of the loop. With a pass every 10 ms, this is twice the need of 10 fixes per second.
 _MAX_CHUNK = const(64)
-_SILENT_MS = const(3000)  # fault() reports when no byte, sentence or fix has arrived for this time
-_LATE_MS = const(2000)  # a fix that waited in the receiver for longer than this is dropped
-_LOOK_MS = const(1500)  # if no sentence with a speed arrives for this time, other kinds of sentences are examined
-# Older times are replaced by times of this age, because after 6 days ticks_diff() is negative
+_SILENT_MS = const(3000)  # time without a byte, a sentence or a fix after which fault() reports it
+_LATE_MS = const(2000)  # longest time for which a fix may wait in the receiver
+_LOOK_MS = const(1500)  # time without a sentence with a speed after which other kinds of sentences are examined
+# Age to which older times are limited, because after 6 days ticks_diff() is negative
 _CARRY_MS = const(60_000)
-_TIME_JUMP_MS = const(5000)  # a fix that seems later than this is not late: the receiver has corrected its clock
+_TIME_JUMP_MS = const(5000)  # smallest apparent delay of a fix that shows a correction of the receiver's clock
 # The delay of a fix is measured against a reference, which is a fix without a delay. If all fixes are late for longer
-# than _TIME_JUMP_MS, the receiver has set its clock back. Then the fix with the smallest delay becomes the new
-# reference, after at least this number of fixes.
+# than _TIME_JUMP_MS, the receiver has set its clock back. The new reference is then the fix with the smallest delay of
+# at least this number of fixes.
 _MIN_FIXES_FOR_NEW_REFERENCE = const(4)
 _KNOT_MPS = const(1852.0 / 3600.0)  # one knot in m/s
 _KMH_MPS = const(1.0 / 3.6)  # one km/h in m/s

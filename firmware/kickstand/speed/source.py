@@ -14,8 +14,8 @@ from ..units import const
 
 _MAX_MPS = const(100.0)
 _MAX_CHANGE_MPS2 = const(15.0)  # largest change of speed per second; no tyre has enough grip for more
-_NOISE_MPS = const(2.0)  # noise of a speed; a change of speed may exceed the limit by this much
-_GIVE_UP_MS = const(3000)  # if all speeds are rejected for this time, the last accepted speed was wrong
+_NOISE_MPS = const(2.0)  # noise of a speed, by which a change of speed may exceed its limit
+_GIVE_UP_MS = const(3000)  # duration of rejected speeds that shows that the last accepted speed was wrong
 # Bytes of half a second at 9600 baud. This buffer is large enough while flash is written or the sensor is set up.
 _RX_BUFFER = const(512)
 

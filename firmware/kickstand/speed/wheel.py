@@ -16,9 +16,9 @@ from ..errors import Notice
 from ..units import const
 
 _MAX_MPS = const(100.0)  # pulses that imply a higher speed are interference
-# A contact bounces if it was open for less than this time, and for less than a quarter of the shortest period
+# A contact that was open for less than _BOUNCE_US, and for less than a quarter of the shortest period, bounces
 _BOUNCE_US = const(3000)
-_STOPPED_MPS = const(0.5)  # a wheel slower than this counts as standing
+_STOPPED_MPS = const(0.5)  # speed below which a wheel counts as standing
 MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # limits of the time after which a wheel without pulses counts as standing
 _REPORT_MS = const(100)  # shortest time between two speeds from poll()
 _STANDING_MS = const(200)  # shortest time between two speeds of zero from poll()
@@ -27,7 +27,7 @@ _STANDING_MS = const(200)  # shortest time between two speeds of zero from poll(
 # the time-out of a transfer. 50 pulses per metre at 70 m/s are not a storm.
 STORM_EDGES, STORM_US = 64, 8_000
 _STORM_PAUSE_MS = const(5000)  # time for which the interrupt is off after a storm
-_SOFT_PERIOD_US = const(3333)  # at shorter periods soft interrupts, such as an ESP32's, lose over 2 % of the pulses
+_SOFT_PERIOD_US = const(3333)  # period below which soft interrupts, such as an ESP32's, lose over 2 % of the pulses
 # Counts and times wrap at 30 bits. The interrupt subtracts times with this mask, because ticks_diff() would be negative
 # after nine minutes of standing.
 _TICKS = _COUNT = 0x3FFFFFFF

@@ -47,7 +47,7 @@ class PageRing:
 
     def show_own(self, now_ms):
         """Go to the first of the owner's pages. The menu calls this method. Without an alignment only the menu leads to
-        these pages."""
+        the owner's pages."""
         self._own_at = 0
 
     def first(self):

@@ -32,7 +32,7 @@ TROUBLES = {
     "cut": 0.02,  # the end of the first log is missing
     "missing": 0.02,  # the first log does not exist
 }
-# Faults that make an alignment impossible, each with the expected codes of the refusal. Each of these codes is correct
+# Faults that make an alignment impossible, each with the codes of the refusals that are correct for this fault
 _REASONS = {
     "moved-between": "mount-moved",
     "moved-within": "mount-moved",
