@@ -35,7 +35,7 @@ _COLLECT_TURNS_DRIVING = const(23)
 # Number of collections between two checks of the free heap. A check takes 3 ms on an ESP32. If the drive, an OLED, a
 # phone or user.py also uses heap, the app checks after each collection.
 _PLAN_EVERY = const(4)
-SINGLE_GAPS = 300  # number of single free heap blocks after a collection
+SINGLE_GAPS = 300  # number of free heap blocks that lie alone after a collection
 _PAGE_MS = const(100)
 # A lean on the display must be at most half a second old. So a page shows no lean if its own delay plus the age of the
 # readings in the FIFO is longer than _LATE_MS. A display that draws needs about _DRAWING_MS more to send a picture
@@ -129,7 +129,8 @@ class App:
             global worst
             chip = self.sensor.chip
             worst = LOOP_US - self._least_wait_us, chip.least_free_samples(), chip.axes.shaken()
-            if not isinstance(error, Exception):  # Ctrl-C; after an error the board is restarted instead
+            # Ctrl-C ends the firmware; after an error the board is restarted instead
+            if not isinstance(error, Exception):
                 port.rest_watchdog()
                 self.rides.stop()
                 if self.live:
@@ -216,7 +217,7 @@ class App:
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self._show(now_ms)
         self.lcd.tick(now_ms)
-        if self.rides.recorder.active:  # calling recording() would cost 20 us
+        if self.rides.recorder.active:  # read directly, because recording() would cost 20 us
             self.rides.recorder.tick()
         if self.live:
             self.live.poll(now_ms)
@@ -251,7 +252,7 @@ class App:
         )
         self.screen.pages.draws = self.lcd.draws
         self._page_ms = ticks_add(now_ms, _PAGE_MS)
-        if self.screen.menu:  # prepare, so that a recording started in the menu begins at once
+        if self.screen.menu:  # prepare here, so that a recording started in the menu begins at once
             self.rides.prepare()
         problem = self.rides.recorder.take_problem() or (self.drive and self.drive.speed.take_problem())
         axes = self.sensor.chip.axes

@@ -140,5 +140,6 @@ def _check(settings, config):
     if not settings.leans and settings.SPEED is None:
         raise SettingsError("needs-speed", "SPEED")
     fitting = MIN_DLPF[settings.SAMPLE_HZ]
-    if settings.DLPF < fitting:  # otherwise vibration of the engine would alias and look like a slow motion
+    # A wider low-pass would alias the engine's vibration, which then looks like a slow motion
+    if settings.DLPF < fitting:
         raise SettingsError("aliasing", "DLPF", settings.DLPF, settings.SAMPLE_HZ, fitting)

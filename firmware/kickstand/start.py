@@ -72,14 +72,14 @@ def main(loop=None):
         print("Kickstand stopped. " + sentence(error))
         try:
             _show(lcd or open_lcd(error.settings), *lines(error))
-        except SettingsError:  # the display's own pins are wrong or not set
+        except SettingsError:  # the pins of the display are wrong or not set
             pass
     except KeyboardInterrupt:
         port.rest_watchdog()
         if lcd:
             lcd.end(*STOPPED)
         print("Kickstand stopped. Ctrl-D starts it again; import kickstand; kickstand.status() reports how it is.")
-    except ImportError as error:  # an update was interrupted, so a restart would not help
+    except ImportError as error:  # no restart, because the files are incomplete after an interrupted update
         port.rest_watchdog()
         print("Kickstand stopped: incomplete firmware (%s). Run kickstand flash." % error)
         _last_words(lcd, "Incomplete:", "flash it again")
@@ -101,7 +101,7 @@ def _last_words(lcd, line1, line2):
             gc.collect()
             lcd = open_lcd(settings.Settings())
         _show(lcd, line1, line2)
-    except Exception:  # memory or a file may be missing; the console already has the message
+    except Exception:  # memory may be short or a file missing; the console already has the message
         pass
 
 

@@ -36,7 +36,7 @@ _OLED_ADDRESSES = const((0x3C, 0x3D))
 ADDRESSES = (0x27, 0x3F) + _OLED_ADDRESSES
 _FAMILY = tuple(range(0x20, 0x27)) + tuple(range(0x38, 0x3C)) + (0x3E,)  # other addresses of a backpack
 LCD_HZ, OLED_HZ = 100_000, 400_000  # fastest clocks of a PCF8574 and of the OLEDs
-STOPPED = "Kickstand", "stopped"  # shown after the firmware has ended
+STOPPED = "Kickstand", "stopped"  # text of the display after the firmware has ended
 KINDS = ("auto", "lcd", "ssd1306", "sh1106", "ssd1306-32")
 _PROBE_MS = const(200)  # time between two searches for a missing display
 # Longest time between two searches. While a driver cannot be loaded, the time is doubled, but not beyond MOST_WAIT_MS
@@ -70,7 +70,7 @@ class Display:
         self._addresses = addresses
         self._look = contrast, inverted
         self._wiring = wiring
-        self._oled = False  # the driver is an Oled
+        self._oled = False  # True if the driver is an Oled
         self._i2c = self._driver = None
         self._wanted = "", "", None
         self._status = bytearray(1)
@@ -83,7 +83,7 @@ class Display:
 
     def show(self, line1, line2, picture=None):
         """Set the lines and the picture that tick() will send."""
-        self._wanted = line1, line2, picture  # kept for a display that is plugged in later
+        self._wanted = line1, line2, picture  # stored for a display that is plugged in later
         if self._driver:
             self._driver.show(line1, line2, picture)
 
@@ -115,7 +115,7 @@ class Display:
         """Show two lines until power-off, because the firmware ends. Raises nothing; Ctrl-C does not interrupt it.
 
         The display is set up again, because a transfer may have been interrupted."""
-        interrupt = getattr(micropython, "kbd_intr", None)  # computers have none
+        interrupt = getattr(micropython, "kbd_intr", None)  # MicroPython on a computer has no kbd_intr
         if interrupt:
             interrupt(-1)
         try:
@@ -124,7 +124,7 @@ class Display:
                 self._fresh = True
                 self.show(line1, line2)
                 self.flush()
-        except Exception:  # nothing can report an error any more, because the firmware has ended
+        except Exception:  # ignored, because nothing can report an error after the firmware has ended
             pass
         finally:
             if interrupt:

@@ -107,7 +107,8 @@ class Lcd:
                 self._initialise(self._step)
             self._step += 1
             self._init_ms = self._seen_ms = now_ms
-        elif self._changed and self._refresh():  # new text is sent first, because the shown text may be too old
+        # New text is sent before the checks, because the shown text may be too old
+        elif self._changed and self._refresh():
             self._seen_ms = self._acted_ms = now_ms
         elif ticks_diff(now_ms, self._seen_ms) >= _PROBE_MS:
             self._seen_ms = self._acted_ms = now_ms
@@ -119,7 +120,7 @@ class Lcd:
     def _put(self, number, text):
         line = self._wanted[number]
         if isinstance(text, str):
-            if text == self._texts[number]:  # the text is usually unchanged, and skipping its conversion saves 0.2 ms
+            if text == self._texts[number]:  # the text is usually the same, and skipping its conversion saves 0.2 ms
                 return
             self._texts[number] = text
             for i in range(_COLUMNS):

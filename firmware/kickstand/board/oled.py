@@ -18,7 +18,7 @@ WIDTH, HEIGHT = 128, 64
 _PART = 32
 _PARTS, _PARTS_SLOW, _SLOW_HZ = 3, 2, 200_000
 _PROBE_MS = const(200)  # time between two checks that the display has kept its power
-_REFRESH_MS = const(10_000)  # time until everything is sent again, to repair the effects of electrical noise
+_REFRESH_MS = const(10_000)  # time until the whole picture is sent again, to repair the effects of electrical noise
 _POWER_UP_MS = 40
 _OFF = 0x40  # bit of the status that is set while the panel is off
 # Low half of the status of an SH1106. The low half of an SSD1306's status is 3 or 6, and a clone may have any value
@@ -143,14 +143,14 @@ class Oled:
             self._seen_ms = self._refresh_ms = now_ms
         elif self._lit and ticks_diff(now_ms, self._seen_ms) >= _PROBE_MS:
             self._seen_ms = now_ms
-            if self._state() & _OFF and self._reports_off:  # the display has lost its power
+            if self._state() & _OFF and self._reports_off:  # the panel is off, so the display has lost its power
                 self._restart()
         elif self._changed:
             self._send()
         elif not self._lit:
             self._command(b"\x00\xaf")
             self._lit = True
-            self._reports_off = not self._state() & _OFF  # some clones never report "off"
+            self._reports_off = not self._state() & _OFF  # False for clones that never report "off"
         elif ticks_diff(now_ms, self._refresh_ms) >= _REFRESH_MS:
             self._refresh_ms = now_ms
             self._refreshes += 1

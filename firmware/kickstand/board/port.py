@@ -27,7 +27,7 @@ if IS_ESP32:
     # Extra arguments of Pin.irq(). An ESP32 has only soft interrupts, and transfers by SoftI2C delay them
     PIN_IRQ = {}
     I2C_NUMBERED = False  # see open_i2c()
-    SD_SPI = (2, 3)  # the slots of machine.SDCard that are SPI
+    SD_SPI = (2, 3)  # slots of machine.SDCard that use SPI
     # Pins that the chip itself needs. An output on a pin of the chip's USB disconnects the board from the computer
     # until BOOT is held. An output on a pin of a classic chip's flash (6 to 11) crashes the board at each start. Pins 1
     # and 3 of a classic chip are the console.
@@ -37,7 +37,7 @@ if IS_ESP32:
         _CHIP, (1, 3, 6, 7, 8, 9, 10, 11) if _CLASSIC else ()
     )
     INPUT_PINS = (34, 35, 36, 37, 38, 39) if _CLASSIC else ()  # pins without output and without pull-up
-else:  # Raspberry Pi Pico and Pico 2, and other makers' boards with the same pins and name
+else:  # Raspberry Pi Pico and Pico 2, and boards of other makers with the same pins and name
     _KNOWN = sys.platform != "rp2" or "Pico" in MACHINE
     SENSOR_PINS, LCD_PINS, BUTTON_PIN = (4, 5), (6, 7), 15
     GPS_UART, GPS_PINS, WHEEL_PIN = 1, (8, 9), 14
@@ -109,7 +109,8 @@ def rest_watchdog():
     if _watchdog is None:
         return
     if IS_ESP32:
-        machine.WDT(timeout=_WEEK_MS)  # an ESP32 accepts a new time-out, and a soft reset keeps it
+        # A long time-out instead: an ESP32 accepts a new time-out, and a soft reset keeps it
+        machine.WDT(timeout=_WEEK_MS)
         return
     # Data sheets RP2040 section 4.7.6 and RP2350 section 12.9.7: ENABLE is bit 30 of the watchdog's CTRL, at its base
     # address. Sections 2.1.2 and 2.1.3: a write to address + 0x3000 clears the bits that are 1.

@@ -88,7 +88,7 @@ class ActiveCalibration:
             return False
         try:
             self._store.save(self.value)
-        except StoreError as error:  # not fatal, because the next ride estimates the trim again
+        except StoreError as error:  # a failed save is not fatal, because the next ride estimates the trim again
             report(error)
         return True
 

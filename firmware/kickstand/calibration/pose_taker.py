@@ -5,10 +5,10 @@ from ..units import const
 from .still_pose import StillPose
 
 _SETTLE_MS = const(500)
-_GIVE_UP_MS = const(10_000)  # longest time to wait for stillness
+_GIVE_UP_MS = const(10_000)  # longest time to wait until the sensor is still
 
 # The states that step() returns
-SETTLING = 0  # waiting for stillness
+SETTLING = 0  # waiting until the sensor is still
 SETTLED = 1  # returned once, when the sensor has been still for _SETTLE_MS and averaging begins
 AVERAGING = 2
 DONE = 3  # returned once, when the pose is complete

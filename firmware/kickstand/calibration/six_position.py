@@ -74,7 +74,7 @@ def fit(poses):
     Arguments and results are those of closed_form(). Raises CalibrationError."""
     offset, slope = closed_form(poses)
     rows = [[0.0] * 7 for _ in range(6)]
-    for _ in range(8):  # 3 to 5 steps are enough
+    for _ in range(8):  # more than enough: 3 to 5 steps suffice
         for pose, row in zip(poses, rows):
             square = 0.0
             for i in range(3):

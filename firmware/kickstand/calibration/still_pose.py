@@ -18,7 +18,8 @@ _PEAK_DPS = const(5.0)
 _NOISE_DPS = const(0.6)
 _SPREAD_G = const(0.02)  # largest standard deviation of an axis of the accelerometer
 _DRIFT_G = const(0.007)  # largest change of force between the two halves of the pose, equal to a tilt of 0.4 degrees
-_MAX_REST_RATE_DPS = const(45.0)  # the data sheet allows 20 deg/s of gyro offset, plus 20 deg/s over temperature
+# The gyro at rest; the data sheet allows an offset of 20 deg/s, plus 20 deg/s over temperature
+_MAX_REST_RATE_DPS = const(45.0)
 _MIN_SAMPLES = const(20)
 
 _AXES = (0, 1, 2, 4, 5, 6)  # indices of accelerometer and gyro in a sample; index 3 is the temperature
@@ -52,7 +53,7 @@ class StillPose:
         self._first = [0] * 7
         # A deviation is the difference between a sample and the first sample, a small integer.
         self._sums = [0] * 7  # sums of the deviations
-        self._early = [0] * 7  # sums of the deviations in the first half
+        self._early = [0] * 7  # sums of the deviations in the first half of the pose
         self._squares = [0] * 7  # sums of the squared deviations
         self._last = [0] * 7  # deviations of the last sample
         self._changes = [0] * 7  # sums of the squared differences between successive deviations

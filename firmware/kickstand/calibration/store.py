@@ -33,7 +33,7 @@ WHOLE_BODY_LENGTH = BODY_LENGTH + struct.calcsize(_WHOLE)
 _HEAD_LENGTH = struct.calcsize(_HEAD)
 _LENGTHS = {_VERSION: _HEAD_LENGTH + BODY_LENGTH + 4, _WHOLE_VERSION: _HEAD_LENGTH + WHOLE_BODY_LENGTH + 4}
 MAX_BIAS_DPS = 60.0  # largest plausible bias of the gyro
-MAX_TRIM_DEG = 3.6  # the limit in lean/upright_trim.py plus a margin for 32-bit rounding
+MAX_TRIM_DEG = 3.6  # MAX_TRIM of lean/upright_trim.py in degrees, plus a margin for 32-bit rounding
 
 
 class Store:
@@ -54,7 +54,7 @@ class Store:
         self._chip = (who_am_i, accel_range_g)
         self._directory = directory
         self.message = ""
-        self._sequence = 0  # sequence number of the record in use, 0 for none
+        self._sequence = 0  # sequence number of the record in use, 0 without a record
         self._problems = []  # faults of the invalid records, in words
 
     def load(self):
@@ -107,7 +107,7 @@ class Store:
                 with open(self._path(name), "rb") as file:
                     record = file.read(_LENGTHS[_WHOLE_VERSION] + 1)
             except OSError as error:
-                if error.args[0] != ENOENT:  # a missing file is normal: save() creates it
+                if error.args[0] != ENOENT:  # a missing file is no problem, because save() creates it
                     problems.append("%s unreadable" % name)
                 continue
             sequence, found, problem = self._unpack(record)

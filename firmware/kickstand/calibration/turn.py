@@ -151,7 +151,7 @@ class Turn:
         own[0] = own[1] = own[2] = 0
         self._n = self._us = 0
         steps = (x, y, z, seconds)
-        small = 1.0 - (x * x + y * y + z * z) / 6  # makes the angle correct to the fifth order
+        small = 1.0 - (x * x + y * y + z * z) / 6  # with this factor the angle is correct to the fifth order
         x, y, z = small * x, small * y, small * z
         r, s = self.r, self.s
         for a in range(3):

@@ -29,9 +29,9 @@ CAR, MOTORCYCLE = "car", "motorcycle"
 # state
 WAITING_FOR_SPEED = 0  # no speed has come yet, or no new speed for STALE_US
 WAITING_FOR_STOP = 1  # only in a car, whose vertical and gyro bias are measured at a stop
-WAITING_FOR_BRAKING = 2  # the next braking must be in a straight line
-BRAKING = 3  # during a braking event
-TURNING = 4  # during a braking event in a bend, so the event will not count
+WAITING_FOR_BRAKING = 2  # waiting for a braking event, which must be in a straight line
+BRAKING = 3  # a braking event in a straight line
+TURNING = 4  # a braking event in a bend, which will not count
 READY = 5  # matrix() gives the alignment; more events improve it
 REFUSED = 6  # matrix() raises `problem`
 
@@ -70,9 +70,9 @@ class DriveAlignment:
         self._judged = (0, 0)  # numbers of events and stops when the quality was last judged
         self._sums = [0.0] * 6  # integrals of force and rate over the current bin
         self._sums_us = 0
-        self._speed_mps = -1.0  # negative before the first speed
+        self._speed_mps = -1.0  # the last speed in m/s, negative before the first speed
         self._top_mps = 0.0
-        self._silent_us = 0  # time since the last speed
+        self._silent_us = 0  # time since the last speed, in us
         self._means = None  # means of force and rate over the last bin, None after they are processed
         self._work = None  # the generator _follow(), None when it has finished
 
@@ -195,7 +195,7 @@ class DriveAlignment:
         if not speed_mps >= 0.0:
             speed_mps = 0.0
         self._speed_mps = speed_mps
-        if self._silent_us > STALE_US:  # the history's time may have wrapped since the last speed
+        if self._silent_us > STALE_US:  # after a long silence the history's time may have wrapped
             self.events.interrupt()
         self._silent_us = 0
         self._top_mps = max(self._top_mps, speed_mps)

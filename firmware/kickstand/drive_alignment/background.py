@@ -16,7 +16,7 @@ from .verdict import MOVED, REFINED, REVERSED, SAME, compare, turn_round
 
 # Number of passes of the loop whose counts are added up before they are converted to floats, to save time
 _FEED_TURNS = const(2)
-_GAP_MS = const(300)  # a longer time between two readings means that readings are missing
+_GAP_MS = const(300)  # longest time between two readings without a loss of readings
 _LOOK_MS = const(1000)  # time between two calls of _look()
 _FRESH_MS = const(3000)  # largest age of a speed that proves a standstill
 _AWAY_MPS = const(2.0)  # speed above which the vehicle has driven off

@@ -147,7 +147,7 @@ class DrivingEvents:
         # The next three lists describe the last interval between two speeds. Each list has one entry per lag.
         self._ends = [[0] * COLUMNS for _ in range(LAGS)]  # the history's integrals at the end of the interval
         self._known = [False] * LAGS  # True if the integrals at the end of the interval were known
-        self._straight = [False] * LAGS  # True if the vehicle drove straight
+        self._straight = [False] * LAGS  # True if the vehicle drove straight in the interval
         self._end = [0] * COLUMNS
         self._before = (0.0, 0)  # speed and time at the end of the last interval
         self._waiting = []  # speed and time at the end of each interval that is not processed yet
@@ -236,7 +236,7 @@ class DrivingEvents:
         if self._finder.update(change, seconds, straight):
             yield from self._end_event()
         elif self._finder.going_on:
-            if self._finder.change == change:  # the first interval of an event
+            if self._finder.change == change:  # this interval is the first of an event
                 self.last.clear()
             if straight[self.lag]:
                 self.last.add(seconds, change_g, best_force)

@@ -11,13 +11,14 @@ from ..rotation import angle_deg, dot
 from ..units import const
 from .regression import Fit
 
-UNKNOWN = 0  # not enough events yet
+UNKNOWN = 0  # too few events for a verdict
 SAME = 1
 REFINED = 2  # the earlier alignment has a yaw error of a few degrees, and the DriveAlignment's matrix() is better
 REVERSED = 3  # forward points backward, and turn_round() corrects the matrix
 MOVED = 4  # the mount has moved, and the sensor must be aligned again
 
-_MIN_EVENTS_TO_REVERSE = const(2)  # smallest number of straight events that can show REVERSED; all must agree
+# Smallest number of straight events that can show REVERSED; each of them must show it
+_MIN_EVENTS_TO_REVERSE = const(2)
 _SAME_DEG = const(1.0)  # smallest yaw error that is corrected
 # Largest yaw error of two poses. At the smallest allowed tilt, 2 degrees of pitch between the poses cause 22 degrees.
 _REFINED_DEG = const(30.0)

@@ -19,7 +19,7 @@ MOVED_MPS = 2.0  # speed that a vehicle must exceed between two stops
 SETTLE_S = 1.0  # time for which a vehicle rocks after braking
 COUNTS_S = 2.0  # time that a stop must last after SETTLE_S to count
 # Largest difference at a stop between a mean over 0.1 s and a mean with the time constant _AVERAGE_S. An idling diesel,
-# wind and passengers cause less.
+# wind and passengers cause a smaller difference.
 _STILL_G = const(0.06)
 _STILL_DPS = const(3.0)
 _AVERAGE_S = const(0.5)
@@ -61,11 +61,11 @@ class StandingVertical:
 
     def _begin_stop(self):
         """Begin the means of a new stop, because the vehicle has driven."""
-        self._stop_force = [0.0] * 3  # means of this stop
+        self._stop_force = [0.0] * 3  # mean force during the current stop
         self._stop_bias = [0.0] * 3
         self._averaged_s = 0.0
         self._counted = False
-        self._force = None  # mean with the time constant _AVERAGE_S
+        self._force = None  # running mean of the force with the time constant _AVERAGE_S
         self._still_s = 0.0
 
     def update(self, force, rate, speed_mps, seconds):

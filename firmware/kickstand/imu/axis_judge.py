@@ -74,7 +74,7 @@ class AxisJudge:
         notes = watch.notes
         lost, gyro = notes[_CLIPPED], notes[_GYRO_CLIPPED]
         watch.clipped += lost
-        enough = 2 * lost < samples  # good samples to judge
+        enough = 2 * lost < samples  # True if at least half of the samples are good
         shaken = 10 * notes[_SHAKEN] >= samples
         if shaken or not enough:
             self._clips += 1
@@ -115,7 +115,7 @@ class AxisJudge:
                 if quiet[i] < 255:
                     quiet[i] += 1
                 if quiet[i] < limit or not limit:
-                    continue  # too early to judge, so collect the values of more looks
+                    continue  # too few values to judge, so collect the values of more looks
                 dead |= 1 << i
             else:
                 quiet[i] = 0

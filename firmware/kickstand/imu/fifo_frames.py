@@ -21,10 +21,10 @@ LOOK_MS = const(400)  # time between two looks
 _HASH = const(0)  # hash of the last frame
 _REPEATS = const(1)  # number of successive repetitions of the last frame
 _LIMIT = const(2)  # number of repetitions that make a frame dead
-LOST = const(3)  # number of frames with an axis at the end of its range, in this call
+LOST = const(3)  # number of frames in the last call of add_up() with an axis at the end of its range
 _ROW = const(4)  # number of successive frames with an axis at the end of its range
 # The next four entries describe the frames since the last look
-_ENDS = const(5)  # one bit per column that was at the end of its range
+_ENDS = const(5)  # a bit for each column that was at the end of its range
 _CLIPPED = const(6)  # number of frames with an axis at the end of its range
 _GYRO_CLIPPED = const(7)  # number of frames with an axis of the gyro at the end of its range
 _DIFFER = const(8)  # bits of pairs of axes that differed: x and y (bits 1 and 5), y and z (2 and 6), x and z (0 and 4)
@@ -82,7 +82,7 @@ def add_up_python(frames, n, sums, watch):
             byte = frames[at + i]
             if i < 6 and byte == first:
                 same += 1
-            if i < 6 or i > 7:  # all but the temperature, which a working chip may repeat
+            if i < 6 or i > 7:  # all bytes but the temperature, which a working chip may repeat
                 mark = (mark * 31 + byte) & 0xFFFFFF
         if same == 6 and (first == 0 or first == 255):
             return good
@@ -205,7 +205,7 @@ class AxisWatch:
                 self.fault = None
                 return False
             self.fault = tried(self._load)
-            if self.fault:  # out of memory, or the firmware is incomplete
+            if self.fault:  # the judge could not be imported: memory is short, or the firmware is incomplete
                 return False
         return self._judge.look(self, samples)
 
@@ -225,7 +225,7 @@ class AxisWatch:
         return True
 
     def _load(self):
-        gc.collect()  # otherwise the module, which stays loaded, would be placed behind garbage
+        gc.collect()  # without a collection the imported module, which stays loaded, would be placed behind garbage
         from .axis_judge import AxisJudge
 
         self._judge = AxisJudge(*self._settings)

@@ -71,7 +71,8 @@ CHIPS = {
     0x74: ("MPU6515", 333.87, 21.0, True, 512, 0xF8),
     0x78: ("MPU6500 0x78", 333.87, 21.0, True, 512, 0xF8),
     0x98: ("ICM20689", 326.8, 25.0, True, 512, 0xF8),
-    0x19: ("MPU6886", 326.8, 25.0, True, 512, 0x18),  # no bit for the temperature, which the chip always stores
+    # FIFO_EN has no bit for the temperature, which the chip always stores
+    0x19: ("MPU6886", 326.8, 25.0, True, 512, 0x18),
 }
 _NAME = const(0)
 _LSB_PER_C = const(1)
@@ -167,7 +168,8 @@ class Mpu6050:
         except (UnknownChip, OSError) as error:
             if self._settled:
                 raise
-            self.address ^= 1  # AD0 may be wired the other way, or a clock chip may use the first address
+            # Try the other address: AD0 may be wired the other way, or a clock chip may use the first address
+            self.address ^= 1
             try:
                 return self._identify()
             except (UnknownChip, OSError) as other:
@@ -207,12 +209,12 @@ class Mpu6050:
         self.write_register(_PWR_MGMT_1, _RESET)
         yield 100
         self.write_register(_PWR_MGMT_1, _CLOCK_PLL_GYRO_X)
-        yield 60  # a write too soon after a reset is lost without an error
+        yield 60  # ms to wait, because a write too soon after a reset is lost without an error
         for i in range(5 if self._chip()[_HAS_ACCEL_CONFIG2] else 4):
             self.write_register(_SMPLRT_DIV + i, self._configuration[i])
         if not self.configured():
             raise NotKept("MPU6050 configuration does not read back")
-        yield 20  # time for the low-pass to settle
+        yield 20  # ms until the low-pass has settled
 
     def start(self):
         """Start the FIFO of a configured chip. Raises OSError as restart_fifo() does."""
@@ -241,8 +243,8 @@ class Mpu6050:
     def fetch(self):
         """Read samples from the FIFO, and set frames_left.
 
-        After an overflow the frames no longer begin at multiples of 14 bytes. This method then empties the FIFO,
-        increments overflows and returns 0. It also returns 0 while the chip is writing a frame.
+        After an overflow the frames no longer begin at multiples of 14 bytes. If the FIFO has overflowed, fetch()
+        empties the FIFO, increments overflows and returns 0. While the chip is writing a frame, fetch() returns 0 too.
 
         Returns:
             The number of samples read: _MAX_FRAMES if the FIFO holds at least that many, else at most _FEW_FRAMES.

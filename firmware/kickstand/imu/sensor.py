@@ -10,7 +10,7 @@ from .mpu6050 import UnknownChip
 
 _RETRY_MS = const(50)  # time between two attempts to set the chip up
 _FAILURES = const(3)  # number of successive failed transfers that are a fault; one or two are tolerated
-_SILENT_MS = const(100)  # longest time without a sample; a longer time is a fault
+_SILENT_MS = const(100)  # longest time without a sample before a fault is reported
 # Longest time without a sample while the FIFO overflows, because the board has no time to read the FIFO
 _STALE_MS = const(500)
 _SETTLED_MS = const(1000)  # a set-up did not help if a fault comes within this time after it
@@ -142,7 +142,7 @@ class Sensor:
         was just emptied."""
         if self._overflows != self.chip.overflows:
             self._overflows = self.chip.overflows
-            if self._sample_ms != self._emptied_ms:  # at least one sample was read since the last overflow
+            if self._sample_ms != self._emptied_ms:  # True if a sample was read since the last overflow
                 self._read_ms = self._sample_ms
             # now_ms may have been read before the long pause that caused the overflow
             self._sample_ms = self._emptied_ms = ticks_ms()
@@ -182,7 +182,7 @@ class Sensor:
         if not self._running or self._failures:
             return
         try:
-            if not self.chip.configured():  # a supply dip has reset the chip
+            if not self.chip.configured():  # the chip has lost its configuration in a supply dip
                 self._fail("sensor-reset", now_ms)
         except OSError:
             self._missed(now_ms)
@@ -242,7 +242,7 @@ class Sensor:
         except OSError as error:
             self._not_set_up(error)
             return
-        self._running = True  # the fault stays until a good sample arrives
+        self._running = True  # the chip runs, but the fault stays until a good sample arrives
         self._refused = 0
         self._started_ms = now_ms
         self.restarts += 1

@@ -105,7 +105,7 @@ class Consistency:
         self.doubts = 0
         self._fits_s = 0.0
         self._since_s = 0.0  # time since the last doubt
-        self._in_rest = True  # rest counts as fitting
+        self._in_rest = True  # True if time at rest counts as fitting
         self._forget_means()
 
     def _forget_means(self):

@@ -11,7 +11,8 @@ from math import sqrt
 from ..errors import NO_MACHINE_CODE, checked
 from ..units import const
 
-_MIN_VARIANCE = const(1e-10)  # a lower bound, because rounding in 32-bit floats could make a variance negative
+# Lower bound of a variance, because rounding in 32-bit floats could make a variance negative
+_MIN_VARIANCE = const(1e-10)
 # Number of terms of a Jacobian's row that are processed between two yields. Without machine code three terms take a
 # millisecond.
 _TERMS_PER_STEP = const(3)
@@ -46,7 +47,7 @@ else:
     _TRIAL = array("f", (0.65625, 0, 0, -0.75, 8388609, 0, 1e-9, 3e9, -0.984))
     _FACTORS, _SOURCE = array("f", (1.5, -2.6875, 0.75)), array("f", (-0.4375, 98304.5, 1.3125))
     add_products = checked(add_products, add_products_python, _TRIAL, _FACTORS, _SOURCE, 3, 3)
-_KIND = "d" if add_products is add_products_python else "f"  # of the arrays
+_KIND = "d" if add_products is add_products_python else "f"  # type of the arrays' elements
 
 
 class Covariance:
@@ -75,7 +76,7 @@ class Covariance:
         # Parts of _p. The type checker treats the elements of a memoryview as integers.
         self.rows = [every[n * i : n * (i + 1)] for i in range(n)]  # type: list
 
-    def __getstate__(self):  # copy and pickle on a computer cannot copy a memoryview
+    def __getstate__(self):  # without the memoryviews in `rows`, which copy and pickle on a computer cannot copy
         return {name: value for name, value in self.__dict__.items() if name != "rows"}
 
     def __setstate__(self, state):

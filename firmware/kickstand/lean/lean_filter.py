@@ -224,7 +224,7 @@ class LeanFilter:
             return
         if not (abs(x[LEAN]) < 2 * pi and x[SPEED] < _MAX_SPEED):  # also true for NaN
             self.consistency.gap()
-            self._forget()  # the sensor's errors may be NaN too
+            self._forget()  # forget the sensor's errors too, because they may be NaN
             return
         if self._impossible(means, seconds):
             self.consistency.fail("odd-up")
@@ -264,7 +264,7 @@ class LeanFilter:
         turning = max(abs(wx), abs(wy), abs(wz)) > measurements.START_MAX_RATE
         moving = turning or abs(sqrt(fx * fx + fy * fy + fz * fz) - 1.0) > measurements.START_MAX_FORCE
         variances = [sigma * sigma for sigma in measurements.SIGMA_START]
-        posed, self._posed = self._posed, False  # only the first start comes right after the poses
+        posed, self._posed = self._posed, False  # used once, because only the first start comes right after the poses
         if posed:
             variances[BIAS_LEFT : BIAS_LEFT + 3] = [measurements.SIGMA_FRESH_BIAS**2] * 3
         if self._gyro_variances:
@@ -280,7 +280,7 @@ class LeanFilter:
         x = self._x
         x[LEAN] = atan2(fx, fy)
         x[PITCH] = 0.0
-        x[SPEED] = measurements.PRIOR_SPEED if moving else 0.0  # most rides begin at rest
+        x[SPEED] = measurements.PRIOR_SPEED if moving else 0.0  # without a movement the ride begins at rest
         if self._kept_speed:
             x[SPEED], variance = self._kept_speed
             self._p.set_variance(SPEED, variance)
@@ -344,7 +344,8 @@ class LeanFilter:
         sideways = (means[5] - means[7] * x[YAW_ERROR]) / max(means[6], 0.5) - self.trim.angle
         if x[SPEED] < measurements.BALANCE_SPEED or p.rows[SPEED][SPEED] > measurements.SIGMA_BALANCE_SPEED**2:
             sideways = 0.0
-        if abs(means[7]) < measurements.MOST_FORWARD * abs(means[6]):  # otherwise the sensor is not on a bike
+        # A larger force forward means that the sensor is not on a bike
+        if abs(means[7]) < measurements.MOST_FORWARD * abs(means[6]):
             up_misfit = p.misfit
             if abs(x[PITCH]) > 2 * measurements.STEEP:
                 # The equations do not hold in a wheelie, so only the duration of the pitch is judged

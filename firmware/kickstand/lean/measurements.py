@@ -166,8 +166,8 @@ MAX_REST_PUSH = 0.08
 # for rest.
 ROLLING_SPEED = 3.0  # m/s
 ROLLING_SIGMAS = 3.0  # standard deviations of the speed
-# The trim is measured while the standard deviations of speed and lean are below these limits. Larger: the trim is found
-# sooner, but less exactly.
+# The trim is measured while the standard deviations of speed and lean are below SIGMA_TRIM_SPEED and SIGMA_TRIM_LEAN.
+# Larger: the trim is found sooner, but less exactly.
 SIGMA_TRIM_SPEED = 8.0  # m/s
 SIGMA_TRIM_LEAN = radians(1.4)  # rad
 
@@ -204,7 +204,8 @@ def forces(model, means, roll_acceleration, force_error, dive=0.0):
         force_error: relative error of the accelerometer's magnitude, as found at rest.
         dive: the result of Dive.update(), in g.
     """
-    rolling = roll_acceleration / STANDARD_GRAVITY  # in g per metre of height, like `square` below
+    # Effect of roll acceleration on the force, in g per metre of height, like `square` below
+    rolling = roll_acceleration / STANDARD_GRAVITY
     uncertain = _SIGMA_ROLL_HEIGHT_M * rolling
     left = means[0]
     shaken = max(0.0, means[8] - left * left)
@@ -259,6 +260,6 @@ def at_rest(model, means, speed, axis):
     return (
         (((SPEED, 1.0),), -speed, SIGMA_REST_SPEED**2),
         (((BIAS_LEFT + axis, 1.0),), means[2 + axis], SIGMA_REST_RATE**2),
-        (model.left_row[0:2], means[0] + model.sideways, _SIGMA_REST_FORCE**2),  # only LEAN and PITCH
+        (model.left_row[0:2], means[0] + model.sideways, _SIGMA_REST_FORCE**2),  # only the terms of LEAN and PITCH
         (((PITCH, model.cos_pitch),), means[7] - model.sin_pitch, _SIGMA_REST_FORCE**2),
     )

@@ -19,7 +19,8 @@ _FALLEN_US = const(1_000_000)
 # Half of the time for which a lean must last to count as a maximum. The jerk of a pothole is shorter than the whole
 # time
 HELD_US = 75_000
-_WHEELIE_DEG = const(20.0)  # pitch. No road is so steep, and the filter's equations do not hold in a wheelie.
+# Pitch of a wheelie. No road is so steep, and the filter's equations do not hold in a wheelie.
+_WHEELIE_DEG = const(20.0)
 
 
 class LeanMeter:

@@ -7,7 +7,7 @@ from ..units import const
 
 # Largest deviation of a window's mean from the recent average at rest. Larger: smooth roads are mistaken for rest.
 _MAX_FORCE_G = const(0.010)  # g
-_MAX_RATE_RADPS = const(0.009)  # rad/s (0.5 deg/s)
+_MAX_RATE_RADPS = const(0.009)  # rad/s (equal to 0.5 deg/s)
 # rad/s (1.2 deg/s): largest mean rate that may be bias. Larger: smooth bends are mistaken for rest.
 MAX_BIAS_RADPS = 0.02
 # rad/s: largest mean rate that may be bias before the first rest, because the bias has drifted since the calibration.

@@ -143,7 +143,8 @@ class Live:
         send nothing."""
         period_ms = self.period_ms
         self._due_ms = ticks_add(self._due_ms, period_ms)
-        if ticks_diff(now_ms, self._due_ms) >= 0:  # the loop is late by more than a period
+        # The next packet is already due: the loop is late by more than a period
+        if ticks_diff(now_ms, self._due_ms) >= 0:
             self._due_ms = ticks_add(now_ms, period_ms)
         if not self._n:
             return

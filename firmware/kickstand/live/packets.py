@@ -8,7 +8,7 @@ from struct import pack_into, unpack_from
 
 from ..units import const
 
-VERSION = 1  # version of our own packets
+VERSION = 1  # version of Kickstand's own packets
 # Kinds of packets, which are also the indices in `intervals`. RaceChrono's packet ids are higher by 1
 LEAN, MOTION, SPEED, OWN = range(4)
 _FASTEST_MS = const(40)  # shortest interval between two packets of the same kind

@@ -83,7 +83,7 @@ class Radio:
                 self.inbox.append((data[1], self._ble.gatts_read(data[1])))
         elif event == _CONNECTED or event == _DISCONNECTED:
             self.phone = data[0] if event == _CONNECTED else None
-            self.changed = True  # set first, because the next lines may run out of memory
+            self.changed = True  # set before the next lines, because they may run out of memory
             self.inbox = []
         elif event == _PASSKEY:
             getattr(self._ble, "gap_passkey")(data[0], data[1], self._pin)  # noqa: B009 missing in the stubs of rp2

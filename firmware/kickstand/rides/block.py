@@ -63,7 +63,7 @@ MAX_DT_US = 1 << 29  # the longest time between two passes that an entry can hol
 _HEAD_LENGTH = struct.calcsize(HEAD)
 _TAIL_LENGTH = struct.calcsize(TAIL)
 _PLACE_LENGTH = struct.calcsize(PLACE)
-_WORST = (FIELDS + 1) * (LIMIT + RAW_BITS) // 8 + 2  # the most bytes that an entry with samples and a speed can take
+_WORST = (FIELDS + 1) * (LIMIT + RAW_BITS) // 8 + 2  # the most bytes that samples and a speed can take together
 # Indices in the state of the coder, an array('i', 22). The first FIELDS values are the previous entry. The others are:
 # * from _MEANS on, the mean size of each of the FIELDS values
 # * _PENDING: the bits that do not yet fill a byte; _BITS: the number of these bits
@@ -197,7 +197,7 @@ class RideBlock:
         self._chip = chip
         self.length = length
         self.count = self._places = 0
-        self._end = length - _TAIL_LENGTH  # where the positions begin
+        self._end = length - _TAIL_LENGTH  # index in the buffer where the positions begin
 
     def add(self, sums, n, dt_us):
         """Append the samples of a pass of the loop.

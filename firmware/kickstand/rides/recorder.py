@@ -75,7 +75,7 @@ class Recorder:
         self._interrupted = False
         self._speed = self._place = None  # the last speed (cm/s) and position since the previous pass of the loop
         self._waiting = None  # the block being written
-        self._at = 0  # number of bytes of this block that are already written
+        self._at = 0  # number of bytes of `_waiting` that are already written
         self.active = True
         self._begin_block()
 
@@ -113,7 +113,7 @@ class Recorder:
             dt_us: microseconds since the previous samples.
         """
         now_ms = ticks_ms()
-        if self._interrupted:  # the replay recognises a gap by its length, and restarts its filter as the board did
+        if self._interrupted:  # a replay recognises a gap by its length, and restarts its filter as the board did
             self._interrupted = False
             if self._time_us != self._start_us:
                 dt_us = max(GAP_US + 1, min(MAX_DT_US, ticks_diff(now_ms, self._before_ms) * 1000))

@@ -48,14 +48,14 @@ class Recording:
             try:  # an ESP32 makes a directory so slowly that the first readings would be lost, so make it now
                 self.recorder.keeper.begin()
             except (OSError, MemoryError):
-                pass  # start() reports this fault
+                pass  # start() reports a failure
 
     def _make(self):
         """Create the Recorder, as a generator of short steps. Each step imports one of the modules that only recording
         needs."""
         names = ["block", "recorder"] if self._keeper else ["block", "ride_paths", "flash_ring", "recorder"]
         for name in names + ["card_trial"] * self.on_card:
-            gc.collect()  # otherwise the module, which stays loaded, would be placed behind garbage
+            gc.collect()  # without a collection the imported module, which stays loaded, would be placed behind garbage
             __import__("kickstand.rides." + name)
             yield
         from .recorder import Recorder
@@ -102,7 +102,7 @@ class Recording:
         does not restart, so the replay's filter at first knows the gyro's errors less well than the board's filter."""
         if self._meter.at_rest:
             self._calibration.restart()
-        if self._refused and not self.on_card:  # a card must be tested before the watchdog runs
+        if self._refused and not self.on_card:  # not for a card, which must be tested before the watchdog runs
             self._refused, self._steps = None, self._make()
         self._finish()
         if not self._refused:

@@ -11,7 +11,7 @@ from time import ticks_diff, ticks_ms
 from ..console import say
 from ..units import const
 
-_LENGTH = const(512)  # bytes in a ride block, about half a second of a ride
+_LENGTH = const(512)  # bytes in a ride block over USB, about half a second of a ride
 _SLOW_APART_MS = const(60_000)  # time within which two slow prints end the ride
 
 

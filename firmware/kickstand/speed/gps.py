@@ -59,7 +59,7 @@ class Gps:
 
     def __init__(self, uart):
         self._uart = uart
-        self._line = b""  # the sentence so far
+        self._line = b""  # the part of a sentence that has arrived so far
         self._heard_ms = None  # ticks_ms() when the receiver last sent any byte
         # ticks_ms() of the last whole sentence, of the last sentence with a fix, and of the last _carry()
         self._sentence_ms = self._fix_ms = self._carried_ms = 0
@@ -67,14 +67,14 @@ class Gps:
         self._other = b""  # a received kind of sentence or message without a speed
         self._time = b""  # time of day in the last RMC
         # A fix is stored as (ticks_ms() at its arrival, its time of day in ms).
-        self._reference = None  # the fix from which delays are counted
+        self._reference = None  # the fix from which the delays of other fixes are counted
         self._earliest = None  # the fix with the smallest delay since the reference was set
-        self._earliest_delay_ms = 0  # the delay of this fix
+        self._earliest_delay_ms = 0  # the delay of the fix `_earliest`
         self._fixes = 0  # number of fixes with a delay since the reference was set
         self._since_ms = 0  # ticks_ms() when the reference was set
         self.age_ms = 0
         self._fix = None  # fields of the RMC with the last speed; None if the speed was from a VTG
-        self._day_ms = 0  # the time of day in that RMC
+        self._day_ms = 0  # the time of day in the RMC with the last speed, in ms
         self._place = array("i", (0, 0, 0, 0))
 
     def poll(self, now_ms):
@@ -109,7 +109,7 @@ class Gps:
             end = chunk.find(b"\n")
         self._line += chunk
         beyond = len(self._line) - _MAX_SENTENCE
-        if beyond > 0:  # the end of a line was lost, so keep only what may be the beginning of the next line
+        if beyond > 0:  # the end of a line was lost, so keep only bytes that may begin the next line
             self._line = self._line[max(beyond, self._line.rfind(b"$")) :]
         return speed
 

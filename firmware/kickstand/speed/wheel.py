@@ -15,7 +15,7 @@ from machine import Pin
 from ..errors import Notice
 from ..units import const
 
-_MAX_MPS = const(100.0)  # pulses that imply a higher speed are interference
+_MAX_MPS = const(100.0)  # largest speed of a wheel; pulses that imply a higher speed are interference
 # A contact that was open for less than _BOUNCE_US, and for less than a quarter of the shortest period, bounces
 _BOUNCE_US = const(3000)
 _STOPPED_MPS = const(0.5)  # speed below which a wheel counts as standing
@@ -87,7 +87,7 @@ class Wheel:
             self._edges = STORM_EDGES
             if (now - self._edges_us) & _TICKS < STORM_US:
                 self._off = True
-                pin.irq(None)  # turn off here, because in a storm the loop may get no time; this call takes no heap
+                pin.irq(None)  # turned off here, because in a storm the loop may get no time; irq(None) takes no heap
             self._edges_us = now
         if pin.value():
             self._opened_us = now
@@ -129,7 +129,7 @@ class Wheel:
         if waited_ms < _REPORT_MS:
             return None
         count, pulse_us = self.count, self._pulse_us
-        while count != self.count:  # a pulse arrived between the two reads
+        while count != self.count:  # repeat if a pulse arrived between the two reads
             count, pulse_us = self.count, self._pulse_us
         pulses = (count - self._seen) & _COUNT
         if pulses:

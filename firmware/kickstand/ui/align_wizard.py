@@ -50,7 +50,7 @@ class AlignWizard(Wizard):
         self._lines = (_TAKING[self.upright], pages.progress_bar(done, total) or restless)
 
     def _spoilt(self, problem, now_ms):
-        self._show(ASKING, messages.lines(problem), problem)  # the next press takes the pose again
+        self._show(ASKING, messages.lines(problem), problem)  # with the next press the pose is taken again
 
     def _pose_done(self, pose, now_ms):
         """Keep the first pose. After the second pose compute and save the alignment.

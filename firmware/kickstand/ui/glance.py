@@ -12,7 +12,7 @@ from . import pages
 
 DIGIT_WIDTH, DIGIT_HEIGHT = 24, 40
 _PITCH = 28  # number of columns from one digit to the next
-_ARC_RADIUS, _ARC_DEG, _ARC_WIDTH = 100, 60, 7  # one degree of lean is one column of the arc
+_ARC_RADIUS, _ARC_DEG, _ARC_WIDTH = 100, 60, 7  # the arc has one column per degree of lean
 _G_PIXELS = 60  # length of the bar for 1 g
 _SMALL_Y = 56  # top row of the last line, which has letters of 8x8 pixels
 
@@ -107,7 +107,7 @@ def _unsure(canvas, reason):
     for x in (38, 66):
         canvas.fill_rect(x, 18, DIGIT_WIDTH, 8, 1)
     canvas.tall(" " * ((17 - len(reason)) // 2) + reason, 5, True)
-    for y in (39, 56):  # a bright row between the letters and the edge of the band
+    for y in (39, 56):  # a bright row above and below the letters
         canvas.hline(0, y, 128, 1)
 
 

@@ -171,7 +171,7 @@ class Screen:
                 break
         self._drop_ended()
         if view is self._question:
-            self.pages.first()  # the first page will be shown after the rider's answer
+            self.pages.first()  # go to the first page, which is shown after the rider's answer
         return view, lines
 
     def _drop_ended(self):
