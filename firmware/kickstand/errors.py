@@ -1,4 +1,4 @@
-"""Errors and notices. Each has a code and the values for its sentence.
+"""Errors and notices. Each error and each notice has a code and the values for its sentence.
 
 A code is a name for programs and is never shown. Three modules have words for each code:
 * ui/messages.py for the display, in two lines of 16 characters

@@ -23,7 +23,7 @@ from .i2c_controller import TimedI2C
 # Keys of rp2040py's table of peripherals. A key is a peripheral's address, shifted right by 12 bits
 _SSI = 0x18000
 _I2C = (0x40044, 0x40048)
-_OSCILLATORS = WDSEL_XOSC | WDSEL_ROSC  # the SDK makes the watchdog's reset spare these oscillators
+_OSCILLATORS = WDSEL_XOSC | WDSEL_ROSC  # oscillators that the SDK excludes from the watchdog's reset
 _ACCESS = ("read_uint8", "read_uint16", "read_uint32", "write_uint8", "write_uint16", "write_uint32")
 
 

@@ -149,7 +149,7 @@ class Machine:
         self.tell(kind, a, b)
         answer = self._link.recv(1)
         if not answer:
-            os._exit(0)  # the other process has ended or has cut the power
+            os._exit(0)  # end, because the other process has ended or has cut the power
         return answer[0]
 
     def _receive(self, size: int) -> bytes:
@@ -365,7 +365,8 @@ def _end(unraisable) -> None:
 
 
 def main() -> None:
-    sys.unraisablehook = _end  # ends this process too if the other process has ended
+    # An exception in a call from QEMU ends this process; one cause is that the other process has ended
+    sys.unraisablehook = _end
     number, folder, flash, *wires = sys.argv[1:]
     link = socket.socket(fileno=int(number))
     pairs = [(int(sda), int(scl)) for sda, scl in (pair.split(",") for pair in wires)]

@@ -59,7 +59,7 @@ class Wires:
         if self._mode == _LISTENS and self._bit <= 8:
             self._byte = self._byte << 1 | self._driven_sda
         elif self._mode == _SENDS and self._bit == 9 and self._driven_sda:
-            self._mode = _IDLE  # the chip does not acknowledge the last byte that it reads
+            self._mode = _IDLE  # wait for a START, because the chip does not acknowledge the last byte that it reads
 
     def _clock_falls(self) -> None:
         if self._mode == _LISTENS and self._bit == 8:

@@ -64,7 +64,8 @@ def build() -> bool:
         return True
     if sys.platform != "linux" or not compiler or not Path(sysconfig.get_path("include"), "Python.h").is_file():
         return False
-    with contextlib.suppress(OSError):  # the disk is full, the home is read-only, or another process was faster
+    # OSError: the disk is full, the home is read-only, or another process was faster
+    with contextlib.suppress(OSError):
         wanted.parent.mkdir(parents=True, exist_ok=True)
         # The folder is renamed at the end, so the context cannot remove it
         with tempfile.TemporaryDirectory(dir=wanted.parent, ignore_cleanup_errors=True) as made:

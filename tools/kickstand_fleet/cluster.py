@@ -33,7 +33,7 @@ Outcome = tuple[int, Any | None, str, str]
 _LOCAL_PATIENCE_S, _REMOTE_PATIENCE_S = 60.0, 20.0  # longest time to wait for the first worker
 # Longest wait for the restart of a worker. A restart after this time would end the worker's next task, too
 _RESTART_S = 120.0
-_LOST_S = 60.0  # longest time without any worker. Dask replaces a dead worker sooner, if it can
+_LOST_S = 60.0  # longest time without a worker. Dask replaces a dead worker sooner, if it can
 
 
 def run_tasks(
@@ -190,7 +190,7 @@ class Cluster:
             if status == "finished":
                 try:
                     result = future.result()
-                except Exception:  # the task's worker died before the result was fetched
+                except Exception:  # the worker of the task died before the result was fetched
                     suspects.append(index)
                 else:
                     yield index, result, "", ""

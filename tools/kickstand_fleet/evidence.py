@@ -125,8 +125,9 @@ def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
     standing = (mean_mps < STANDING_MPS) & (np.abs(a) < 0.01)
     if kind == MOTORCYCLE:
         terms = np.column_stack((np.sqrt(1.0 + c * c), a, np.zeros_like(a), np.zeros_like(a)))
-        weight = length * (mean_mps > MOVING_MPS)  # at lower speeds the rider has a foot on the ground
-        shown = np.zeros_like(a)  # sway is not used: a motorcycle sways about its tyre contacts and with its rider
+        # A motorcycle at a lower speed has no weight, because the rider may have a foot on the ground
+        weight = length * (mean_mps > MOVING_MPS)
+        shown = np.zeros_like(a)  # no sway, because a motorcycle sways about its tyre contacts and with its rider
     else:
         around = [np.clip(time + ahead, log.t_s[0], log.t_s[-1]) for ahead in (-SWING_S / 2.0, SWING_S / 2.0)]
         sooner, later = (_integrals(rate.T, log.t_s, step, at) for at in around)

@@ -117,7 +117,7 @@ def identities(paths: Iterable[str]) -> dict[str, str]:
             try:
                 stat = Path(path).stat()
                 known[path] = f"{stat.st_size}-{stat.st_mtime_ns}"
-            except (OSError, ValueError):  # a name that contains a NUL
+            except (OSError, ValueError):  # OSError or ValueError: the name contains a NUL
                 known[path] = ""
             continue
         parent = path.rpartition("/")[0]
@@ -197,7 +197,7 @@ def write_bytes(path: str, content: bytes) -> None:
             fs.pipe_file(place, content)
         return
     directory = Path(path).parent
-    try:  # a directory created here stays if the write fails, because other workers use it too
+    try:  # a new directory stays if the write fails, because other workers use it too
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{directory} cannot be made: {cause(error)}") from error

@@ -17,8 +17,9 @@ from kickstand_tools.signals import Array, rotation_vector
 from . import evidence
 from .evidence import Intervals
 
-SENSOR_DEG = 0.3  # standard error of forward, in degrees, if the scales of the sensor's axes differ by 1 %
-CORRELATION = 0.5  # correlation between the errors of the two methods, which use the same braking
+SENSOR_DEG = 0.3  # standard error of forward, in degrees, caused by a scale difference of 1 % between the sensor's axes
+# Correlation between the errors of the firmware's and this module's forward, which use the same braking
+CORRELATION = 0.5
 # Largest difference between the two methods, in standard deviations, that does not increase the standard error of
 # forward
 APART_SIGMAS = 2.0

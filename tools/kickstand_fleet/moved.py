@@ -24,7 +24,9 @@ LEAST_DEG = 3.2  # smallest rotation that is reported. Roads, load and temperatu
 # because a log has many moments, and one of them may exceed a low limit by chance
 BETWEEN_SIGMAS, WITHIN_SIGMAS = 3.3, 4.3
 SUDDEN_SIGMAS = 3.8  # the limit within a log for a moment at which the vertical jumps
-SUSPECTED_SHARE = 0.7  # factor on the three limits if the firmware suspects that the mount moved
+# BETWEEN_SIGMAS, WITHIN_SIGMAS and SUDDEN_SIGMAS are multiplied by this value if the firmware suspects that the mount
+# moved
+SUSPECTED_SHARE = 0.7
 # Standard deviations, in degrees, of the errors that are constant before the moment or after it. The three values are
 # for pitch, yaw and roll (about left, up and forward). ROAD_DEG is for two parts of one log, OTHER_ROAD_DEG for two
 # logs
@@ -44,11 +46,11 @@ SWAY_DEG, SWAY_WORST_DEG, SWAY_SIGMAS = 0.7, 5.0, 3.0
 # A tilt larger than this within a log, in degrees, is reported even if it is gradual. The slopes of roads differ by
 # less
 SURELY_DEG = 8.0
-TILT_DEG = 2.2  # a rotation with a smaller tilt counts as a rotation about the vertical
+TILT_DEG = 2.2  # a rotation with a smaller tilt, in degrees, counts as a rotation about the vertical
 # To find a jump, the vertical during the STEP_S before a moment is compared with the vertical during the STEP_S after
 # it. The readings within STEP_GAP_S of the moment are left out
 STEP_S, STEP_GAP_S = 8.0, 1.0
-STEP_SHARE = 0.7  # a tilt is sudden if more than this share of it happens at one moment
+STEP_SHARE = 0.7  # a tilt is sudden if more than this share of the tilt happens at one moment
 
 
 @dataclass
@@ -212,9 +214,11 @@ def _moment_of_jump(log: Intervals, move: Move) -> float | None:
     if np.count_nonzero(near) < 10:
         return None
     found, varied = fits(terms[near].T @ terms[near], terms[near].T @ force[near])
-    level = (force - terms[:, 1:] @ found[1:]) / terms[:, :1]  # the vertical: the force minus the effects of driving
+    # The vertical: the measured force minus the effects of driving
+    level = (force - terms[:, 1:] @ found[1:]) / terms[:, :1]
     left, _, forward = frames(found, varied)
-    tips = (left * move.turn_deg[2] - forward * move.turn_deg[0]) / tilt  # unit vector in which the vertical moves
+    # Unit vector of the direction in which the vertical moves
+    tips = (left * move.turn_deg[2] - forward * move.turn_deg[0]) / tilt
     best, moment = 0.0, move.at_s
     for now in time[np.abs(time - move.at_s) < 2.5 * STEP_S]:
         early = (time > now - STEP_GAP_S - STEP_S) & (time < now - STEP_GAP_S)

@@ -137,7 +137,7 @@ def _share(part: int, whole: int) -> str:
 def _quality(values: Sequence[float]) -> Markup:
     if not values:
         return Markup()
-    top = 1.6  # standard errors of aligned vehicles are under 1.5 degrees
+    top = 1.6  # right end of the scale in degrees; standard errors of aligned vehicles are under 1.5
     title = f"Standard error of forward, median {statistics.median(values):.2f}°"
     return _histogram(values, top, 26, title, 230, "degrees", "vehicles", _BLUE)
 

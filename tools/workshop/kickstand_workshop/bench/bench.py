@@ -167,7 +167,8 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
             device.fit_wheel(lambda t_s: _SPEED_MPS)
         code = f"{device.SINK}import bench_guest\nbench_guest.run({detail}, {seconds}, Sink(), {chosen})\n"
         said = device.exec(code, limit_s=2.0 * seconds + 30.0)
-        result["figures"] = ast.literal_eval(said.rpartition("\x02")[2].strip())  # figures follow the output of a Sink
+        # The figures follow the output of a Sink
+        result["figures"] = ast.literal_eval(said.rpartition("\x02")[2].strip())
     turns = result["figures"]["turns"]
     result["took"] = arrays[0][:turns]
     asked_for = arrays[1][: result["figures"]["collections_by_app"]]

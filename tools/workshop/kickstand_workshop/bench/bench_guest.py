@@ -41,7 +41,8 @@ class Canary:
     MARK = 0x5AC3
 
     def arm(self):
-        self._address = addressof(array("H", [self.MARK] * 8))  # an address does not keep the array alive
+        # Only the address, because a reference would keep the array alive
+        self._address = addressof(array("H", [self.MARK] * 8))
 
     def died(self):
         return mem16[self._address] != self.MARK
@@ -59,7 +60,7 @@ class TimedGc:
             return
         start = ticks_us()
         gc.collect()
-        app_module.fill_gaps(app_module.SINGLE_GAPS)  # the app does the same after each collection
+        app_module.fill_gaps(app_module.SINGLE_GAPS)  # as the app does after each collection
         if app.n_pauses < MAX_PAUSES:
             app.pauses[app.n_pauses] = min(ticks_diff(ticks_us(), start), 65535)
             app.n_pauses += 1
@@ -103,7 +104,7 @@ class MeasuredApp(app_module.App):
 
     def _begin(self):
         gc.collect()
-        app_module.fill_gaps(app_module.SINGLE_GAPS)  # the app does the same after each collection
+        app_module.fill_gaps(app_module.SINGLE_GAPS)  # as the app does after each collection
         self.free_before = gc.mem_free()
         gc.disable()
         self._allocated = gc.mem_alloc()

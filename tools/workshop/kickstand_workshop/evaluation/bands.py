@@ -16,7 +16,7 @@ BANDS_HZ = ((0.03, 0.1), (0.1, 0.3), (0.3, 1.0), (1.0, 3.0), (3.0, 10.0))
 QUANTITIES = ("vertical, g", "sideways, g", "pitch rate, deg/s", "yaw rate, deg/s", "roll rate, deg/s")
 _GRID_HZ = 50.0
 _LEAST_S = 2.0 / BANDS_HZ[0][0]
-_RIDING_DPS = 5.0  # a standing bike rotates more slowly than this
+_RIDING_DPS = 5.0  # largest rate of a standing bike
 
 Figures = dict[str, NDArray[np.float64]]
 

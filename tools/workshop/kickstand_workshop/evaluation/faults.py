@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 SEEN, ILL, HARMLESS = "seen", "ill", "harmless"
-ACCEL_RANGE_G, GYRO_RANGE_DPS = 16.0, 500.0  # the board's defaults
+ACCEL_RANGE_G, GYRO_RANGE_DPS = 16.0, 500.0  # ranges of the sensor, the defaults of a board
 
 
 @dataclass

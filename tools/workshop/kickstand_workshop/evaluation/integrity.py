@@ -172,7 +172,7 @@ def _made(
     made = ride(profile, seed, seconds, road=road, mount=mount)
     try:
         return made, calibrated_by_poses(made)
-    except InputError:  # the slanted pose refuses sensors with large cross-axis errors
+    except InputError:  # calibrate without the slanted pose, which refuses sensors with large cross-axis errors
         return made, calibrated_by_poses(replace(made, poses=made.poses[:6]))
 
 

@@ -99,7 +99,7 @@ class Tests:
                 os.killpg(child, signal.SIGKILL)
                 _, status = os.waitpid(child, 0)
         with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(child, signal.SIGKILL)  # also end the processes that the tests started
+            os.killpg(child, signal.SIGKILL)  # end the processes that the tests started, too
         if os.WIFSIGNALED(status):
             return TIMED_OUT
         return SURVIVED if os.WEXITSTATUS(status) == 0 else KILLED
@@ -109,7 +109,8 @@ class Tests:
         status = 3
         try:
             os.setpgid(0, 0)
-            for number in (signal.SIGTERM, signal.SIGHUP):  # as at the start of a program, which some tests rely on
+            # Default handlers, as at the start of a program, which some tests rely on
+            for number in (signal.SIGTERM, signal.SIGHUP):
                 signal.signal(number, signal.SIG_DFL)
             os.dup2(self._output.fileno(), 1)
             os.dup2(self._output.fileno(), 2)

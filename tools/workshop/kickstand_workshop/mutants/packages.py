@@ -34,7 +34,8 @@ PACKAGES = {
     ),
     "lean": _package(
         "firmware/kickstand/lean/*.py",
-        "lean/test_known_ride lean/test_filter_states lean/test_[bkmru]* lean/test_formula",  # the others take longer
+        # All other tests of lean take longer
+        "lean/test_known_ride lean/test_filter_states lean/test_[bkmru]* lean/test_formula",
     ),
     "drive_alignment": _package(
         "firmware/kickstand/drive_alignment/*.py",
