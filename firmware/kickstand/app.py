@@ -6,7 +6,7 @@ collects garbage, feeds the watchdog and waits until the next pass is due.
 
 Most of a pass is spent in the methods step, turn, _pass_on, LeanMeter.update_sum and Sensor.fetch. Each of these
 methods must need at most eleven words for locals and stack, because MicroPython puts a larger stack frame on the heap.
-After such a frame is freed, MicroPython's next search for free memory begins at its place on the heap. The search then
+After a frame on the heap is freed, MicroPython's next search for free memory begins where the frame was. This search
 scans all garbage since the last collection, which takes up to 1 ms per pass.
 """
 
@@ -27,10 +27,11 @@ from .ui.screen import Screen
 from .units import const
 
 LOOP_US = 10_000  # length of a pass of the loop in us; the chip's FIFO can keep samples for much longer
-# Passes of the loop between two garbage collections. These passes use 80 KB of heap. While recording, 91 KB are free
+# Passes of the loop between two garbage collections. The passes between two collections use 80 KB of heap. While
+# recording, 91 KB of heap are free
 _COLLECT_TURNS = const(40)
-# Passes between two garbage collections while aligning by driving, and with an OLED, a phone or user.py. These passes
-# use 46 KB of heap. While aligning by driving, 72 KB are free
+# Passes between two garbage collections while aligning by driving, and with an OLED, a phone or user.py. The passes
+# between two collections use 46 KB of heap. While aligning by driving, 72 KB of heap are free
 _COLLECT_TURNS_DRIVING = const(23)
 # Number of collections between two checks of the free heap. A check takes 3 ms on an ESP32. If the drive, an OLED, a
 # phone or user.py also uses heap, the app checks after each collection.
@@ -38,8 +39,8 @@ _PLAN_EVERY = const(4)
 SINGLE_GAPS = 300  # number of free heap blocks that lie alone after a collection
 _PAGE_MS = const(100)
 # A lean on the display must be at most half a second old. So a page shows no lean if its own delay plus the age of the
-# readings in the FIFO is longer than _LATE_MS. A display that draws needs about _DRAWING_MS more to send a picture
-# (estimated).
+# readings in the FIFO is longer than _LATE_MS. A display that draws needs about _DRAWING_MS longer to send a picture
+# than another display needs to send its lines (estimated).
 _LATE_MS = const(400)
 _DRAWING_MS = const(200)
 # Time from the start of the sensor to the first page, long enough for the lean filter's first window
@@ -204,7 +205,8 @@ class App:
             self._pass_on(n, dt_us, now_ms)
         if self.drive:
             self._poll_speed(now_ms)
-        # Compared here and again below, because a local variable would put this method's stack frame on the heap
+        # The times are compared twice in this method, because a local variable would put the method's stack frame on
+        # the heap
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self.sensor.check(now_ms)
         if self.sensor.fault is not None:

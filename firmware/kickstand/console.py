@@ -1,6 +1,6 @@
 """The sentences for the board's USB console. Each code (see errors.py) has one sentence.
 
-This module is imported only when there is something to print. On most boards that is never the case.
+This module is imported only when there is something to print. Most boards never print anything.
 """
 
 from .units import const

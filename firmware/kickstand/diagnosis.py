@@ -156,7 +156,7 @@ def fifo_fault(chip):
     values[0] of the Notice is the fault in words. The test takes up to 0.3 s and leaves the FIFO empty. Raises OSError
     from the bus."""
     chip.restart_fifo()
-    left = chip.waiting()  # not 0 if a sample has arrived since the restart
+    left = chip.waiting()  # not 0 if a sample has arrived since the restart of the FIFO
     chip.write_register(_INT_ENABLE, 1)
     before = _reading(chip)
     sleep_ms(_PERIODS * chip.period_ms)

@@ -71,8 +71,8 @@ _TABLE = {
     "GPS_BAUD": (9600, _whole(4800, 115_200)),
     "PULSES_PER_METRE": (0.5, (_pulses, "pulses along a metre of road, from 0.1 to 100")),
 }
-# The table of the pins, in the same form. A wrong pin is replaced by None, because the default pin may be connected to
-# something else.
+# The settings of the pins, as entries like those of _TABLE. A wrong pin is replaced by None, because the default pin
+# may be connected to something else.
 _PINS = {
     "SENSOR_SDA": (port.SENSOR_PINS[0], _PIN),
     "SENSOR_SCL": (port.SENSOR_PINS[1], _PIN),

@@ -61,7 +61,7 @@ def main(loop=None):
             print("Kickstand %s: safe mode, the button was held at power-up." % __version__)
             _show(lcd, "Safe mode", "Ready for USB")
             return
-        lcd.show("Kickstand", "starting")  # replaces a lean shown before a reset
+        lcd.show("Kickstand", "starting")  # replace a lean that was shown before a reset
         run(chosen, lcd, loop)
     except SettingsError as error:
         # the watchdog may be running, because the app finds some wrong pins only when it opens them

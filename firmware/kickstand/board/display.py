@@ -42,7 +42,8 @@ _PROBE_MS = const(200)  # time between two searches for a missing display
 # Longest time between two searches. While a driver cannot be loaded, the time is doubled, but not beyond MOST_WAIT_MS
 MOST_WAIT_MS = 60_000
 _REOPEN_PROBES = const(5)  # number of searches without a display after which the bus is freed
-_POWER_UP_MS = const(40)  # time after the start in which a found display may have been powered together with the board
+# A display found within this time after the start may have been powered together with the board
+_POWER_UP_MS = const(40)
 _FLUSH_STEPS = const(60)
 _STEP_MS = const(5)
 

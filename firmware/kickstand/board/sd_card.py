@@ -11,7 +11,7 @@ MOUNT = "/sd"
 
 
 def mount(settings):
-    """Mount the card unless it is already mounted. Return its directory. settings: a Settings. Raises CardError.
+    """Mount the card unless it is already mounted. Return the card's directory. settings: a Settings. Raises CardError.
 
     If the card does not become ready, the attempt takes 5 s or more."""
     # The directory of a mounted card is listed without a size. A folder in flash with the same name has a size.

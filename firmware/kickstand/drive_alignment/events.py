@@ -23,7 +23,7 @@ _MAX_WAITING = const(4)  # number of intervals that can wait while an earlier in
 # Largest yaw rate of straight driving. At 10 m/s a yaw rate of 2 deg/s causes a lateral force of 0.036 g, a fifth of
 # the force of braking. The regression removes most of this lateral force.
 _STRAIGHT_DPS = const(2.0)
-# Lowest speed of an interval that is used. At lower speeds steering angles are large, and a stop ends with a jerk.
+# Lowest mean speed of an interval that is used. At lower speeds steering angles are large, and a stop ends with a jerk.
 _MIN_SPEED_MPS = const(1.0)
 _MAX_FORCE_G = const(3.0)  # largest mean force of an interval that is used; a larger force means a knock on the sensor
 

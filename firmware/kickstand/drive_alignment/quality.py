@@ -21,7 +21,8 @@ MIN_EVENTS_TO_CHECK_SPEED = 2
 
 # Largest standard error of forward. In one of ten drives, the real error of forward is twice the standard error
 READY_DEG, STAY_READY_DEG = 1.5, 2.5
-# Largest angle between the forward directions of the two halves. The same limits hold for the two parts of a drive
+# Largest angle between the forward directions of the two halves. The limits also hold for the angle between the two
+# parts of a drive
 AGREE_DEG, STAY_AGREE_DEG = 4.0, 6.0
 # Largest difference between two parts in standard deviations of the difference, if it exceeds the limit in degrees
 AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0
@@ -29,7 +30,8 @@ AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0
 # Difference of forward. A long banked motorway curve that was treated as straight caused a difference of 15 degrees
 _MOVED_DEG = const(30.0)
 PITCH_DEG = 7.0  # difference of pitch. A road that climbs by 6 % and then falls by 6 % causes a smaller difference
-# Difference of roll, for a car only, because a motorcycle leans. The banked curve caused 6 degrees
+# Difference of roll, for a car only, because a motorcycle leans. The same motorway curve caused a difference of 6
+# degrees
 ROLL_DEG = 7.0
 # The mount moved if forward from one event differs by over _EVENT_OFF_DEG from forward of the whole drive. An event is
 # judged only if its weight and the length of its forward exceed the two limits below. On recorded drives no such event

@@ -15,7 +15,7 @@ _TURNING_DPS = const(5.0)  # largest yaw rate of a second that counts, because a
 _STUCK_S = const(8)
 _STUCK_SHARE = const(0.15)
 # Limits of the ratio between the change of force and the change of speed. The ratio should be 1. The pitch of a braking
-# vehicle and a coarsely rounded speed shift it by 0.2.
+# vehicle and a coarsely rounded speed shift the ratio by 0.2.
 MIN_FORCE_RATIO, MAX_FORCE_RATIO = 0.75, 1.35
 MAX_LAG_S = 1.9
 

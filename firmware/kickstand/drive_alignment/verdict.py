@@ -20,10 +20,12 @@ MOVED = 4  # the mount has moved, and the sensor must be aligned again
 # Smallest number of straight events that can show REVERSED; each of them must show it
 _MIN_EVENTS_TO_REVERSE = const(2)
 _SAME_DEG = const(1.0)  # smallest yaw error that is corrected
-# Largest yaw error of two poses. At the smallest allowed tilt, 2 degrees of pitch between the poses cause 22 degrees.
+# Largest yaw error of two poses. At the smallest allowed tilt, 2 degrees of pitch between the poses cause a yaw error
+# of 22 degrees.
 _REFINED_DEG = const(30.0)
 _REVERSED_DEG = const(135.0)  # smallest yaw error that means REVERSED
-# Largest difference between the two verticals. An inexact upright pose and the road's camber cause less.
+# Largest difference between the two verticals. An inexact upright pose and the road's camber cause a smaller
+# difference.
 _UPRIGHT_DEG = const(8.0)
 
 

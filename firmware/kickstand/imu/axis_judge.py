@@ -74,7 +74,7 @@ class AxisJudge:
         notes = watch.notes
         lost, gyro = notes[_CLIPPED], notes[_GYRO_CLIPPED]
         watch.clipped += lost
-        enough = 2 * lost < samples  # True if at least half of the samples are good
+        enough = 2 * lost < samples  # True if at least half of the samples were within the range
         shaken = 10 * notes[_SHAKEN] >= samples
         if shaken or not enough:
             self._clips += 1

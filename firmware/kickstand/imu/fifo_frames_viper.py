@@ -1,7 +1,7 @@
 """The functions decode_python() and add_up_python() of fifo_frames.py as machine code.
 
-decode() takes 7 us instead of 140. Both versions must give the same results. host_tests/imu/test_batches.py compares
-them.
+As machine code decode() takes 7 us, in Python 140 us. Both versions must give the same results.
+host_tests/imu/test_batches.py compares them.
 """
 
 import micropython

@@ -178,7 +178,7 @@ class Mpu6050:
 
     def _identify(self):
         self.who_am_i = self.read_register(_WHO_AM_I)
-        # Read twice, because a misread number would select the calibration of another chip.
+        # WHO_AM_I is read twice, because a misread number would select the calibration of another chip.
         if self.read_register(_WHO_AM_I) != self.who_am_i:
             raise OSError("MPU6050 WHO_AM_I reads differently each time")
         if self.who_am_i not in CHIPS and self.who_am_i != self._accept:

@@ -34,7 +34,8 @@ from ..units import const
 
 # s: time constant of the short means. Larger: fewer correct leans are hidden, and wrong leans are hidden later.
 _SHORT_S = const(3.0)
-# s: time constant of all other means. Larger: fewer correct leans are hidden, and wrong leans are hidden later.
+# s: time constant of all means except the short means. Larger: fewer correct leans are hidden, and wrong leans are
+# hidden later.
 _LONG_S = const(10.0)
 # standard deviations: limit to which larger innovations are reduced. Larger: a single blow counts for more.
 _MOST = const(4.0)

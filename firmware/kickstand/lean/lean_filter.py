@@ -68,8 +68,8 @@ class LeanFilter:
         # The sensor's errors (the states from BIAS_LEFT on) at two earlier times while everything fitted
         self._good = self._next_good = [0.0] * (STATES - BIAS_LEFT)
         self._good_s = 0.0
-        self._kept_speed = None  # (speed, variance) for the next start
-        self._gap = False  # True if the next start follows missing readings
+        self._kept_speed = None  # (speed, variance) for the next start of the filter
+        self._gap = False  # True if the next start of the filter follows missing readings
         self.restart()
 
     def restart(self):
@@ -243,7 +243,7 @@ class LeanFilter:
         self._rest.update(means[2:5], means[5:8], bias, seconds, self.rolling or pushed, moving)
         if self._rest.resting and not rested:
             self._stand(means)
-            return  # without an update, because this window's innovations belong to the state before _stand()
+            return  # no update, because this window's innovations belong to the state before _stand()
         self._work = self._process(means, seconds, roll_acceleration)
 
     def _impossible(self, means, seconds):
@@ -264,7 +264,8 @@ class LeanFilter:
         turning = max(abs(wx), abs(wy), abs(wz)) > measurements.START_MAX_RATE
         moving = turning or abs(sqrt(fx * fx + fy * fy + fz * fz) - 1.0) > measurements.START_MAX_FORCE
         variances = [sigma * sigma for sigma in measurements.SIGMA_START]
-        posed, self._posed = self._posed, False  # used once, because only the first start comes right after the poses
+        # _posed is used once, because only the first start comes right after the poses
+        posed, self._posed = self._posed, False
         if posed:
             variances[BIAS_LEFT : BIAS_LEFT + 3] = [measurements.SIGMA_FRESH_BIAS**2] * 3
         if self._gyro_variances:

@@ -64,7 +64,8 @@ _HEAD_LENGTH = struct.calcsize(HEAD)
 _TAIL_LENGTH = struct.calcsize(TAIL)
 _PLACE_LENGTH = struct.calcsize(PLACE)
 _WORST = (FIELDS + 1) * (LIMIT + RAW_BITS) // 8 + 2  # the most bytes that samples and a speed can take together
-# Indices in the state of the coder, an array('i', 22). The first FIELDS values are the previous entry. The others are:
+# Indices in the state of the coder, an array('i', 22). The first FIELDS values are the previous entry. The other values
+# are:
 # * from _MEANS on, the mean size of each of the FIELDS values
 # * _PENDING: the bits that do not yet fill a byte; _BITS: the number of these bits
 # * _AT: the index of the next byte in the buffer

@@ -187,7 +187,7 @@ class Recorder:
         return room * self.seconds() // self._bytes
 
     def _begin_block(self):
-        """Begin an empty block. The next passes of the app's loop fill it."""
+        """Begin an empty block. The next passes of the app's loop fill the block."""
         length, number = self.keeper.next_length(), (self._ride, self._sequence)
         self._block.begin(length, *number, self._time_us, self._chip, self._sample_hz, self._body)
         self._sequence += 1

@@ -1,5 +1,5 @@
-"""Begins and ends recordings. Before a recording it imports the required modules step by step, and tests the SD
-card."""
+"""Begins and ends recordings. Before a recording this module imports the modules that recording needs, step by step,
+and tests the SD card."""
 
 import gc
 

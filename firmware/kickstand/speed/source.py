@@ -50,7 +50,7 @@ class Speed:
         speed = self.source.poll(now_ms)
         if self._last is not None:
             waited_ms = ticks_diff(now_ms, self._last_ms)
-            # Checked even without a new speed, because after 6 days ticks_diff() is negative
+            # waited_ms is checked even without a new speed, because after 6 days ticks_diff() is negative
             if waited_ms >= _GIVE_UP_MS:
                 self._last = None
         if speed is None or not 0.0 <= speed <= _MAX_MPS:

@@ -56,7 +56,7 @@ _SCALE = _scale()
 
 
 def _number(canvas, value, x, y, digits=0):
-    """Draw a number with at least `digits` digits. Return the column where it ends."""
+    """Draw a number with at least `digits` digits. Return the column where the number ends."""
     for character in "%0*d" % (digits, value):
         canvas.blit(_GLYPHS[ord(character) - 48], x, y)
         x += _PITCH
