@@ -106,7 +106,7 @@ def test_the_free_pose_is_the_one_further_from_its_axis():
             with pytest.raises(InputError, match=r"side \+z exists twice \(e and g\)"):
                 poses._sides([*named, pose("g", slanted(deg))])
     with pytest.raises(InputError, match="exists twice"):
-        # The slanted pose is tilted under 3 degrees more than the side pose
+        # The tilt of the slanted pose exceeds the tilt of the side pose by less than 3 degrees
         poses._sides([*tilted, pose("g", slanted(24.4))])
     assert poses._sides([*tilted, pose("g", slanted(24.6))])[1] is not None
     with pytest.raises(InputError, match=r"side -z is missing, and side \+z is there 2 times"):

@@ -45,7 +45,7 @@ def test_simulated_rides(profile):
     assert (WRONG_WAY in judged(log, gyro=MINUS)) is (profile != "parked")
     if profile not in ("parked", "city"):
         assert WRONG_WAY in judged(log, gyro=MINUS, speed=False)
-    assert judged(log, gyro=np.eye(3) * np.radians(1.0)) == ""  # rates in rad/s get another remark, not this one
+    assert judged(log, gyro=np.eye(3) * np.radians(1.0)) == ""  # rates in rad/s get another remark
 
 
 @pytest.mark.parametrize("profile", MAIN)

@@ -38,7 +38,7 @@ def board(config="", world=None, files=None):
     return esp32(world or leaning(LEAN_DEG), (files or firmware("esp32")) | own)
 
 
-@pytest.mark.nightly  # the tests in host_tests/device have the same faults on MicroPython for Linux
+@pytest.mark.nightly  # the tests in host_tests/device cause the same faults on MicroPython for Linux
 def test_board_survives_ctrl_c_unplugging_and_soft_reset():
     """The owner presses Ctrl-C, unplugs the board and does a soft reset, each while the board is running."""
     with board() as device:

@@ -1,5 +1,5 @@
-"""What the demo prints: a short program takes the place of the device. Also the checks of a user's program, the keys of
-a real terminal, and the bike steered by hand."""
+"""Tests what the demo prints, the checks of a user's program, the keys of a real terminal, and the bike steered by
+hand. A short program takes the place of the device."""
 
 import itertools
 import json

@@ -1,4 +1,4 @@
-"""What the picture of the demo says: times, leans, speed and button. And the states that the device sends."""
+"""Tests the times, leans, speed and button in the picture of the demo, and the states that the device sends."""
 
 import os
 from types import SimpleNamespace

@@ -1,4 +1,5 @@
-"""The bike that is steered by hand: its lean and speed over time, and the readings of its sensor, by known numbers."""
+"""The lean and the speed of the bike that is steered by hand, and the readings of its sensor, are compared with known
+numbers."""
 
 from math import cos, exp, radians, sin, tan
 

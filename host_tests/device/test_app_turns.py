@@ -119,8 +119,8 @@ def test_the_first_page_waits_for_the_filter(looped):
     [(0, False, False), (80, False, False), (81, False, True), (40, True, False), (41, True, True)],
 )
 def test_readings_that_wait_too_long_make_a_page_late(looped, frames_left, draws, late):
-    """A page is late if readings wait for over 400 ms, which are 80 readings at 200 Hz. A display that draws needs 200
-    ms more."""
+    """A page is late if readings wait for over 400 ms, which are 80 readings at 200 Hz. On a display that draws, a page
+    is late if readings wait for over 200 ms."""
 
     def use(app, calls, board):
         app._page_ms = 10**6  # show no page yet

@@ -97,7 +97,8 @@ def test_pages_and_menu(tmp_path):
     record = device_plans.run("cpython", tmp_path, {**ALIGNED, "presses": presses, "until": menu_s + 21})
 
     def shows(page, line1, line2):
-        """Return True if the display showed lines that match, in the second of the page."""
+        """Return True if the display showed two lines that match these patterns, in the second in which the page is
+        shown."""
         begin_s = 45.0 + ring.index(page)
         of_page = [lines for start_s, *lines in record.frames if begin_s < start_s < begin_s + 1.0]
         return any(re.match(line1, first) and re.match(line2, second) for first, second in of_page)

@@ -161,7 +161,7 @@ def test_the_worst_of_the_last_run_is_reported(report, monkeypatch):
 
 @pytest.mark.parametrize("slow", [[], [1], [0, 3]])
 def test_functions_without_machine_code_are_named(report, slow, monkeypatch):
-    """CPython has no machine code. So the test replaces the functions in use by others."""
+    """CPython has no machine code. So the test replaces the functions in use by other functions."""
     from kickstand.calibration import transform
     from kickstand.imu import fifo_frames
     from kickstand.rides import block

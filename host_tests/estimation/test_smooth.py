@@ -59,9 +59,8 @@ def test_smoothed_lean_beats_the_display_and_knows_its_error(name):
     off, sigma = (found.lean_deg - ride.lean_deg)[ride.riding], found.lean_sigma_deg[ride.riding]
     assert rms(off) < 0.6 * rms((ride.live() - ride.lean_deg)[ride.riding])
     assert np.max(np.abs(off)) < 2.5
-    assert (
-        np.mean(np.abs(off) < sigma) > 0.35
-    )  # the limit for one short ride; over many rides the mean is at least 0.58
+    # The limit is for one short ride. Over many rides, at least 0.58 of the errors are below sigma
+    assert np.mean(np.abs(off) < sigma) > 0.35
     assert np.mean(np.abs(off) < 3.0 * sigma) > 0.95
     assert np.mean(found.lean_sigma_deg) < 1.2
 
@@ -91,7 +90,8 @@ def test_good_mounts_and_roads_are_not_doubted():
 
 def test_side_force_of_tyres_grows_with_the_force_up():
     """The side force of wide tyres grows with the force along the bike's up. When the smoother ignored this force,
-    bends with unequal leans shifted the lean of the whole ride by 0.44 degrees. The display's error is smaller."""
+    bends with unequal leans shifted the lean of the whole ride by 0.44 degrees, which is more than the displayed lean's
+    error."""
     ride = simulated("sweeper", 304, 200.0)
     assert rms(error(ride)[ride.riding]) < 0.2
 

@@ -1,4 +1,4 @@
-"""The intervals of a log with known motion: their terms, weights and limits, by known numbers."""
+"""The intervals of a log with known motion: their terms, weights and limits are compared with known numbers."""
 
 from typing import Any
 
@@ -154,7 +154,7 @@ def test_blocks_are_sums_over_eight_seconds():
 
 
 def test_a_slope_is_forgotten_after_some_hundred_metres():
-    """A road's slope falsifies forward less than a plain regression would be falsified."""
+    """A road's slope causes a smaller error of forward than in a plain regression."""
     log = log_of(120.0, lambda t_s: 15.0 - 4.0 * np.sin(t_s / 3.0))
     slope = 0.03 * np.sin(log.t_s / 20.0)
     log.accel_g[:, 2] += slope

@@ -64,7 +64,7 @@ def test_around_a_junction_the_road_is_straight_for_a_second():
     for time in (braked_s + 0.1, turned_s + 0.9):
         assert at(route, route.yaw_rate, time) == pytest.approx(0.0, abs=1e-3)
         assert at(route, route.speed, time) == pytest.approx(4.0, abs=0.1)
-    # After the bend it speeds up by 1 m/s2
+    # After the bend the vehicle speeds up by 1 m/s2
     assert at(route, route.speed, turned_s + 3.0) == pytest.approx(6.0, abs=0.02)
 
 

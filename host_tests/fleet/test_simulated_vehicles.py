@@ -64,7 +64,7 @@ def test_a_motorcycle_in_a_bend_has_its_force_along_its_up():
 
 
 def test_slope_and_camber_tilt_the_force():
-    """Uphill the force has a part forward. On a road that falls to the right it has a part to the left."""
+    """Uphill the force has a part forward. On a road that falls to the right the force has a part to the left."""
     force, _ = readings(road(slope=0.05, camber=0.03))
     assert force == pytest.approx([cos(0.05) * sin(0.03), cos(0.05) * cos(0.03), sin(0.05)], abs=0.51 * COUNT_G)
 

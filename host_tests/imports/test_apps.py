@@ -28,7 +28,8 @@ ON_BIKE = api.CalibrationFile(aligned=True)
 ON_THE_BIKE = ("RaceBox", "VBO", "AiM")  # apps that record along the bike's axes, not the phone's
 WITHOUT_DATE = ("AiM", "Sensor Kinetics")  # apps whose times have no date
 WITHOUT_SPEED = ("Sensor Kinetics",)  # the app does not use the satellite receiver
-# Largest rms difference between a replay and the true lean. The original ride has 0.28 at 100 samples per second.
+# Largest rms difference between a replay and the true lean. The replay of the original ride has 0.28 degrees at 100
+# samples per second.
 WITHIN_DEG = 0.5
 
 

@@ -307,9 +307,9 @@ def test_least_squares_leave_out_what_has_no_weight():
 def test_the_standard_deviation_of_a_fit_by_hand():
     """The variance of the shift is a sum of three terms.
 
-    * Three segments pull by 1, 1 and -2. The sum of the squares is 6, which gives 6 * 3 / 1 * 0.1^2 = 0.18 s2. The end
-    * is 70 s from the middle, where a drift with a standard deviation of 0.01 gives 0.49 s2. The receiver's delay has a
-    * standard deviation of 0.05 s, which gives 0.0025 s2.
+    * Three segments pull by 1, 1 and -2. The sum of the squares is 6, which gives 6 * 3 / 1 * 0.1^2 = 0.18 s2.
+    * The end is 70 s from the middle, where a drift with a standard deviation of 0.01 gives 0.49 s2.
+    * The receiver's delay has a standard deviation of 0.05 s, which gives 0.0025 s2.
     """
     turned = np.array([[1.0, -1.0], [2.0, 0.0], [0.0, -2.0]])
     given = SimpleNamespace(

@@ -82,7 +82,7 @@ def test_our_page_gets_every_packet_without_side_effects(run):
 
 
 def test_a_lean_that_is_not_trusted_is_never_a_number(run):
-    """At first there is no alignment, and later no sensor. RaceChrono gets no lean either."""
+    """At first there is no alignment, and later no sensor. At these times no packet contains a lean."""
     acts = [[3.0, "connect"], [3.1, "write", "rate", [40, 0]], [3.1, "write", "filter", [1, 0, 40]]]
     faults = [["unplug_sensor", [30.0, 4.0]]]
     plan = {**device_plans.ALIGNED, **LIVE, "phones": [acts], "until": 40}

@@ -1,4 +1,5 @@
-"""Files and options that an overlay accepts, messages about others, and the picture at the ends of a ride."""
+"""Files and options that an overlay accepts, messages about refused files and options, and the picture at the ends of a
+ride."""
 
 import math
 from pathlib import Path

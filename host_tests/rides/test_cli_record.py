@@ -194,13 +194,14 @@ def test_a_disturbed_vehicle_name_does_not_end_the_recording(streaming, tmp_path
 
 
 def at_rest(count, seed=0):
-    """Yield turns as ride_writer.turns() does, for an upright bike at rest."""
+    """Yield passes of the loop as ride_writer.turns() does, for an upright bike at rest."""
     for i in range(count):
         yield [2 * mean for mean in (-40, 83, 4096, 0, i % 2, 98, 0)], 2, 10_000
 
 
 def braking_in_a_left_bend(count, seed=0):
-    """Yield turns as ride_writer.turns() does, for a car with forces of 0.2 g backward and 0.3 g to the left."""
+    """Yield passes of the loop as ride_writer.turns() does, for a car with forces of 0.2 g backward and 0.3 g to the
+    left."""
     for _ in range(count):
         yield [2 * mean for mean in (-851, 1324, 4096, 0, 0, 98, 0)], 2, 10_000
 

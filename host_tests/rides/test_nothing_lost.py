@@ -29,7 +29,8 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has
 
 WEATHER = b"# my weather station\nwhile True: pass\n"
 OFTEN = [("record", "full"), ("pull", "kill"), ("pull", "cable"), ("flash", "cable"), ("smooth", "kill")]
-# number of random moments: FAST for each case in OFTEN, and ALL for each case in KINDS in a nightly run
+# number of random moments at which each case is tested: FAST for the cases in OFTEN, and ALL for all cases in a nightly
+# run
 FAST, ALL = 2, 10
 
 

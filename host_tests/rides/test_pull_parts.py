@@ -199,7 +199,8 @@ def streamed(given, live=None, fails=0):
 
 
 def whole_block(sequence=0, time_us=1_000_000, turns=2, car=False, changed=0) -> StoredBlock:
-    """A block with the calibration of a sensor that is not aligned, and turns of two samples in each 10 ms."""
+    """A block with the calibration of a sensor that is not aligned, and passes of the loop with two samples in each 10
+    ms."""
     calibration = Calibration()
     calibration.set_scale(16384, 131.0)
     calibration.gyro_bias[0] = float(changed)

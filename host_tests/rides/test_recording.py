@@ -94,7 +94,7 @@ def start(recorder):
 
 
 def add(recorder, turns, clock=None, tick=True):
-    """Add `turns` turns of 10 ms, with the same two samples in each turn."""
+    """Add `turns` passes of the loop of 10 ms, with the same two samples in each pass."""
     for _ in range(turns):
         if clock:
             clock.advance(TURN_US)
@@ -248,7 +248,7 @@ def test_a_gap_belongs_to_its_own_ride(recorder, keeper, clock):
 
 
 def test_a_position_and_a_speed_belong_to_the_next_turn_only(recorder, keeper):
-    """A turn may have a position without a speed, or a speed without a position. Zero is a valid speed."""
+    """A pass of the loop may have a position without a speed, or a speed without a position. Zero is a valid speed."""
     start(recorder)
     recorder.add_fix(None, ride_writer.place(0))
     recorder.add_fix(None, ride_writer.place(1))  # the newest position is recorded

@@ -80,7 +80,7 @@ def held(block):
 
 
 def test_every_turn_comes_back_exactly():
-    """The written turns include turns with the largest numbers."""
+    """The written passes of the loop include passes with the largest numbers."""
     turns = [*_EXTREMES, *ride_writer.turns(200), *_EXTREMES]
     data = written(turns)
     block = block_reader.parse(data)

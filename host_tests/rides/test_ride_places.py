@@ -21,7 +21,7 @@ def expected(k: int) -> tuple[float, float, float]:
 
 
 def found(blocks) -> list[tuple[int, tuple[float, float, float | None]]]:
-    """Return [(number of the turn, position), ...] of all positions in the blocks."""
+    """Return [(number of the loop's pass, position), ...] of all positions in the blocks."""
     turns = [turn for block in blocks for turn in block.turns]
     return [(i, (t.place.lat_deg, t.place.lon_deg, t.place.utc_s)) for i, t in enumerate(turns) if t.place]
 

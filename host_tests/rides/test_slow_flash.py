@@ -19,7 +19,8 @@ PARTS = {"1024 bytes": (0x68, 0.40, 0.365), "512 bytes": (0x70, 0.25, 0.180)}
 
 
 class Seen:
-    """Notes the meter's results. turns: [(time in s, lean in degrees, trusted, dt in s, number of samples), ...]."""
+    """Notes the meter's results in each pass of the loop. turns: [(time in s, lean in degrees, trusted, dt in s, number
+    of samples), ...]."""
 
     def __init__(self, monkeypatch):
         self.turns, boards = [], []

@@ -220,7 +220,8 @@ def test_a_picture_is_redrawn_only_for_other_values():
 
 @pytest.mark.parametrize(("free", "turns"), [(1_000_000, 50), (100_000, 10), (61_000, 3), (0, 3)])
 def test_garbage_is_collected_more_often_in_a_small_heap(free, turns, monkeypatch):
-    """One pass of the loop uses 2000 bytes. Half of the present heap may fill up. The heap may still grow by 60 KB."""
+    """One pass of the loop uses 2000 bytes of heap. Between two collections, the passes may use half of the present
+    free heap. The heap may still grow by 60 KB."""
     from kickstand.board import port
 
     heap = types.SimpleNamespace(HEAP_DATA=4, idf_heap_info=lambda _: [(9, 9, 20_000, 9), (9, 9, 60_000, 9)])

@@ -35,7 +35,7 @@ def speeds_of(text, piece=1000, step_ms=10, steps=60):
 def busy_with_transfers():
     """Return turn(number), which simulates an ESP32's SoftI2C transfers. Call turn(number) in each pass of the loop.
 
-    The sensor's transfer takes 1.3 ms in each turn. The display's transfers take 12 ms every 100 ms.
+    The sensor's transfer takes 1.3 ms in each pass. The display's transfers take 12 ms every 100 ms.
     """
     from machine import Pin, SoftI2C  # type: ignore[import-not-found]
 
@@ -307,7 +307,7 @@ def test_an_esp32_counts_pulses_that_fall_into_a_transfer():
 
 
 def test_a_contact_that_bounces_is_counted_once_on_an_esp32_too():
-    """The contact may bounce during a transfer, at any speed and at any time of the loop's turn."""
+    """The contact may bounce during a transfer, at any speed and at any time in a pass of the loop."""
     for speed in (1.3, 7.77, 33.3):
         mean, _, _ = wheel_on_an_esp32(0.5, speed, bounce_us=2000)
         assert abs(mean - speed) < 0.01 * speed, (speed, mean)

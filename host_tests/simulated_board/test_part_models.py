@@ -1,4 +1,4 @@
-"""The models of contacts, the SD card and the chips' pins, by known numbers."""
+"""The models of contacts, the SD card and the chips' pins are compared with known numbers."""
 
 import pytest
 from kickstand_tools.simulated_board.clock import Clock

@@ -200,7 +200,7 @@ def test_after_power_on_in_a_bend_it_says_what_ends_the_doubt(stages):
 
 
 def test_it_rides_straight_is_not_said_of_a_bike_that_leans(guide):
-    """The guide does not say so before or after the first lean."""
+    """Before and after the first lean the guide asks for ten seconds on a straight."""
     tick = {"powered": True, "plugged": True, "pose": "ride", "phase": "ride", "stage": 0}
     tick.update(t_s=1.0, lean_deg=-7.5)
     said = [

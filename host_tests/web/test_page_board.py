@@ -39,7 +39,7 @@ def test_board_is_updated_and_watched(chromium, address, tmp_path):
         rider.page.click("#stop")
         rider.page.wait_for_selector("#files li", timeout=120_000)
     assert rider.text("#live-said") == "Stopped."
-    # Until the gauge gets no new value
+    # Wait until the gauge gets no new value
     rider.page.wait_for_function("document.querySelector('#lean').textContent === '--'")
     blocks = streamed(bytes(line.said))
     assert len(blocks) > 1

@@ -84,7 +84,8 @@ def test_car_shows_g_instead_of_a_lean(line, rider, board, tmp_path, monkeypatch
 
 
 def braking_in_a_left_bend(count, seed=0):
-    """Yield turns as ride_writer.turns() does, for a car with forces of 0.2 g backward and 0.3 g to the left."""
+    """Yield passes of the loop as ride_writer.turns() does, for a car with forces of 0.2 g backward and 0.3 g to the
+    left."""
     for _ in range(count):
         yield [2 * mean for mean in (-851, 1324, 4096, 0, 0, 98, 0)], 2, 10_000
 

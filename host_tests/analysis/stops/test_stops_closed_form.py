@@ -79,7 +79,7 @@ def test_jerk_is_the_steepest_change_of_the_force():
     road.mps2 = road.mps2 - braked[: len(road.t_s)]
     road.rests = (road.t_s < REST_S) | (road.t_s > 17.9)
     (stop,) = find_stops(road.channels())
-    # the jerk is smaller, because the force is smoothed twice over 0.2 s
+    # the force is smoothed twice over 0.2 s, which makes the jerk less than 20 m/s3
     assert stop.jerk_mps3 == pytest.approx(20.0, rel=0.15)
     assert stop.peak_mps2 == pytest.approx(6.0, rel=0.01)
     assert stop.initial_speed_mps == pytest.approx(lost, rel=0.01)
@@ -195,7 +195,6 @@ def test_brief_standstill_shows_no_slope(samples, counts):
     road = braking(20.0, 5.0)
     still = (road.t_s >= 18.0 - 1e-6) & (road.t_s < 18.0 + samples / RATE_HZ - 1e-6)
     found = stops_of(road.channels(forward_g=road.mps2 / STANDARD_GRAVITY - 0.1), still)
-    # The braking that is found first
     assert [stop.mfdd_mps2 for stop in found] == pytest.approx([5.0 - 2.5 / 11] * counts, rel=0.002)
 
 
