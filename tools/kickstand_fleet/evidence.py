@@ -52,8 +52,8 @@ SWING_S = 0.2  # averaging time of the yaw rate at each end of an interval
 # the difference removes braking, speeding up and bends
 SWAY_S = 0.05, 0.3
 # Yaw rate at which an interval of a car has half of its usual weight. In a tight bend, a sensor ahead of the rear axle
-# does not move along the vehicle's heading. Its direction of motion differs by an angle: the distance from sensor to
-# rear axle, divided by the bend's radius.
+# does not move along the vehicle's heading. Its direction of motion differs from the heading by an angle: the distance
+# from sensor to rear axle, divided by the bend's radius.
 TIGHT_DPS = 20.0
 
 

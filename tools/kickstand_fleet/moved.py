@@ -1,7 +1,8 @@
 """Finds mounts that rotated by a few degrees or more, between two logs or during a log.
 
 The firmware refuses a drive only if the mount moved by some 7 to 30 degrees. The module also finds smaller rotations.
-At every moment in all logs of a mount, it compares the alignment before that moment with the alignment after it.
+At every moment in all logs of a mount, the module compares the alignment before that moment with the alignment after
+it.
 
 A rotation that tilts the sensor shows in gravity. A rotation about the vertical shows only in three things: in braking,
 in bends, and in the direction in which the vehicle sways on its springs. The sway also shows on a straight road without

@@ -132,8 +132,10 @@ class Calibration:
         """Return calibration and alignment combined, as matrices and offsets for raw counts.
 
         The results combine Nicolae's equations (18)-(20), accel_matrix and gyro_matrix, and equation (15). The results
-        convert a reading with 18 multiplications: force = force_matrix * counts + force_offset, and rate = rate_matrix
-        * counts + rate_offset.
+        convert a reading with 18 multiplications:
+
+            force = force_matrix * counts + force_offset
+            rate = rate_matrix * counts + rate_offset
 
         Returns:
             force_matrix: 9 values, in g per count.

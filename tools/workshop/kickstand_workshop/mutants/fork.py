@@ -18,8 +18,8 @@ import pytest
 
 WARM = ("numpy", "hypothesis", "click", "rich.console", "matplotlib.pyplot", "pandas", "plotly.graph_objects")
 WARM += ("pyarrow.parquet",)
-# Arguments of pytest that skip the variants of tests on MicroPython. These variants are slow, and the same tests run on
-# CPython.
+# Arguments of pytest that skip the variants of tests on MicroPython. The variants on MicroPython are slow, and the same
+# tests run on CPython.
 ARGUMENTS = ("-x", "-q", "-k", "not micropython", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0")
 KILLED, SURVIVED, TIMED_OUT = "killed", "survived", "timed out"
 # The tests of a change may use TIMES the processor time of the tests of the unchanged code, plus EXTRA_S
