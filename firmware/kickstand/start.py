@@ -93,7 +93,8 @@ def main(loop=None):
 def _last_words(lcd, line1, line2):
     """Show two lines when the firmware ends.
 
-    Args: lcd: the Display, or None if it is not open yet. Without a Display one is opened on the default pins.
+    Args:
+        lcd: the Display, or None if it is not open yet. Without a Display one is opened on the default pins.
     """
     try:
         if lcd is None:

@@ -258,7 +258,7 @@ def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: i
     first = 0 if fault.from_start else round(begin_s * rate_hz)
     end = len(made) if fault.seconds is None else min(len(made), first + round(fault.seconds * rate_hz))
     span = slice(first, end)
-    # Apply a fault of the kind SEEN along the chip's own axes. If the fault were rotated, the counts would not reveal it
+    # Apply a fault of the kind SEEN along the chip's own axes. A rotated fault would not show in the counts
     square = seed // 3 % 2 == 0 and fault.kind != SEEN
     turned = vehicle_from_sensor if square else np.eye(3)
     part = Part(
