@@ -221,8 +221,8 @@ def test_vbo_has_at_most_100_rows_per_second(tmp_path, form, rows):
 @pytest.mark.parametrize("start_s", [1e8, 1e8 + 0.0043, 1e8 + 0.00065])
 @pytest.mark.parametrize(("form", "step_s", "columns"), [("racechrono", 0.001, (0, 3)), ("vbo", 0.01, (1,))])
 def test_no_time_is_written_twice(tmp_path, form, step_s, columns, start_s):
-    """Some samples are closer together than the smallest time step of the format. Their times are just before or after
-    a time step, or in the middle between two steps. The returned number of rows still includes every sample."""
+    """Some samples are closer together than the smallest time step of the format. The samples' times are just before or
+    after a time step, or in the middle between two steps. The returned number of rows still includes every sample."""
     t_s = step_s * np.array([0.0, 0.96, 1.04, 2.5, 3.5, 4.5, 5.49, 5.51, 6.4, 7.0, 8.0, 9.96, 10.04, 10.5])
     log = Log(t_s, np.tile([0.0, 1.0, 0.0], (len(t_s), 1)), np.zeros((len(t_s), 3)), start_s=start_s)
     notices = []

@@ -153,8 +153,8 @@ def test_a_track_across_180_degrees_goes_the_short_way():
 
 
 def test_last_position_of_a_stretch_is_kept():
-    """The positions are on both sides of the meridian of 180 degrees. Their mean longitude would be on the other side
-    of the earth, so the last position is used."""
+    """The positions are on both sides of the meridian of 180 degrees. The mean longitude of the positions would be on
+    the other side of the earth, so the last position is used."""
     few = log().part(log().t_s < 0.1)
     few.lon_deg[:] = np.nan
     few.lat_deg[:], few.lon_deg[3:6], few.utc_s[2] = -10.0, (179.9999, -179.9999, -179.9998), START_S

@@ -156,8 +156,8 @@ def test_stops_and_three_brakings_give_the_mount_by_hand(every_s, mount):
 def test_forward_is_along_the_sum_of_the_brakings_forces():
     """Three braking events have the levelled forces (0.18, -0.24), (0, -0.3) and (-0.18, -0.24) g along left and
     forward. The sum of these forces points straight back. The dispersion of their directions is 4.32 / 13.52, see
-    above. The standard error of the mean direction is therefore the root of 4.32 / 13.52 / 3, which is 18.70
-    degrees."""
+    test_the_dispersion_by_hand(). The standard error of the mean direction is therefore the root of 4.32 / 13.52 / 3,
+    which is 18.70 degrees."""
     drive = Drive()
     assert drive.alignment.quality_deg == 180.0
     drive.brake((0.18, 1.0, -0.24), mps2=-0.24 * G)

@@ -99,8 +99,8 @@ def yawed(degrees):
 
 
 def test_the_mean_of_two_alignments_is_weighted_by_variance():
-    """Both methods use the same braking, so half of their errors are common. Their mean is therefore less exact than
-    with independent errors."""
+    """Both methods use the same braking, so half of their errors are common. The mean of the two methods is therefore
+    less exact than with independent errors."""
     sensor = forward.SENSOR_DEG**2
     frame, variance = forward._mean(yawed(1.0), 1.0, yawed(0.0), float(np.sqrt(1.0 - sensor)))
     assert frame == pytest.approx(yawed(0.5), abs=1e-6)

@@ -207,9 +207,9 @@ def frame_of(up: Array, ahead: Array) -> Array:
 def handedness(found: Array, varied: Array) -> float:
     """Divide the lateral force measured in bends by the lateral force computed from speed and yaw rate.
 
-    The ratio is about 1. The ratio is about -1 if the gyro's signs or the axes are mirrored. It is 0 without bends, and
-    for a motorcycle, because a motorcycle leans into bends. The arguments are the two results of fits(), with k left
-    out.
+    The ratio is about 1. The ratio is about -1 if the gyro's signs or the axes are mirrored. The ratio is 0 without
+    bends, and for a motorcycle, because a motorcycle leans into bends. The arguments are the two results of fits(),
+    with k left out.
     """
     if varied[1] < 0.05:
         return 0.0

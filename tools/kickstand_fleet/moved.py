@@ -45,7 +45,7 @@ YAW_PRIOR_DEG = 0.4
 # used if it contradicts the braking by more than SWAY_SIGMAS standard deviations
 SWAY_DEG, SWAY_WORST_DEG, SWAY_SIGMAS = 0.7, 5.0, 3.0
 # A tilt larger than this within a log, in degrees, is reported even if it is gradual. The slopes of roads differ by
-# less
+# less than SURELY_DEG
 SURELY_DEG = 8.0
 TILT_DEG = 2.2  # a rotation with a smaller tilt, in degrees, counts as a rotation about the vertical
 # To find a jump, the vertical during the STEP_S before a moment is compared with the vertical during the STEP_S after

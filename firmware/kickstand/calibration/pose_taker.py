@@ -44,8 +44,8 @@ class PoseTaker:
         self.pose = self._new(self._settle_count)
 
     def step(self, counts):
-        """Take one sample of 7 counts in the chip's order. Return one of the states above. Raises CaptureError, which
-        ends the pose."""
+        """Take one sample of 7 counts in the chip's order. Return SETTLING, SETTLED, AVERAGING or DONE. Raises
+        CaptureError, which ends the pose."""
         if self._state == SETTLING:
             return self._settle(counts)
         if self._state == AVERAGING:

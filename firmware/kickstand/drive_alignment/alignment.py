@@ -93,7 +93,7 @@ class DriveAlignment:
 
     @property
     def state(self):
-        """The state of the drive, one of the constants above."""
+        """The state of the drive, one of this module's constants from WAITING_FOR_SPEED on."""
         if self.problem is not None:
             return REFUSED
         if self.ready:

@@ -34,8 +34,8 @@ PITCH_DEG = 7.0  # difference of pitch. A road that climbs by 6 % and then falls
 # degrees
 ROLL_DEG = 7.0
 # The mount moved if forward from one event differs by over _EVENT_OFF_DEG from forward of the whole drive. An event is
-# judged only if its weight and the length of its forward exceed the two limits below. On recorded drives no such event
-# differed by more than 40 degrees.
+# judged only if its weight and the length of its forward exceed _MIN_EVENT_WEIGHT and _MIN_EVENT_FORWARD. On recorded
+# drives no such event differed by more than 40 degrees.
 _EVENT_OFF_DEG = const(80.0)
 _MIN_EVENT_WEIGHT = const(0.012)  # smallest weight of an event that is judged, in g^2 s
 _MIN_EVENT_FORWARD = const(0.5)  # smallest length of an event's forward, in g per g

@@ -56,8 +56,8 @@ def compare(drive, matrix):
 def yaw_deg(fit, matrix):
     """Return the yaw error of a matrix in degrees.
 
-    The yaw error is the angle from the matrix's forward to the Fit's forward, about the matrix's up. It is positive if
-    the Fit's forward is farther to the left."""
+    The yaw error is the angle from the matrix's forward to the Fit's forward, about the matrix's up. The yaw error is
+    positive if the Fit's forward is farther to the left."""
     return degrees(atan2(dot(matrix[0:3], fit.forward), dot(matrix[6:9], fit.forward)))
 
 

@@ -28,7 +28,7 @@ _SAME_STOP_DEG = const(1.5)  # largest angle by which doors and passengers tilt 
 # angle also differs for a short time when the vehicle drives again but the late speed is still zero.
 _TURNED_S = const(6.0)
 # Largest difference between a rate at a stop and the bias at the last stop. At a larger difference the vehicle drives
-# in a bend, and a speed of zero is wrong. A gyro that warms up changes its bias by less.
+# in a bend, and a speed of zero is wrong. The bias of a gyro that warms up changes by less than this limit.
 TURNING_DPS = 10.0
 _MEAN_S = const(60.0)  # time constant of the mean force, which is used until a better vertical is known
 # Largest difference of two verticals that the road's slope can cause (14 %). If two verticals differ more, the mount
@@ -163,7 +163,7 @@ class Vertical:
 
     @property
     def turn_axis(self):
-        """The axis of the yaw rate, 3 values with a length of about 1. It is known after the first update()."""
+        """The axis of the yaw rate, 3 values with a length of about 1. The axis is known after the first update()."""
         return (self.is_car and self._standing.up) or self._from_pose or self._mean
 
     def known(self, out, fit=None):

@@ -13,7 +13,7 @@ from ..errors import SettingsError
 from ..units import const
 
 _MAX_MPS = const(100.0)
-_MAX_CHANGE_MPS2 = const(15.0)  # largest change of speed per second; no tyre has enough grip for more
+_MAX_CHANGE_MPS2 = const(15.0)  # largest change of speed per second; no tyre has enough grip for a larger change
 _NOISE_MPS = const(2.0)  # noise of a speed, by which a change of speed may exceed its limit
 _GIVE_UP_MS = const(3000)  # duration of rejected speeds that shows that the last accepted speed was wrong
 # Bytes of half a second at 9600 baud. This buffer is large enough while flash is written or the sensor is set up.

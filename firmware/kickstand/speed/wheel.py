@@ -34,7 +34,7 @@ _TICKS = _COUNT = 0x3FFFFFFF
 
 
 class Wheel:
-    """A speed sensor with pulses.
+    """A speed sensor that gives pulses.
 
     Args:
         pin: a machine.Pin with pull-up.

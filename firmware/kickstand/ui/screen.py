@@ -157,7 +157,7 @@ class Screen:
             self._notice.show(("Calibration", "stopped: fault"), now_ms, "stopped")
 
     def _update_front(self, now_ms):
-        """Find the front view, the first view in the order below that has something to show.
+        """Find the front view, the first view in this method's order that has something to show.
 
         Also drop a wizard or menu that has ended, and go back to the first page when a question is shown.
 
