@@ -97,7 +97,8 @@ def checked(machine_code, plain, *arguments):
         arguments: the arguments for one call of each function. The second call gets copies.
 
     Returns:
-        machine_code if both functions give the same results. If they differ, plain, after a report on the console.
+        machine_code if both functions give the same results. If the results differ, plain, after a report on the
+        console.
     """
     copies = [a if isinstance(a, (int, bytes)) else a[:] for a in arguments]
     same = machine_code(*arguments) == plain(*copies)

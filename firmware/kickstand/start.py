@@ -40,7 +40,7 @@ def _held(button):
     """Return True if the button is pressed now and a moment later.
 
     A capacitor for debouncing between pin and ground would look like a press at power-on. The pin's weak pull-up must
-    charge it first. 1 uF through 80 kOhm takes 75 ms."""
+    charge the capacitor first. 1 uF through 80 kOhm takes 75 ms."""
     if button.held():
         sleep_ms(_CHARGE_MS)
     return button.held()
@@ -50,8 +50,8 @@ def main(loop=None):
     """Run until Ctrl-C, power-off or a reset. An exception is reported on display and console, then the board restarts.
 
     Args:
-        loop: a function that is called with the App instead of App.run(), or None. A simulation uses it to call
-            App.begin() and App.step() later.
+        loop: a function that is called with the App instead of App.run(), or None. A simulation uses such a function to
+            call App.begin() and App.step() later.
     """
     lcd = None
     try:

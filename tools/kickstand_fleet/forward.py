@@ -24,7 +24,7 @@ CORRELATION = 0.5
 # forward
 APART_SIGMAS = 2.0
 # Number of coefficients of evidence.py that are fitted: level, forward and left. The fourth coefficient, arm, is useful
-# only to compare parts of a drive. When it was fitted to whole drives, forward was wrong by 2 degrees in one of three
+# only to compare parts of a drive. When arm was fitted to whole drives, forward was wrong by 2 degrees in one of three
 # recorded drives. Without arm, the error was at most 0.6 degrees in all three drives.
 _TERMS = 3
 _LEAST_BLOCKS = 4

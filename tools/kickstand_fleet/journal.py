@@ -89,7 +89,7 @@ class Journal:
         return key in self._places and key not in self._again
 
     def add(self, key: str, result: PeriodResult, again: bool = False) -> None:
-        """Save a result. again: True if the next run should recompute it.
+        """Save a result. again: True if the next run should recompute the result.
 
         Raises InputError if the result cannot be written. Earlier results stay in the file.
         """

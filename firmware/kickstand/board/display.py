@@ -89,7 +89,7 @@ class Display:
             self._driver.show(line1, line2, picture)
 
     def tick(self, now_ms):
-        """Do the next step of the display's work. Call it about every 10 ms. now_ms: ticks_ms().
+        """Do the next step of the display's work. Call this method about every 10 ms. now_ms: ticks_ms().
 
         Raises SettingsError for pins that cannot be used, and nothing else."""
         try:
@@ -113,7 +113,8 @@ class Display:
             sleep_ms(_STEP_MS)
 
     def end(self, line1, line2):
-        """Show two lines until power-off, because the firmware ends. Raises nothing; Ctrl-C does not interrupt it.
+        """Show two lines until power-off, because the firmware ends. Raises nothing; Ctrl-C does not interrupt this
+        method.
 
         The display is set up again, because a transfer may have been interrupted."""
         interrupt = getattr(micropython, "kbd_intr", None)  # MicroPython on a computer has no kbd_intr

@@ -65,9 +65,10 @@ _watchdog = None
 def open_i2c(controller, sda, scl, frequency, timeout_us):
     """Open a machine.I2C, or a SoftI2C on an ESP32. Raises ValueError for pins that the controller cannot use.
 
-    An ESP32's machine.I2C has three problems. Up to MicroPython 1.28 it ignores the time-out, and waits up to 0.1 s for
-    each byte of a stalled transfer. The whole transfer then takes longer than the watchdog allows. Later versions count
-    the time-out in ticks of 10 ms, so with 5 ms every transfer fails. And a C3 has only one I2C controller.
+    An ESP32's machine.I2C has three problems. Up to MicroPython 1.28 machine.I2C ignores the time-out, and waits up to
+    0.1 s for each byte of a stalled transfer. The whole transfer then takes longer than the watchdog allows. Later
+    versions count the time-out in ticks of 10 ms, so with 5 ms every transfer fails. And a C3 has only one I2C
+    controller.
 
     Args:
         controller: number of the controller, not used on an ESP32.

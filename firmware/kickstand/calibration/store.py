@@ -71,8 +71,8 @@ class Store:
     def unchanged(self):
         """Return True if both files read the same as in load() or save().
 
-        If they differ, a file was misread, for example in a voltage sag. After a misread the loaded record may be the
-        older of the two, and the newer record must not be overwritten."""
+        If the files read differently, a file was misread, for example in a voltage sag. After a misread the loaded
+        record may be the older of the two, and the newer record must not be overwritten."""
         sequence, _, problems = self._newest()
         return sequence == self._sequence and problems == self._problems
 

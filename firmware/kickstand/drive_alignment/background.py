@@ -116,7 +116,7 @@ class BackgroundAlignment:
         return speed
 
     def fresh_speed(self, now_ms):
-        """Return the last speed in m/s, or None if it is old."""
+        """Return the last speed in m/s, or None if the speed is old."""
         if self._speed_ms is not None and ticks_diff(now_ms, self._speed_ms) >= _FRESH_MS:
             # forget the time, because after 6 days ticks_diff() is negative and the speed would seem new
             self._speed_ms = None

@@ -110,8 +110,8 @@ class DriveParts:
             yield
 
     def _sum(self, sums, first, last):
-        """Add up the blocks from first to last - 1. Write the 6 sums of their values and the sum of the squared weights
-        into sums."""
+        """Add up the blocks from first to last - 1. Write the 6 sums of the blocks' values and the sum of the squared
+        weights into sums."""
         for i in range(7):
             sums[i] = 0.0
         for k in range(first, last):

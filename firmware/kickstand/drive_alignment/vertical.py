@@ -167,7 +167,7 @@ class Vertical:
         return (self.is_car and self._standing.up) or self._from_pose or self._mean
 
     def known(self, out, fit=None):
-        """Write the vertical into out, as a unit vector. Return False if it is not known yet.
+        """Write the vertical into out, as a unit vector. Return False if the vertical is not known yet.
 
         In a car the vertical is unknown until the first stop.
 

@@ -2,8 +2,8 @@
 
 A frame is one sample of 14 bytes: seven big-endian int16 in the order ax ay az temperature gx gy gz (register map
 RM-MPU-6000A rev 4.2, pp. 29 to 31). On the board, decode() and add_up() are the machine code of fifo_frames_viper.py.
-On a computer they are decode_python() and add_up_python(). The machine code and the Python functions give the same
-results.
+On a computer, decode() and add_up() are decode_python() and add_up_python(). The machine code and the Python functions
+give the same results.
 """
 
 import gc

@@ -171,8 +171,8 @@ class Sensor:
         return self._named_fifo() or (self.explain(self.chip, None)[0] if self.explain else None)
 
     def check(self, now_ms):
-        """Check that the chip is still configured. Call this before readings are shown, because a supply dip during a
-        transfer can corrupt half a sample. The check takes 0.6 ms. Raises nothing.
+        """Check that the chip is still configured. Call this method before readings are shown, because a supply dip
+        during a transfer can corrupt half a sample. The check takes 0.6 ms. Raises nothing.
 
         After a failed transfer nothing is checked, because a restart of the FIFO may be incomplete.
 
@@ -300,7 +300,7 @@ class SampleClock:
         return dt_us
 
     def emptied(self, now_us):
-        """Correct the clock. Call this when the chip's FIFO is empty and all its samples were counted.
+        """Correct the clock. Call this method when the chip's FIFO is empty and all its samples were counted.
 
         At that time the last sample is half a period old on average.
 

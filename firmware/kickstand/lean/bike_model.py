@@ -34,10 +34,10 @@ tan(lean of the bike) = tan t / cos psi.
 d is the part of the pitch rate q' that the springs cause. The wheels do not rise with this pitch. Braking causes most
 of d, see (8) in dive.py. h is the height of the sensor above the roll axis.
 
-(4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a steady bend they cannot separate lean from speed,
-because the derivatives by lean and by speed have the same ratio in (4) and (5). In a steady bend the ratio of two rates
-gives the lean: by (6) the pitch does not change, so by (2) w_x / w_y is tan t. At the beginning of a bend the speed
-estimated before the bend is still valid, and with this speed (4) gives the lean.
+(4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a steady bend the two equations cannot separate lean
+from speed, because the derivatives by lean and by speed have the same ratio in (4) and (5). In a steady bend the ratio
+of two rates gives the lean: by (6) the pitch does not change, so by (2) w_x / w_y is tan t. At the beginning of a bend
+the speed estimated before the bend is still valid, and with this speed (4) gives the lean.
 """
 
 from math import cos, radians, sin, sqrt, tan

@@ -30,12 +30,12 @@ def centripetal_g(left_g, up_g, yaw_rate):
 
 
 def formula_lean_deg(force, yaw_rate):
-    """Return Nicolae's lean by (25) and (26), in degrees, > 0 to the right. In free fall (under 0.1 g) it is 0.
+    """Return Nicolae's lean by (25) and (26), in degrees, > 0 to the right. In free fall (under 0.1 g) the lean is 0.
 
     force: left, up, forward in g. yaw_rate: in any unit, because only its sign counts.
 
-    In bends it is right on average. Near upright it is noisy: 1 % of vibration causes an error of 8 degrees, always to
-    the side of the yaw rate.
+    In bends this lean is right on average. Near upright this lean is noisy: 1 % of vibration causes an error of 8
+    degrees, always to the side of the yaw rate.
     """
     left, up = force[0], force[1]
     square = left * left + up * up

@@ -26,7 +26,7 @@ def add_products_python(out, factors, source, n, rows):
 
     out, factors, source: arrays of floats. rows: 1, or n for a symmetric matrix. Half of a symmetric matrix is computed
     and copied to the other half. On the board add_products() is the machine code of kalman_viper.py, for array("f").
-    Elsewhere it is this function.
+    Elsewhere add_products() is this function.
     """
     for i in range(rows):
         factor = factors[i]
@@ -91,7 +91,8 @@ class Covariance:
         p[i * n + i] = variance
 
     def add_noise(self, i, variance):
-        """Add process noise to the variance of state i. Use this for states that do not depend on other states."""
+        """Add process noise to the variance of state i. Use this method for states that do not depend on other
+        states."""
         self._p[i * self.n + i] += variance
 
     def propagate_row(self, i, derivatives, seconds, noise):

@@ -38,7 +38,7 @@ WORK_STEPS = 21  # number of steps of the work on a window; a test checks this n
 _SLOW_STEP_US = const(12_000)  # time between two samples above which all steps are done at once
 DELAY_S = 0.0048  # delay of the MPU6050's gyro at DLPF 3
 # m/s: estimated speed above which the filter restarts. A board that lies on its nose seems to accelerate, but
-# standstill is detected long before the estimated speed is this high.
+# standstill is detected long before the estimated speed reaches this limit.
 _MAX_SPEED = const(250.0)
 
 

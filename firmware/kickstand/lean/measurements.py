@@ -159,8 +159,8 @@ _SIGMA_REST_FORCE = const(0.02)  # g: noise of the force at rest while the engin
 # more.
 REST_FORCE_SHARE = 0.1
 SIGMA_REST_SPEED = 0.02  # m/s: error of the speed 0 at rest. Larger: the estimated speed goes to 0 more slowly.
-# g: largest forward force at rest that the pitch does not explain. A greater force is braking. Larger: steady braking
-# is mistaken for rest.
+# g: largest forward force at rest that the pitch does not explain. A larger force is braking. Larger: steady braking is
+# mistaken for rest.
 MAX_REST_PUSH = 0.08
 # The bike certainly rolls if the estimated speed is above both of the next limits. Larger: a smooth road is mistaken
 # for rest.

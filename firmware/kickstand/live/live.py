@@ -74,7 +74,7 @@ class Live:
             self._sums[i] = 0
 
     def feed(self, sums, n):
-        """Take the samples of a pass of the loop. Call this once per pass with samples while period_ms is not 0.
+        """Take the samples of a pass of the loop. Call this method once per pass with samples while period_ms is not 0.
 
         Args:
             sums: sums of the samples' counts, 7 values.
@@ -86,7 +86,7 @@ class Live:
         self._n += n
 
     def poll(self, now_ms):
-        """Send the packets whose time has come. Call this once per pass of the loop. Never waits."""
+        """Send the packets whose time has come. Call this method once per pass of the loop. Never waits."""
         radio = self.radio
         if radio.changed:
             self._begin()

@@ -111,7 +111,8 @@ class Radio:
         self._attempt(self._ble.gap_disconnect, self.phone)
 
     def save_bonds(self):
-        """Write the keys that a pairing has changed to flash. Call this in the loop, because a write takes long."""
+        """Write the keys that a pairing has changed to flash. Call this method in the loop, because a write takes
+        long."""
         if self._bonds:
             self._bonds.save()
 

@@ -92,8 +92,8 @@ def block_length(index):
 def encode_python(entry, state, out):
     """Append an entry to a buffer.
 
-    On the board, encode() is the machine code of block_viper.py. On a computer it is this function. Both functions
-    write the same bytes.
+    On the board, encode() is the machine code of block_viper.py. On a computer, encode() is this function. Both
+    functions write the same bytes.
 
     Args:
         entry: array('i', FIELDS).

@@ -14,8 +14,8 @@ from .block import BLOCK, block_length
 _DIRECTORY = 0x4000  # bit in the mode of os.stat() that marks a directory
 _ENOSPC = const(28)  # error number for a full disk; MicroPython's errno does not define it
 PART_BLOCKS = 16  # number of ride blocks in a part in flash
-# Number of ride blocks in a part on a card. A day's ride then takes 85 files. With PART_BLOCKS it would take 1300
-# files.
+# Number of ride blocks in a part on a card. A day's ride then takes 85 files. With PART_BLOCKS a day's ride would take
+# 1300 files.
 _CARD_PART_BLOCKS = const(256)
 # Space for the compiled firmware; each file takes whole blocks, and each folder takes two blocks
 FIRMWARE = 103 * BLOCK

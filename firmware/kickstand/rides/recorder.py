@@ -144,7 +144,7 @@ class Recorder:
             self._place = place
 
     def tick(self):
-        """Do one step of the writing. Call it once per pass of the loop while active."""
+        """Do one step of the writing. Call this method once per pass of the loop while active."""
         waiting = self._waiting
         if not waiting:
             return

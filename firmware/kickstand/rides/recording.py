@@ -88,7 +88,7 @@ class Recording:
             self._refused = attempt(self._step)
 
     def try_out_card(self):
-        """Test the SD card (see card_trial.py). Call this before the watchdog runs. Raises nothing."""
+        """Test the SD card (see card_trial.py). Call this method before the watchdog runs. Raises nothing."""
         if not self._refused:
             from . import card_trial
 

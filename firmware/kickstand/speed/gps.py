@@ -19,7 +19,7 @@ from time import ticks_add, ticks_diff
 from ..errors import Notice
 from ..units import const
 
-# Longest sentence in bytes. The standard says 82, but receivers with many decimals exceed this length.
+# Longest sentence in bytes. The standard allows 82 bytes, but receivers with many decimals exceed this length.
 _MAX_SENTENCE = const(100)
 # Most bytes read per pass of the loop. With a pass every 10 ms, this is twice the need of 10 fixes per second.
 _MAX_CHUNK = const(64)

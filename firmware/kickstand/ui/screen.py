@@ -100,8 +100,8 @@ class Screen:
         self.front = self.pages
 
     def lines(self, now_ms):
-        """Return the content of the display: two lines and, for a display that draws, a picture. Call this about every
-        100 ms."""
+        """Return the content of the display: two lines and, for a display that draws, a picture. Call this method about
+        every 100 ms."""
         self.front, lines = self._update_front(now_ms)
         return lines
 
