@@ -129,7 +129,8 @@ class Machine:
         self._inputs: dict[int, int] = {}  # levels set from outside the chip, by pin
         self._wires_of: dict[int, tuple[Wires, int, int]] = {}
         self._driven = [1] * _PINS
-        self._stale: list[int] = []  # pins whose input must be corrected, because QEMU set it to the chip's own output
+        # Pins whose input must be corrected, because QEMU set the input to the chip's own output
+        self._stale: list[int] = []
         # _may_reset is True while the processors wait for a reset, _resetting while the main loop executes it
         self._may_reset = self._resetting = False
         self._fuses: _Timer | None = None

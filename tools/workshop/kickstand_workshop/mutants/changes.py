@@ -55,7 +55,7 @@ class Change(NamedTuple):
 
 
 class Number(Operator):
-    """Changes numbers. Such a change shows limits that no test checks."""
+    """Changes numbers. A changed number that no test notices is a limit that no test checks."""
 
     def mutation_positions(self, node):
         if is_number(node):
