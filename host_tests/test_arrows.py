@@ -1,6 +1,6 @@
 """Checks which modules may import which, in the firmware and in the tools. A sample takes the path imu -> calibration
--> lean -> ui. drive_alignment, speed and rides are beside this path. The app connects them all. Only start, which
-main.py runs, imports the app.
+-> lean -> ui. The folders drive_alignment, speed and rides are beside this path. The app connects all folders. Only
+start, which main.py runs, imports the app.
 
 In the tools, kickstand_fleet, kickstand_emulator and the workshop are leaves: they import the core, kickstand_tools.
 The core imports none of them, and finds their commands by entry points. Only these commands import cli, for shared
@@ -13,7 +13,7 @@ from graphlib import TopologicalSorter
 
 from kickstand_tools.common import firmware_path
 
-ROOT = {"errors", "units", "rotation"}  # modules above the folders, which any folder may import
+ROOT = {"errors", "units", "rotation"}  # modules outside the folders, which any folder may import
 
 # {folder or module: the other parts of the firmware that it may import}
 ARROWS = {
@@ -21,17 +21,17 @@ ARROWS = {
     "units": set(),
     "rotation": set(),
     "console": set(),
-    "board": set(),  # pins, bus, button, display, card: no mathematics
+    "board": set(),  # pins, bus, button, display and card, without mathematics
     "imu": set(),
     "calibration": set(),
     "lean": {"calibration"},
-    "drive_alignment": set(),  # the app passes the calibrations to it
+    "drive_alignment": set(),  # nothing: the app passes the calibrations to it
     "speed": {"board"},
-    "rides": {"board", "calibration", "console"},  # each block of a ride holds its calibration's record
+    "rides": {"board", "calibration", "console"},  # each block of a ride contains the record of its calibration
     "live": {"calibration.transform"},  # only live.radio uses the radio; the modules that build packets do not
     "ui": {"board.button", "lean", "calibration", "drive_alignment"},
     "settings": set(),
-    "setting_table": {"board", "imu.mpu6050"},  # ranges and pins that can be chosen
+    "setting_table": {"board", "imu.mpu6050"},  # for the ranges and pins that can be set
     "devices": {"board", "imu"},
     "diagnosis": {"imu"},
     "status_report": {
@@ -51,15 +51,15 @@ ARROWS = {
     "start": {"board", "devices", "settings"},
     "__init__": {"status_report"},
 }
-# {part: the parts that it imports only in the function that needs them}. They cost memory, and most boards never need
-# them.
+# {part: the parts that it imports only in the function that needs them}. These parts cost memory, and most boards never
+# need them.
 LATE = {
-    "settings": {"setting_table"},  # the module is unloaded after use
-    "errors": {"console"},  # report() prints a refusal in words
-    "status_report": {"rides"},  # reports whether its machine code is used
+    "settings": {"setting_table"},  # removed from memory after use
+    "errors": {"console"},  # console has the words that report() prints
+    "status_report": {"rides"},  # reports whether the machine code of rides is used
     "app": {"state", "user_code"},
-    "devices": {"diagnosis"},  # finds out why no sensor answers
-    "start": {"app", "console", "ui.messages", "live"},  # imported while the display says "starting"
+    "devices": {"diagnosis"},  # diagnosis finds out why no sensor answers
+    "start": {"app", "console", "ui.messages", "live"},  # loaded while the display says "starting"
 }
 # MicroPython's hardware modules, which only drivers may import
 HARDWARE = {"machine", "micropython", "esp32", "rp2", "neopixel", "network", "bluetooth"}
@@ -70,7 +70,7 @@ LEAVES = {"kickstand_fleet", "kickstand_emulator", "kickstand_workshop"}
 # package.
 TOOL_ARROWS = {
     "common": set(),
-    "signals": set(),  # numpy only, no log and no file
+    "signals": set(),  # uses numpy only, no logs and no files
     "logs": {"common", "signals", "checks", "calibration.file"},  # a log is checked while it is read
     "checks": {"common", "signals", "logs.cells", "logs.log", "calibration.file"},
     "calibration": {"common", "signals", "logs", "checks.units"},
@@ -91,7 +91,7 @@ TOOL_ARROWS = {
     "simulated_board": set(),
     "simulation": {"common", "logs.cells"},
     "demo": {"common", "simulated_board", "simulation.scripted"},
-    "deploy": {"common", "simulated_board"},  # config.py is tried on the simulated board
+    "deploy": {"common", "simulated_board"},  # tries config.py on the simulated board
     "rides": {"common", "logs", "calibration.file", "deploy", "replay.replay_engine"},
     "pictures": {"common", "simulated_board"},
     "web": {
@@ -262,7 +262,7 @@ def test_no_arrow_is_left_over():
 
 
 def test_no_module_imports_itself_by_way_of_others():
-    """This includes imports within functions."""
+    """The test includes imports within functions."""
     package = firmware_path.PACKAGE
     found = {".".join(path.relative_to(package).with_suffix("").parts): imports(path) for _, path in modules()}
     graph = TopologicalSorter({name: {target or "__init__" for target, _ in seen} for name, seen in found.items()})
@@ -373,7 +373,7 @@ def test_the_core_may_import_no_leaf():
 
 
 def test_no_tool_imports_itself_by_way_of_others():
-    """This includes imports within functions and for type checking only."""
+    """The test includes imports within functions and for type checking only."""
     TopologicalSorter(tool_modules()).prepare()  # raises CycleError
 
 

@@ -1,5 +1,5 @@
-"""Prints the lean of the bike ten times per second. It shows how to use the lean meter's mathematics in your own
-program.
+"""Prints the lean of the bike ten times per second. The program shows how to use the lean meter's mathematics in your
+own code.
 
 The firmware must be on the board (`kickstand flash`), and the bike aligned with it once. Then, on your computer,
 `mpremote run firmware/examples/print_lean.py` shows the lean, positive to the right, and the forward acceleration:

@@ -4,7 +4,7 @@ The firmware must be on the board (`kickstand flash`). Then, on your computer:
 
     mpremote run firmware/examples/print_sensor.py
 
-It prints acceleration and turning rate along the sensor's own x, y and z, and the temperature:
+The program prints acceleration and rate of rotation along the sensor's own x, y and z, and the temperature:
 
     -0.01  +0.02  +1.01 g     +0.3   -1.2   +0.1 deg/s   25.3 C
 

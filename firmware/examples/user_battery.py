@@ -1,4 +1,4 @@
-"""A page with the voltage of the bike's battery. It needs neither sensor nor alignment.
+"""A page with the voltage of the bike's battery. The page needs neither sensor nor alignment.
 
 Copy it to the board as user.py, and restart (the firmware must be on the board; an update leaves user.py alone):
 

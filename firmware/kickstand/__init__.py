@@ -10,7 +10,7 @@ from .units import __version__ as __version__
 def status(wirings=False):
     """Print a report of the board: versions, settings, sensor, display, button, speed, calibration, memory, flash.
 
-    Stop the app first, because the report opens sensor and display, and writes a file for a trial.
+    Stop the app first, because the report opens sensor and display, and writes a file to measure the flash.
 
     Args:
         wirings: True to show the number of each known backpack wiring on the character display for some seconds.

@@ -1,13 +1,13 @@
 """The device: connects sensor, mathematics, button, flash and display, and runs the loop.
 
 Data flows in one direction: sensor -> calibration and alignment -> lean -> page -> display. The chip takes samples at
-SAMPLE_HZ on its own. One pass of the loop is called a turn. App.turn() processes the new samples. App.step() also
-collects garbage, feeds the watchdog and waits for the next turn.
+SAMPLE_HZ on its own. App.turn() processes the new samples. App.step() is one pass of the loop: it calls turn(),
+collects garbage, feeds the watchdog and waits until the next pass is due.
 
-The methods that take most of a turn are step, turn, _pass_on, LeanMeter.update_sum and Sensor.fetch. Each of them must
-need at most eleven words for locals and stack, because MicroPython puts a larger frame on the heap. When a frame on the
-heap is freed, the next search for free memory begins there. It passes all garbage since the last collection, which
-takes up to 1 ms per turn.
+Most of a pass is spent in the methods step, turn, _pass_on, LeanMeter.update_sum and Sensor.fetch. Each of these
+methods must need at most eleven words for locals and stack, because MicroPython puts a larger stack frame on the heap.
+After a frame on the heap is freed, MicroPython's next search for free memory begins where the frame was. This search
+scans all garbage since the last collection, which takes up to 1 ms per pass.
 """
 
 import gc
@@ -26,20 +26,21 @@ from .rides.recording import Recording
 from .ui.screen import Screen
 from .units import const
 
-LOOP_US = 10_000  # length of a turn in us; the chip's FIFO can keep the samples for much longer
-# Turns between two garbage collections. They use 80 KB of heap. While recording, 91 KB are free
+LOOP_US = 10_000  # length of a pass of the loop in us; the chip's FIFO can keep samples for much longer
+# Passes of the loop between two garbage collections. The passes between two collections use 80 KB of heap. While
+# recording, 91 KB of heap are free
 _COLLECT_TURNS = const(40)
-# Turns between two collections while aligning by driving, and with an OLED, a phone or user.py. They use 46 KB of heap.
-# While aligning by driving, 72 KB are free
+# Passes between two garbage collections while aligning by driving, and with an OLED, a phone or user.py. The passes
+# between two collections use 46 KB of heap. While aligning by driving, 72 KB of heap are free
 _COLLECT_TURNS_DRIVING = const(23)
 # Number of collections between two checks of the free heap. A check takes 3 ms on an ESP32. If the drive, an OLED, a
 # phone or user.py also uses heap, the app checks after each collection.
 _PLAN_EVERY = const(4)
-SINGLE_GAPS = 300  # number of single free heap blocks after a collection
+SINGLE_GAPS = 300  # number of free heap blocks that lie alone after a collection
 _PAGE_MS = const(100)
 # A lean on the display must be at most half a second old. So a page shows no lean if its own delay plus the age of the
-# readings in the FIFO is longer than _LATE_MS. A display that draws needs about _DRAWING_MS more to send a picture
-# (estimated).
+# readings in the FIFO is longer than _LATE_MS. A display that draws needs about _DRAWING_MS longer to send a picture
+# than another display needs to send its lines (estimated).
 _LATE_MS = const(400)
 _DRAWING_MS = const(200)
 # Time from the start of the sensor to the first page, long enough for the lean filter's first window
@@ -49,16 +50,18 @@ _FIRST_PAGE_MS = const(60)
 def fill_gaps(n):
     """Allocate n single blocks of the heap and drop them.
 
-    After a collection the heap has many single free blocks. Until they are in use, MicroPython scans past all of them
-    for each larger object. This function takes 2 ms, and saves 0.4 ms in each of the turns that follow a collection.
+    After a collection the heap has many single free blocks. Until these blocks are in use, MicroPython scans past all
+    of them for each larger object. This function takes 2 ms. Its effect saves 0.4 ms in each pass of the loop until the
+    next collection.
     """
     value = 0.5
     for _ in range(n):
         value = -value  # each new float takes one block of the heap
 
 
-# Worst values of the last run, which kickstand.status() prints. Ctrl-C sets them. They are the length of the longest
-# turn in us, the smallest number of free places in the chip's FIFO, and AxisWatch.shaken() of the axes.
+# Worst values of the last run, which kickstand.status() prints. Ctrl-C sets them. The values are the length of the
+# longest pass of the loop in us, the smallest free space found in the chip's FIFO, in samples, and the result of
+# AxisWatch.shaken().
 worst = None
 
 
@@ -112,8 +115,8 @@ class App:
         return BackgroundAlignment(self.settings.leans, open_speed(self.settings), self.meter, self.calibration)
 
     def run(self):
-        """Loop until Ctrl-C, one turn per LOOP_US. At the end the display says that the firmware has stopped, because
-        an old lean must not stay on it."""
+        """Run the loop until Ctrl-C, one pass per LOOP_US. At the end the display says that the firmware has stopped,
+        because an old lean must not stay on it."""
         try:
             self.begin()
             while True:
@@ -127,7 +130,8 @@ class App:
             global worst
             chip = self.sensor.chip
             worst = LOOP_US - self._least_wait_us, chip.least_free_samples(), chip.axes.shaken()
-            if not isinstance(error, Exception):  # Ctrl-C; after an error the board is restarted instead
+            # Ctrl-C ends the firmware; after an error the board is restarted instead
+            if not isinstance(error, Exception):
                 port.rest_watchdog()
                 self.rides.stop()
                 if self.live:
@@ -151,7 +155,7 @@ class App:
         LOOP_US."""
         self.turn()
         self._turns_left -= 1
-        if self._turns_left <= 0:  # collect between two turns, while the FIFO keeps the samples
+        if self._turns_left <= 0:  # collect between two passes, while the FIFO keeps the samples
             gc.collect()
             fill_gaps(SINGLE_GAPS)
             self._plan_collection()
@@ -165,7 +169,7 @@ class App:
             self._least_wait_us = wait_us
         if wait_us > 0:
             sleep_us(wait_us)
-        else:  # the turn was late, for example after a write to flash: do not try to catch up
+        else:  # the pass took too long, for example because of a write to flash: do not try to catch up
             self._due_us = ticks_us()
 
     @property
@@ -180,7 +184,7 @@ class App:
         return state(self)
 
     def _plan_collection(self):
-        """Set the number of turns until the next garbage collection."""
+        """Set the number of passes until the next garbage collection."""
         small = self.drive or self.lcd.draws or self.live or self.user
         if small or self._collections % _PLAN_EVERY == 0:
             self._planned_turns = port.turns_to_collect(_COLLECT_TURNS_DRIVING if small else _COLLECT_TURNS)
@@ -201,7 +205,8 @@ class App:
             self._pass_on(n, dt_us, now_ms)
         if self.drive:
             self._poll_speed(now_ms)
-        # The comparison is done twice, because a local variable would put this frame on the heap
+        # The times are compared twice in this method, because a local variable would put the method's stack frame on
+        # the heap
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self.sensor.check(now_ms)
         if self.sensor.fault is not None:
@@ -214,7 +219,7 @@ class App:
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self._show(now_ms)
         self.lcd.tick(now_ms)
-        if self.rides.recorder.active:  # calling recording() would cost 20 us
+        if self.rides.recorder.active:  # read directly, because recording() would cost 20 us
             self.rides.recorder.tick()
         if self.live:
             self.live.poll(now_ms)
@@ -249,7 +254,7 @@ class App:
         )
         self.screen.pages.draws = self.lcd.draws
         self._page_ms = ticks_add(now_ms, _PAGE_MS)
-        if self.screen.menu:  # prepare, so that a recording started in the menu begins at once
+        if self.screen.menu:  # prepare here, so that a recording started in the menu begins at once
             self.rides.prepare()
         problem = self.rides.recorder.take_problem() or (self.drive and self.drive.speed.take_problem())
         axes = self.sensor.chip.axes
@@ -288,7 +293,8 @@ class App:
         wizard.follow(chip.sums, n, dt_us, now_ms)
 
     def _sensor_started(self):
-        """Handle a chip that was set up at the start or after a fault. After a fault it may be another chip."""
+        """Handle a chip that was set up at the start or after a fault. After a fault the chip may be another one than
+        before."""
         self._restarts = self.sensor.restarts
         self.clock.restart()
         self.meter.restart()

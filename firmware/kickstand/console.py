@@ -1,14 +1,14 @@
 """The sentences for the board's USB console. Each code (see errors.py) has one sentence.
 
-This module is imported only when there is something to print. On most boards that is never the case.
+This module is imported only when there is something to print. Most boards never print anything.
 """
 
 from .units import const
 
-# A print that takes longer than this is slow. Most prints take a few ms. If the computer on USB sleeps, a print takes
-# 500 ms, and the sensor's FIFO overflows.
+# Shortest duration of a slow print. Most prints take a few ms. If the computer on USB sleeps, a print takes 500 ms, and
+# the sensor's FIFO overflows.
 _SLOW_MS = const(100)
-_QUIET_MS = const(60_000)  # after a slow print no refusal is printed for this time
+_QUIET_MS = const(60_000)  # time after a slow print in which no refusal is printed
 
 _slow_ms = None  # ticks_ms() of the last slow print
 

@@ -14,7 +14,7 @@ def open_lcd(settings, wiring=None):
     """Open the Display. The Display's tick() raises SettingsError for pins that the I2C controller cannot use.
 
     Args:
-        wiring: the wiring of a character display's backpack. By default it is LCD_WIRING.
+        wiring: the wiring of a character display's backpack. The default is LCD_WIRING.
     """
     return Display(
         lambda hz: open_bus(settings, "LCD", hz),

@@ -76,7 +76,7 @@ def exchanged(sda, scl, addresses):
 
 
 def scan(sda, scl, reopen, addresses):
-    """Examine a bus. This takes 0.1 s and leaves the bus open.
+    """Examine a bus. The scan takes 0.1 s and leaves the bus open.
 
     Args:
         addresses: the addresses at which the missing device may answer.
@@ -156,7 +156,7 @@ def fifo_fault(chip):
     values[0] of the Notice is the fault in words. The test takes up to 0.3 s and leaves the FIFO empty. Raises OSError
     from the bus."""
     chip.restart_fifo()
-    left = chip.waiting()  # the FIFO may already hold a sample that arrived after the restart
+    left = chip.waiting()  # not 0 if a sample has arrived since the restart of the FIFO
     chip.write_register(_INT_ENABLE, 1)
     before = _reading(chip)
     sleep_ms(_PERIODS * chip.period_ms)

@@ -1,4 +1,4 @@
-"""Errors and notices. Each has a code and the values for its sentence.
+"""Errors and notices. Each error and each notice has a code and the values for its sentence.
 
 A code is a name for programs and is never shown. Three modules have words for each code:
 * ui/messages.py for the display, in two lines of 16 characters
@@ -97,7 +97,8 @@ def checked(machine_code, plain, *arguments):
         arguments: the arguments for one call of each function. The second call gets copies.
 
     Returns:
-        machine_code if both functions give the same results. Otherwise plain, after a report on the console.
+        machine_code if both functions give the same results. If the results differ, plain, after a report on the
+        console.
     """
     copies = [a if isinstance(a, (int, bytes)) else a[:] for a in arguments]
     same = machine_code(*arguments) == plain(*copies)

@@ -90,8 +90,8 @@ def frame(out, up, forward):
 
 
 def angle_deg(a, b):
-    """Return the angle between two vectors, from 0 to 180 degrees. It uses atan2, because acos of a 32-bit float is
-    useless near 0 and 180 degrees."""
+    """Return the angle between two vectors, from 0 to 180 degrees. The angle comes from atan2, because acos of a 32-bit
+    float is useless near 0 and 180 degrees."""
     c = vector()
     cross(c, a, b)
     return degrees(atan2(norm(c), dot(a, b)))

@@ -71,8 +71,8 @@ _TABLE = {
     "GPS_BAUD": (9600, _whole(4800, 115_200)),
     "PULSES_PER_METRE": (0.5, (_pulses, "pulses along a metre of road, from 0.1 to 100")),
 }
-# The table of the pins, in the same form. A wrong pin is replaced by None, because the default pin may be connected to
-# something else.
+# The settings of the pins, as entries like those of _TABLE. A wrong pin is replaced by None, because the default pin
+# may be connected to something else.
 _PINS = {
     "SENSOR_SDA": (port.SENSOR_PINS[0], _PIN),
     "SENSOR_SCL": (port.SENSOR_PINS[1], _PIN),
@@ -140,5 +140,6 @@ def _check(settings, config):
     if not settings.leans and settings.SPEED is None:
         raise SettingsError("needs-speed", "SPEED")
     fitting = MIN_DLPF[settings.SAMPLE_HZ]
-    if settings.DLPF < fitting:  # otherwise vibration of the engine would alias and look like a slow motion
+    # A wider low-pass would alias the engine's vibration, which then looks like a slow motion
+    if settings.DLPF < fitting:
         raise SettingsError("aliasing", "DLPF", settings.DLPF, settings.SAMPLE_HZ, fitting)

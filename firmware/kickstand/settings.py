@@ -29,7 +29,7 @@ def _line_of(error):
 
 
 class Settings:
-    """The settings. There is one attribute per name in setting_table.py. Raises SettingsError.
+    """The settings. Each name in setting_table.py is an attribute. Raises SettingsError.
 
     Args:
         config: the module config, or None for the defaults.

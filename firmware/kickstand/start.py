@@ -1,7 +1,8 @@
 """Starts the lean meter. main.py runs it when the board gets power.
 
-Safe mode: if the button is held at power-on, nothing is started. So new firmware can always be copied. After a reset
-the button is ignored. Otherwise a press while an error is shown could leave the rider without a display.
+Safe mode: if the button is held at power-on, nothing is started. In safe mode new firmware can always be copied. After
+a reset the button is ignored. Without this rule a press while an error is shown could leave the rider without a
+display.
 """
 
 import gc
@@ -39,7 +40,7 @@ def _held(button):
     """Return True if the button is pressed now and a moment later.
 
     A capacitor for debouncing between pin and ground would look like a press at power-on. The pin's weak pull-up must
-    charge it first. 1 uF through 80 kOhm takes 75 ms."""
+    charge the capacitor first. 1 uF through 80 kOhm takes 75 ms."""
     if button.held():
         sleep_ms(_CHARGE_MS)
     return button.held()
@@ -49,8 +50,8 @@ def main(loop=None):
     """Run until Ctrl-C, power-off or a reset. An exception is reported on display and console, then the board restarts.
 
     Args:
-        loop: a function that is called with the App instead of App.run(), or None. A simulation uses it to call
-            App.begin() and App.step() later.
+        loop: a function that is called with the App instead of App.run(), or None. A simulation uses such a function to
+            call App.begin() and App.step() later.
     """
     lcd = None
     try:
@@ -60,7 +61,7 @@ def main(loop=None):
             print("Kickstand %s: safe mode, the button was held at power-up." % __version__)
             _show(lcd, "Safe mode", "Ready for USB")
             return
-        lcd.show("Kickstand", "starting")  # replaces a lean shown before a reset
+        lcd.show("Kickstand", "starting")  # replace a lean that was shown before a reset
         run(chosen, lcd, loop)
     except SettingsError as error:
         # the watchdog may be running, because the app finds some wrong pins only when it opens them
@@ -71,14 +72,14 @@ def main(loop=None):
         print("Kickstand stopped. " + sentence(error))
         try:
             _show(lcd or open_lcd(error.settings), *lines(error))
-        except SettingsError:  # the display's own pins are wrong or not set
+        except SettingsError:  # the pins of the display are wrong or not set
             pass
     except KeyboardInterrupt:
         port.rest_watchdog()
         if lcd:
             lcd.end(*STOPPED)
         print("Kickstand stopped. Ctrl-D starts it again; import kickstand; kickstand.status() reports how it is.")
-    except ImportError as error:  # an update was interrupted, so a restart would not help
+    except ImportError as error:  # no restart, because the files are incomplete after an interrupted update
         port.rest_watchdog()
         print("Kickstand stopped: incomplete firmware (%s). Run kickstand flash." % error)
         _last_words(lcd, "Incomplete:", "flash it again")
@@ -93,7 +94,7 @@ def _last_words(lcd, line1, line2):
     """Show two lines when the firmware ends.
 
     Args:
-        lcd: the Display, or None if it is not open yet. Then it is opened on the default pins.
+        lcd: the Display, or None if it is not open yet. Without a Display one is opened on the default pins.
     """
     try:
         if lcd is None:
@@ -101,7 +102,7 @@ def _last_words(lcd, line1, line2):
             gc.collect()
             lcd = open_lcd(settings.Settings())
         _show(lcd, line1, line2)
-    except Exception:  # memory or a file may be missing; the console already has the message
+    except Exception:  # memory may be short or a file missing; the console already has the message
         pass
 
 

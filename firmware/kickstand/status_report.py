@@ -65,8 +65,8 @@ def report(wirings=False):
 
 
 def _write_ms():
-    """Return the time in ms to erase and write a flash block. Readings are lost if the chip's FIFO overflows in this
-    time."""
+    """Return the time in ms to erase and write a flash block. Readings are lost if the chip's FIFO overflows during the
+    erase and the write."""
     begun_ms = ticks_ms()
     with open(_TRIAL, "wb") as file:
         file.write(bytes(4096))
@@ -130,7 +130,8 @@ def _display(lcd, settings):
 
 
 def _speed(settings):
-    """Print the speed or the fault of the speed source after _LISTEN_MS. Each fault is detected within this time."""
+    """Print the speed or the fault of the speed source after _LISTEN_MS. Each fault of a speed source is detected
+    within _LISTEN_MS."""
     if settings.SPEED is None:
         _print("Speed", "no source: SPEED is not set, alignment by driving is off")
         return

@@ -1,4 +1,5 @@
-"""Runs the owner's code, the file user.py on the board. Updates do not touch this file. It may define these functions:
+"""Runs the owner's code, the file user.py on the board. Updates do not touch this file. The file may define these
+functions:
 
 setup(app)                          is called once, before the lean meter runs
 page(app), page_battery(app) ...    is called while its page is shown. It returns two lines of 16 characters and, for a
@@ -21,9 +22,9 @@ from time import ticks_diff, ticks_ms
 from .errors import Notice, report
 from .units import const
 
-_SLOW_MS = const(50)  # a call that takes longer is reported, once per function
+_SLOW_MS = const(50)  # longest call that is not reported; a slow function is reported once
 _TOO_SLOW_MS = const(300)  # longest time of a call, because the sensor does not keep its samples for longer
-# Number of successive calls longer than _SLOW_MS that disable a function. After more such calls the loop could not
+# Number of successive calls longer than _SLOW_MS that disable a function. After more slow calls the loop could not
 # catch up with the samples.
 _MOST_SLOW = const(5)
 _LEAST_FREE = const(20_000)  # smallest free heap in bytes; with less the lean meter would soon fail too

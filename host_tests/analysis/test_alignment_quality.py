@@ -1,5 +1,5 @@
-"""A report finds the alignment errors of a ride, their effect on the lean, and the remedy. The tests use known
-errors."""
+"""A report finds the alignment errors of a ride, their effect on the lean, and the remedy. The rides in the tests have
+known alignment errors."""
 
 import dataclasses
 import re
@@ -69,7 +69,7 @@ def test_yaw_and_pitch_cause_the_stated_lean_error(ride, name, degrees):
     said = vars(lean_cost(Quality(**angles, gravity_g=1.0, straight_s=60.0, lateral_g=NONE, forward_g=NONE)))
     most = said.pop(f"{name}_deg")
     assert cost < 1.75 * most + 0.15
-    if ride[3] != "city":  # the cost is smaller in slow rides
+    if ride[3] != "city":  # in slow rides an alignment error costs less
         assert cost > 0.3 * most
     assert set(said.values()) == {0.0}
 
@@ -77,7 +77,7 @@ def test_yaw_and_pitch_cause_the_stated_lean_error(ride, name, degrees):
 def test_riding_corrects_roll_up_to_a_limit(ride):
     usual = error_deg(ride, ride[1], 0.5)
     assert error_deg(ride, turned(ride[1], "roll", 3.0), 0.5) < usual + 0.3
-    assert error_deg(ride, turned(ride[1], "roll", 12.0), 0.5) > 7.0  # infinity if no lean is shown at all
+    assert error_deg(ride, turned(ride[1], "roll", 12.0), 0.5) > 7.0  # the error is infinite if no lean is shown at all
 
 
 def test_calibrate_drive_corrects_yaw(ride):

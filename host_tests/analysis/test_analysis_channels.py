@@ -41,7 +41,7 @@ def test_maxima_are_those_of_the_display(ride):
     whole = joined(list(ride.blocks()))
     for start in range(0, len(whole.t_s), 777):
         summary.add(whole.part(slice(start, start + 777)))
-    # windows of 150 ms begin every 75 ms on the display, but at every sample in the summary
+    # the display finds maxima in windows of 150 ms that begin every 75 ms, the summary in windows from every sample
     assert meter.max_left_deg - 0.01 < summary.left_deg.value < meter.max_left_deg + 0.5
     assert meter.max_right_deg - 0.01 < summary.right_deg.value < meter.max_right_deg + 0.5
     assert summary.left_deg.value > 25
@@ -76,7 +76,7 @@ def test_thinned_ride_is_the_mean_of_each_stretch(course, block):
         want = getattr(course, name)[: 4 * n].reshape(n, 4).mean(axis=1)
         assert np.allclose(getattr(thin, name)[:n], want)
     assert np.count_nonzero(~np.isnan(thin.speed_mps)) == np.count_nonzero(~np.isnan(course.speed_mps))
-    slow = course.part(slice(0, None, 10))  # a slow log is not thinned
+    slow = course.part(slice(0, None, 10))  # a log with few samples per second is not thinned
     assert np.array_equal(joined(list(downsampled([slow], 0.02))).lean_deg, slow.lean_deg, equal_nan=True)
 
 
@@ -147,5 +147,5 @@ def test_channels_are_those_of_the_meter(ride, course):
             assert np.max(np.abs(getattr(course, name) - column)) < 1e-5, name
     assert np.array_equal(course.shown_g, shown)
     assert np.array_equal(course.rolling, rolling)
-    assert 0.2 < np.mean(rolling) < 0.9  # the ride has turns and straights
+    assert 0.2 < np.mean(rolling) < 0.9  # the ride has bends and straights
     assert np.array_equal(course.trusted, trusted)

@@ -92,8 +92,8 @@ def test_time_without_readings_is_missing():
 
 
 def test_the_alignment_of_a_straight_ride_by_hand():
-    """The bike always leans by 2 degrees to the right. It brakes and accelerates by 0.2 g. A tenth of this force is
-    along left."""
+    """The bike always leans by 2 degrees to the right. The bike brakes and accelerates by 0.2 g. A tenth of this force
+    is along left."""
     n, push = 10_000, 0.2 * np.where(np.arange(10_000) // 100 % 2, 1.0, -1.0)
     tilt = np.tan(np.radians(2.0))
     standing = (np.arange(n) < 500) | (np.arange(n) >= n - 500)
@@ -117,7 +117,7 @@ def test_what_a_ride_must_have_to_show_its_alignment():
         return quality(made(n, forward_g=push, yaw_rate_dps=yaw_dps), standing)
 
     assert of(yaw_dps=1.9).roll_deg is not None and of(yaw_dps=2.1).roll_deg is None
-    # 2 s of this time are standstill
+    # `seconds` includes 2 s of standstill
     assert of(seconds=12.6).roll_deg is not None and of(seconds=11.4).roll_deg is None
     assert of(push_g=0.06).yaw_deg is not None and of(push_g=0.04).yaw_deg is None
     assert of(seconds=63.0).pitch_deg is not None and of(seconds=61.0).pitch_deg is None
@@ -168,7 +168,7 @@ def test_positions_are_interpolated_except_in_gaps():
 def test_absurd_readings_are_those_of_the_second_before():
     t_s = np.arange(300) / 100.0
     force, rates = np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3))
-    force[50, 0], rates[60, 0] = 99.0, 9999.0  # at 0.5 and 0.6 s, too early to be named for 2.5 s
+    force[50, 0], rates[60, 0] = 99.0, 9999.0  # at 0.5 and 0.6 s, too early for the notice about 2.5 s
     force[160, 2], rates[250, 1] = -30.0, -5000.0
     (block,) = read_blocks(api.Log(t_s, force, rates))
     notice = _divergence_notice(block, 250)

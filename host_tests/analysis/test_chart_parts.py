@@ -53,7 +53,7 @@ def test_the_chart_of_shares_is_cut_above_small_leans():
 
 
 def test_the_chart_of_g_against_g_counts_seconds():
-    """For 30 s the bike has a force of 0.26 g to the right and brakes with 0.51 g. Then it is at rest."""
+    """For 30 s the bike has a force of 0.26 g to the right and brakes with 0.51 g. Then the bike is at rest."""
     course = made(6000, lateral_g=-0.26, forward_g=-0.51, resting=np.arange(6000) >= 3000)
     cells, *rings = charts.charts(seen(course)).below[0].traces
     assert isinstance(cells, charts.CellMap)
@@ -89,7 +89,7 @@ def test_an_envelope_breaks_the_line_in_the_middle_of_a_gap():
     assert x.tolist() == [0.0, 1.0, 2.5, 4.0, 5.0] and y[:2].tolist() == [1.0, 2.0] and np.isnan(y[2])
     assert len(charts.envelope(time, values, 10, gap_s=3.0)[0]) == 4
     few = charts.envelope(np.arange(8.0), np.array([0.0, 9.0, 1.0, -9.0, 2.0, 2.0, 5.0, 1.0]), 4)
-    assert few[0].tolist() == [1.0, 3.0, 6.0, 7.0]  # the smallest and the largest of each four values
+    assert few[0].tolist() == [1.0, 3.0, 6.0, 7.0]  # of each four values the smallest and the largest are kept
 
 
 def test_numbers_of_a_page_are_rounded_and_nan_is_none():
@@ -155,8 +155,8 @@ def test_points_of_a_map_that_hardly_move_are_left_out():
 
 
 def test_the_tiles_are_placed_by_mercator():
-    """The world is 40 030 km wide at the equator, and half as wide at 60 degrees north. In the Mercator projection this
-    latitude is 1.3170 radii from the equator."""
+    """The world is 40 030 km wide at the equator, and half as wide at 60 degrees north. In the Mercator projection, 60
+    degrees north is 1.3170 radii from the equator."""
     none = np.zeros(1)
     found = page.tiles_at(track_map.MapPoints(none, none, none, none, none, 60.0, 90.0))
     assert found["world_m"] == pytest.approx(40_030_174.0 / 2.0, rel=1e-3)

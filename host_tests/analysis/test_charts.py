@@ -25,7 +25,7 @@ pytest.importorskip("plotly")
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory) -> Overview:
-    """Return a ride with gentle acceleration, one left turn and a hard stop. Its calibration has a yaw error of 10
+    """Return a ride with gentle acceleration, one left turn and a hard stop. The calibration has a yaw error of 10
     degrees on purpose."""
     ride = analysis_rides.write(
         tmp_path_factory.mktemp("ride"),
@@ -125,8 +125,8 @@ def test_charts_of_car_and_speed_are_drawn_only_if_present(seen, car, speed):
 
 
 def test_charts_are_stacked_in_a_narrow_window(seen):
-    """In a wide window the last three charts are side by side. In a narrow window they are below each other. They never
-    overlap."""
+    """In a wide window the last three charts are side by side. In a narrow window the last three charts are below each
+    other. They never overlap."""
     for kind, last_row in (("layout", 3), ("narrow", 1)):
         drawn = interactive.figure(charts(seen))[kind]
         axes = [name.removeprefix("xaxis") for name in drawn if name.startswith("xaxis")]
@@ -172,7 +172,7 @@ def test_labels_of_the_lean_histogram_do_not_overlap(seen, most):
         assert min(box.x0 for box in boxes) > inside.x0
     (corner,) = (text.get_window_extent() for text in axes.texts if "upright" in text.get_text())
     tops = [line.get_window_extent().y1 for line in axes.lines]
-    assert len(tops) == 2 and max(tops) < corner.y0  # no line crosses the words
+    assert len(tops) == 2 and max(tops) < corner.y0  # no line crosses the words "upright"
 
 
 def test_doubtful_lean_and_warnings_are_drawn(seen, tmp_path):
@@ -233,8 +233,8 @@ def luminance(rgb):
 
 
 def test_rarest_g_is_visible_on_white_and_on_dark_paper(seen):
-    """The rarest value has the first colour of the scale. This colour must also be visible in dark mode, where the page
-    inverts the charts."""
+    """The rarest value has the first colour of the scale. The first colour must also be visible in dark mode, where the
+    page inverts the charts."""
     (cells,) = [trace for trace in interactive.figure(charts(seen))["data"] if trace["type"] == "heatmap"]
     logs = np.array([[np.nan if value is None else value for value in row] for row in cells["z"]])
     assert cells["zmin"] == pytest.approx(np.nanmin(logs), abs=0.001)

@@ -33,7 +33,7 @@ def export(ride, form, out, *more) -> Path:
 
 @pytest.mark.parametrize("form", ["parquet", "csv.gz"])
 def test_csv_and_parquet_have_every_sample(ride, shown, tmp_path, form):
-    """`export` computes forces, rates and formula with numpy. They equal the values of the firmware in `replay`."""
+    """`export` computes forces, rates and formula with numpy. These values equal the firmware's values in `replay`."""
     read = pandas.read_parquet if form == "parquet" else pandas.read_csv
     got = read(export(ride, form.partition(".")[0], tmp_path / f"out.{form}", "--live"))
     given = analysis_rides.table(ride)
@@ -49,7 +49,7 @@ def test_csv_and_parquet_have_every_sample(ride, shown, tmp_path, form):
     s = shown["left_g"] * np.cos(lean) - shown["up_g"] * np.sin(lean)
     assert np.allclose(got["lateral_g"], s, atol=1e-4)
     assert np.array_equal(got["speed_mps"].notna(), ~np.isnan(given["speed_mps"]))
-    assert got["temp_c"].isna().all()  # the log has no temperatures
+    assert got["temp_c"].isna().all()
 
 
 def test_a_car_has_no_lean_as_in_replay(ride, tmp_path):

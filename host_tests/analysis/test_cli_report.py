@@ -59,7 +59,7 @@ def test_unknown_figures_are_not_reported(ride, tmp_path):
     seen = overview(open_ride(ride, up_is_back))
     assert [notice.code for notice in seen.notices] == ["up-off"]
     total = seen.summary
-    # no values, as if none was certain enough
+    # no maxima, as if no lean and no force was certain enough
     total.left_deg = total.right_deg = total.brake_g = total.accel_g = Peak()
     rows = {name: value for name, value, _ in report.words(seen).ride}
     names = "Max left", "Max right", "Over 30°", "Over 40°", "Max braking", "Max acceleration"
@@ -127,7 +127,7 @@ def test_a_kickstand_on_the_other_side_is_noticed(ride, tmp_path):
     assert line in said.err
     assert "do all accelerations have the opposite sign?" in said.err
     assert "Stops: not known" in said.out
-    assert "MFDD" not in said.out  # with reversed axes no figure is right
+    assert "MFDD" not in said.out  # with reversed axes the stops have no correct MFDD
     data = report.as_data(overview(open_ride(ride, cal)))
     assert data["remark"].startswith(line)
     assert data["stops"] == []
@@ -135,7 +135,7 @@ def test_a_kickstand_on_the_other_side_is_noticed(ride, tmp_path):
     car = turned_round(tmp_path, vehicle="car")
     said = command.works("report", ride, "--calibration", car, "--live")
     assert "exchanged: calibrate drive again?" in said.err
-    assert "Max left" not in said.out and "Max braking" in said.out  # a car has no lean
+    assert "Max left" not in said.out and "Max braking" in said.out  # the report of a car shows no lean
 
 
 def test_stop_shown_only_by_the_speed_is_reported(ride, tmp_path):

@@ -1,4 +1,4 @@
-"""The values that a page of a ride and its map draw, for lines, areas, bars and maps of a few points."""
+"""Tests the values that a ride's page draws, with lines, areas, bars and maps of a few points."""
 
 import math
 from dataclasses import replace

@@ -20,7 +20,7 @@ from kickstand_tools.logs.log import Log
 from support import command
 from support.recordings import analysis_rides
 
-EVENING_S = 1_700_000_000.0  # this Unix time is 22:13:20 UTC on 14/11/2023
+EVENING_S = 1_700_000_000.0  # Unix time of 22:13:20 UTC on 14/11/2023
 VALUES = {
     "lean_deg": -12.34567,
     "lean_formula_deg": 23.4567,
@@ -81,7 +81,7 @@ def test_vbo_to_the_letter(tmp_path):
     are in minutes, positive to the west."""
     evening = EVENING_S + 6400.0 - 0.25  # the ride begins in the last second before midnight
     moved = block(0.25, 61.5, 3661.75)
-    moved.lon_deg[0] += 1e-5  # this moves the position 0.68 m to the east
+    moved.lon_deg[0] += 1e-5  # a move by 0.68 m to the east
     moved.lat_deg[2] = moved.lon_deg[2] = np.nan
     text = written(export_vbo.write, tmp_path / "x", block(0.0), moved, start_s=evening)
     assert text == expected("ride.vbo").replace("\n", "\r\n")
@@ -115,7 +115,7 @@ def test_vbo_has_a_channel_with_gaps(tmp_path):
 
 def test_vbo_keeps_the_heading_at_standstill(tmp_path):
     """The vehicle goes north and then east, and then stands. At standstill the position moves 0.8 mm north, like the
-    noise of a receiver. The heading must not follow this movement."""
+    noise of a receiver. The heading must not follow this small movement of the position."""
     ridden, stood = block(0.0, 1.0, 2.0), block(3.0, 4.0)
     ridden.lat_deg[1:] += 1e-5
     ridden.lon_deg[2] += 1e-5
@@ -146,11 +146,11 @@ def test_a_left_turn_under_braking_has_the_signs_of_each_format(tmp_path):
     expected = {"lateral_acc": 0.2, "longitudinal_acc": -0.4, "x_acc": 0.2, "y_acc": 1.0, "z_acc": -0.4}
     expected |= {f"{axis}_rate_of_rotation": dps for axis, dps in zip("xyz", (5.0, 7.0, 9.0))}
     assert found == pytest.approx(expected, abs=1e-3)
-    assert row["lean_angle"] == ""  # a car has no lean
+    assert row["lean_angle"] == ""  # a car has no lean to export
     export(ride, "vbo", out)
     cells = [float(cell) for cell in out.read_text().split("\n")[-2].split(" ")]
-    assert cells[7:9] == [-0.4, 0.2]  # long accel is positive forward, lat accel in a left turn
-    assert cells[9:] == pytest.approx([7.0, 9.0])  # yaw is positive in a left turn, roll to the right
+    assert cells[7:9] == [-0.4, 0.2]  # long accel is positive forward, lat accel is positive in a left turn
+    assert cells[9:] == pytest.approx([7.0, 9.0])  # yaw is positive in a left turn, roll is positive to the right
     export(ride, "csv", out)
     row = dict(zip(export_columns.COLUMNS, out.read_text().split("\n")[-2].split(",")))
     assert [float(row[f"{name}_rate_dps"]) for name in ("pitch", "yaw", "roll")] == pytest.approx([-5.0, 7.0, 9.0])
@@ -166,7 +166,7 @@ def test_exported_lean_is_smoothed_unless_live(tmp_path):
 
 
 def first_time(path: Path, form: str) -> float:
-    """Return the Unix time of the first row. For vbo it is the time of day."""
+    """Return the Unix time of the first row or, for vbo, its time of day."""
     lines = path.read_text().split("\n")
     if form == "racechrono":
         return float(lines[lines.index("") + 4].partition(",")[0])
@@ -179,7 +179,8 @@ def first_time(path: Path, form: str) -> float:
     ("start_s", "now_s", "first_s"),
     [
         (1e8, EVENING_S, 1e8),  # a time after 3 March 1973 is a Unix time
-        (1e8 - 1.0, EVENING_S, EVENING_S - 2.0),  # an earlier time is the time since power-on: three years, two months
+        # An earlier time counts from power-on, here three years and two months ago
+        (1e8 - 1.0, EVENING_S, EVENING_S - 2.0),
         (0.0, EVENING_S + 0.985, EVENING_S - 2.0),  # the log begins 1.99 s before now, rounded to whole seconds
         (0.0, 1.0, 0.0),  # if the computer's clock was never set, no time before 1970 is written
     ],
@@ -191,7 +192,7 @@ def test_log_in_memory_without_a_clock_ends_now(tmp_path, monkeypatch, form, sta
 
 
 def test_every_row_of_a_vbo_has_a_speed(tmp_path):
-    """The log has a speed at 0.5 s and at 1.5 s. Between these times the speed is interpolated."""
+    """The log has a speed at 0.5 s and at 1.5 s. Between 0.5 s and 1.5 s the speed is interpolated."""
     speed = np.full(200, np.nan)
     speed[[50, 150]] = 10.0, 20.0
     ride = open_ride(squarely(speed_mps=speed), SQUARE)
@@ -220,8 +221,8 @@ def test_vbo_has_at_most_100_rows_per_second(tmp_path, form, rows):
 @pytest.mark.parametrize("start_s", [1e8, 1e8 + 0.0043, 1e8 + 0.00065])
 @pytest.mark.parametrize(("form", "step_s", "columns"), [("racechrono", 0.001, (0, 3)), ("vbo", 0.01, (1,))])
 def test_no_time_is_written_twice(tmp_path, form, step_s, columns, start_s):
-    """Some samples are closer together than the smallest time step of the format. They are just before or after a step,
-    or in the middle between two steps. The returned number still includes every sample."""
+    """Some samples are closer together than the smallest time step of the format. The samples' times are just before or
+    after a time step, or in the middle between two steps. The returned number of rows still includes every sample."""
     t_s = step_s * np.array([0.0, 0.96, 1.04, 2.5, 3.5, 4.5, 5.49, 5.51, 6.4, 7.0, 8.0, 9.96, 10.04, 10.5])
     log = Log(t_s, np.tile([0.0, 1.0, 0.0], (len(t_s), 1)), np.zeros((len(t_s), 3)), start_s=start_s)
     notices = []

@@ -17,7 +17,7 @@ from support.recordings import app_exports
 
 gpxpy = pytest.importorskip("gpxpy")
 pandas = pytest.importorskip("pandas")
-START_S = app_exports.START_UTC_S + 0.004  # not a whole second, because exports must keep milliseconds
+START_S = app_exports.START_UTC_S + 0.004  # not a whole second, to test that exports keep milliseconds
 HZ = 5  # number of positions per second
 ALIGNED = api.CalibrationFile(aligned=True)
 DEGREE_M = np.radians(app_exports._EARTH_M)
@@ -25,7 +25,7 @@ DEGREE_M = np.radians(app_exports._EARTH_M)
 
 @functools.cache
 def log(start_s: float = 0.0) -> api.Log:
-    """Return a log of half a minute with a position every 0.2 s and a speed every second. There are no positions before
+    """Return a log of half a minute with a position every 0.2 s and a speed every second. Positions are missing before
     1 s and from 10 to 20 s. start_s: the start time by the log's own clock."""
     ride = app_exports.riding().every(2)  # 100 samples per second
     row = np.arange(len(ride.t_s))
@@ -62,7 +62,8 @@ def values(points, name: str) -> np.ndarray:
 def test_gpx_has_all_positions_with_time_speed_and_lean(tmp_path):
     gpx = gpxpy.parse(exported("gpx", tmp_path).read_text())
     (track,) = gpx.tracks
-    assert [len(segment.points) > 20 for segment in track.segments] == [True, True]  # no line across the gap
+    # The track has no line across the gap
+    assert [len(segment.points) > 20 for segment in track.segments] == [True, True]
     points = [point for segment in track.segments for point in segment.points]
     given = log()
     there = np.isfinite(given.lat_deg)
@@ -152,8 +153,8 @@ def test_a_track_across_180_degrees_goes_the_short_way():
 
 
 def test_last_position_of_a_stretch_is_kept():
-    """The positions are on both sides of the meridian of 180 degrees. Their mean longitude would be on the other side
-    of the earth, so the last position is used."""
+    """The positions are on both sides of the meridian of 180 degrees. The mean longitude of the positions would be on
+    the other side of the earth, so the last position is used."""
     few = log().part(log().t_s < 0.1)
     few.lon_deg[:] = np.nan
     few.lat_deg[:], few.lon_deg[3:6], few.utc_s[2] = -10.0, (179.9999, -179.9999, -179.9998), START_S

@@ -62,12 +62,13 @@ def test_metre_of_the_map_is_right_in_both_directions(place):
         assert np.max(np.abs(got - got[0] - (want - want[0]))) < 0.5
     moved = np.hypot(np.diff(found.east_m), np.diff(found.north_m))
     assert np.sum(moved) == pytest.approx(np.sum(np.hypot(np.diff(east), np.diff(north))), rel=0.01)
-    assert np.min(moved) > 0.3  # a standstill gives only one point
+    assert np.min(moved) > 0.3  # the points of a standstill are joined into one
 
 
 def test_map_shows_lean_and_speed_at_each_moment():
     _, dots = track_map.figure(points_of(car=True), seen(car=True))["data"]
-    assert isinstance(dots["marker"]["color"], str) and len(dots["x"]) > 50  # the track of a car has no lean
+    # The track of a car has one colour, because a car has no lean
+    assert isinstance(dots["marker"]["color"], str) and len(dots["x"]) > 50
     found, channels = points_of(), seen().course
     lean = np.interp(found.t_s, channels.t_s, channels.lean_deg)
     known = np.isfinite(found.lean_deg)
@@ -153,7 +154,7 @@ _POINT = """() => {
 def test_in_a_browser_chart_and_map_show_the_same_moment(tmp_path, chromium):
     page_of(tmp_path, seen())
     view = chromium.new_page(viewport={"width": 1300, "height": 800})
-    view.set_default_timeout(120_000)  # on a busy machine drawing is slow
+    view.set_default_timeout(120_000)  # drawing is slow on a busy machine
     asked, errors = [], []
     view.on("request", lambda request: asked.append(request.url))
     view.on("pageerror", lambda error: errors.append(str(error)))

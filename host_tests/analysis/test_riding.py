@@ -60,7 +60,7 @@ def test_riding_time_excludes_standing(tmp_path):
 
 
 def test_a_speed_that_is_always_0_hides_no_ride(tmp_path):
-    """A broken contact at the wheel gives a speed that is always 0. The riding time is then computed without this
+    """A broken contact at the wheel gives a speed that is always 0. The riding time is then computed without the
     speed."""
     log = read_log(analysis_rides.short(tmp_path))
     without = words_of(log)
@@ -71,8 +71,8 @@ def test_a_speed_that_is_always_0_hides_no_ride(tmp_path):
 
 
 def test_straight_stretch_without_speed_counts_as_riding():
-    """The log is a stretch of a longer log. Its readings fit a standing bike, but also a ride at constant speed on a
-    rough road. A stretch with such readings counts as riding."""
+    """The log is a stretch of a longer log. The readings of the stretch fit a standing bike, but also a ride at
+    constant speed on a rough road. A stretch whose readings do not show which of the two it is counts as riding."""
     assert words_of(Stretch(standing(40, 0.05, 1.5), 5.0, 30.0)).too_little == ""
 
 

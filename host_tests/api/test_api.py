@@ -38,7 +38,7 @@ def test_pydoc_lists_the_promised_functions():
 
 @pytest.fixture(scope="module")
 def directory(tmp_path_factory):
-    """Return the folder of a simulated ride and its poses. The functions under test make its calibration."""
+    """Return the folder of a simulated ride and its poses. The functions under test make the ride's calibration."""
     made = tmp_path_factory.mktemp("ride")
     simulate("street", 1, made, seconds=60.0, speed=True)
     six = api.fit_six_positions([made / f"POSE_{k}.csv" for k in range(1, 8)])

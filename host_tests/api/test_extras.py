@@ -1,5 +1,5 @@
-"""The commands and the Python interface work without any optional package, as in the demo's .venv. They also work
-without the tools that are installed separately, such as `kickstand_fleet`."""
+"""The commands and the Python interface work without any optional package, as in the demo's .venv. Commands and
+interface also work without the tools that are installed separately, such as `kickstand_fleet`."""
 
 import subprocess
 import sys

@@ -106,7 +106,8 @@ def test_the_free_pose_is_the_one_further_from_its_axis():
             with pytest.raises(InputError, match=r"side \+z exists twice \(e and g\)"):
                 poses._sides([*named, pose("g", slanted(deg))])
     with pytest.raises(InputError, match="exists twice"):
-        poses._sides([*tilted, pose("g", slanted(24.4))])  # tilted under 3 degrees more than the side pose
+        # The tilt of the slanted pose exceeds the tilt of the side pose by less than 3 degrees
+        poses._sides([*tilted, pose("g", slanted(24.4))])
     assert poses._sides([*tilted, pose("g", slanted(24.6))])[1] is not None
     with pytest.raises(InputError, match=r"side -z is missing, and side \+z is there 2 times"):
         poses._sides([*named[:5], pose("g", slanted(25.0))])
@@ -152,7 +153,8 @@ def moving_log(stretches_s, hz=100.0, size_g=0.5, between_s=1.0) -> Log:
 def test_stillness_lasts_a_second_between_margins():
     found = procedure._still_stretches(moving_log([1.15, 1.35, 3.0]))
     assert [last - first for first, last in found] == pytest.approx([115, 280], abs=6)
-    assert found[0][0] == pytest.approx(325, abs=6)  # begins after 1 + 1.15 + 1 s and a margin of 0.1 s
+    # The second stretch begins after 1 + 1.15 + 1 s and a margin of 0.1 s
+    assert found[0][0] == pytest.approx(325, abs=6)
     with pytest.raises(InputError, match="too short for the six positions"):
         procedure._still_stretches(Log(np.arange(40) / 100.0, np.zeros((40, 3)), np.zeros((40, 3))))
 
@@ -168,7 +170,8 @@ def test_stillness_lasts_a_second_between_margins():
     + [("drift", 0.0065, True), ("drift", 0.0075, False), ("rate", 5.9, True), ("rate", 6.1, False)],
 )
 def test_a_still_window_has_limits(what, amount, still):
-    """A window has 50 samples. Its halves may differ by 0.007 g, and its standard deviation is at most 0.02 g."""
+    """A window has 50 samples. The halves of a window may differ by 0.007 g, and its standard deviation is at most 0.02
+    g."""
     n = 300
     force, rates = np.tile([0.0, 1.0, 0.0], (n, 1)), np.zeros((n, 3))
     k = np.arange(n)
@@ -204,8 +207,8 @@ def test_the_least_tilted_pose_is_a_sides():
     ("most", "used"), [(240.0, True), (246.0, True), (246.3, False), (252.4, False), (252.6, True)]
 )
 def test_turns_at_the_end_of_a_range_are_left_out(most, used):
-    """A rate of 98.5 to 101 % of 250 deg/s is treated as the end of a range of 250 deg/s. Then all rates over 237.5
-    deg/s are left out."""
+    """A rate of 98.5 to 101 % of 250 deg/s is treated as the end of a range of 250 deg/s. In a range of 250 deg/s, all
+    rates over 237.5 deg/s are left out."""
     rates = np.zeros((100, 3))
     rates[50] = [0.0, most, 0.0]
     log = Log(np.arange(100) / 100.0, np.tile([0.0, 1.0, 0.0], (100, 1)), rates)
@@ -316,7 +319,8 @@ def test_the_vehicle_follows_from_the_calibration():
 
 
 def test_stops_are_found_in_each_log_of_its_own():
-    """In each log the vehicle stands for 4 s, so there are two stops. A speed of over 5 s ago is not known any more."""
+    """In each of the two logs the vehicle stands for 4 s, which makes two stops. A speed of over 5 s ago is not known
+    any more."""
     seen: list = []
     steps = drive_feed.Steps(lambda *done: seen.append(done), 800)
 
@@ -332,7 +336,7 @@ def test_stops_are_found_in_each_log_of_its_own():
     for seconds, stops in ((6.1, 1), (4.0, 1), (2.9, 0)):
         assert drive_feed.standing([log(seconds)], CalibrationFile(), drive_feed.Steps(None, 1)).stops == stops
     late = drive_feed.standing([log(4.0, (250,))], CalibrationFile(), drive_feed.Steps(None, 1))
-    assert late.stops == 0  # only 1.5 s of the log come after its only speed, at 2.5 s
+    assert late.stops == 0  # the log's only speed is at 2.5 s, and the log ends 1.5 s later
 
 
 def test_a_speed_counts_as_known_for_5_s(monkeypatch):
@@ -343,7 +347,7 @@ def test_a_speed_counts_as_known_for_5_s(monkeypatch):
     speed[10] = -0.2
     log = Log(np.arange(801) / 100.0, np.tile([0.0, 1.0, 0.0], (801, 1)), np.zeros((801, 3)), speed)
     drive_feed.standing([log], CalibrationFile(), drive_feed.Steps(None, 1))
-    assert seen[0] == (2.0 * 2.0, 0.0)  # the pretended motion between two logs
+    assert seen[0] == (2.0 * 2.0, 0.0)  # a pretended motion separates the two logs
     assert seen[1:] == [(0.0, pytest.approx(0.1))] * 51
 
 

@@ -145,7 +145,7 @@ def readings(offset=(0.0,) * 3, slope=(1.0,) * 3, forces: ArrayLike = AXES):
 
 
 def test_six_poses_with_a_duplicate_give_no_parameters():
-    """Two of the six poses are the same. The fit refuses them, although each axis changes enough."""
+    """Two of the six poses are the same. The fit refuses the six poses, although each axis changes enough."""
     poses = AXES.copy()
     poses[0] = poses[2] = [0.9, 0.9, 0.0]
     with pytest.raises(CalibrationError) as refusal:

@@ -110,7 +110,7 @@ def test_a_small_tilt_is_warned_of(tmp_path):
 
 def test_the_bias_of_the_six_positions_is_the_median(tmp_path, six_poses):
     """The sensor turns during one of the six poses, for example because somebody moves the table. The median ignores
-    this pose."""
+    the spoilt pose."""
     command.still(six_poses[2], reads(command.AXES["+y"]), np.array(BIAS) + 20.0, seed=2)
     command.works("calibrate", "six", *six_poses, "--out", tmp_path / "CAL.json")
     assert json.loads((tmp_path / "CAL.json").read_text())["gyro_bias_dps"] == pytest.approx(BIAS, abs=0.05)

@@ -125,8 +125,8 @@ def test_harmful_outputs_are_refused(tmp_path, log):
 
 @pytest.mark.skipif(os.name == "nt", reason="named pipes are of Unix")
 def test_a_special_file_is_not_replaced(tmp_path, log):
-    """A user with enough rights could otherwise replace a special file such as /dev/null. The test uses its own
-    pipe."""
+    """Without this refusal a user with enough rights could replace a special file such as /dev/null. The test uses its
+    own pipe."""
     cal = command.write_cal(tmp_path / "CAL.json")
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)

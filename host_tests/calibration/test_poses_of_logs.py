@@ -29,7 +29,8 @@ def log(up, name="", **how):
 
 
 def test_six_poses_give_offset_slope_and_the_median_bias():
-    """The sides come in reverse order, and their biases are 0 to 5 deg/s. With the free pose, they are 0 to 6 deg/s."""
+    """The sides come in reverse order, and their biases are 0 to 5 deg/s. With the free pose, the biases are 0 to 6
+    deg/s."""
     made = [log(up, "abcdef"[k], bias_dps=(k, -k, 2 * k)) for k, up in enumerate(SIX)][::-1]
     found = poses.fit_six_positions(made)
     assert found.calibration.accel_offset_g == pytest.approx(OFFSET_G, abs=0.001)
@@ -103,7 +104,7 @@ def test_the_same_path_twice_is_refused(tmp_path):
 
 @pytest.mark.parametrize(("side", "left"), [("left", -1.0), ("right", 1.0)])
 def test_two_poses_show_which_way_is_left(side, left):
-    """On a left kickstand the bike leans to its left. Then up, seen from the bike, turns to the right."""
+    """On a left kickstand the bike leans to its left. Seen from the leaning bike, up turns to the right."""
     lean = np.radians(10.0)
     straight = CalibrationFile(accel_offset_g=OFFSET_G, accel_slope=SLOPE, six_done=True)
     stand, upright = log([np.sin(lean), np.cos(lean), 0.0], bias_dps=(1.0, 2.0, 3.0)), log([0.0, 1.0, 0.0])

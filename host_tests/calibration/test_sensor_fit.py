@@ -76,10 +76,10 @@ def test_a_turn_is_integrated_as_by_matrices_in_double():
             exact = exact @ (np.eye(3) + np.sin(size) / size * k + (1 - np.cos(size)) / size**2 * k @ k)
     turn.end()
     r = np.array(turn.attitude(bias.tolist(), 0.5)).reshape(3, 3)
-    assert np.max(np.abs(r - exact)) < 3e-4  # this is 0.02 degrees
+    assert np.max(np.abs(r - exact)) < 3e-4  # 3e-4 rad are 0.02 degrees
     assert turn.seconds == pytest.approx(1.0)
     s = np.array(turn.packed(bias.tolist())[9:]).reshape(3, 9)
-    # the effect of a scale error that is the same on all axes is a longer turn about the mean axis
+    # a scale error that is the same on all axes makes the turn about the mean axis longer
     nominal = s[:, [0, 4, 8]].sum(axis=1)
     assert np.linalg.norm(nominal) == pytest.approx(turn.angle(), rel=1e-5)
 
@@ -95,7 +95,7 @@ def test_samples_of_a_pose_that_is_spoilt_count_after_all():
         turn.end()
         return np.degrees(turn.angle())
 
-    assert turned(spoilt=True) == pytest.approx(10.0, abs=0.01)  # a rate of 20 deg/s for half a second
+    assert turned(spoilt=True) == pytest.approx(10.0, abs=0.01)  # the spoilt turn has 20 deg/s for half a second
     assert turned(spoilt=False) == pytest.approx(8.0, abs=0.01)
 
 
@@ -174,8 +174,8 @@ def test_the_fit_is_numpys_and_so_is_its_covariance():
 
 
 def test_micropython_finds_the_same():
-    """MicroPython gets the same poses and turns, and computes the fit step by step. All its results are compared with
-    CPython's."""
+    """MicroPython gets the same poses and turns, and computes the fit step by step. All results of MicroPython are
+    compared with CPython's."""
     fit = fitted()
     script = (
         "from array import array\nfrom kickstand.calibration.sensor_fit import SensorFit\n"
@@ -205,9 +205,10 @@ def late(rates):
     [
         (lambda rates: 0.5 * rates, "gyro-scale"),
         (lambda rates: 2.0 * rates, "gyro-scale"),
-        (lambda rates: -rates, None),  # the axis is named if the turns were nearly about one axis
+        (lambda rates: -rates, None),  # if nearly all turns are about one axis, the error names this axis
         (lambda rates: 0.0 * rates, "dead-gyro"),
-        (lambda rates: np.where(np.abs(rates) > 5.0, 0.0, rates), "dead-gyro"),  # a dead axis that still shows noise
+        # The axis is dead but still shows noise
+        (lambda rates: np.where(np.abs(rates) > 5.0, 0.0, rates), "dead-gyro"),
         (late, "gyro-misfit"),
         (lambda rates: np.clip(rates, -60.0, 60.0), None),
     ],

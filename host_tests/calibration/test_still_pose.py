@@ -80,7 +80,7 @@ def test_each_axis_has_to_change_by_a_count_now_and_then(axis, code):
 def test_a_noisy_gyro_spoils_the_pose_and_a_sway_does_not(axis):
     for dps, code in ((0.5, None), (0.7, "noisy-gyro")):
         rows = samples(600)
-        for k, row in enumerate(rows):  # this noise has the rms `dps`
+        for k, row in enumerate(rows):  # add noise with the rms `dps`
             row[axis] += round((-1, 1, 1, -1)[k % 4] * dps * 65.5)
         assert problem_of(rows) == code
     rows = samples(600)

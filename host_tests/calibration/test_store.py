@@ -40,7 +40,7 @@ def newest_file(tmp_path, store):
 def test_nothing_stored(store, tmp_path):
     loaded = store.load()
     assert (loaded.aligned, loaded.six_done, store.message) == (False, False, "not calibrated")
-    assert list(tmp_path.iterdir()) == []  # loading never writes
+    assert list(tmp_path.iterdir()) == []  # load() writes nothing
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
@@ -52,7 +52,8 @@ def test_the_largest_trim_that_the_filter_finds_is_loaded_again(store, sign):
 
 
 IDENTITY = [1, 0, 0, 0, 1, 0, 0, 0, 1]
-NUMBERS = [0.25, -0.125, 0.375, 1.125, 0.875, 1.0, 3.5, -2.5, 1.5, *IDENTITY, 2.5]  # each is exact as a 32-bit float
+# All values are exact as 32-bit floats
+NUMBERS = [0.25, -0.125, 0.375, 1.125, 0.875, 1.0, 3.5, -2.5, 1.5, *IDENTITY, 2.5]
 
 
 def record(*, magic=b"KSTD", version=1, sequence=7, chip=(0x68, 8), six_done=1, how=1, numbers=NUMBERS):
@@ -181,8 +182,8 @@ def test_power_cut_at_every_byte_of_a_save(store, tmp_path, saved_before):
         for name, content in before.items():
             (tmp_path / name).write_bytes(content)
         written.write_bytes(record[:cut])
-        assert mark_of(store.load()) == saved_before  # the previous record is loaded, or none
-        store.save(calibration(5))  # after the power cut the next save works
+        assert mark_of(store.load()) == saved_before  # load() returns the previous record, or nothing without one
+        store.save(calibration(5))  # the next save() after the power cut works
         assert mark_of(store.load()) == 5
         assert store.load().aligned
 
@@ -228,7 +229,7 @@ def test_a_flash_that_loses_writes_is_reported(store, tmp_path, monkeypatch):
 
 
 def test_a_trim_may_be_stored_beside_a_foreign_record(store, tmp_path):
-    """A foreign record is from another chip, or is empty after a power cut. A trim may be saved in spite of such a
+    """A foreign record is from another chip, or is empty after a power cut. A trim may be saved in spite of a foreign
     record."""
     store.save(calibration(1))
     store.save(calibration(2))

@@ -68,7 +68,8 @@ def test_every_mounting_is_recovered(engine, side):
 )
 def test_poses_that_fix_nothing_are_refused(engine, kickstand, upright, reason):
     answer = engines.run(engine, [("two_position", (kickstand, upright, "left"))])[0]
-    if kickstand == [0, -1, 0]:  # exactly opposite to the upright pose, as if the bike were upside down
+    # The kickstand pose is exactly opposite to the upright pose, as if the bike were upside down
+    if kickstand == [0, -1, 0]:
         reason = "no kickstand"
     assert reason in engines.words(answer)
     assert all(len(line) <= 16 for line in answer["lcd"])

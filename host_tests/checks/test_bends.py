@@ -33,7 +33,7 @@ def test_a_short_ride_shows_it_too():
 
 def test_one_long_steady_bend_is_not_the_gyros_bias():
     """The bend takes 60 s of a ride of 92 s, so it contains most of the calmest seconds. The check measures the gyro's
-    bias in these seconds, and must not take the bend's yaw rate for a bias."""
+    bias in the calmest seconds, and must not take the bend's yaw rate for a bias."""
     log = drawn_ride(1036, mounts=["firm"], kind="sweepers").logs[0]
     assert words(handedness(cells_of(log)) or bends(cells_of(log))) == ""
     log.gyro_dps = -log.gyro_dps
@@ -52,7 +52,7 @@ def straight_on(time, forward, up):
 
 @pytest.mark.parametrize("slope", [0.2, 0.0, -0.2])
 def test_braking_and_dips_are_no_bends(slope):
-    """The vehicle brakes hard on a level road, uphill and downhill. Such forces must not look like a bend."""
+    """The vehicle brakes hard on a level road, uphill and downhill. The forces of braking must not look like a bend."""
     time = np.arange(0.0, 300.0, 0.02)
     brake = np.where(time % 20.0 < 5.0, -0.9, 0.0)
     assert straight_on(time, slope + brake, 1.0 + 0.1 * np.sin(time)) == ""

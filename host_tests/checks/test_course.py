@@ -55,8 +55,8 @@ def circling(both_sides: bool, bias_dps: float, wavering_dps: float = 0.0) -> bo
 
     both_sides: True if the ride turns to the left and later to the right, False for only left turns.
     bias_dps: the gyro's bias about up, in deg/s.
-    wavering_dps: amplitude of a slow change of the track's yaw rate. The gyro measures this change with the opposite
-        sign.
+    wavering_dps: amplitude of a slow change of the track's yaw rate. The gyro measures the slow change with the
+        opposite sign.
     """
     t_s = np.arange(0.0, 120.0, 0.02)
     turning_dps = np.where(both_sides & (t_s > 60.0), -10.0, 10.0)

@@ -45,7 +45,7 @@ def test_simulated_rides(profile):
     assert (WRONG_WAY in judged(log, gyro=MINUS)) is (profile != "parked")
     if profile not in ("parked", "city"):
         assert WRONG_WAY in judged(log, gyro=MINUS, speed=False)
-    assert judged(log, gyro=np.eye(3) * np.radians(1.0)) == ""  # rates in rad/s have their own remark
+    assert judged(log, gyro=np.eye(3) * np.radians(1.0)) == ""  # rates in rad/s get another remark
 
 
 @pytest.mark.parametrize("profile", MAIN)
@@ -74,7 +74,7 @@ def test_the_remark_names_what_fits():
         (None, swap, f"{EITHER} along x and y are exchanged, or the rates are in another order or of another sign"),
         (np.eye(3)[[1, 2, 0]], None, f": the rates are in another order or of another sign, {INSTEAD} gz, gx, gy"),
         (MINUS, None, WRONG_WAY),
-        (None, MINUS, None),  # this log is a mirror image, which motion alone cannot show
+        (None, MINUS, None),  # the log is a mirror image, which motion alone cannot show
     ):
         said = judged(log, accel, gyro)
         assert (line in said) if line else said == "", said
@@ -86,7 +86,7 @@ def test_axes_exchanged_in_one_sensor():
     seen = 0
     log = simulated("street")
     for exchange in EXCHANGES[1::2]:
-        turning = liveliest(cells_of(log, gyro=exchange.T))  # exchange undoes exchange.T
+        turning = liveliest(cells_of(log, gyro=exchange.T))  # `exchange` undoes exchange.T
         assert turning is not None
         place = better_exchange(turning)
         assert place is None or np.array_equal(EXCHANGES[place], exchange)
@@ -122,7 +122,7 @@ def test_a_phone_in_the_hand():
 
 def test_gaps_and_frozen_readings():
     log = simulated("street")
-    kept = (log.t_s % 30.0) < 25.0  # five seconds are missing in every half minute
+    kept = (log.t_s % 30.0) < 25.0  # leave out five seconds of every half minute
     gaps = log.part(kept)
     assert judged(gaps) == ""
     assert WRONG_WAY in judged(gaps, gyro=MINUS)

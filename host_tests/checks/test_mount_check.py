@@ -1,4 +1,5 @@
-"""A command warns if its calibration belongs to another mount. It never warns about a right calibration."""
+"""A command warns if its calibration belongs to another mount. A command never warns about the calibration of the log's
+own mount."""
 
 import json
 import re
@@ -57,7 +58,7 @@ def test_right_calibrations_are_never_reported(profile):
     log, calibration = made(profile)
     for each in log, silent(log):
         assert said(each, calibration) == ""
-        assert said(each, other(calibration, up=8.0)) == ""  # the error that two poses may have
+        assert said(each, other(calibration, up=8.0)) == ""  # an alignment by two poses may have this error
 
 
 @pytest.mark.parametrize(("profile", "speed"), [("street", True), ("city", False), ("track", False), ("hills", True)])
@@ -99,9 +100,9 @@ def test_gaps():
 
 def test_a_log_that_cannot_show_the_mount_gets_no_remark():
     log, calibration = made("street")
-    assert said(log, CalibrationFile()) == ""  # an unaligned calibration has its own message
+    assert said(log, CalibrationFile()) == ""  # an unaligned calibration gets another message
     assert said(log.part(log.t_s < 10.0), other(calibration, up=90.0)) == ""
-    assert said(silent(log), other(calibration, "car", up=90.0)) == ""  # a car does not lean
+    assert said(silent(log), other(calibration, "car", up=90.0)) == ""  # a car has no lean to compare
 
 
 def test_the_commands_say_so_in_one_line(tmp_path):
@@ -145,9 +146,9 @@ def exchanged_line(car, side, roll_deg=None):
 
 
 def test_what_is_reported():
-    """Forward and backward are exchanged. The message suggests another side of the kickstand. It also asks whether the
-    log's accelerations have the opposite sign, because then another side would only give a plausible, mirrored
-    report."""
+    """Forward and backward are exchanged. The message suggests another side of the kickstand. The message also asks
+    whether the log's accelerations have the opposite sign, because then another side would only give a plausible,
+    mirrored report."""
     assert exchanged_line(False, "left", 0.0).endswith("exchanged: calibrate two --side right?" + SIGN)
     assert exchanged_line(False, "right", -3.9).endswith("exchanged: calibrate two --side left?" + SIGN)
     assert exchanged_line(False, "", 0.0).endswith("calibrate two with the other --side?" + SIGN)
@@ -223,8 +224,8 @@ def test_seconds_without_a_speed_or_without_samples():
 
 
 def swaying(yaw_dps: float, seconds: float) -> Log:
-    """Return a log whose yaw rate swings with a period of 4 s and an amplitude of yaw_dps. The roll rate has half this
-    amplitude and a quarter period of delay, similar to a motorcycle."""
+    """Return a log whose yaw rate swings with a period of 4 s and an amplitude of yaw_dps. The roll rate has half the
+    amplitude of the yaw rate and a quarter period of delay, similar to a motorcycle."""
     time = np.arange(0.0, seconds, 0.02)
     yaw, roll = yaw_dps * np.sin(np.pi / 2 * time), -0.5 * yaw_dps * np.cos(np.pi / 2 * time)
     return Log(time, np.tile([0.0, 1.0, 0.0], (len(time), 1)), np.column_stack((0 * yaw, yaw, roll)))
@@ -234,8 +235,8 @@ def swaying(yaw_dps: float, seconds: float) -> Log:
     ("yaw_dps", "seconds", "shown"), [(1.16, 90.0, False), (1.24, 90.0, True), (3.0, 61.0, False), (3.0, 63.0, True)]
 )
 def test_small_or_short_bends_show_no_forward(yaw_dps, seconds, shown):
-    """The check needs changes of the yaw rate with a standard deviation of 1 deg/s. Here the standard deviation is
-    0.832 yaw_dps:
+    """The check needs changes of the yaw rate with a standard deviation of 1 deg/s. In this log the standard deviation
+    of these changes is 0.832 yaw_dps:
 
     * Means over 0.5 s keep 0.974 of the amplitude.
     * The changes of these means over a second have 1.414 times the amplitude.

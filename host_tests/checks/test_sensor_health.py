@@ -1,4 +1,4 @@
-"""A dead axis and a gyro at the end of its range are reported. The smoothed lean never hides such faults."""
+"""A dead axis and a gyro at the end of its range are reported. The smoothed lean never hides these two faults."""
 
 from dataclasses import replace
 

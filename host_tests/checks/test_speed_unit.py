@@ -85,8 +85,8 @@ def test_no_simulated_ride_is_refused(profile):
 
 
 def test_the_force_during_missing_samples_is_unknown():
-    """A logger that sleeps for half of each second records only half of the force. Its speed must not seem to change
-    too much."""
+    """A logger that sleeps for half of each second records only half of the force. The log's speed must not seem to
+    change too much for this force."""
     time = np.arange(0.0, 300.0, 0.01)
     push = 0.4 * np.sign(np.sin(2.0 * np.pi * time / 20.0)) * (time % 10.0 < 4.0)
     speed = np.where(np.arange(len(time)) % 100 == 99, 20.0 + np.cumsum(push) * 0.01 * 9.80665, np.nan)

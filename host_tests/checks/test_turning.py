@@ -61,8 +61,8 @@ def test_the_likelier_mistake_wins_unless_another_fits_better(left, best):
 
 def test_windows_that_differ_require_a_factor_of_two():
     """The gain differs by +s or -s in ten windows, where s is `swing`. The standard error of the mean gain is s / root
-    10. Three standard errors are 0.95 s. If the mean gain is not larger than this, the residual must fall to below
-    half."""
+    10. Three standard errors are 0.95 s. If the mean gain is not larger than three standard errors, the residual must
+    fall to below half."""
     for g2, swing, clear in ((0.0195, 0.011, False), (0.0195, 0.0099, True), (0.0201, 0.011, True)):
         assert (reported((AS_IT_IS, g2), (OPPOSITE, 0.01), swing=swing) is not None) is clear, (g2, swing)
 
@@ -87,4 +87,4 @@ def test_an_unknown_velocity_is_linear_between_its_knots():
         assert knots_s @ changes[:, window] == pytest.approx(np.ones(100))
         assert values[:, window].sum(axis=0) == pytest.approx(np.ones(100))
         assert changes[:, window].sum(axis=0) == pytest.approx(np.zeros(100))
-    assert values[:, 0, 62] == pytest.approx([0.0, 0.75, 0.25])  # at 6.25 s, between the knots at 5 and 10 s
+    assert values[:, 0, 62] == pytest.approx([0.0, 0.75, 0.25])  # values at 6.25 s, between the knots at 5 and 10 s

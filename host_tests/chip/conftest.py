@@ -1,7 +1,7 @@
 """Emulated boards for the tests. Tests of one process that need the same start share one board.
 
 Each test of a Pico runs in a fork of the process, so it changes only its own copy of the board. QEMU cannot be forked.
-So the tests of the ESP32 restore its state, or use a board of their own.
+An ESP32 cannot be forked, so its tests restore its state, or use a board of their own.
 """
 
 import os

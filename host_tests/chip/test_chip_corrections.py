@@ -55,7 +55,7 @@ def test_fast_division_gives_the_results_of_rp2040py():
     assert results[0] == results[1]
 
 
-# This code leaves out the import hook for modules that are compiled for this Python.
+# Code that removes the import hook for modules that are compiled for this Python.
 _WHEELS_OWN = """
 import sys, kickstand_emulator
 del sys.meta_path[0]

@@ -1,5 +1,6 @@
-"""The whole device on the emulated boards, with MicroPython's own image, file system, floats and drivers. The faults
-here concern I2C, the FIFO's backlog, the watchdog and resets. The tests in host_tests/device cover all other faults."""
+"""The whole device on the emulated boards, with MicroPython's own image, file system, floats and drivers. The faults in
+this file concern I2C, the FIFO's backlog, the watchdog and resets. The tests in host_tests/device cover all other
+faults."""
 
 import re
 from typing import Any
@@ -18,15 +19,16 @@ NEAR_DEG = 2.0
 SENSOR = 0x68
 RECOVERY_S = 0.5
 FAULT_S = 0.6
-ON_A_PICO = ["pico", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])]  # nightly on both chips
+# The ESP32 is tested only in the nightly run
+ON_A_PICO = ["pico", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])]
 
 
-@pytest.mark.nightly  # takes minutes; host_tests/device has the same steps on MicroPython for Linux
+@pytest.mark.nightly  # takes minutes; the tests in host_tests/device do the same steps on MicroPython for Linux
 @pytest.mark.long
 @pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_two_presses_align_a_new_board_for_good(chip):
     """The sensor is not calibrated. After the pose on the kickstand and the upright pose, the power is switched off and
-    on. Then the display shows the lean of the bike."""
+    on. After power-on the display shows the lean of the bike."""
     ride = Ride([kickstand(5.5), upright(5.5), upright(1e6, lean_deg=LEAN_DEG)])
     # a tenth of the usual sensor errors, because no calibration corrects them in this test
     part = Sensor(seed=1, share=0.1)
@@ -106,9 +108,9 @@ def test_bus_errors_are_shown_while_they_last(riding, fault):
 
 @pytest.mark.parametrize("riding", ["pico"], indirect=True)
 def test_stalled_processor_keeps_the_lean_right(riding):
-    """A stall of 45 ms loses no sample. It is as long as a flash erase, during which interrupts are off. A stall of
-    seconds overflows the FIFO. The firmware then counts the lost samples, does not restart the sensor, and the lean
-    stays correct."""
+    """A stall of 45 ms loses no sample. The erase of a flash block takes 45 ms, during which interrupts are off. A
+    stall of seconds overflows the FIFO. The firmware then counts the lost samples, does not restart the sensor, and the
+    lean stays correct."""
     samples = SampleCount(riding.board.sensor)
     samples.begin()
     for stall_s in (0.045, 0.3):
@@ -126,8 +128,8 @@ def test_stalled_processor_keeps_the_lean_right(riding):
 
 @pytest.mark.parametrize("riding", ON_A_PICO, indirect=True)
 def test_watchdog_restarts_a_hung_program(riding):
-    """The watchdog resets the board within 8.4 s. An ESP32 needs a second more, because it prints the reason. Then the
-    display shows the lean again."""
+    """The watchdog resets the board within 8.4 s. An ESP32 needs a second more, because it prints the reason. After the
+    reset the display shows the lean again."""
     riding.exec("from time import sleep\nfrom kickstand.board import port")
     riding.send(b"port.start_watchdog()\nwhile True: sleep(10)\x04")
     resets = riding.resets

@@ -38,7 +38,7 @@ def board(config="", world=None, files=None):
     return esp32(world or leaning(LEAN_DEG), (files or firmware("esp32")) | own)
 
 
-@pytest.mark.nightly  # host_tests/device has the same faults on MicroPython for Linux
+@pytest.mark.nightly  # the tests in host_tests/device cause the same faults on MicroPython for Linux
 def test_board_survives_ctrl_c_unplugging_and_soft_reset():
     """The owner presses Ctrl-C, unplugs the board and does a soft reset, each while the board is running."""
     with board() as device:
@@ -52,7 +52,7 @@ def test_board_survives_ctrl_c_unplugging_and_soft_reset():
         assert not device.board.lcd.on
         shows(device, LEAN, 4.0)
         device.send(b"\x03")
-        device.run(9.0)  # longer than the watchdog's time-out
+        device.run(9.0)  # 9 s is longer than the watchdog's time-out
         assert device.resets == 0
         assert b"Kickstand stopped." in device.said
         status = device.exec("import kickstand\nkickstand.status()", 20.0)
@@ -172,7 +172,7 @@ def test_power_cut_loses_only_the_last_block_of_a_ride():
     assert seen >= 3
 
 
-@pytest.mark.nightly  # host_tests/rides/test_ring.py has the same on the host
+@pytest.mark.nightly  # host_tests/rides/test_ring.py tests the same on the host
 def test_ride_removes_the_oldest_parts_first():
     """The flash is full of rides. The new ride removes no more parts than it needs room for."""
     parts = [part_path("rides", ride, number) for ride in (1, 2) for number in range(11)]
@@ -183,7 +183,7 @@ def test_ride_removes_the_oldest_parts_first():
         device.exec("recorder.start(Chip(), Calibration())\nfeed(2)\nrecorder.stop()", 30.0)
         files = device.files()
     gone = [path for path in parts if path not in files]
-    short = needed - (before - 2 * BLOCK)  # bytes to be freed, after the ride has created its directory
+    short = needed - (before - 2 * BLOCK)  # bytes that must be freed after the ride has created its directory
     assert short > 0
     assert gone == parts[: math.ceil(short / (PART_BLOCKS * BLOCK))]
     assert FILES.items() <= files.items()

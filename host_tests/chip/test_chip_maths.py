@@ -24,7 +24,7 @@ def records():
     world = PART.world(Ride([accelerate(15.0, 1.0), turn(-30.0, 1.0, 0.5)]).motion)
     offsets = [-o / s for o, s in zip(PART.accel_offset_g, PART.accel_scale, strict=True)]
     slopes = [1.0 / s for s in PART.accel_scale]
-    identity = 2 * (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)  # accel_matrix and gyro_matrix
+    identity = 2 * (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)  # identity matrices as accel_matrix and gyro_matrix
     measured = (*offsets, *slopes, *PART.gyro_bias_dps, *PART.vehicle_from_sensor, 0.0)
     calibration = (*measured, *identity, *(9 * (0.0,)), 0.0048)
     made = struct.pack(replay_engine.CALIBRATION, *calibration)

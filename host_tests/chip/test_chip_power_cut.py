@@ -35,7 +35,8 @@ def torn(before, after, share):
 
 
 def loaded(system, image, directory):
-    """Return the gyro bias that the firmware loads from this flash. Fail if it finds no complete calibration."""
+    """Return the gyro bias that the firmware loads from this flash. Fail if the firmware finds no complete
+    calibration."""
     for name, content in system.read(image).items():
         if name.endswith(".cal"):
             (directory / name).write_bytes(content)
@@ -58,7 +59,7 @@ def test_old_or_new_wherever_a_save_is_cut(at_prompt, tmp_path):
         assert set(found) == {value - 1, value}
         assert found[0] == value - 1
         assert found[len(states) - 1] == value
-    assert operations >= SAVES + 2  # at least one block was erased
+    assert operations >= SAVES + 2  # the saves include the erase of at least one block
 
 
 @pytest.mark.parametrize("operation", [8, *(pytest.param(n, marks=pytest.mark.nightly) for n in (1, 9, 10))])

@@ -1,5 +1,5 @@
-"""The recorder on the emulated Pico. This board has littlefs, a flash that stalls the processor, and 32-bit floats. The
-tests also cut the power and use mpremote."""
+"""The recorder on the emulated Pico. The emulated Pico has littlefs, a flash that stalls the processor, and 32-bit
+floats. The tests also cut the power and use mpremote."""
 
 import ast
 import re
@@ -91,7 +91,7 @@ def rides(files):
     return found
 
 
-@pytest.mark.nightly  # host_tests/rides has similar tests: test_recorder.py, and test_slow_flash.py with a slow flash
+@pytest.mark.nightly  # host_tests/rides/test_recorder.py and test_slow_flash.py have similar tests
 def test_a_recorded_ride_replays_as_it_was_shown(at_prompt, tmp_path):
     """No sample is lost during the recording, and the display keeps working."""
     begun_s, world = at_prompt.time_s, PART.world(RIDE.motion)
@@ -118,7 +118,7 @@ def test_a_recorded_ride_replays_as_it_was_shown(at_prompt, tmp_path):
     assert max(leans) - min(leans) > 10
 
 
-@pytest.mark.nightly  # test_chip_power_cut.py is similar: it cuts each write of a calibration
+@pytest.mark.nightly  # test_chip_power_cut.py has a similar test, which cuts each write of a calibration
 def test_power_cut_loses_only_the_last_block(at_prompt):
     """The power is cut before, during and after each flash operation. The calibration always survives."""
     at_prompt.exec(FEED)
@@ -166,8 +166,8 @@ def test_board_records_again_after_a_power_cut(at_prompt, operation):
 @pytest.mark.nightly
 @pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_pull_and_record_through_mpremote(tmp_path, monkeypatch, chip):
-    """A ride ends and is pulled, then a log is streamed. The ESP32 also has a GPS receiver. Both logs can be
-    replayed."""
+    """A ride ends and is pulled, then a log is streamed. The ESP32 also has a GPS receiver. The logs of the ride and of
+    the stream can be replayed."""
     config = "RECORD = True\n" + {"pico": "", "esp32": 'SPEED = "gps"\n'}[chip]
     files = firmware(chip) | calibrated() | {"config.py": config.encode()}
     board: Any = CHIPS[chip](PART.world(RIDE.motion), files)

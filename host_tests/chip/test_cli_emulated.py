@@ -115,7 +115,7 @@ class Emulating(threading.Thread):
             time.sleep(0.001)
 
 
-@pytest.mark.nightly  # the page Install has a similar test, and host_tests/deploy tests a fake board
+@pytest.mark.nightly  # the page Install has a similar test, and host_tests/deploy has tests with a fake board
 @pytest.mark.parametrize("chip", ["rp2040", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_flash_and_status_on_the_emulated_board(monkeypatch, chip):
     """The board has an older version and an edited config.py. After `flash` the display shows the rider's next step."""

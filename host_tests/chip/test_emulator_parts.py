@@ -172,7 +172,7 @@ def test_one_client_at_a_time_talks_to_the_console():
         with socket.create_connection(("127.0.0.1", server.port)) as client:
             while server._client is None:
                 server.poll()
-            server.poll()  # nothing was sent yet, so the client stays
+            server.poll()  # the client stays, because nothing was sent yet
             server.say(b"hello " + word)
             assert client.recv(100) == b"hello " + word
             client.sendall(word)
@@ -198,7 +198,8 @@ def test_a_closed_server_disconnects_its_client():
 
 @pytest.mark.parametrize(("name", "start", "end"), [("PICO", 0xA0000, 0x200000), ("ESP32", 0x200000, 0x400000)])
 def test_the_file_system_fills_the_flash_and_keeps_files(name, start, end):
-    """The Pico has 2 MB of flash, the ESP32 4 MB. Both official images put the file system at its end."""
+    """The Pico has 2 MB of flash, the ESP32 4 MB. MicroPython's images for both boards put the file system at the end
+    of the flash."""
     flash_image = pytest.importorskip("kickstand_emulator.flash_image")
     system = getattr(flash_image, name)
     assert (system.start, system.start + system.size) == (start, end)
@@ -254,7 +255,7 @@ def test_a_missing_package_of_the_emulator_is_named(cached, monkeypatch):
 
 
 class PlainDevice(EmulatedDevice):
-    """A board without a chip. Its console answers from a list, one answer per line of code."""
+    """A board without a chip. The console answers from a list, one answer per line of code."""
 
     NAME = "plain board"
 
@@ -380,7 +381,7 @@ def nor_flash(chip):
     from rp2040py.gpio_pin import GPIOPinState
 
     flash = TimedFlash(chip, "SSI")
-    flash.write_uint32(0x08, 1)  # enable the interface
+    flash.write_uint32(0x08, 1)  # enable the flash interface
 
     def send(*data):
         flash._on_cs_pin_changed(GPIOPinState.LOW, GPIOPinState.HIGH)
@@ -411,7 +412,7 @@ def test_flash_takes_time_and_is_torn_where_power_is_cut(chip):
     assert took_ms(0xD8, 2, 0, 0) == pytest.approx(150.0)
     assert took_ms(0x02, 1, 0x10, 0, *b"\x12\x34") == pytest.approx(0.5)
     assert chip.flash[0x11000:0x11003] == b"\x12\x34\xff"
-    assert took_ms(0x9F) == 0.0  # reading the flash's identity is no operation
+    assert took_ms(0x9F) == 0.0  # reading the flash's identity takes no time
     assert flash.operations == 3 and begun == [1, 2, 3]
     flash.cut_power(2, 0.5)
     took_ms(0x02, 1, 0x10, 4, 0x55)

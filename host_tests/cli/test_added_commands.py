@@ -42,7 +42,8 @@ def installed(tmp_path, monkeypatch):
             monkeypatch.delitem(sys.modules, name, raising=False)
             (tmp_path / f"{name}.py").write_text(text)
 
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # command.refused() allows no new files in the folder
+    # Write no .pyc files, because command.refused() allows no new files in the folder
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
     monkeypatch.syspath_prepend(tmp_path)
     return install
 
@@ -62,7 +63,8 @@ def test_command_of_another_package_runs(installed):
         ("lap_timer:laps_command", "", "AttributeError"),
         ("lap_timer:laps_command", "laps_command = 3", "is not a click command"),
         ("no_such_module", "", "ModuleNotFoundError"),
-        ("not an object!", "", "cannot be loaded"),  # the words of the error depend on Python's version
+        # Python's own words are not compared, because they depend on its version
+        ("not an object!", "", "cannot be loaded"),
     ],
 )
 def test_a_broken_command_is_one_line_with_its_package(installed, tmp_path, value, module, why):

@@ -58,7 +58,7 @@ def test_a_time_axis_has_six_to_twelve_round_ticks():
 def test_a_drawing_is_a_file_of_its_elements():
     text = svg.element("text", "1 < 2 & 3", x=1 / 3, font_weight=None, text_anchor="end", class_="a<b")
     assert text == '<text x="0.33" text-anchor="end" class="a&lt;b">1 &lt; 2 &amp; 3</text>'
-    assert svg.element("g", text) == f"<g>{text}</g>"  # an element is not escaped again
+    assert svg.element("g", text) == f"<g>{text}</g>"  # an element inside another element is not escaped again
     assert svg.element("rect", width=200000, y=-0.006) == '<rect width="200000" y="-0.01"/>'
     whole = svg.drawing((10.125, 20), svg.element("g"), role="img")
     assert whole == ('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 10.12 20" role="img">\n<g/>\n</svg>\n')
@@ -209,9 +209,9 @@ def test_in_a_checkout_the_firmware_and_config_are_the_checkouts(tmp_path, monke
     assert firmware_path.documents() == root
     monkeypatch.chdir(tmp_path)
     (tmp_path / "config.py").write_text("")
-    assert firmware_path.config() == root / "firmware" / "config.py"  # only an installed package uses this file
+    assert firmware_path.config() == root / "firmware" / "config.py"  # only an installed package uses its own config.py
     (tmp_path / "firmware" / "kickstand").mkdir(parents=True)
-    assert firmware_path.config() == root / "firmware" / "config.py"  # the folder is no checkout yet
+    assert firmware_path.config() == root / "firmware" / "config.py"  # the folder is not a checkout yet
     (tmp_path / "firmware" / "config.py").write_text("")
     assert firmware_path.config() == tmp_path / "firmware" / "config.py"
     assert errors.extra("web") == f'{sys.executable} -m pip install -e "{root}[web]"'

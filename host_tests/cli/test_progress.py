@@ -1,4 +1,4 @@
-"""The progress of slow work is shown on a terminal. It is shown at once if the work is known to be slow."""
+"""The progress of slow work is shown on a terminal. The progress is shown at once if the work is known to be slow."""
 
 import contextlib
 
@@ -34,8 +34,8 @@ def test_simulating_a_ride_shows_progress(tmp_path, monkeypatch):
 
 
 def test_evaluation_shows_progress_from_the_start(monkeypatch):
-    """On a terminal the progress is shown at 0 %, before the first ride is finished. Otherwise a line is printed from
-    time to time."""
+    """On a terminal the progress is shown at 0 %, before the first ride is finished. Without a terminal a line is
+    printed from time to time."""
     monkeypatch.setattr(runs.estimators, "estimate", lambda log, calibration: {})
     arguments = ["evaluate", "--profiles", "parked", "--seeds", 2, "--seconds", 60, "--json"]
     shown = watched(monkeypatch, Watched(), *arguments)

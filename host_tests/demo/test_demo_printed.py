@@ -1,5 +1,5 @@
-"""What the demo prints: a short program takes the place of the device. Also the checks of a user's program, the keys of
-a real terminal, and the bike steered by hand."""
+"""Tests what the demo prints, the checks of a user's program, the keys of a real terminal, and the bike steered by
+hand. A short program takes the place of the device."""
 
 import itertools
 import json
@@ -57,7 +57,7 @@ def test_a_frame_is_printed_when_the_display_has_changed(monkeypatch, capsys):
         at(1.2, "Lean  28° left", ""),
         at(1.25, "Lean  29° left", "x"),
         at(1.3, "Max   29°", ""),
-        at(1.35, "?", ""),  # an OLED's picture that is not complete yet
+        at(1.35, "?", ""),  # a picture of an OLED that is not complete yet
         at(1.4, "Lean  30° left", ""),
         {"ended": "off"},
     ]
@@ -95,7 +95,7 @@ def test_a_device_that_ends_otherwise_is_an_error(monkeypatch, capsys):
 
 
 def test_the_device_steered_by_commands():
-    """The device sends a state every 50 ms of its time. It executes each command, and pauses."""
+    """The device sends a state every 50 ms of its time. The device executes each command, and pauses."""
     with DeviceProcess("cpython", "hand", 20.0) as device:
         states, new = [], []
 
@@ -132,7 +132,8 @@ def test_the_device_steered_by_commands():
 
 
 def test_the_scripted_rider_aligns_a_board_with_12_6_volts(tmp_path):
-    """The user's program measures the battery through a divider of 11. The rider also turns to its page."""
+    """The user's program measures the battery through a divider of 11. The rider also turns to the page of the
+    program."""
     user = tmp_path / "my.py"
     user.write_text(
         "import machine\nprint('battery', round(machine.ADC(26).read_u16() * 3.3 / 65535 * 11, 1))\n"
@@ -289,6 +290,6 @@ def test_the_bike_by_hand_keeps_its_limits():
 def test_each_key_leans_the_bike_five_degrees():
     bike = HandBike(vibration_g=0.0)
     bike.command("upright")
-    for name in ("right", "right", "right", "left"):  # the first sets off
+    for name in ("right", "right", "right", "left"):  # the first command only sets the bike off
         bike.command(name)
     assert bike.truth(12.0)[0] == pytest.approx(5.0, abs=0.6)

@@ -1,4 +1,4 @@
-"""What the picture of the demo says: times, leans, speed and button. And the states that the device sends."""
+"""Tests the times, leans, speed and button in the picture of the demo, and the states that the device sends."""
 
 import os
 from types import SimpleNamespace
@@ -57,7 +57,7 @@ def test_the_first_line_has_the_title_and_the_time(paused, of_s, end):
     lines = drawn(paused, of_s=of_s)
     assert lines[0].startswith("a title") and lines[0].rstrip().endswith(end)
     assert lines[-1].startswith("the keys")
-    assert len(lines) == len(drawn()) - (of_s is None)  # a ride without an end has no bar of its progress
+    assert len(lines) == len(drawn()) - (of_s is None)  # without an end of the ride, the picture has no progress bar
 
 
 def test_the_picture_of_an_oled_has_its_pixels_and_no_bike():
@@ -84,7 +84,7 @@ def columns(picture, style):
 
 @pytest.mark.parametrize(("shown_deg", "side"), [(-30.0, -1), (30.0, 1)])
 def test_a_dashed_line_shows_the_shown_lean(shown_deg, side):
-    """The bike is upright. The line begins at its wheel and ends at the side of the lean."""
+    """The bike is upright. The line begins at the bike's wheel and ends at the side of the lean."""
     rows = columns(bike(0.0, shown_deg), "yellow")
     upper = [column - 18.5 for row in rows[:5] for column in row]
     assert upper and all(column * side > 3.0 for column in upper)

@@ -1,4 +1,5 @@
-"""The bike that is steered by hand: its lean and speed over time, and the readings of its sensor, by known numbers."""
+"""The lean and the speed of the bike that is steered by hand, and the readings of its sensor, are compared with known
+numbers."""
 
 from math import cos, exp, radians, sin, tan
 
@@ -21,7 +22,7 @@ def test_it_begins_on_the_kickstand():
     lean, *motion = bike.truth(0.0)
     assert lean == pytest.approx(-12.0) and motion == [0.0, 0.0, "kickstand"]
     expected = (sin(radians(-12.0)), cos(radians(-12.0)), 0.0, 0.0, 0.0, 0.0)
-    assert bike.motion(5.0) == pytest.approx(expected, abs=1e-9)  # no vibration while it stands
+    assert bike.motion(5.0) == pytest.approx(expected, abs=1e-9)  # a standing bike has no vibration
 
 
 @pytest.mark.parametrize("lean_deg", [-30.0, 20.0, 50.0])
@@ -35,7 +36,7 @@ def test_the_lean_follows_its_command_without_overshoot(lean_deg, after_s):
 
 
 def test_the_speed_first_rises_steadily_and_then_approaches_its_goal():
-    """3 m/s2 until 13 m/s, then with a time constant of 1/1.5 s."""
+    """The speed rises by 3 m/s2 until 13 m/s, then with a time constant of 1/1.5 s."""
     bike = HandBike(vibration_g=0.0)
     bike.ride(15.0)
     for t_s, speed in ((1.0, 3.0), (4.0, 12.0), (5.0, 15.0 - 2.0 * exp(-1.5 * (5.0 - 13.0 / 3.0))), (9.0, 15.0)):
@@ -61,12 +62,12 @@ def test_a_bike_that_brakes_is_upright_until_it_stands_on_its_kickstand():
     assert abs(bike.truth(26.5)[0]) < 0.7 and bike.truth(26.5)[3] == "brake"
     assert bike.truth(40.0)[0] == pytest.approx(-12.0, abs=0.01) and bike.truth(40.0)[3] == "kickstand"
     bike.ride(15.0)
-    assert bike.truth(55.0)[0] == pytest.approx(0.0, abs=0.6)  # the earlier lean is forgotten
+    assert bike.truth(55.0)[0] == pytest.approx(0.0, abs=0.6)  # the lean before the stop is forgotten
 
 
 @pytest.mark.parametrize("lean_deg", [-25.0, 25.0])
 def test_a_bike_in_a_turn_is_in_balance(lean_deg):
-    """The force is along its up. A lean to the right turns right, which is a negative yaw rate."""
+    """The force is along the bike's up. A bike that leans to the right turns right, so its yaw rate is negative."""
     bike = riding(15.0)
     bike.lean_to(lean_deg)
     lean, speed, yaw_rate_dps, phase = bike.truth(30.0)
@@ -84,10 +85,11 @@ def test_the_rider_sways_with_0_4_hz(pose, amplitude_deg):
     bike.stand("upright")
     if pose == "riding":
         bike.ride(15.0)
-    bike.truth(25.0)  # ten periods of 2.5 s
+    bike.truth(25.0)  # ten periods of the sway, of 2.5 s each
     quarters = [bike.truth(25.0 + 0.625 * k)[0] for k in range(8)]
     assert quarters == pytest.approx([0.0, amplitude_deg, 0.0, -amplitude_deg] * 2, abs=0.03 * amplitude_deg)
-    assert bike.motion(30.0)[5] == pytest.approx(amplitude_deg * 0.8 * 3.14159, rel=0.03)  # the fastest roll rate
+    # The largest roll rate of the sway
+    assert bike.motion(30.0)[5] == pytest.approx(amplitude_deg * 0.8 * 3.14159, rel=0.03)
 
 
 @pytest.mark.parametrize(("cruise_mps", "leans"), [(3.9, False), (4.2, True)])
@@ -110,7 +112,7 @@ def test_keys_do_nothing_on_the_kickstand_and_set_off_upright():
     assert bike.truth(2.0)[1:] == (0.0, 0.0, "kickstand")
     bike.command("upright")
     bike.truth(5.0)
-    bike.command("left")  # sets off without a lean
+    bike.command("left")  # the first command only sets the bike off
     assert bike.truth(20.0)[0] == pytest.approx(0.0, abs=0.6) and bike.truth(20.0)[1] == pytest.approx(15.0, abs=0.01)
     bike.command("left")
     bike.command("left")
@@ -145,7 +147,7 @@ def test_it_accelerates_until_1_mps_below_its_goal(t_s, accelerates):
 
 @pytest.mark.parametrize(("after_s", "phase"), [(1.5, "roll"), (1.68, "held turn")])
 def test_a_turn_is_held_when_the_roll_rate_is_under_0_02_rad_per_s(after_s, phase):
-    """A roll to 25 degrees has this rate after 1.58 s, and is then within 0.006 rad of its goal."""
+    """In a roll to 25 degrees, the lean has the tested rate after 1.58 s, and is then within 0.006 rad of its goal."""
     bike = riding()
     bike.lean_to(25.0)
     assert bike.truth(20.0 + after_s)[3] == phase
@@ -153,7 +155,7 @@ def test_a_turn_is_held_when_the_roll_rate_is_under_0_02_rad_per_s(after_s, phas
 
 @pytest.mark.parametrize(("after_s", "phase"), [(1.1, "roll"), (1.3, "straight")])
 def test_a_bike_is_straight_below_a_lean_of_0_02_rad(after_s, phase):
-    """A roll from 25 degrees back to 0 reaches this lean after 1.21 s."""
+    """A roll from 25 degrees back to 0 reaches the tested lean after 1.21 s."""
     bike = riding()
     bike.lean_to(25.0)
     bike.truth(30.0)

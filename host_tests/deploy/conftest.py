@@ -1,5 +1,5 @@
-"""Caches the checks of config.py for the tests in this folder. These tests flash boards hundreds of times, and each
-check would start a process."""
+"""Caches the checks of config.py for the tests in this folder. The tests flash boards hundreds of times, and each check
+would start a process."""
 
 import functools
 from pathlib import Path

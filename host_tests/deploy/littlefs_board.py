@@ -55,7 +55,7 @@ class LittlefsBoard(fake_board.FakeBoard):
         context = _Flash(len(self._context.buffer))
         context.buffer[:] = self._context.buffer
         for file in self._written:
-            file.close()  # closing writes only to the old buffer
+            file.close()  # close() writes only to the old buffer
         self._written.clear()
         self._context = context
         self.system = LittleFS(context, mount=False, **self._layout)

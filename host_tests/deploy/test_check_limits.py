@@ -39,7 +39,7 @@ def test_a_clock_with_losses_is_not_measured(overflows, errors):
 
 
 def rested(force=(0.0, 0.0, 1.0), rate=(0.0, 0.0, 0.0), noise_g=0.005, noise_dps=(0.05,) * 3, **other):
-    """Return the findings for a sensor at rest. It has 4096 counts per g and 65.5 counts per deg/s."""
+    """Return the findings for a sensor at rest. The sensor has 4096 counts per g and 65.5 counts per deg/s."""
     means = [4096 * value for value in force] + [0.0] + [65.5 * value for value in rate]
     spreads = [4096 * noise_g] * 3 + [0.0] + [65.5 * value for value in noise_dps]
     given = {"samples": 1000, "changes": (900,) * 7, "temperature_c": 25.0, "overflows": 0} | other
@@ -108,8 +108,8 @@ def test_each_limit_of_a_sensor_at_rest(given, what, verdict):
 
 @pytest.mark.parametrize(("off_percent", "verdict"), [(13.9, GOOD), (-13.9, GOOD), (14.1, BAD), (-14.1, BAD)])
 def test_the_self_test_is_compared_with_the_factory_trim(off_percent, verdict):
-    """The gyro's trim code is 1 on each axis. A code of 1 means a self-test response of 25 x 131 counts. Its
-    sign is reversed about y."""
+    """The gyro's trim code is 1 on each axis. A code of 1 means a self-test response of 25 x 131 counts. About y the
+    self-test response has the opposite sign."""
     trims = [0.0] * 3 + [3275.0, -3275.0, 3275.0]
     on = tuple(100.0 + trim * (1.0 + off_percent / 100.0) for trim in trims)
     found = limits.self_test((1, 1, 1, 0), (100.0,) * 6, on)
@@ -159,7 +159,8 @@ def test_the_fifo_may_lose_a_tenth_and_two_frames(waiting, noticed, after, verdi
     [
         ({}, (GOOD, GOOD, GOOD)),
         ({"longest_us": 100_100}, (LOOK, GOOD, GOOD)),
-        ({"longest_us": 182_600}, (BAD, GOOD, GOOD)),  # more than half of the time in which the FIFO fills
+        # The longest pass takes more than half of the time in which the FIFO fills
+        ({"longest_us": 182_600}, (BAD, GOOD, GOOD)),
         ({"overflows": 1}, (BAD, GOOD, GOOD)),
         ({"lost": 1}, (GOOD, LOOK, GOOD)),
         ({"restarts": 1}, (GOOD, GOOD, GOOD)),

@@ -41,7 +41,7 @@ def test_a_compiled_module_has_the_boards_format():
     for second, third in ((5, 0x13), (6, 0x12)):
         with pytest.raises(bytecode.CannotCompile, match="another format"):
             made(second, third)
-    assert made(6, 0x13, 0x5306)  # bits 14 and above do not belong to the format
+    assert made(6, 0x13, 0x5306)  # bits 14 and above do not belong to the .mpy format
 
 
 # check.py
@@ -56,7 +56,7 @@ def test_the_last_line_of_a_check_counts_its_faults():
 
 
 class Answers:
-    """A board that gives these values to the functions of check_guest.py, and records the calls."""
+    """Replaces a board: each function of check_guest.py returns its value in `values`, and the calls are recorded."""
 
     def __init__(self, **values):
         self.values = {
@@ -112,7 +112,8 @@ def test_a_check_leaves_out_what_cannot_be_measured():
     assert "fifo(parts, 0)" in called(flash=((9,), 0, 99, "full"))[1]
     _, _, found = called(clock=check.GuestFailed("OSError: 5"), loop=(151_000, 1, 0, 0, 1, "", 9, 50_000))
     assert found["sample clock"] == Finding("sample clock", BAD, "broken off by OSError: 5")
-    assert found["longest turn"].verdict == BAD  # half of the 300 ms of the FIFO
+    # The longest pass takes over half of the 300 ms in which the FIFO fills
+    assert found["longest turn"].verdict == BAD
     assert called(loop=(149_000, 1, 0, 0, 1, "", 9, 50_000))[2]["longest turn"].verdict == LOOK
 
 

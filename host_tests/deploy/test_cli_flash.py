@@ -24,7 +24,7 @@ BUILT_IN = types.SimpleNamespace(device="/dev/ttyS0", vid=None, pid=None)
 
 @pytest.fixture
 def board(tmp_path, monkeypatch):
-    """Return the only connected board. It contains only MicroPython's own boot.py."""
+    """Return the only connected board, which contains only MicroPython's own boot.py."""
     (tmp_path / "flash").mkdir()
     board = fake_board.FakeBoard(tmp_path / "flash")
     board.path("boot.py").write_text("# boot\n")
@@ -62,7 +62,7 @@ def test_empty_board_gets_everything_and_starts(board):
     assert fake_board.files(board.root) == wanted() | {"/boot.py": b"# boot\n"}
     assert {"/main.py", "/config.py", "/kickstand/__init__.mpy"} <= set(wanted())
     assert not [path for path in wanted() if module(path) and not path.endswith(".mpy")]
-    assert board.written[-1] == "/main.py"  # after an interruption an old main.py never runs with new modules
+    assert board.written[-1] == "/main.py"  # main.py is written last, so an old main.py never runs with new modules
     assert (board.resets, board.closed) == (1, True)
     assert f"copied {len(wanted())} files" in result.out
     assert "Imagined Pico with RP2040, MicroPython 1.26.1 on /dev/ttyACM0" in result.out

@@ -23,7 +23,7 @@ def test_mip_installs_every_module_and_nothing_else():
     firmware = ROOT / "firmware"
     modules = {path.relative_to(firmware).as_posix() for path in (firmware / "kickstand").rglob("*.py")}
     assert {target for target, _ in listed["urls"]} == modules
-    assert all(target == source for target, source in listed["urls"])  # relative targets need no network
+    assert all(target == source for target, source in listed["urls"])  # targets without a host need no network
     assert listed == firmware_files.mip_package(), "python -m kickstand_tools.deploy.firmware_files writes it again"
 
 
@@ -136,7 +136,7 @@ def test_a_moved_checkout_gets_a_new_venv(dev, steps):
 
 
 def test_working_venv_of_another_python_is_kept(dev, steps, monkeypatch, capsys):
-    """The user may have made this .venv on purpose and installed other packages in it."""
+    """The user may have made the .venv on purpose, and installed other packages in it."""
     dev.prepare("")
     stamp = Path(dev.STAMP)
     stamp.write_text(stamp.read_text().replace("Python ", "Python 0.", 1))

@@ -53,8 +53,8 @@ def test_installed_package_uses_config_of_the_current_folder(board, tmp_path, mo
 
 @pytest.mark.parametrize("arguments", [["flash"], ["flash", "--config"]])
 def test_setting_behind_a_mark_is_reported(arguments, board, config):
-    """A setting behind a '#' has no effect. The message gives its line, also if config.py is not copied. The file as
-    shipped has only examples behind a '#', which are not reported."""
+    """A setting behind a '#' has no effect. The message gives the line of the setting, also if config.py is not copied.
+    The file as shipped has only examples behind a '#', which are not reported."""
     shipped = (firmware_path.directory() / "config.py").read_text()
     config.write_text(shipped.replace('# SIDE = "left" ', '# SIDE = "right"'))
     said = f"note: {config}, line 4: SIDE = \"right\" is not used, because a '#' is in front of it"
@@ -82,7 +82,7 @@ def test_mistake_in_config_is_refused_before_copying(slip, board, config):
     config.write_text(text)
     words = f"{config}, line {line}: {reason}" if line else f"{config}: {reason}"
     command.refused(board.root, "flash", "--config", words=words)
-    assert board.resets == 1  # the previous program runs again
+    assert board.resets == 1  # the board restarts, so its program runs again
 
 
 def test_a_new_board_gets_no_faulty_config_either(board, config):
@@ -108,7 +108,7 @@ def pose(board, machine):
 @pytest.mark.parametrize(("machine", "status"), [("pico", 2), ("pico 2", 2), ("esp32", 0)])
 def test_config_is_checked_for_the_board(machine, status, board, config):
     pose(board, machine)
-    config.write_text("BUTTON_PIN = 4\n")  # on a Pico this pin is the sensor's SDA
+    config.write_text("BUTTON_PIN = 4\n")  # on a Pico pin 4 is the sensor's SDA
     assert command.run("flash", "--config").status == status
 
 

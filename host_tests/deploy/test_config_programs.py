@@ -1,4 +1,5 @@
-"""A config.py is a program and may end, hide or delay its own check. Such a config.py is refused in one line."""
+"""A config.py is a program and may end, hide or delay its own check. A config.py with such a fault is refused in one
+line."""
 
 import pytest
 from kickstand_tools.deploy import config_check

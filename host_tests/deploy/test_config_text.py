@@ -32,7 +32,7 @@ def test_each_setting_can_be_set_and_unset():
     assert len(names) > 30 and config_text.values(text) == {}
     whole = config_text.with_values(text, {name: f"({i}, 'x')" for i, name in enumerate(names)})
     assert settings_of(whole) == {name: (i, "x") for i, name in enumerate(names)}
-    assert whole.count("\n") == text.count("\n")  # each setting stays in its place in the file
+    assert whole.count("\n") == text.count("\n")  # each setting stays on its line of the file
     assert '# or "right"\n' in whole
     assert settings_of(config_text.with_values(whole, dict.fromkeys(names))) == {}
 

@@ -63,7 +63,7 @@ def answers(monkeypatch):
     """Return a function that runs lines() with a board that prints these pieces.
 
     The function returns a list and the bytes that were sent to the board. The list has the program's lines. If lines()
-    broke off, the message of this error is the last item.
+    raised an error, the error's message is the last item.
     """
     clock = Clock()
     fake = SimpleNamespace(monotonic=lambda: clock.now, time=lambda: clock.wall)

@@ -52,7 +52,7 @@ def test_mip_installs_from_a_local_server(package, tmp_path):
     assert {path: file.read_bytes() for path, file in found.items()} == sources()
 
 
-@pytest.mark.nightly  # slow, because 500 kB go through the console
+@pytest.mark.nightly  # slow, because 500 kB are sent through the console
 @pytest.mark.chip
 def test_mip_installation_starts_on_the_emulated_pico(package, monkeypatch):
     """The board also gets main.py and config.py, as firmware/docs/settings.md describes."""

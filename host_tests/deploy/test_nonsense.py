@@ -39,7 +39,7 @@ COMMANDS = {
 
 
 class Nonsense(fake_board.FakeBoard):
-    """A board that answers every command with the same bytes. first: number of correct answers before that."""
+    """A board that answers every command with the same bytes. first: number of correct answers before the nonsense."""
 
     def __init__(self, root, content, first=0):
         super().__init__(root)

@@ -1,5 +1,5 @@
-"""A used board may contain files of other projects. They are renamed and kept. A config.py that would stop the firmware
-is refused."""
+"""A used board may contain files of other projects. `flash` renames and keeps these files. A config.py that would stop
+the firmware is refused."""
 
 import sys
 
@@ -61,7 +61,7 @@ def test_other_projects_files_are_renamed(there, kept, board):
     assert now["main.py"] == MAIN
     for name in there.keys() - {"main", *kept}:
         assert now[f"{name}.py"] == there[name]
-    assert command.works("flash").out.count("another project's") == 0  # no file is moved twice
+    assert command.works("flash").out.count("another project's") == 0  # the second run moves no file again
     assert own(board) == now
 
 
@@ -112,7 +112,7 @@ def test_byte_order_mark_is_never_copied(encode, content, board, tmp_path, monke
     monkeypatch.chdir(tmp_path / "mine")
     command.works("flash", "--config")
     assert own(board)["config.py"] == content
-    put(board, config=encode(content))  # a config.py on the board is corrected
+    put(board, config=encode(content))  # correct the config.py on the board
     command.works("flash")
     assert own(board)["config.py"] == content
 

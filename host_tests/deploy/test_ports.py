@@ -28,14 +28,15 @@ BOARDS = {"Pico": bytecode.PICO, "Pico 2": 0x1F06, "ESP32": 0x2B06, "ESP32-C3": 
 # (MicroPython, py/persistentcode.h and ports/esp32/mpconfigport.h).
 ESP32S = {0x2B06: "xtensawin", 0x2F06: "rv32imc", 0x12F06: "rv32imc"}
 
-# Messages of pyright that are ignored, because code for a board has no type annotations. They are about names that are
-# first None or NoRecorder, settings made by setattr(), pointers in viper functions, and ticks, which are numbers.
+# Messages of pyright that are ignored, because code for a board has no type annotations. The messages are about names
+# that are first None or NoRecorder, settings made by setattr(), pointers in viper functions, and ticks, which are
+# numbers.
 UNTYPED = '"None"', 'for class "NoRec', 'for class "Settings', 'of type "ptr', "Variable not allowed in", '"_Ticks'
 
 
 @pytest.fixture(scope="module", params=["rp2", pytest.param("esp32", marks=pytest.mark.nightly)])
 def stubs(request):
-    """Return a port and the directory with the stubs of its MicroPython. The first use installs them in .venv."""
+    """Return a port and the directory with the stubs of its MicroPython. The first use installs the stubs in .venv."""
     groups = tomllib.loads((ROOT / "pyproject.toml").read_text())["dependency-groups"]
     wanted = groups[f"stubs-{request.param}"]
     directory = Path(sys.prefix) / f"stubs-{request.param}-{hashlib.sha256(repr(wanted).encode()).hexdigest()[:8]}"
@@ -48,7 +49,7 @@ def stubs(request):
             if done.returncode != 0:
                 said = done.stderr.strip() or "pip failed"
                 pytest.skip(f"no {wanted[0]}: it cannot be installed: {said.splitlines()[-1]}")
-            with contextlib.suppress(OSError):  # another process has already installed the stubs
+            with contextlib.suppress(OSError):  # OSError: another process has already installed the stubs
                 os.rename(f"{scratch}/stubs", directory)
     return request.param, directory
 
@@ -127,7 +128,7 @@ def test_only_port_py_knows_the_port():
 
 
 def test_device_works_on_an_esp32(tmp_path):
-    """The ESP32's default pins differ from the Pico's. Its error number for a device that does not answer differs
+    """The ESP32's default pins differ from the Pico's. The error number for a device that does not answer differs
     too."""
     faults = [["unplug_sensor", [2.0, 1.0]], ["unplug_lcd", [4.0, 0.5]]]
     plan = {"lean": [[0, 25]], "board": {"machine": "esp32"}, "faults": faults, "until": 6}

@@ -23,8 +23,8 @@ force_history frames frames_viper gps hardware hd44780 kalman lean lean_filter m
 recorder rest ride_file ride_file_viper ride_ring ride_stream rodrigues rotation sample_clock screen sd_card sensor
 settings six_position six_wizard speed speed_check standing status_report store transform transform_viper trim wheel
 """.split()
-FLAT_BYTES = {".mpy": 1800, ".py": 5000}  # size of most files
-FLAT_SMALL_BYTES = 400  # size of every sixth file; littlefs may store such a small file inside its folder
+FLAT_BYTES = {".mpy": 1800, ".py": 5000}  # size of most files, in bytes
+FLAT_SMALL_BYTES = 400  # size in bytes of every sixth file; littlefs may store such a small file inside its folder
 NOTES = {"/kickstand/notes.txt": b"mine", "/kickstand_a.cal": b"calibration"}
 
 
@@ -45,7 +45,7 @@ def before(which):
     if which == "nothing":
         return {}
     layout, ending = which.split()
-    if layout == "nested":  # every module of the new version is different
+    if layout == "nested":  # in this version every module differs from the new version
         return {path: data[:-1] + b"#" for path, data in wanted(ending).items()}
     modules = {
         f"/kickstand/{name}{ending}": bytes(FLAT_BYTES[ending] if i % 6 else FLAT_SMALL_BYTES)
@@ -79,7 +79,7 @@ def fresh(port="rp2", ending=".mpy") -> Any:
 def test_flat_modules_of_old_versions_are_removed(plugged, ending):
     board = plugged(fresh())
     board.put(before("flat " + ending) | NOTES | {"/kickstand/lean/old/older.py": b"pass", "/kickstand/own/a.txt": b""})
-    board.system.makedirs("/kickstand/errors")  # Python would import this folder instead of errors.mpy
+    board.system.makedirs("/kickstand/errors")  # a folder of this name would hide errors.mpy from the import
     result = command.works("flash")
     expected = wanted(".mpy") | NOTES | {"/kickstand/own/a.txt": b"", "/config.py": before("flat .py")["/config.py"]}
     assert board.files() == expected
@@ -186,7 +186,7 @@ def test_reported_free_space_is_enough(plugged, port, ending, which):
     assert advice in result.err
     assert result.err.count("\n") == 1
     assert board.files() == files
-    assert board.resets == 1  # the previous program runs again
+    assert board.resets == 1  # the board restarts, so its program runs again
 
     board.fill("/rides/000/01/00001.rid", blocks)
     command.works("flash")
@@ -204,15 +204,15 @@ def on_board(files, free_blocks=0):
 
 @pytest.mark.parametrize("which", ["flat .mpy", "flat .py", "nested .mpy", "nested .py"])
 def test_a_board_full_of_rides_has_room_for_an_update(which):
-    """The recorder always keeps RESERVE bytes of flash free. Compiled firmware fits in them, so no ride must be pulled
-    before an update."""
+    """The recorder always keeps RESERVE bytes of flash free. Compiled firmware fits in the reserve, so no ride must be
+    pulled before an update."""
     board = on_board(before(which))
     assert needed_blocks(plan(wanted(".mpy"), board, True), board) * BLOCK <= flash_ring.RESERVE
 
 
 def test_sources_may_need_rides_to_be_pulled_first():
-    """Computers without mpy-cross copy .py files, which take twice the space. If they do not fit, the message says what
-    to do."""
+    """Computers without mpy-cross copy .py files, which take twice the space. If the .py files do not fit, the message
+    says what to do."""
     board = on_board(before("nested .mpy"), flash_ring.RESERVE // BLOCK)
     with pytest.raises(InputError, match="kickstand pull --delete, then flash again"):
         refuse_without_room(plan(wanted(".py"), board, True), board)

@@ -111,7 +111,7 @@ def test_an_update_is_carried_out_in_its_order(monkeypatch):
         ("copying main.py", 5, 6),
         ("copying main.py", 6, 6),
     ]
-    assert seen[4:] == [("copying a.py", 6, 6)] * 2  # the file that lost a byte is sent again
+    assert seen[4:] == [("copying a.py", 6, 6)] * 2  # the file that has lost a byte is sent again
     assert (found.copied, found.copied_bytes, found.kept, found.removed) == (["/a.py", "/main.py"], 6, ["/k"], ["/r"])
     board = Written(loses=99)
     with pytest.raises(InputError, match=rf"a.py reads back differently, {flash._TRIES} times"):

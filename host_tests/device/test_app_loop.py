@@ -79,7 +79,8 @@ def test_a_card_is_tested_before_the_loop(looped, on_card):
 
 @pytest.mark.parametrize(("error", "stopped"), [(KeyboardInterrupt, 1), (SystemExit, 1), (OSError, 0)])
 def test_the_end_of_the_loop(looped, error, stopped, monkeypatch):
-    """After Ctrl-C the watchdog rests, and ride and phone end. After an error the board restarts instead."""
+    """After Ctrl-C the watchdog is disarmed, and the ride and the connection to the phone end. After an error the board
+    restarts instead."""
 
     def use(app, calls, board):
         from kickstand import app as module

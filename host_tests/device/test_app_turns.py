@@ -1,4 +1,4 @@
-"""What each part of the app gets in one turn of its loop, and when."""
+"""What each part of the app gets in one pass of the loop, and when."""
 
 from types import SimpleNamespace
 
@@ -119,10 +119,11 @@ def test_the_first_page_waits_for_the_filter(looped):
     [(0, False, False), (80, False, False), (81, False, True), (40, True, False), (41, True, True)],
 )
 def test_readings_that_wait_too_long_make_a_page_late(looped, frames_left, draws, late):
-    """80 readings at 200 Hz are 400 ms. A display that draws needs 200 ms more."""
+    """A page is late if readings wait for over 400 ms, which are 80 readings at 200 Hz. On a display that draws, a page
+    is late if readings wait for over 200 ms."""
 
     def use(app, calls, board):
-        app._page_ms = 10**6  # the next page is due later
+        app._page_ms = 10**6  # show no page yet
         app.turn()
         app.sensor.chip.frames_left, app.lcd.draws = frames_left, draws
         from time import ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
@@ -182,7 +183,7 @@ def test_a_lean_is_trusted_only_without_a_doubt(looped, fault, trusted, config, 
 
 
 def test_the_first_problem_is_shown(looped):
-    """A problem of the recording comes before one of the speed source, the sensor's axes, and user.py."""
+    """Problems are shown in this order: the recording, the speed source, the sensor's axes, user.py."""
 
     def use(app, calls, board):
         app.user = calls.part("user", take_problem=lambda: "user")

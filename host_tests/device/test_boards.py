@@ -45,7 +45,7 @@ def test_other_boards_measure(machine, board, config, touched, tmp_path):
 
 @pytest.mark.parametrize("machine", WITHOUT)
 def test_a_board_without_usual_pins_touches_none(machine, tmp_path, capsys):
-    """The message names the missing pins. It also appears in safe mode, with the button held at power-on."""
+    """The message names the missing pins. The message also appears in safe mode, with the button held at power-on."""
     plan = {"board": {"machine": machine, **WIRED}, "presses": [[0, 2]], "until": 3}
     record = device_plans.run("cpython", tmp_path, plan, capsys)
     assert record.ends == ["returned"]
@@ -75,7 +75,7 @@ def test_the_refusal_is_shown_where_the_display_s_pins_are_set(config, lines, tm
     [
         *[
             ("esp32", "BUTTON_PIN", pin) for pin in (1, 6, 11, 34, 39)
-        ],  # pins of the console and the flash, and input-only pins
+        ],  # pins of the console, pins of the flash, and pins that are only inputs
         *[("esp32", name, 6) for name in ("SENSOR_SDA", "SENSOR_SCL", "WHEEL_PIN", "GPS_TX", "SD_CS")],
         ("esp32 unicore", "BUTTON_PIN", 11),
     ],
@@ -124,8 +124,8 @@ def test_a_display_with_wrong_pins_drives_no_other_pin(machine, config, wrong, t
 
 @pytest.mark.parametrize("driver", ["legacy", "new"])
 def test_a_bus_that_stalls_never_stops_the_loop_of_an_esp32(driver, tmp_path):
-    """A fault holds the sensor's wires for a second, then the display's wires for a moment. Both devices work again
-    without a reset."""
+    """A fault holds the sensor's wires for a second, then the display's wires for a moment. Sensor and display work
+    again without a reset."""
     faults = [["timeout_for", [SENSOR, 3.0, 1.0]], ["timeout_for", [LCD, 6.0, 0.05]], ["stuck_sda", [7.0]]]
     board = {"machine": "esp32", "i2c_driver": driver}
     plan = {"lean": [[0, 25], [6, 30]], "board": board, "faults": faults, "until": 9}
@@ -139,15 +139,15 @@ def test_a_bus_that_stalls_never_stops_the_loop_of_an_esp32(driver, tmp_path):
 
 @pytest.mark.parametrize("bits", [8, 60])
 def test_a_device_that_hangs_on_an_esp32_is_freed(bits, tmp_path):
-    """SoftI2C does not notice that a device holds SDA. Its clock pulses free the device. If they do not, the firmware
-    rejects the readings."""
+    """SoftI2C does not notice that a device holds SDA. The clock pulses of SoftI2C free the device. If the clock pulses
+    do not help, the firmware rejects the readings."""
     faults = [["stuck_sda", [3.0, bits]], ["stuck_sda", [3.0, bits, True]]]
     plan = {"lean": [[0, 25], [3.2, 35]], "board": {"machine": "esp32"}, "faults": faults, "until": 5}
     record = device_plans.run("cpython", tmp_path, plan)
     assert record.ends == ["off"]
     assert record.first("Raw   3[1-5]°", 3.2) < 4.0
     shown = {int(line[5:8]) for t_s, line, _ in record.frames if t_s > 1.0 and line.startswith("Raw")}
-    assert shown <= set(range(25, 36))  # no reading from the time of the fault is used
+    assert shown <= set(range(25, 36))  # only readings from before and after the fault are used
 
 
 def on(machine, function, until_s):
@@ -163,7 +163,7 @@ def on(machine, function, until_s):
 
 @pytest.mark.parametrize("machine", ["pico", "esp32", "s3"])
 def test_a_stopped_watchdog_allows_an_open_console_for_days(machine):
-    """An ESP32's watchdog cannot be stopped, even by a soft reset. So the firmware must feed it."""
+    """An ESP32's watchdog cannot be stopped, even by a soft reset. So the firmware must feed the watchdog."""
 
     def use_the_console(board):
         from time import sleep_ms  # pyright: ignore[reportAttributeAccessIssue]

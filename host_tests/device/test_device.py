@@ -13,14 +13,15 @@ from support.device_plans import ALIGNED, LEFT_S, PRESSES, RIDE, RIGHT_S, STRAIG
 
 @pytest.mark.parametrize(("engine", "seed"), [("cpython", None), ("micropython", 3)])
 def test_two_presses_and_a_ride(engine, seed, tmp_path):
-    """With seed None the sensor is perfect, and its axes are the bike's. With seed 3 it has the data sheet's errors and
-    a random mounting, and is not calibrated."""
+    """With seed None the sensor is perfect, and its axes are the bike's. With seed 3 the sensor has the data sheet's
+    errors and a random mounting, and is not calibrated."""
     record = device_plans.run(engine, tmp_path, {**ALIGNED, "seed": seed})
     assert record.at(1.9)[0].startswith("Raw")
     assert record.first("On stand: press") < 2.5
     assert record.at(6)[0] == "Now upright:    "
     assert record.first("Aligned!") < 16.0
-    # The error of an uncalibrated sensor differs between the two poses. So the alignment is wrong by some degrees.
+    # The error of an uncalibrated sensor differs between the two poses. So without the six positions the alignment is
+    # wrong by some degrees.
     tolerance = 2 if seed is None else 7
     for t_s, lean in ((LEFT_S, -30), (RIGHT_S, 40), (STRAIGHT_S, 0)):
         assert record.lean_at(t_s) == pytest.approx(lean, abs=tolerance)
@@ -38,7 +39,7 @@ def test_the_calibration_outlives_the_power(engine, tmp_path):
     device_plans.align(tmp_path)
     again = device_plans.run(engine, tmp_path, {"lean": [[0, 25]], "until": 3})
     assert again.lean_at(2.5) == 25
-    assert again.first("Lean +25") < 1.5  # the first reading after power-on
+    assert again.first("Lean +25") < 1.5  # the lean is shown with the first readings after power-on
     assert again.first("Not aligned") == math.inf
 
 
@@ -59,7 +60,7 @@ def test_unusable_poses_are_refused_and_repeated(lean, complaint, tmp_path):
     )
     assert record.at(13.5)[0].startswith(complaint)
     assert record.last[0] == "On the stand,   "
-    assert list(tmp_path.iterdir()) == []  # no file was stored
+    assert list(tmp_path.iterdir()) == []  # nothing was stored in flash
 
 
 def test_a_knock_during_the_pose(tmp_path):
@@ -80,14 +81,15 @@ def test_a_refused_alignment_leaves_the_old_one(tmp_path):
         "cpython", tmp_path, {"lean": [[0, 20]], "presses": [*menu_align, [17, 1.2]], "until": 20}
     )
     assert record.at(16)[0].startswith("Same pose twice")
-    assert record.lean_at(19.5) == 20  # the old alignment is in use
+    assert record.lean_at(19.5) == 20  # the old alignment is still in use
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == files
 
 
 def test_pages_and_menu(tmp_path):
     source = (firmware_path.PACKAGE / "ui" / "page_ring.py").read_text(encoding="utf-8")
     ring = re.findall(r"pages\.(\w+)", source.partition("MOTORCYCLE = (")[2].partition(")")[0])
-    turns_s = [46.0 + k for k in range(len(ring))]  # times of the presses through all pages, back to the first page
+    # Times of the presses that show all pages and return to the first page
+    turns_s = [46.0 + k for k in range(len(ring))]
     menu_s = turns_s[-1] + 1.0
     short = [*turns_s, *(menu_s + after_s for after_s in (2, 3, 7.5, 11, 12, 13, 19))]
     long = [menu_s + after_s for after_s in (0, 4, 9, 14)]
@@ -95,12 +97,14 @@ def test_pages_and_menu(tmp_path):
     record = device_plans.run("cpython", tmp_path, {**ALIGNED, "presses": presses, "until": menu_s + 21})
 
     def shows(page, line1, line2):
-        """Return True if the display showed lines that match, in the second of the page."""
+        """Return True if the display showed two lines that match these patterns, in the second in which the page is
+        shown."""
         begin_s = 45.0 + ring.index(page)
         of_page = [lines for start_s, *lines in record.frames if begin_s < start_s < begin_s + 1.0]
         return any(re.match(line1, first) and re.match(line2, second) for first, second in of_page)
 
-    assert record.first("Max left +(29|3[0-3])°") == pytest.approx(46.3, abs=0.2)  # the plan changes the lean instantly
+    # In the plan the lean changes instantly
+    assert record.first("Max left +(29|3[0-3])°") == pytest.approx(46.3, abs=0.2)
     assert record.first("Max right +(39|4[0-3])°") == pytest.approx(46.3, abs=0.2)
     assert shows("acceleration", "Accel|Brake", r"pk \+0\.")
     assert shows("formula", "Formula", "Filter")

@@ -19,8 +19,8 @@ def aligned(tmp_path):
 
 @pytest.fixture
 def spoilt(monkeypatch):
-    """Return spoilt(column, value, from_s, until_s), which sets this column of the readings to a value for this
-    time."""
+    """Return spoilt(column, value, from_s, until_s), which sets a column of the readings to a value from from_s to
+    until_s."""
 
     def spoil(column, value, from_s, until_s):
         def installed(board):
@@ -74,7 +74,7 @@ def test_an_axis_that_dies_in_a_pose_ends_it(spoilt, tmp_path):
 
 
 def test_a_moment_at_the_end_of_the_range_hides_nothing_for_long(spoilt, aligned):
-    """The display reports the fault. Soon after it the correct lean returns, because the bike is at rest."""
+    """The display reports the fault. Soon after the fault the correct lean returns, because the bike is at rest."""
     spoilt(3, 600.0, FAULT_S, FAULT_S + 0.3)
     record = device_plans.run("cpython", aligned, {"lean": [[0, STATIC]], "until": 10})
     assert record.first("Gyro clips", FAULT_S) < FAULT_S + 0.5

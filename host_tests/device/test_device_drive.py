@@ -63,17 +63,17 @@ def forward_error_deg(calibration, seed=None):
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
 def test_a_car_finds_its_alignment_and_shows_the_next_step(engine, tmp_path):
-    """This drive runs on MicroPython, to test its floats and its heap. The other drives run on CPython."""
+    """The first drive runs on MicroPython, to test its floats and its heap. The other drives run on CPython."""
     record = device_plans.run(engine, tmp_path, car("gps", 5, presses=[[60, SHORT], [65, SHORT]]))
     assert record.at(3.0) == ["Brakings   0/5  ", "stop needed     "]
     assert record.first("brake straight") < 8.0
     assert record.first("braking...") < 30.0
-    assert record.at(62.0)[0].startswith("Raw")  # the first press leaves the page of the alignment
+    assert record.at(62.0)[0].startswith("Raw")  # the first press has left the page of the alignment
     assert record.first("Brakings   [2-4]/5", 65.0) < 67.0
     saved = record.first("Aligned by drive")
     assert saved < 150.0 and stops(saved, 6.0)
     assert record.at(saved)[1].startswith("error about")
-    assert record.first("Accel    0.3", saved) < math.inf  # a car's first page
+    assert record.first("Accel    0.3", saved) < math.inf  # the first page of a car
     calibration = stored(tmp_path)
     assert calibration.aligned and calibration.by_drive
     assert forward_error_deg(calibration, 3) < 1.5
@@ -109,7 +109,7 @@ def test_a_car_finds_out_that_its_sensor_was_remounted(tmp_path):
 
 
 QUESTION = "Side was wrong"
-TURN_S = POSES_S + 30.0 * 2 + 9.0  # a time in a right turn of 20 degrees
+TURN_S = POSES_S + 30.0 * 2 + 9.0  # a time in a right bend with a lean of 20 degrees
 
 
 @pytest.fixture(scope="module")
@@ -129,8 +129,8 @@ def test_a_wrong_kickstand_side_is_noticed(unanswered, asked):
     assert asked < POSES_S + 60.0 and stops(asked, POSES_S)
     assert unanswered.at(asked)[1] == "hold = fix      "
     away = unanswered.first("Lean", asked)
-    assert not stops(away, POSES_S)  # the question disappears during the ride
-    assert unanswered.lean_at(TURN_S) is None  # no lean is shown, because its sign is uncertain
+    assert not stops(away, POSES_S)  # the question disappears while the bike rides
+    assert unanswered.lean_at(TURN_S) is None  # the lean is hidden, because its sign is uncertain
     assert unanswered.at(TURN_S) == ["Lean  --        ", "side was wrong? "]
 
 
@@ -163,7 +163,7 @@ def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
         assert shown == pytest.approx(-25 if town_round % 2 else 20, abs=4)
     shown_s = record.first("Speed (stuck at|2.0 times)")
     assert stops(shown_s, POSES_S)
-    assert record.at(shown_s + 2.0) == record.at(shown_s)  # the text stays until the rider answers or rides on
+    assert record.at(shown_s + 2.0) == record.at(shown_s)  # the report stays until the rider answers or rides on
 
 
 def test_errors_of_both_poses_are_found_while_riding(tmp_path):
@@ -179,7 +179,7 @@ def test_errors_of_both_poses_are_found_while_riding(tmp_path):
     assert forward_error_deg(stored(tmp_path)) < 1.5
     assert stored(tmp_path).by_drive
     for town_round in range(3, 7):
-        assert record.lean_at(POSES_S + 30.0 * town_round - 1.0) in (-1, 0, 1)  # the bike is upright
+        assert record.lean_at(POSES_S + 30.0 * town_round - 1.0) in (-1, 0, 1)  # the bike is upright here
     assert record.first("Max right +(19|2[0-9])°", POSES_S + 232.0) < math.inf
 
 
@@ -284,7 +284,7 @@ def test_status_shows_the_speed(config, fitted, said, capsys, monkeypatch, tmp_p
 
 
 def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
-    """Other code keeps the processor busy for 0.25 s. The status then reports this longest turn of the loop, and the
+    """Other code keeps the processor busy for 0.25 s. The status then reports the longest pass of the loop, and the
     room that was left in the FIFO."""
     monkeypatch.chdir(tmp_path)
 
@@ -293,7 +293,7 @@ def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
 
     with Board(
         sensor_errors.resting(sensor_errors.Sensor(), (0, 1, 0))
-    ) as board:  # a perfectly level sensor would look frozen
+    ) as board:  # lean the sensor a little, because a perfectly level sensor would look frozen
         from kickstand import app, devices, settings, status_report
         from kickstand.lean import consistency
 

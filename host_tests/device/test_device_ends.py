@@ -61,7 +61,7 @@ def test_ctrl_c_in_a_transfer_leaves_no_lean(turn, boards, tmp_path, monkeypatch
 
 
 def test_a_ride_that_is_streamed_ends_without_a_lean(boards, tmp_path, monkeypatch):
-    """In this test `kickstand record` starts the app, not main.py."""
+    """`kickstand record` starts the app, not main.py."""
     from kickstand import app
 
     turn = app.App.turn

@@ -1,5 +1,5 @@
 """Faults of sensor, bus, display and flash on the whole device. The display shows a fault while it lasts and soon
-recovers. It never shows a wrong value as good."""
+recovers. The display never shows a wrong value as good."""
 
 import math
 import time
@@ -41,8 +41,8 @@ def test_a_lasting_fault_is_shown_until_it_ends(faults, said, aligned):
     assert record.lean_at(FAULT_S - 0.1) == STATIC
     assert record.first(said, FAULT_S) < FAULT_S + 0.4
     back = record.first("Lean +25° right", END_S)
-    assert back < END_S + RECOVERY_S + 0.1  # the record has a frame every 0.1 s
-    assert set(record.leans(0, 10)) == {STATIC}  # no other value was shown as the lean
+    assert back < END_S + RECOVERY_S + 0.1  # frames of the record are 0.1 s apart
+    assert set(record.leans(0, 10)) == {STATIC}  # the display shows no other lean
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,8 @@ def test_a_sagging_supply_while_the_calibration_is_read(fault, aligned):
     files = {path.name: path.read_bytes() for path in aligned.iterdir()}
     record = device_plans.run("cpython", aligned, standing([[fault, [".cal", 0, 2]]], until=4))
     assert record.first("Not aligned") < math.inf
-    assert {path.name: path.read_bytes() for path in aligned.iterdir()} == files  # the flash is not rewritten
+    # The firmware does not rewrite the flash
+    assert {path.name: path.read_bytes() for path in aligned.iterdir()} == files
     assert device_plans.run("cpython", aligned, standing([], until=3)).lean_at(2.5) == STATIC
 
 
@@ -118,7 +119,7 @@ def in_turn_300(monkeypatch):
 
 def test_an_exception_is_reported_and_the_board_restarts(aligned, in_turn_300, capsys):
     in_turn_300(lambda: 1 / 0)
-    held = {"presses": [[3.0, 5.0]]}  # the button is held during the restart: safe mode starts only at power-on
+    held = {"presses": [[3.0, 5.0]]}  # the button is held during the restart, which does not start safe mode
     record = device_plans.run("cpython", aligned, standing([], until=12, **held), capsys)
     assert record.first("Error, restarts") < math.inf
     assert record.first("ZeroDivisionErro") < math.inf
@@ -146,7 +147,7 @@ def test_a_sensor_lost_in_a_turn(lean, off_s, tmp_path):
     record = device_plans.run("cpython", tmp_path, {**plan, "faults": [["unplug_sensor", [40.0, off_s]]]})
     assert record.lean_at(39.5) == pytest.approx(lean, abs=2)
     assert record.first("No sensor|Sensor", 40) < 40.5
-    assert all(abs(shown - lean) <= 7 for shown in record.leans(40.6, 52))  # before 40.6 s no lean is shown
+    assert all(abs(shown - lean) <= 7 for shown in record.leans(40.6, 52))  # no lean is shown before 40.6 s
     assert record.lean_at(51) == pytest.approx(lean, abs=3)
 
 

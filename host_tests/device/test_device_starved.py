@@ -14,9 +14,9 @@ RIDE = [
     *[["turn", 40.0 * (-1) ** k, 0.3] for k in range(8)],
 ]
 TRUE = script.Ride([getattr(script, name)(*more) for name, *more in RIDE])
-# sum of half a second, the time to write a page, and the time between two frames of the record
+# the sum of half a second, the time to write a page, and the time between two frames of the record
 OLDEST_S = 0.5 + 0.1 + 0.1
-HANG_S = 1.46  # with this duration, the first page after the hang is complete at the next frame of the record
+HANG_S = 1.46  # a hang of this duration ends so that the next frame of the record has a complete page
 NEAR_DEG = 10.0  # readings lost while the bike rolls cause errors of up to 8 degrees for a while
 
 STARVED = {
@@ -37,7 +37,8 @@ def run(engine, flash, faults, config, **more):
 def too_old(record, from_s=FROM_S - 5.0):
     """Return the displayed leans that the bike has not had within the last OLDEST_S.
 
-    Returns a list of (t_s, line, smallest lean, largest lean). Both leans are the bike's within the last OLDEST_S.
+    Returns a list of (t_s, line, smallest lean, largest lean). The smallest and the largest lean are the bike's within
+    the last OLDEST_S.
     """
     found = []
     for k in range(int(10 * (FROM_S + 8.0 - from_s))):

@@ -102,7 +102,7 @@ def test_each_address_for_devices_is_asked():
 
 
 class FifoChip:
-    """Replaces an Mpu6050. `waiting` and `readings` are the successive results of the calls of these names."""
+    """Replaces an Mpu6050. waiting: the successive numbers of bytes in the FIFO. readings: the successive readings."""
 
     period_ms = 5
 
@@ -153,7 +153,8 @@ class FifoChip:
     ],
 )
 def test_a_fifo_that_cannot_be_used_is_recognised(chip, how):
-    """A frame has 14 bytes. While four frames arrive, at most four may be left of the restart."""
+    """A frame has 14 bytes. Just after its restart the FIFO may hold at most four frames, and then four frames should
+    arrive."""
     found = []
 
     def program(board):

@@ -33,7 +33,7 @@ def test_presses_and_unplugs_at_random(engine, display, tmp_path):
             presses.append([at_s, chance.choice((0.1, 0.15, 0.9))])
         else:
             faults.append(["unplug_lcd", [at_s, chance.choice((0.001, 0.05, 0.25))]])
-    until_s = 18.0 + 0.2 * SHOTS + 45.0  # by this time every menu and wizard has ended
+    until_s = 18.0 + 0.2 * SHOTS + 45.0  # every menu and wizard has ended by this time
     plan = {
         "ride": device_plans.RIDE,
         "presses": presses,

@@ -1,5 +1,5 @@
-"""The firmware detects wrong machine code when it imports the module. It then uses the plain function, and the console
-says so."""
+"""The firmware detects wrong machine code when it imports the module. The firmware then uses the plain function, and
+the console says so."""
 
 import re
 import shutil

@@ -1,7 +1,7 @@
-"""The heap of an ESP32 is small at the start. The firmware still collects garbage only between turns of the loop.
+"""The heap of an ESP32 is small at the start. The firmware still collects garbage only between two passes of the loop.
 
 The test runs MicroPython's unix port with a nearly full heap, as on an ESP32. Objects of the unix
-port are twice as large, and the simulated parts also use heap. So the test first measures how much heap one turn uses.
+port are twice as large, and the simulated parts also use heap. So the test first measures how much heap one pass uses.
 """
 
 import json
@@ -88,10 +88,10 @@ print(json.dumps({"free": free, "turns": turns.n, "within": within, "plan": plan
 
 @pytest.mark.parametrize("plan", [True, False])
 def test_the_garbage_is_collected_between_turns(plan):
-    """plan: True if the firmware checks the free heap. Without this check garbage is collected during turns, which
+    """plan: True if the firmware checks the free heap. Without this check garbage is collected during passes, which
     proves that the heap of the test is small enough."""
     found = json.loads(run_mpy(_SCRIPT.replace("PLAN", str(plan)), heap="4M").splitlines()[-1])
-    assert 8 < found["free"] < 20  # number of turns until the heap is full
+    assert 8 < found["free"] < 20  # number of passes until the heap is full
     assert 3 <= found["plan"] <= 10
     assert found["turns"] > 500
     assert (found["within"] == 0) is plan, found
@@ -110,10 +110,10 @@ IDLE = SimpleNamespace(
 
 @pytest.mark.parametrize("part", ["drive", "live", "user"])
 def test_a_part_that_uses_heap_shortens_the_next_wait(part, tmp_path, monkeypatch):
-    """The part uses heap in the first turn, when four collections are already planned. Only the first collection is
+    """The part uses heap in the first pass, when four collections are already planned. Only the first collection is
     still made as planned."""
     monkeypatch.chdir(tmp_path)
-    turns = [0]  # between two collections
+    turns = [0]  # number of passes between two collections
     with Board(sensor_errors.resting(sensor_errors.Sensor(), (0, 1, 0))) as board:
         from kickstand import app, devices, settings
 

@@ -32,7 +32,7 @@ def test_incomplete_firmware_ends_at_the_prompt_and_says_so(module, board, monke
 
     def use_the_console():
         start.main()
-        sleep_ms(20_000)  # a running watchdog would reset the board in this time
+        sleep_ms(20_000)  # 20 s, in which a running watchdog would reset the board
 
     monkeypatch.setitem(sys.modules, module, None)
     board.press(2.0)
@@ -99,7 +99,7 @@ def watch(board):
 
 
 def choose(board, at_s, place):
-    """Return the presses that choose an entry of the menu. They take 8 s. place: position of the entry."""
+    """Return the presses that choose an entry of the menu. The presses take 8 s. place: position of the entry."""
     for t_s in range(place):
         board.press(at_s + 2 + t_s)
     board.press(at_s, 1.2)
@@ -122,7 +122,7 @@ def test_a_failed_import_of_the_menu_is_reported(module, place, without, board, 
         choose(board, at_s, place)
     assert board.run(start.main, 28.0) == "off"
     shown_s = [t_s for t_s, lines in seen if lines == said]
-    for t_s in shown_s:  # the message is shown for two seconds, and one sample may be a half-written line
+    for t_s in shown_s:  # tolerance of 2 s: the message is shown for 2 s, and one sample may be a half-written line
         assert min(abs(t_s - (at_s + 4 + place)) for at_s in (3, 15)) < 2
     assert min(shown_s) < 12 < max(shown_s)
     assert seen[-1][1][0].startswith("Raw")
@@ -184,7 +184,8 @@ def test_a_display_without_its_driver_is_probed_less_often(without, board, monke
     assert board.run(start.main, 31.0) == "off"
     words = "no memory for that" if said == NO_MEMORY else "incomplete firmware"
     times = capsys.readouterr().out.count(words)
-    assert 8 <= times <= 10 and board.boots == 1  # attempts after 0.4, 0.8, 1.6 and 3.2 s, then every 6.4 s
+    # The pauses between attempts are 0.4, 0.8, 1.6 and 3.2 s, then 6.4 s each
+    assert 8 <= times <= 10 and board.boots == 1
 
 
 @pytest.mark.parametrize("missing", [MemoryError, ImportError])
@@ -203,7 +204,8 @@ def test_settings_that_cannot_be_loaded_end_on_the_display(missing, board, monke
 
 
 def test_a_failed_import_can_be_repeated(tmp_path):
-    """If an import is interrupted, MicroPython keeps the incomplete module. The next import must load it again."""
+    """If an import is interrupted, MicroPython keeps the incomplete module. The next import must load the module
+    again."""
     (tmp_path / "outer.py").write_text("import inner\n\n\nclass Outer:\n    inner = inner.Inner\n")
     (tmp_path / "inner.py").write_text("import memory\n\nmemory.take()\n\n\nclass Inner:\n    pass\n")
     (tmp_path / "memory.py").write_text(

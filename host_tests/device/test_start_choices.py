@@ -10,10 +10,10 @@ from support.board_access import level, on_board
 
 @pytest.fixture
 def started(tmp_path, monkeypatch, capsys):
-    """Return started(run, fit). It starts a board whose app is run(settings, lcd, loop).
+    """Return started(run, fit). The function starts a board whose app is run(settings, lcd, loop).
 
-    fit(board, start): changes the board or the module before. Returns how the board ended, the lines of its display,
-    what the console printed, and how often the watchdog was stopped.
+    fit(board, start): changes the board or the module before the start. Returns how the board ended, the lines of its
+    display, what the console printed, and how often the watchdog was stopped.
     """
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))

@@ -12,7 +12,7 @@ from kickstand_tools.simulated_board.simulator import Board
 
 
 def world(t_s):
-    """Readings that change, so that no axis looks dead. Their means are 0.5 g, 0.25 g and 0.75 g."""
+    """Readings that change, so that no axis looks dead. The mean forces are 0.5 g, 0.25 g and 0.75 g."""
     a, b, c = (t_s * k % 1 - 0.5 for k in (977, 577, 433))
     return (0.5 + 0.004 * a, 0.25 + 0.004 * b, 0.75 + 0.004 * c, 0.4 * b, 0.4 * c, 0.4 * a, 31.0)
 
@@ -161,7 +161,7 @@ def test_the_worst_of_the_last_run_is_reported(report, monkeypatch):
 
 @pytest.mark.parametrize("slow", [[], [1], [0, 3]])
 def test_functions_without_machine_code_are_named(report, slow, monkeypatch):
-    """CPython has no machine code. So the test replaces the functions in use by others."""
+    """CPython has no machine code. So the test replaces the functions in use by other functions."""
     from kickstand.calibration import transform
     from kickstand.imu import fifo_frames
     from kickstand.rides import block

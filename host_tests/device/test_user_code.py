@@ -1,4 +1,5 @@
-"""The firmware calls the owner's code in user.py at the right times. The lean continues, whatever this code does."""
+"""The firmware calls the owner's code in user.py at the right times. The lean continues, whatever the owner's code
+does."""
 
 import re
 import sys
@@ -30,7 +31,7 @@ def page_two(app):
 
 @pytest.fixture
 def run(tmp_path, monkeypatch, capsys):
-    """Return run(source of user.py, plan), which returns the Record. By default it runs on MicroPython, to test its
+    """Return run(source of user.py, plan), which returns the Record. By default the run is on MicroPython, to test its
     exceptions, memory and printing."""
 
     def run(source, plan=PLAN, engine="micropython"):
@@ -54,7 +55,7 @@ def test_each_function_is_called(run, engine):
     record = run(WHOLE, POSES, engine)
     console = record.console
     assert "setup left" in console and console.count("press 1") == 2
-    assert "lean 100 False" in console  # not aligned yet
+    assert "lean 100 False" in console  # the sensor is not aligned yet
     assert re.search(r"lean 280 True -\d\d? True", console)
     assert goes_on(record, device_plans.LEFT_S)
 

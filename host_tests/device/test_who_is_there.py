@@ -105,8 +105,8 @@ def test_a_chip_of_another_family_is_named(name, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("number", [0x47, 0x75])
 def test_a_chip_that_is_accepted_and_keeps_nothing(number, tmp_path, monkeypatch):
-    """The display does not blame the wiring. It names an ICM-42688, which has some of the settings in
-    other registers."""
+    """The display does not blame the wiring. The display names an ICM-42688, which has some of the settings in other
+    registers."""
     fit = instead(Registers(0x68, {0x75: number}, range(0x4B, 0x77)))
     name = {0x47: ("ICM-42688", "not supported"), 0x75: ("Sensor keeps no", "settings: broken")}[number]
     config = {"ACCEPT_WHO_AM_I": number}
@@ -129,7 +129,8 @@ def test_the_other_address_is_tried(mine, tmp_path, monkeypatch):
 
 
 def test_a_clock_that_has_the_sensors_address_is_not_set(tmp_path, monkeypatch):
-    """The driver only reads at this address. It writes nothing but the number of the register to read."""
+    """The driver only reads from a device that is not the sensor. The driver writes nothing but the number of the
+    register to read."""
     clocks = []
 
     def fit(board):

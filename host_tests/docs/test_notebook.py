@@ -1,4 +1,5 @@
-"""The notebook of the tools runs from the first cell to the last. It finds the lean of the ride that it simulates."""
+"""The notebook of the tools runs from the first cell to the last. The notebook finds the lean of the ride that it
+simulates."""
 
 import json
 import re

@@ -28,7 +28,7 @@ def test_no_drawing_is_stale(pictures):
     assert not stale, f"{', '.join(stale)}: {STALE}"
 
 
-@pytest.mark.nightly  # each case draws a whole ride, which is slow; host_tests/analysis tests the content of plots
+@pytest.mark.nightly  # slow, because each case draws a whole ride; host_tests/analysis tests the content of plots
 @pytest.mark.parametrize(("name", "draw"), [("ride.png", ride.draw), ("lean_compared.png", explained.lean_compared)])
 def test_no_plot_of_a_ride_is_stale(name, draw):
     """The pixels of the pictures are compared. The files themselves differ between versions of matplotlib."""
@@ -38,7 +38,7 @@ def test_no_plot_of_a_ride_is_stale(name, draw):
     )
     assert fresh.shape == kept.shape, STALE
     difference = float(np.mean(np.abs(fresh - kept)))
-    assert difference < 1.0, STALE  # mean difference of the pixels, which are 0 to 255
+    assert difference < 1.0, STALE  # `difference` is the mean difference of the pixels, which are 0 to 255
 
 
 def test_the_picture_of_the_page_is_not_stale():

@@ -111,7 +111,7 @@ PACKAGES = (
 def test_the_map_has_every_folder_and_no_other(package):
     name = package.rpartition("/")[2]
     drawn = re.split(rf"^ .*\b{name}/(?=\s)", text_of(CONTRIBUTING), maxsplit=1, flags=re.MULTILINE)[1]
-    drawn = re.split(r"\n {4}\w", drawn)[0]  # the lines of this folder, up to the next top folder
+    drawn = re.split(r"\n {4}\w", drawn)[0]  # keep the lines of this folder, up to the next top folder
     mapped = set(re.findall(r"\b(\w+)/(?=,| )", drawn.split("\n", 1)[1]))
     folders = {path.parent for path in (ROOT / package).rglob("*.py")} - {ROOT / package}
     assert mapped == {folder.relative_to(ROOT / package).parts[0] for folder in folders}

@@ -14,7 +14,7 @@ def said(problem):
 def background(real=False, leans=True, speed=None, **given: Any) -> Any:
     """Return a BackgroundAlignment with stand-ins for the meter and the drive. The list `calls` collects their calls.
 
-    real: True to keep the real _adopt() and _restart(). Otherwise stand-ins replace them.
+    real: True to keep the real _adopt() and _restart(), False to replace them by stand-ins.
     given: values of the stand-ins, and of attributes.
     """
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):
@@ -118,7 +118,7 @@ def test_two_passes_of_counts_are_fed_together():
     assert applied == [[3.0] * 7] and made.calls == [("update", made._force, made._rate, 15_000)]
     assert (made._n, made._us, made._turns, made._total) == (0, 0, 0, [0] * 7)
     made.feed([1] * 7, 1, 5000, 300)
-    made.feed([1] * 7, 1, 5000, 601)  # 301 ms later
+    made.feed([1] * 7, 1, 5000, 601)  # 601 ms is 301 ms after the previous call
     assert "interrupt" in made.calls and made._n == 1 and made._fed_ms == 601
 
 
@@ -131,7 +131,7 @@ def test_the_result_is_looked_at_once_a_second():
     assert [made.poll(now) for now in (0, 500, 999, 1000, 2001)] == [None, 6.0, None, None, None]
     assert looks == [0, 1000, 2001] and ("speed", 6.0, 70) in made.calls
     assert made._speed_mps == 6.0 and made._speed_ms == 500
-    assert made.calls.count("interrupt") == 1 and made._fed_ms is None  # no reading for over 1 s
+    assert made.calls.count("interrupt") == 1 and made._fed_ms is None  # the last reading is over 1 s old
 
 
 def test_an_answer_exchanges_forward_and_backward():

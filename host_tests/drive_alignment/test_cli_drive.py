@@ -13,8 +13,8 @@ from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 from support import command, driving_runs
 from support.driving_runs import RATE_HZ, STAND, around, mounted
 
-# For each recording, the matrix from the sensor's axes to the vehicle's, with the rows left, up, forward. It was
-# measured with the recording's own receiver and has an error of 1 to 2 degrees.
+# For each recording, the matrix from the sensor's axes to the vehicle's, with the rows left, up, forward. The matrix
+# was measured with the recording's own receiver and has an error of 1 to 2 degrees.
 RECORDED = {
     "car-urban-short-turn-loop-nominal-001": [
         [0.0124, 0.9995, 0.0302],
@@ -95,7 +95,7 @@ def test_a_calibrated_accelerometer_keeps_its_parameters(tmp_path):
     data = json.loads(out.read_text())
     assert data["accel_offset_g"] == [0.2, 0.0, 0.0]
     assert data["gyro_bias_dps"] == pytest.approx([1.0, -2.0, 3.0], abs=0.02)
-    assert errors(matrix_in(out), MOUNT)[1] > 5.0  # the wrong offset of 0.2 g was used
+    assert errors(matrix_in(out), MOUNT)[1] > 5.0  # the alignment is wrong, because the wrong offset of 0.2 g was used
     assert "no six-position" not in result.out
     assert result.out.count("car, method improved") == 1
 
@@ -222,7 +222,7 @@ UPSIDE_DOWN = [0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0]  # rows left, up, 
 
 
 def test_a_log_of_opposite_sign_looks_upside_down(tmp_path):
-    """All accelerations of this log have the opposite sign. In the log of a car only this notice shows the mistake."""
+    """All accelerations of this log have the opposite sign. In the log of a car only a notice shows the mistake."""
     log, out = record(tmp_path / "drive.csv", around(8), UPSIDE_DOWN), tmp_path / "CAL.json"
     said = command.works("calibrate", "drive", log, "--out", out)
     assert "the sensor's z points down: if it is not mounted upside down, all accelerations are of the" in said.err

@@ -81,15 +81,16 @@ def test_the_result_turns_with_the_sensor(method):
 @pytest.mark.parametrize(("method", "yaw_deg"), [("improved", 0.0), ("published", 10.0)])
 def test_camber_at_the_stops_does_not_reach_forward(method, yaw_deg):
     """The road's camber at the stops is 2 degrees, so the levelled force has an error of sin 2 degrees = 0.035 g to the
-    side. Compared with a braking force of 0.2 g, this gives the published method a yaw error of 10 degrees."""
+    side. Together with a braking force of 0.2 g, this side force gives the published method a yaw error of 10
+    degrees."""
     yaw, total = errors(drive(around(8), samples={"tilt_deg": 2.0}, method=method), MOUNT)
     assert abs(yaw) == pytest.approx(yaw_deg, abs=1.0)
     assert total < max(2.3, 1.1 * abs(yaw))
 
 
 def test_it_reports_the_missing_step():
-    """The alignment waits first for a speed, then for a stop, then for a braking event. During a braking event it
-    reports whether the vehicle brakes straight. At the end it reports that the result is ready."""
+    """The alignment waits first for a speed, then for a stop, then for a braking event. During a braking event the
+    alignment reports whether the vehicle brakes straight. At the end it reports that the result is ready."""
     legs = [[2.0, 1.0, 0.0], [2.0, -1.0, 0.0], *around(2), [8.0, 1.5, 0.0], [4.0, -2.0, 15.0], *around(6, stands=False)]
     states = drive(legs)["states"]
     assert alignment.DriveAlignment("car").state == alignment.WAITING_FOR_SPEED
@@ -145,7 +146,7 @@ def test_only_usable_speeds_align(source, fine):
 @pytest.mark.parametrize(
     ("axis", "degrees", "from_s", "words"),
     [
-        (1, 180.0, 130.0, "no longer where it was"),  # only one braking event follows
+        (1, 180.0, 130.0, "no longer where it was"),  # the rotation is followed by only one braking event
         (1, 12.0, 100.0, "two parts of the drive"),
         (0, 1.3 * quality.PITCH_DEG, 82.0, "vertical"),
         (2, 1.3 * quality.ROLL_DEG, 82.0, "vertical"),
@@ -156,7 +157,7 @@ def test_only_usable_speeds_align(source, fine):
 def test_a_mount_that_moved(axis, degrees, from_s, words):
     """The sensor is rotated by these degrees at the time from_s. The drive has ten braking events in a straight line;
     the last begins at 137 s."""
-    legs = [*around(10), [4.0, 1.5, 20.0], [4.0, -1.5, 20.0]]  # events in turns at the end do not hide the move
+    legs = [*around(10), [4.0, 1.5, 20.0], [4.0, -1.5, 20.0]]  # events in bends at the end do not hide the move
     result = drive(legs, moved=[from_s, turned(MOUNT, axis, degrees)])
     assert result["ready"] is (words is None), result
     assert words is None or words in engines.words(result)
@@ -168,14 +169,14 @@ def test_the_first_braking_counts_after_any_late_first_speed(silent_s):
     wrap must not lose a braking event."""
     legs = [[silent_s, 0.0, 0.0], *around(6)]
     result = drive(legs, source={"every_s": 1.0, "silent": (-1.0, silent_s)})
-    assert result["counted"] == 6  # the six braking events; the vehicle only speeds up in turns
+    assert result["counted"] == 6  # the six braking events; the vehicle speeds up only in bends
     assert result["ready"]
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_silent_source_at_zero_is_no_standstill(engine):
-    """The receiver fails during a stop, so the last speed is zero. Then the vehicle drives off into a long curve, where
-    the force is as steady as at a stop."""
+    """The receiver fails during a stop, so the last speed is zero. After the stop the vehicle drives off into a long
+    curve, where the force is as steady as at a stop."""
     before = [*around(7), [8.0, -1.0, 0.0], STAND]
     legs = [*before, [4.0, 4.0, 0.0], [30.0, 0.0, 9.0]]
     seconds = sum(leg[0] for leg in before)
@@ -230,7 +231,7 @@ def test_nothing_is_joined_across_missing_samples():
 )
 def test_an_alignment_is_compared_with_driving(against, brakings, verdict):
     """A change of pitch by 2 degrees between two poses 10 degrees apart causes a yaw error of 11.4 degrees. The cases
-    use this yaw error."""
+    use a yaw error of 11.4 degrees."""
     up = against[3:6] if against[3:6] == PLAIN[3:6] else PLAIN[3:6]
     options = {"vehicle": "motorcycle", "up": up, "bias": [0.0, 0.0, 0.0], "against": against}
     assert drive(around(brakings), PLAIN, **options)["compare"] == verdict

@@ -13,9 +13,9 @@ from kickstand_tools.simulated_board.simulator import Board
 
 
 def device(leans=True, counted=9, problem=None, speed_problem=None, state=alignment.TURNING, speed_mps=0.0):
-    """Return a BackgroundAlignment whose drive has these values. Its list `passed` collects the speeds that it passes
-    to the lean filter."""
-    with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):  # imported here because the module needs a board's clock
+    """Return a BackgroundAlignment whose drive has these values. The list `passed` collects the speeds that the
+    alignment passes to the lean filter."""
+    with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):  # the import needs a board's clock
         from kickstand.drive_alignment.background import BackgroundAlignment
     made: Any = object.__new__(BackgroundAlignment)
     quality = SimpleNamespace(speed_problem=speed_problem)
@@ -29,7 +29,7 @@ def device(leans=True, counted=9, problem=None, speed_problem=None, state=alignm
 @pytest.mark.parametrize(
     ("given", "speed", "used"),
     [
-        ({}, 12.3456, 12.35),  # rounded as in a recording
+        ({}, 12.3456, 12.35),  # the speed is rounded as in a recording
         ({}, 0.0, None),
         ({"counted": MIN_EVENTS_TO_CHECK_SPEED}, 5.0, 5.0),
         ({"counted": MIN_EVENTS_TO_CHECK_SPEED - 1}, 5.0, None),
@@ -70,7 +70,7 @@ def test_a_bend_at_walking_pace_is_shown_as_braking(state, speed_mps, shown):
         (1.9, 1.0, ("speed-late", 1.9)),
         (0.0, 0.74, ("speed-unit", pytest.approx(1 / 0.74))),
         (0.0, 1.36, ("speed-unit", pytest.approx(1 / 1.36))),
-        (0.0, 1 / 3.6, ("speed-unit", pytest.approx(3.6))),  # the unit is km/h
+        (0.0, 1 / 3.6, ("speed-unit", pytest.approx(3.6))),  # a factor of 3.6 means that the unit is km/h
         (0.0, 0.0, ("speed-unit", 99.9)),
         (0.0, -1.0, ("speed-unit", 99.9)),
     ],

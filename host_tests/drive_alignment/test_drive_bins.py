@@ -101,7 +101,7 @@ def test_a_refusal_is_in_the_result_with_its_counts():
 
 def test_another_slope_in_the_next_log_is_no_moved_mount():
     """The vehicle is parked at the end of the first log on one slope, and at the beginning of the second log on the
-    opposite slope. Both slopes are 4.5 degrees."""
+    opposite slope. Each slope is 4.5 degrees."""
     mount = np.reshape(random_mounting(5), (3, 3))
     logs = []
     for slope_deg, first in ((-4.5, False), (4.5, True)):
@@ -110,7 +110,7 @@ def test_another_slope_in_the_next_log_is_no_moved_mount():
         standing_g = np.array([0.0, np.cos(np.radians(slope_deg)), np.sin(np.radians(slope_deg))]) @ mount
         noise_g = np.random.default_rng(1).normal(0.0, 0.002, log.accel_g.shape)
         log.accel_g = np.where(at[:, None], standing_g + noise_g, log.accel_g)
-        if not first:  # the simulated drive ends before the vehicle stands
+        if not first:  # in the second log the simulated drive ends before the vehicle stands
             log.gyro_dps = np.where(at[:, None], [0.5, -1.0, 0.3], log.gyro_dps)
             log.speed_mps = np.where(at & ~np.isnan(log.speed_mps), 0.0, log.speed_mps)
         logs.append(log)

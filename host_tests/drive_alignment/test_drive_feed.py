@@ -29,7 +29,7 @@ def steady(seconds, speeds, name="a", gap=None):
     return Log(t_s, np.tile([0.0, 1.0, 0.0], (n, 1)), np.tile([0.5, 0.0, 0.0], (n, 1)), speed, name=name)
 
 
-_Base: Any = DriveAlignment  # the class below replaces its properties by attributes
+_Base: Any = DriveAlignment  # an untyped base, because the class below replaces its properties by attributes
 
 
 class Noted(_Base):

@@ -41,7 +41,7 @@ def judged(yaw=0.0, up=0.0, straight=6, counted=6, ready=True, quality=0.5, prob
         ({}, verdict.SAME),
         ({"yaw": 0.99}, verdict.SAME),
         ({"yaw": -1.01}, verdict.REFINED),
-        ({"yaw": 2.0, "quality": 2.01}, verdict.SAME),  # the difference is within the drive's own error
+        ({"yaw": 2.0, "quality": 2.01}, verdict.SAME),  # the difference is within the drive's own standard error
         ({"yaw": 29.9}, verdict.REFINED),
         ({"yaw": 30.1}, verdict.MOVED),
         ({"yaw": 134.0}, verdict.MOVED),

@@ -34,7 +34,7 @@ def test_an_event_changes_the_speed_by_15_mps():
     assert ended([1.49, 0.0])[0] == [False, False]
     assert ended([1.5, 0.0])[0] == [False, True]
     assert ended([-0.9, -0.6, 0.0])[0] == [False, False, True]
-    # the event that ends has counted before the opposite event begins
+    # an event counts when it ends, also if the opposite event begins at once
     seen, finder = ended([1.0, -2.0])
     assert seen == [False, False] and finder.change == -2.0
     seen, finder = ended([2.0, -2.0])
@@ -188,7 +188,7 @@ def test_full_blocks_are_joined_in_pairs():
     assert [made._sums[0][15 * block + 1] for block in range(4)] == pytest.approx([-0.1, -0.5, -0.9, -1.3])
     made.add(0, 1.0, 0.5, 0.0, [0.0, 1.0, 0.5])
     list(made.end_event())
-    assert (made.blocks, made.filled) == (5, 5)  # two events belong to a block from now on
+    assert (made.blocks, made.filled) == (5, 5)  # from now on a block has two events
     list(made.end_event())
     assert (made.blocks, made.filled) == (6, 5)
     assert made.fit(fit, 0, 0, 2) and fit.seconds == 8.0

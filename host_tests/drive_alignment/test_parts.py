@@ -74,7 +74,7 @@ def test_history_is_exact_and_wraps_round():
         expected = [np.interp(times[-1] - one, times, np.array(totals)[:, i]) for i in range(4)]
         expected -= np.array([np.interp(times[-1] - two, times, np.array(totals)[:, i]) for i in range(4)])
         got = [((a - b + 2**28) & MASK) - 2**28 for a, b in zip(out, before, strict=True)]
-        # the differences are about a million; 200 allows for the rounding of about 60 bins
+        # the values are about a million; a difference of 200 allows for the rounding of about 60 bins
         assert np.abs(np.array(got) - expected).max() < 200
         assert not history.at(out, history.now + 1000)
         assert not history.at(out, history.now - oldest - 1000)
@@ -96,7 +96,7 @@ def test_regression_is_weighted_least_squares(engine, count):
     weight = np.sqrt(seconds)[:, None]
     design = np.column_stack((a, np.ones(count), c))
     expected = np.linalg.lstsq(design * weight, force * weight, rcond=None)[0]
-    # the ridge term for c and 32-bit sums cause this difference
+    # the tolerance allows for the ridge term of c and for 32-bit sums
     assert np.abs(np.array(forward) - expected[0]).max() < 2e-3
     assert np.abs(np.array(level) - expected[1]).max() < 2e-4
     assert 5 <= blocks <= 8
@@ -122,7 +122,7 @@ def test_two_fits_at_the_same_time_do_not_interfere():
 @pytest.mark.parametrize("engine", ENGINES)
 def test_parts_of_a_drive(engine):
     """Forward turns by 12 degrees after five of eight blocks. The pitch changes by 5 degrees after four blocks. The
-    differences between the parts match numpy. These differences do not depend on the forward direction of the whole
+    differences between the parts match numpy. The differences do not depend on the forward direction of the whole
     drive, so two directions are tried."""
     rng = np.random.default_rng(5)
     weights, seconds = rng.uniform(0.1, 0.5, 8), rng.uniform(25.0, 40.0, 8)
@@ -181,7 +181,7 @@ def test_a_late_speed_is_no_rotated_sensor():
 
 def test_each_vehicle_has_its_source_of_the_vertical():
     """A car uses the vertical of its stops. With a fit, the car uses the mean of the verticals from stops and fit. A
-    motorcycle uses its upright pose. Without the pose it uses the fit, or straight riding."""
+    motorcycle uses its upright pose. Without the upright pose a motorcycle uses the fit, or straight riding."""
     standing = types.SimpleNamespace(up=None)
     fit = types.SimpleNamespace(level=[2.0 * part for part in level(4.0)])
 

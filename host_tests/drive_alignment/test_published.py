@@ -9,7 +9,7 @@ The article rotates a unit vector a to a unit vector b with this matrix:
     t: the angle between a and b
     u.L: the cross product matrix of u; L_x, L_y and L_z are those of the three axes
 
-In the article z points down and x forward. Here the axes are left, up, forward. A vehicle at rest therefore reads
+In the article z points down and x forward. The tests use the axes left, up, forward. A vehicle at rest therefore reads
 (0, 1, 0), and the force of braking is along (0, 0, -1).
 """
 
@@ -41,12 +41,12 @@ LEVEL = np.array([[2, -2, -1], [2, 1, 2], [-1, -2, 2]]) / 3
 #   L_y^2 = diag(-1, 0, -1)
 #   R = I + 0.6 L_y + 0.2 L_y^2
 TURN = np.array([[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]])
-# The matrix product TURN @ LEVEL, computed by hand. This sensor reads (2, 1, 2) / 3 at rest. LEVEL rotates its force
-# of braking to (0.6, 0, -0.8).
+# The matrix product TURN @ LEVEL, computed by hand. The sensor in this case reads (2, 1, 2) / 3 at rest. LEVEL rotates
+# its force of braking to (0.6, 0, -0.8).
 MOUNT = np.array([[1.0, -2.8, 0.4], [2, 1, 2], [-2.0, -0.4, 2.2]]) / 3
-# This sensor also reads (2, 1, 2) / 3 at rest, but LEVEL rotates its force of braking to (0.6, 0, 0.8). This direction
-# is over 90 degrees from backward. The rotation about up has sin t = 0.6 and cos t = -0.8, so it is
-# [[-0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, -0.8]].
+# The second sensor also reads (2, 1, 2) / 3 at rest, but LEVEL rotates its force of braking to (0.6, 0, 0.8), which is
+# over 90 degrees from backward. The rotation about up has sin t = 0.6 and cos t = -0.8, so it is [[-0.8, 0, 0.6], [0,
+# 1, 0], [-0.6, 0, -0.8]].
 TURNED_MOUNT = np.array([[-2.2, 0.4, 2.0], [2, 1, 2], [-0.4, 2.8, -1.0]]) / 3
 BRAKES = (0.0, 1.0, -0.3)  # the force while braking, in g along left, up, forward
 STEADY = (0.0, 1.0, 0.0)
@@ -106,7 +106,7 @@ def test_directions_without_a_mean_have_the_largest_dispersion():
 
 
 class Drive:
-    """A drive with a sample every 10 ms and a speed every `every_s` seconds. It begins with 6 s at rest."""
+    """A drive with a sample every 10 ms and a speed every `every_s` seconds. The drive begins with 6 s at rest."""
 
     def __init__(self, every_s=0.5, mount=MOUNT):
         self.alignment, self.mount = PublishedAlignment("car"), mount
@@ -156,8 +156,8 @@ def test_stops_and_three_brakings_give_the_mount_by_hand(every_s, mount):
 def test_forward_is_along_the_sum_of_the_brakings_forces():
     """Three braking events have the levelled forces (0.18, -0.24), (0, -0.3) and (-0.18, -0.24) g along left and
     forward. The sum of these forces points straight back. The dispersion of their directions is 4.32 / 13.52, see
-    above. The standard error of the mean direction is therefore the root of 4.32 / 13.52 / 3, which is 18.70
-    degrees."""
+    test_the_dispersion_by_hand(). The standard error of the mean direction is therefore the root of 4.32 / 13.52 / 3,
+    which is 18.70 degrees."""
     drive = Drive()
     assert drive.alignment.quality_deg == 180.0
     drive.brake((0.18, 1.0, -0.24), mps2=-0.24 * G)
@@ -187,16 +187,16 @@ def test_a_longer_braking_counts_for_more():
 
 @pytest.mark.parametrize(("side_g", "counted"), [(0.040, 1), (0.045, 0)])
 def test_a_braking_whose_direction_spreads_does_not_count(side_g, counted):
-    """The force is 0.3 g to the back, and side_g to the left in the first half and to the right in the second half. Its
-    dispersion (side_g / 0.3)^2 is 0.0178 in the first case and 0.0225 in the second. The limit is 0.02."""
+    """The force is 0.3 g to the back, and side_g to the left in the first half and to the right in the second half. The
+    force's dispersion (side_g / 0.3)^2 is 0.0178 in the first case and 0.0225 in the second. The limit is 0.02."""
     drive = Drive()
     drive.brake((side_g, 1.0, -0.3), (-side_g, 1.0, -0.3))
     assert (drive.alignment.counted, drive.alignment.turned) == (counted, 1 - counted)
 
 
 def test_a_shaking_of_ten_times_a_second_is_averaged_away():
-    """The side force is 0.2 g and changes its side every 50 ms. Its mean over 100 ms, which the method uses, is 0.
-    Means over 50 ms would have a dispersion of (0.2 / 0.3)^2 = 0.44."""
+    """The side force is 0.2 g and changes its side every 50 ms. The mean side force over 100 ms, which the method uses,
+    is 0. Means over 50 ms would have a dispersion of (0.2 / 0.3)^2 = 0.44."""
     drive = Drive()
     drive.brake(*[(side, 1.0, -0.3) for side in (0.2, -0.2)] * 20)
     assert (drive.alignment.counted, drive.alignment.turned) == (1, 0)
@@ -205,10 +205,10 @@ def test_a_shaking_of_ten_times_a_second_is_averaged_away():
 @pytest.mark.parametrize(
     ("seconds", "mps2", "counted"),
     [
-        (2.0, -0.74, 0),  # a deceleration below 1 m/s2 is not braking, whatever the force
+        (2.0, -0.74, 0),  # a deceleration below 1 m/s2 is not braking, whatever the force is
         (2.0, -0.99, 0),
         (2.0, -1.01, 1),
-        (1.0, -1.45, 0),  # this reduces the speed by less than 1.5 m/s
+        (1.0, -1.45, 0),  # braking that reduces the speed by less than 1.5 m/s does not count
         (1.0, -1.55, 1),
         (0.5, -2.9, 0),
         (0.5, -3.1, 1),
@@ -216,7 +216,8 @@ def test_a_shaking_of_ten_times_a_second_is_averaged_away():
     ],
 )
 def test_which_change_of_speed_is_a_braking(seconds, mps2, counted):
-    """A braking event that reduces the speed too little is treated as noise. It is neither counted nor refused."""
+    """A braking event that reduces the speed too little is treated as noise. Such an event is neither counted nor
+    refused."""
     drive = Drive()
     drive.brake(seconds=seconds, mps2=mps2)
     assert (drive.alignment.counted, drive.alignment.turned) == (counted, 0)
@@ -261,7 +262,7 @@ def test_a_braking_with_a_gap_is_dropped_and_earlier_ones_stay(lost):
 @pytest.mark.parametrize("lost", [lost_samples, lost_speeds])
 def test_the_loss_of_a_dropped_braking_is_dropped_too(lost):
     """The speed falls by 3 m/s before the gap, and by 0.5 s x 2 m/s2 = 1 m/s after the gap. Only the fall after the gap
-    counts. It is less than the 1.5 m/s that a braking event needs."""
+    counts, which is less than the 1.5 m/s that a braking event needs."""
     drive = Drive()
     drive.reach_15_mps()
     drive.go(BRAKES, 1.0, -3.0)

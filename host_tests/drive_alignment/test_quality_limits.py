@@ -200,7 +200,7 @@ def test_a_tilt_of_up_to_1_5_degrees_does_not_end_a_stop():
     for pitch, standing_still in ((1.3, True), (2.9, False)):
         standing = StandingVertical()
         stand(standing, pitched(0.0), 4.0)
-        for _ in range(3):  # calls with the same pitch
+        for _ in range(3):  # call three times with the same pitch
             stand(standing, pitched(pitch), 1.5)
         assert standing.standing is standing_still and not standing.moved
 

@@ -76,8 +76,8 @@ def test_the_display_shows_the_lean_with_this_alignment():
 
 
 def test_ride_alignment_is_as_good_as_two_poses():
-    """The ride gives a better yaw, which a kickstand pose hardly determines. It also gives a better roll, which an
-    offset of the accelerometer falsifies in the poses."""
+    """The ride gives a better yaw, which a kickstand pose hardly determines. The ride also gives a better roll, which
+    an offset of the accelerometer falsifies in the poses."""
     made = simulated("hills", 22, 240.0)
     kickstand, upright = (api.Log.from_readings(pose, RATE_HZ) for pose in (made.kickstand, made.upright))
     two = errors_deg(api.fit_two_positions(kickstand, upright), made.vehicle_from_sensor)
@@ -87,7 +87,7 @@ def test_ride_alignment_is_as_good_as_two_poses():
 
 
 def test_the_offset_across_the_bike_is_found():
-    """The accelerometer has an additional offset of 50 mg across the bike. Half of this offset would be 1.4 degrees of
+    """The accelerometer has an additional offset of 50 mg across the bike. An offset of 25 mg would be 1.4 degrees of
     roll. The fit must find the offset to within 20 mg."""
     made = simulated()
     log = log_of(made)
@@ -101,7 +101,7 @@ def test_the_offset_across_the_bike_is_found():
 
 
 def test_left_handed_axes_are_refused():
-    """There are 48 ways to exchange and reverse axes. The 24 right-handed ways are only another mounting. The 24
+    """Axes can be exchanged and reversed in 48 ways. The 24 right-handed ways are only another mounting. The 24
     left-handed ways are refused. This test tries every fifth way; checks/test_handedness.py tries all."""
     log = log_of(simulated(), speed=False)
     want = first_guess.axes(mounted_windows(log)).matrix
@@ -186,7 +186,8 @@ def test_bad_readings_are_left_out_and_a_rough_speed_suffices():
 
 
 def car(seconds=300.0):
-    """Simulate a car on level ground at 12 m/s, in bends to both sides. Its body leans outwards by 3 degrees per g."""
+    """Simulate a car on level ground at 12 m/s, in bends to both sides. The car's body leans outwards by 3 degrees per
+    g."""
     chance = np.random.default_rng(1)
     t = np.arange(0.0, seconds, 0.01)
     yaw = 0.3 * np.sin(0.2 * t) ** 3

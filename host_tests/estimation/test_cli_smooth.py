@@ -75,7 +75,7 @@ def test_report_has_the_smoothed_or_the_live_lean(ride):
         assert data["lean"] == word
         assert said in works("report", log, *option).out
         largest[word] = [data[f"max_{side}_deg"]["value"] for side in ("left", "right")]
-    true = [-np.min(lean), np.max(lean)]  # the lean to the left is on the kickstand
+    true = [-np.min(lean), np.max(lean)]  # the largest lean to the left is the pose on the kickstand
     assert np.max(np.abs(np.subtract(largest["smoothed"], true))) < 1.0
     assert largest["smoothed"] != largest["live"]
 

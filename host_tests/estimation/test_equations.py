@@ -32,8 +32,8 @@ def found(rate, force, states=(), parameters=(), speed=np.nan, warm=0.0):
 @pytest.mark.parametrize("lean", [-0.9, 0.0, 0.6])
 @pytest.mark.parametrize("yaw_rate", [-0.4, 0.5])
 def test_steady_turn_is_constant(lean, yaw_rate):
-    """Nicolae's equations (22) and (23) give the force in a steady turn, whether the lean is balanced or not. With this
-    force the states stay constant."""
+    """Nicolae's equations (22) and (23) give the force in a steady turn, whether the lean is balanced or not. With the
+    force of (22) and (23) the states stay constant."""
     speed, s, c = 17.0, np.sin(lean), np.cos(lean)
     across = speed * yaw_rate / G
     rate, force = [yaw_rate * s, yaw_rate * c, 0.0], [across * c + s, c - across * s, 0.0]
@@ -103,7 +103,7 @@ def test_the_jacobian_is_that_of_the_equations():
 
 def test_a_yaw_of_eight_degrees_is_no_error_of_scale():
     """The sensor is rotated by 8 degrees about the bike's up, while the bike leans, rolls and turns. If the parameters
-    contain this rotation, the residuals do not change."""
+    contain the sensor's rotation, the residuals do not change."""
     lean, speed, yaw_rate, roll = 0.7, 25.0, -0.3, 1.5
     s, c = np.sin(lean), np.cos(lean)
     across = speed * yaw_rate / G
@@ -114,7 +114,8 @@ def test_a_yaw_of_eight_degrees_is_no_error_of_scale():
         found(a, b, states, p)
         for a, b, p in ((rate, force, {}), (turn.T @ rate, turn.T @ force, {of.ROTATION.start + 1: np.radians(8.0)}))
     )
-    assert np.allclose(turned[:LEFT], right[:LEFT], atol=1e-3)  # equations of first order would differ by 15e-3
+    # With equations of first order the residuals would differ by 15e-3
+    assert np.allclose(turned[:LEFT], right[:LEFT], atol=1e-3)
 
 
 def test_a_measured_gyro_is_not_estimated_again():
@@ -131,7 +132,7 @@ def test_the_upright_pose_gives_the_sum_of_rotation_and_offset():
     right, the force at rest is right too."""
     prior, p = Prior.of_pose(six_done=False), np.zeros(PARAMETERS)
     p[of.ROTATION.stop - 1] = p[of.OFFSET.start] = 0.03  # rotation and offset to the side
-    p[of.ROTATION.start], p[of.OFFSET.stop - 1] = 0.02, -0.02  # rotation and offset forward
+    p[of.ROTATION.start], p[of.OFFSET.stop - 1] = 0.02, -0.02  # rotation and offset along forward
     motion = found([0.0] * 3, [0.0, 1.0, 0.0], parameters=enumerate(p))[MOTION]
     assert np.allclose(motion[[LEFT, FORWARD]], 0.0, atol=1e-9)
     apart = p.copy()

@@ -106,8 +106,8 @@ def test_outliers_weigh_less():
 
 
 def test_roughness_follows_the_residuals():
-    """Residuals of the expected size give a roughness of 1. Residuals of half this size give a roughness of 0.5. The
-    roughness is kept between 0.1 and 4."""
+    """Residuals of the expected size give a roughness of 1. Residuals of half the expected size give a roughness of
+    0.5. The roughness is kept between 0.1 and 4."""
     expected = np.zeros((400, eq.ROWS))
     expected[:, [of.LEAN, of.PITCH, of.LEFT, of.UP, of.FORWARD]], expected[:, [eq.SLIDING, eq.CLIMBING]] = 0.38, 0.5
     for factor, roughness in ((1.0, 1.0), (0.5, 0.5), (0.01, 0.1), (9.0, 4.0)):
@@ -129,8 +129,9 @@ def test_unbalance_follows_the_force_to_the_side():
     force = 0.011 * np.where(np.arange(2000) // 50 % 2, 1.0, -1.0)
     noise = noise_of(windows(2000))
     noise.estimate_unbalance(force, 3.0)
-    left = 2.0 * np.exp(-1.0)  # factor on the variance of an error that lasts as long as the mean
-    assert noise.unbalance == pytest.approx(np.sqrt(0.8 / left), abs=0.05)  # a mean across a change of sign is smaller
+    left = 2.0 * np.exp(-1.0)  # factor on the variance of an error that lasts for the 3 s of a mean
+    # A mean that includes a change of sign is smaller
+    assert noise.unbalance == pytest.approx(np.sqrt(0.8 / left), abs=0.05)
     noise.estimate_unbalance(np.full(2000, 0.1), 3.0)
     assert noise.unbalance == pytest.approx(0.12)
     noise.estimate_unbalance(1000.0 * force, 10.0)

@@ -89,7 +89,7 @@ def turned(axis, deg):
 )
 @pytest.mark.parametrize(("axis", "deg"), [(0, 44.0), (1, -44.0), (2, 20.0)])
 def test_the_nearest_mounting_of_a_phone_is_used(phone, left, up, forward, axis, deg):
-    """The screen faces the rider. In a flat phone it faces up, and its top is ahead."""
+    """The screen faces the rider. In a flat phone the screen faces up, and the phone's top is ahead."""
     usual = np.array([left, up, forward], dtype=float)
     assert alignment._mounting(phone, turned(axis, deg) @ usual).tolist() == usual.tolist()
     assert np.linalg.det(usual) == pytest.approx(1.0)

@@ -59,9 +59,8 @@ def test_smoothed_lean_beats_the_display_and_knows_its_error(name):
     off, sigma = (found.lean_deg - ride.lean_deg)[ride.riding], found.lean_sigma_deg[ride.riding]
     assert rms(off) < 0.6 * rms((ride.live() - ride.lean_deg)[ride.riding])
     assert np.max(np.abs(off)) < 2.5
-    assert (
-        np.mean(np.abs(off) < sigma) > 0.35
-    )  # the limit for one short ride; over many rides the mean is at least 0.58
+    # The limit is for one short ride. Over many rides, at least 0.58 of the errors are below sigma
+    assert np.mean(np.abs(off) < sigma) > 0.35
     assert np.mean(np.abs(off) < 3.0 * sigma) > 0.95
     assert np.mean(found.lean_sigma_deg) < 1.2
 
@@ -76,8 +75,8 @@ def test_forces_that_are_not_the_bikes_count_less():
 
 @pytest.mark.parametrize(("seed", "mount"), [(2018, "drifting"), (98, "holder")])
 def test_steady_ride_on_a_straight_is_not_a_standstill(seed, mount):
-    """At 22 m/s and at 12 m/s, the two bikes ride so steadily for 2 s that the readings resemble a standstill. When
-    the smoother treated this as a standstill, its rms errors were 0.56 and 0.37 degrees."""
+    """At 22 m/s and at 12 m/s, the two bikes ride so steadily for 2 s that the readings resemble a standstill. When the
+    smoother treated the 2 s as a standstill, its rms errors were 0.56 and 0.37 degrees."""
     live, off, _ = judged(drawn_ride(seed, mounts=[mount]))
     assert rms(off) < 0.8 * rms(live)
 
@@ -91,14 +90,15 @@ def test_good_mounts_and_roads_are_not_doubted():
 
 def test_side_force_of_tyres_grows_with_the_force_up():
     """The side force of wide tyres grows with the force along the bike's up. When the smoother ignored this force,
-    bends with unequal leans shifted the lean of the whole ride by 0.44 degrees. The display's error is smaller."""
+    bends with unequal leans shifted the lean of the whole ride by 0.44 degrees, which is more than the displayed lean's
+    error."""
     ride = simulated("sweeper", 304, 200.0)
     assert rms(error(ride)[ride.riding]) < 0.2
 
 
 def test_wheelies_do_not_count_as_a_soft_mount():
-    """When wheelies were treated as a soft mount, the error was 0.4 degrees. When they were treated as slopes, it was
-    0.16 degrees."""
+    """When wheelies were treated as a soft mount, the error was 0.4 degrees. When wheelies were treated as slopes, the
+    error was 0.16 degrees."""
     ride, found = known("wheelie"), smoothed("wheelie")
     assert not np.any(found.doubtful)
     assert rms((found.lean_deg - ride.lean_deg)[ride.riding]) < 0.155
@@ -123,13 +123,14 @@ def test_pose_that_was_not_upright_is_reported(street, wrong_deg):
     calibration = replace(street.calibration, vehicle_from_sensor=turned)
     (notice,) = (n for n in smooth(street.log, calibration).notices if isinstance(n, PoseOff))
     assert np.sign(notice.angle_deg) == np.sign(wrong_deg)
-    assert abs(abs(notice.angle_deg) - 4.0) < 2.1  # the ride's own pose is 1.5 degrees off
+    # The mount moved by 4 degrees, and the ride's own pose is 1.5 degrees off
+    assert abs(abs(notice.angle_deg) - 4.0) < 2.1
     assert ("right" if wrong_deg > 0.0 else "left") in sentence(notice)
 
 
 def test_slipping_mount_has_little_effect_afterwards(street):
-    """The mount slips by 1.5 degrees about forward within 0.3 s. The gyro measures this rotation. From then on the bike
-    seems to lean on straights."""
+    """The mount slips by 1.5 degrees about forward within 0.3 s. The gyro measures the rotation of the mount. From then
+    on the bike seems to lean on straights."""
     log, calibration = street.log, street.calibration
     angle = np.radians(1.5) * np.clip((log.t_s - 65.0) / 0.3, 0.0, 1.0)
     about = calibration.vehicle_from_sensor
@@ -287,6 +288,6 @@ def test_long_ride_is_estimated_in_parts(street, monkeypatch):
     assert len(sizes) > 2
     assert len(added) > 1 and sum(added) == pytest.approx(street.log.t_s[-1], abs=0.3 * len(added))
     assert max(sizes) <= 7 * 2000
-    assert sizes[-1] > 5 * 2000  # the end is estimated together with earlier parts
+    assert sizes[-1] > 5 * 2000  # the end of the ride is estimated together with earlier parts
     assert np.array_equal(parts.t_s, whole.t_s)
     assert rms((parts.lean_deg - street.lean_deg)[street.riding]) < 0.8

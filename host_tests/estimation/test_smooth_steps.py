@@ -1,4 +1,4 @@
-"""A ride is cut for its smoothing. The result has known values and messages. The estimate is replaced."""
+"""Tests how a ride is cut for smoothing, and the values and messages of the result. The estimate is replaced."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -55,8 +55,9 @@ def test_a_short_ride_is_estimated_as_a_whole(estimated):
     ],
 )
 def test_a_long_ride_is_estimated_in_parts_of_eight_segments(estimated, segments, calls, monkeypatch):
-    """A part has one more segment before and after it. The rest of the ride has earlier segments, up to eight in all.
-    Each call has the first and the last segment, and those of them whose lean is wanted."""
+    """The estimate of a part also uses one segment before and one after the part. The estimate of the ride's last part
+    also uses earlier segments, so that it uses eight segments. Each call is the range of the segments that it uses, and
+    the range of the segments whose lean is wanted."""
     monkeypatch.setattr(smooth, "SEGMENT_S", 1.0)
     found = smooth.smooth(standing(float(segments)), ALIGNED)
     assert len(found.t_s) == 10 * segments and found.lean_deg == pytest.approx(found.t_s)

@@ -16,7 +16,7 @@ from kickstand_workshop.evaluation import estimators, real_ride, runs
 from kickstand_workshop.evaluation.estimators import Samples
 from support.command import refused, works
 
-pytestmark = pytest.mark.long  # each process that gets one of its tests computes the rides of a fixture
+pytestmark = pytest.mark.long  # long, because each process that gets one of the tests computes the rides of a fixture
 
 THERE = [name for name in estimators.OTHERS if estimators.PACKAGES.get(name) not in estimators.missing()]
 
@@ -207,15 +207,16 @@ def test_bands_of_a_recording_without_riding_are_refused(tmp_path):
 
 
 def test_simulate_states_both_leans_on_the_stand(tmp_path):
-    """The two poses are not taken where the ride starts. The ground there differs, so the stand leans the bike
-    differently."""
+    """The two poses are not taken where the ride starts. The two places have different ground, so the stand leans the
+    bike differently."""
     arguments = "--profile", "street", "--seconds", "20", "--pitch-change", "0", "--out", tmp_path
     said = works("simulate", *arguments).out.splitlines()[-1]
     pose, begin = (float(number) for number in re.findall(r"-\d+\.\d", said))
     made = [tmp_path / name for name in ("KICKSTAND.csv", "UPRIGHT.csv")]
     found = works("calibrate", "two", *made, "--out", tmp_path / "C.json").out
     tilt = re.search(r"([\d.]+) degrees from the kickstand", found)
-    assert tilt and float(tilt[1]) == pytest.approx(-pose, abs=0.8)  # inexact, because the six positions are not used
+    # The tilt is inexact, because the six positions are not used
+    assert tilt and float(tilt[1]) == pytest.approx(-pose, abs=0.8)
     truth = (tmp_path / "TRUTH.csv").read_text().splitlines()[1]
     assert float(truth.split(",")[1]) == pytest.approx(begin, abs=0.05)
     assert abs(pose - begin) > 1.0

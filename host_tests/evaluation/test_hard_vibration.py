@@ -19,7 +19,7 @@ def shaken(monkeypatch, profile, seed, factor, range_g, seconds):
 
     Returns:
         The ride, with its vibration multiplied by `factor`.
-        The rms of this vibration per axis, in g.
+        The rms of the ride's vibration per axis, in g.
     """
     rms = []
 

@@ -39,7 +39,7 @@ def save_calibration(part, directory=""):
 
 
 def run(program, until_s, turn_to):
-    """Run the program as described at the top of this file.
+    """Run the program on the simulated board.
 
     turn_to: [[at_s, name of a view], ...]. From at_s on, the button is pressed until this view is shown.
 

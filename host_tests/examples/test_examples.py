@@ -10,7 +10,7 @@ from support.mpy import BOARD_HEAP, run_mpy
 
 SCRIPT = Path(__file__).resolve().with_name("example_run.py")
 EXAMPLES = SCRIPT.parents[2] / "firmware" / "examples"
-TURN_DEG = 35.0  # lean in the ride of example_run.py
+TURN_DEG = 35.0  # lean of the ride of example_run.py, in degrees
 
 
 def run(flash, name, until, turn_to=()):
@@ -39,10 +39,11 @@ def test_print_sensor(tmp_path):
     printed, _ = run(tmp_path, "print_sensor.py", 1.5)
     found, *lines = printed.split("\n")
     assert found == "Found an MPU6050"
-    assert len([line for line in lines if line]) == 7  # one line per 0.2 s, after a set-up of 0.2 s
+    assert len([line for line in lines if line]) == 7  # the set-up takes 0.2 s, and then a line is printed every 0.2 s
     ax, ay, az, gx, gy, gz, temperature = numbers(lines[0])
-    assert (ax * ax + ay * ay + az * az) ** 0.5 == pytest.approx(1.0, abs=0.1)  # at rest, not calibrated
-    assert max(abs(gx), abs(gy), abs(gz)) < 25.0  # including the gyro's bias
+    # The sensor is at rest and not calibrated
+    assert (ax * ax + ay * ay + az * az) ** 0.5 == pytest.approx(1.0, abs=0.1)
+    assert max(abs(gx), abs(gy), abs(gz)) < 25.0  # the rates are the gyro's bias
     assert temperature == pytest.approx(25.0, abs=0.1)
 
 
@@ -57,14 +58,14 @@ def test_print_lean(tmp_path):
     assert len(lines) > 100
     assert numbers(lines[0])[0] == pytest.approx(0.0, abs=1.0)
     assert numbers(lines[-1])[0] == pytest.approx(TURN_DEG, abs=3.0)
-    assert max(numbers(line)[1] for line in lines) > 0.2  # the bike sets off
+    assert max(numbers(line)[1] for line in lines) > 0.2  # the bike accelerates when it sets off
 
 
 def test_user_page(tmp_path):
     """The usual pages come before the user's page, and after the user's page the first page comes again."""
     _, frames = run(tmp_path, "user_page.py", 12.0, turn_to=[(4, "own")])
     shown = re.fullmatch(r"Load     (\d\.\d\d) x", frames[-1][0].rstrip())
-    assert shown and float(shown[1]) == pytest.approx(1.22, abs=0.05)  # 1 / cos(35 degrees)
+    assert shown and float(shown[1]) == pytest.approx(1.22, abs=0.05)  # the load is 1 / cos(35 degrees)
     assert re.fullmatch(r"Lean  3\d deg *", frames[-1][1])
     _, frames = run(tmp_path, "user_page.py", 10.0, turn_to=[(4, "own"), (8.5, "lean")])
     assert frames[-1][0].startswith("Lean")

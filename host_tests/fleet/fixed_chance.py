@@ -10,7 +10,7 @@ class Fixed(np.random.Generator):
     """Returns fixed numbers from a range or a distribution. Other random numbers are those of seed 1.
 
     share: 0 for the lower end of a range, 1 for the upper end.
-    choices: the results of random(). The last is repeated.
+    choices: the results of random(). The last result is repeated.
     sigmas: number of standard deviations above the mean, for normal distributions.
     """
 

@@ -65,7 +65,7 @@ def yaw_deg(found, true):
 
 
 def worked_on(directory, *logs):
-    """Write these logs as the logs of one car, and return the fleet's result for this car."""
+    """Write the logs as the logs of one car, and return the fleet's result for this car."""
     paths = tuple(str(directory / f"{k}.csv") for k in range(1, 1 + len(logs)))
     for path, log in zip(paths, logs):
         write_log(path, log)

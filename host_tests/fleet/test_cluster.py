@@ -61,7 +61,8 @@ def test_killed_worker_costs_no_result(cluster, tmp_path):
     def kill():
         while not note.exists() or len(note.read_text().splitlines()) < 3:
             time.sleep(0.05)
-        os.kill(int(note.read_text().splitlines()[-1].split()[1]), signal.SIGKILL)  # a worker of this test's cluster
+        # The process is a worker of this test's cluster
+        os.kill(int(note.read_text().splitlines()[-1].split()[1]), signal.SIGKILL)
 
     killer = threading.Thread(target=kill, daemon=True)
     killer.start()
@@ -159,7 +160,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.nightly  # the next test is similar, and does not depend on the machine's load
+@pytest.mark.nightly  # the next test is similar, but does not depend on how busy the machine is
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="Ctrl-C comes at once on this system")
 @pytest.mark.parametrize("after_s", [0.6, 1.6])
 def test_ctrl_c_while_workers_start_is_deferred(tmp_path, after_s):

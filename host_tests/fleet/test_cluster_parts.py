@@ -81,7 +81,7 @@ class Client:
         self.begun.append(future.item)
         ways = self.ways.get(future.item, [])
         way = ways.pop(0) if ways else "return"
-        if way == "hang":  # no other task is announced, so none is ended on a busy machine
+        if way == "hang":  # only a hanging task is announced, so no other task is ended on a busy machine
             self.note((time.time(), (future.key, "w1")))
             return
         errors = {"die": KilledWorker(), "raise": ValueError("on purpose"), "lose": OSError("gone")}
@@ -111,7 +111,7 @@ def outcomes(count, timeout_s=600.0, **ways):
     """Return {item: (result, reason, explanation)} of the tasks 0 to count - 1. ways: {"_2": [...]} for item 2."""
     Client.ways = {int(name[1:]): list(way) for name, way in ways.items()}
     found = list(run_tasks(lambda item: item, [(k,) for k in range(count)], ADDRESS, timeout_s=timeout_s))
-    assert sorted(index for index, *_ in found) == list(range(count))  # one outcome each
+    assert sorted(index for index, *_ in found) == list(range(count))  # each task has one outcome
     return {index: rest for index, *rest in found}
 
 

@@ -50,7 +50,8 @@ def test_signals_of_equally_named_logs_have_separate_files(drive, tmp_path, alon
     assert sum(parquet.ParquetFile(tmp_path / path).metadata.num_rows for path in written) == 6 * len(
         files.open_log(str(drive)).t_s
     )
-    assert sum("second" in path.name for path in written) == 2  # the names of both files contain the mount
+    # Two files have the mount's name "second" in their names
+    assert sum("second" in path.name for path in written) == 2
     run_fleet(periods[:1], tmp_path / "again", with_signals=True)
     again = {path.name for path in (tmp_path / "again" / "signals").rglob("*.parquet")}
     assert len(again) == 2 and again <= {path.name for path in written}
@@ -151,7 +152,7 @@ def test_only_the_run_itself_can_run_code_on_its_workers(tmp_path):
             except OSError as refused:
                 assert "404" in str(refused) or not isinstance(refused, urllib.error.HTTPError)
             except http.client.HTTPException:
-                pass  # there is no web server
+                pass  # the cluster has no web server
         process.stdin.close()
         assert process.stderr.read() == b""  # Dask would print each connection that it refuses
 

@@ -1,4 +1,4 @@
-"""The intervals of a log with known motion: their terms, weights and limits, by known numbers."""
+"""The intervals of a log with known motion: their terms, weights and limits are compared with known numbers."""
 
 from typing import Any
 
@@ -61,7 +61,8 @@ def test_a_bias_of_the_gyro_is_removed():
 
 
 def test_the_beginning_of_a_bend_swings_the_sensor():
-    """The fourth term is the change of the yaw rate in rad/s2. It is 0 at the end of a log that ends in a bend."""
+    """The fourth term is the change of the yaw rate in rad/s2. The term is 0 at the end of a log that ends in a
+    bend."""
     found = intervals(log_of(20.0, 10.0, lambda t_s: np.clip(t_s - 10.0, 0.0, 4.0) * 2.0))
     swung = (found.t_s > 11.0) & (found.t_s < 13.0)
     assert found.terms[swung, 3] == pytest.approx(np.radians(2.0), rel=0.01)
@@ -80,11 +81,11 @@ def test_a_motorcycle_has_no_force_to_the_left():
 @pytest.mark.parametrize(
     ("kind", "speed", "weight"),
     [
-        ("car", 0.0, 0.3),  # a standstill counts less
+        ("car", 0.0, 0.3),  # a standstill has a smaller weight
         ("car", 1.0, 1.0),
         ("car", 2.1, 1.0),
         ("motorcycle", 0.0, 0.0),
-        ("motorcycle", 1.99, 0.0),  # the rider has a foot on the ground
+        ("motorcycle", 1.99, 0.0),  # below 2 m/s the rider may have a foot on the ground
         ("motorcycle", 2.01, 1.0),
     ],
 )
@@ -130,7 +131,7 @@ def test_the_vertical_is_the_mean_force_over_20_seconds(reach_s):
 
 
 def test_the_sway_is_sideways_if_the_body_shakes_sideways():
-    """The sway is the change of force within 0.3 s. At low speed it is not used."""
+    """The sway is the change of force within 0.3 s. At low speed the sway is not used."""
     log = log_of(20.0)
     log.accel_g[:, 0] += 0.1 * np.sin(2.0 * np.pi * 5.0 * log.t_s)
     found = intervals(log)
@@ -153,7 +154,7 @@ def test_blocks_are_sums_over_eight_seconds():
 
 
 def test_a_slope_is_forgotten_after_some_hundred_metres():
-    """A road's slope falsifies forward less than a plain regression would be falsified."""
+    """A road's slope causes a smaller error of forward than in a plain regression."""
     log = log_of(120.0, lambda t_s: 15.0 - 4.0 * np.sin(t_s / 3.0))
     slope = 0.03 * np.sin(log.t_s / 20.0)
     log.accel_g[:, 2] += slope

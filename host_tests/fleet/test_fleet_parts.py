@@ -99,8 +99,8 @@ def yawed(degrees):
 
 
 def test_the_mean_of_two_alignments_is_weighted_by_variance():
-    """Both methods use the same braking, so half of their errors are common. So the mean is less exact than with
-    independent errors."""
+    """Both methods use the same braking, so half of their errors are common. The mean of the two methods is therefore
+    less exact than with independent errors."""
     sensor = forward.SENSOR_DEG**2
     frame, variance = forward._mean(yawed(1.0), 1.0, yawed(0.0), float(np.sqrt(1.0 - sensor)))
     assert frame == pytest.approx(yawed(0.5), abs=1e-6)
@@ -113,7 +113,8 @@ def test_the_mean_of_two_alignments_is_weighted_by_variance():
 def test_alignments_that_contradict_each_other_are_less_exact():
     sensor = forward.SENSOR_DEG**2
     other = float(np.sqrt(1.0 - sensor))
-    _, agreeing = forward._mean(yawed(2.0), 1.0, yawed(0.0), other)  # the difference has a standard deviation of 1
+    # The difference of the two yaws has a standard deviation of 1 degree
+    _, agreeing = forward._mean(yawed(2.0), 1.0, yawed(0.0), other)
     _, contradicting = forward._mean(yawed(6.0), 1.0, yawed(0.0), other)
     assert agreeing == pytest.approx(0.75)
     assert contradicting == pytest.approx(0.75 * 9.0, rel=1e-3)

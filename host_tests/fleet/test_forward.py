@@ -1,5 +1,5 @@
-"""The fleet's tool computes the direction forward from whole logs. This direction is more exact than the device's, and
-its standard error is right."""
+"""The fleet's tool computes the direction forward from whole logs. The computed direction is more exact than the
+device's, and its standard error is right."""
 
 import dataclasses
 
@@ -81,8 +81,8 @@ def test_late_speed_is_not_reported_as_a_moved_mount(tmp_path, monkeypatch):
     assert "2.5 s late" in row["message"]
 
 
-# Matrices from the sensor's axes to the vehicle's, with the rows left, up, forward. These matrices were measured with
-# the recordings' own receivers.
+# Matrices from the sensor's axes to the vehicle's, with the rows left, up, forward. The matrices were measured with the
+# recordings' own receivers.
 REFERENCES = {
     "short-turn-loop-nominal-001": [[0.0124, 0.9995, 0.0302], [-0.0021, -0.0302, 0.9995], [0.9999, -0.0124, 0.0017]],
     "medium-turn-loop-nominal-001": [[0.0473, 0.9987, 0.0204], [-0.0003, -0.0204, 0.9998], [0.9989, -0.0473, -0.0006]],

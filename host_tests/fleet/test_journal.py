@@ -74,8 +74,8 @@ def test_two_runs_do_not_share_a_journal(tmp_path):
 
 
 def test_removed_journal_is_replaced_and_locked_again(tmp_path, monkeypatch):
-    """A run locks the journal and removes it at its end. A second run may have opened the journal just before. Then the
-    second run must create and lock a new journal."""
+    """A run locks the journal and removes it at its end. A second run may have opened the journal just before its
+    removal. This second run must create and lock a new journal."""
     fcntl = pytest.importorskip("fcntl", reason="files are not locked on this system")
     path = tmp_path / "journal.jsonl"
     locks, lock = [], fcntl.flock

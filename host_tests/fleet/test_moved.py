@@ -1,4 +1,4 @@
-"""Small rotations of a mount are found. The swaying of the car's body also shows these rotations. The tests use
+"""Small rotations of a mount are found. The swaying of the car's body also shows small rotations. The tests use
 simulated and recorded drives."""
 
 import copy
@@ -83,8 +83,8 @@ def test_move_between_logs_is_not_found_during_them():
 
 
 def test_one_road_counts_once_for_all_its_intervals():
-    """The slope of the road gives all intervals of one standstill the same error. Together these intervals therefore
-    count about as much as one interval. Intervals on different roads count separately."""
+    """The slope of the road gives all intervals of one standstill the same error. All intervals of a standstill
+    together therefore count about as much as one interval. Intervals on different roads count separately."""
     count = 50
     standing = evidence.Intervals(
         np.arange(count, dtype=float),
@@ -96,7 +96,7 @@ def test_one_road_counts_once_for_all_its_intervals():
     )
     weight = float(np.sum(evidence.blocks([standing]).square[:, 0, 0]))
     assert weight == pytest.approx(1.0 / (evidence.ROAD_SHARE + 1.0 / count), rel=1e-6)
-    standing.speed += 1000.0  # now each interval is on a different road
+    standing.speed += 1000.0  # another place each second, so each interval counts as on another road
     weight = float(np.sum(evidence.blocks([standing]).square[:, 0, 0]))
     assert weight == pytest.approx(count / (evidence.ROAD_SHARE + 1.0), rel=0.01)
 

@@ -1,5 +1,5 @@
-"""Rotations between two groups of exact intervals: the angle, the standard deviations by known numbers, and the limits
-below which nothing is found."""
+"""Rotations between two groups of exact intervals: the angle, the standard deviations, and the limits below which
+nothing is found."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from kickstand_fleet.evidence import Blocks, Intervals
 from made_fleet import turn_of
 
 LEFT, UP, FORWARD = np.eye(3)
-MOUNT = turn_of(50.0, (1.0, 2.0, 3.0))  # from the sensor's axes to left, up, forward
+MOUNT = turn_of(50.0, (1.0, 2.0, 3.0))  # rotation from the sensor's axes to left, up, forward
 NO_SWAY = np.zeros((3, 3))
 
 
@@ -52,7 +52,8 @@ def test_an_exact_rotation_is_measured_exactly(axis, turn_deg):
 
 @pytest.mark.parametrize(("log", "road"), [(0, (0.5, 0.25, 0.35)), (1, (0.75, 0.7, 0.5))])
 def test_without_noise_the_errors_are_those_of_roads_and_of_chance(log, road):
-    """The errors of both sides add. Yaw also has an error of 0.4 degrees at a variation of 1 g^2 s, on each side."""
+    """The variances of the errors before and after the move add. Before and after the move, yaw also has an error of
+    0.4 degrees at a variation of 1 g^2 s."""
     _, sigma = compared(part(varied=2.0), part(varied=4.0, log=log))
     variance = 2.0 * np.square(road) + [0.0, 0.16 / 2.0 + 0.16 / 4.0, 0.0]
     assert sigma == pytest.approx(np.sqrt(variance), rel=0.001)
@@ -96,7 +97,7 @@ def test_the_sway_measures_yaw_too():
 
 @pytest.mark.parametrize(("apart_deg", "used"), [(3.5, True), (3.65, False), (-3.5, True), (-3.65, False)])
 def test_sway_that_contradicts_by_three_standard_deviations_is_not_used(apart_deg, used):
-    """Three standard deviations are 3.58 degrees."""
+    """Three standard deviations of the difference are 3.58 degrees."""
     _, sigma = compared(part(sway=swaying(40.0)), part(sway=swaying(40.0 + apart_deg)))
     assert bool(sigma[1] < 0.6) is used
 

@@ -52,7 +52,7 @@ def test_bars_are_as_high_as_their_values():
     made.bars([0.0, 1.0, 2.0, 3.0], [1.0, 0.0, 4.0], "green")
     made.dots([(0.0, 0.0), (1.0, 4.0)], "red")
     found = re.findall(r'<rect x="([\d.]+)" y="([\d.]+)" width="([\d.]+)" height="([\d.]+)" fill="green"', made.svg())
-    (x0, y0, wide, low), (x2, y2, also_wide, high) = np.array(found, dtype=float)  # no bar for 0
+    (x0, y0, wide, low), (x2, y2, also_wide, high) = np.array(found, dtype=float)  # a value of 0 has no bar
     (left, bottom), (right, top) = dots(made.svg())
     assert high == pytest.approx(4.0 * low, abs=0.05) == pytest.approx(bottom - top, abs=0.1)
     assert y2 + high == pytest.approx(y0 + low, abs=0.05) == pytest.approx(bottom, abs=0.1)
@@ -90,8 +90,8 @@ def test_the_picture_of_a_vehicle_says_how_well_it_is_known():
     ("kind", "left"), [("car", ((0.2, 0.21), (0.0, 0.02))), ("motorcycle", ((0.1, 0.21), (-0.3, 0.02)))]
 )
 def test_measured_forces_are_over_the_expected_ones(kind, left):
-    """Both scales of a panel are equal, so the dots of a good alignment are on the diagonal. A motorcycle has no force
-    to the left, so this force is shown over the change of speed."""
+    """The two scales of a panel are equal, so the dots of a good alignment are on the diagonal. A motorcycle has no
+    force to the left, so this force is shown over the change of speed."""
     found = dots(plot.draw(result(kind)))
     assert len(found) == 4
     for (one, other), ((x0, y0), (x1, y1)) in zip((found[:2], found[2:]), (((0.1, 0.11), (-0.3, -0.29)), left)):

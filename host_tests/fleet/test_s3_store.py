@@ -11,7 +11,7 @@ from kickstand_fleet.run import run_fleet
 from kickstand_fleet.tables import TABLES
 from kickstand_tools.common.errors import InputError
 
-WANTED = (0, 4)  # indices of a car, and of a bus with a log that is not text
+WANTED = (0, 4)  # indices of two vehicles: a car, and a bus with a log that is not text
 TABLE_FILES = [f"{name}.parquet" for name in TABLES]
 
 

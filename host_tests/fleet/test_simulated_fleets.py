@@ -69,7 +69,8 @@ def test_each_fault_has_its_share_of_the_fleet(drives, tmp_path):
         "cut": 2,
         "missing": 2,
     }
-    assert [row["trouble"] for row in rows] != sorted((row["trouble"] for row in rows), reverse=True)  # in any order
+    # The faults are in random order
+    assert [row["trouble"] for row in rows] != sorted((row["trouble"] for row in rows), reverse=True)
     assert Counter(row["status"] for row in rows) == {"aligned": 100 - 6 - 6 - 3 - 3 - 3 - 2, "refused": 23}
 
 
@@ -142,7 +143,7 @@ def test_usually_a_drive_has_50_samples_per_second_for_about_four_minutes(drives
     assert all(0.8 * 240.0 < route.time[-1] < 1.3 * 240.0 + 20.0 for _, route, *_ in drives)
     first = (tmp_path / "TRUTH.csv").read_text()
     fleet.make_fleet(tmp_path / "again", 3, 0, troubles=["moved-within"] * 3)
-    assert (tmp_path / "again" / "TRUTH.csv").read_text() == first  # the usual seed is 0
+    assert (tmp_path / "again" / "TRUTH.csv").read_text() == first  # seed 0 is the default
 
 
 def test_broken_files(drives, tmp_path):
@@ -163,7 +164,8 @@ def test_broken_files(drives, tmp_path):
         "0.02,0.12346,0.12346,0.12346,7.7654,7.7654,7.7654,,",
         "0.04,0.12346,0.12346,0.12346,7.7654,7.7654,7.7654,3,",
     ]
-    assert whole[0].read_bytes()[4:8] == bytes(4)  # without a date, so that the same seed gives the same bytes
+    # The file contains no date, so that the same seed gives the same bytes
+    assert whole[0].read_bytes()[4:8] == bytes(4)
 
 
 @pytest.mark.parametrize("trouble", FAULTS)

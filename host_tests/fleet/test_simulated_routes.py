@@ -64,7 +64,8 @@ def test_around_a_junction_the_road_is_straight_for_a_second():
     for time in (braked_s + 0.1, turned_s + 0.9):
         assert at(route, route.yaw_rate, time) == pytest.approx(0.0, abs=1e-3)
         assert at(route, route.speed, time) == pytest.approx(4.0, abs=0.1)
-    assert at(route, route.speed, turned_s + 3.0) == pytest.approx(6.0, abs=0.02)  # then it speeds up with 1 m/s2
+    # After the bend the vehicle speeds up by 1 m/s2
+    assert at(route, route.speed, turned_s + 3.0) == pytest.approx(6.0, abs=0.02)
 
 
 def test_bends_of_the_road_are_apart():
@@ -96,7 +97,7 @@ def test_circles_are_tight_and_slow(share, choice, expected):
 
 
 def test_the_route_ends_some_seconds_after_the_wanted_time():
-    """New legs begin until 12 s before the wanted time. Then the vehicle brakes, and stands for 4.5 s."""
+    """New legs begin until 12 s before the wanted time. After the last leg the vehicle brakes, and stands for 4.5 s."""
     assert random_route(Fixed(0.0, 0.75), HANDLING, 18.9, RATE_HZ).time[-1] == pytest.approx(7.0 + 4.5, abs=0.03)
     longer = random_route(Fixed(0.0, 0.75), HANDLING, 19.1, RATE_HZ)
     assert longer.time[-1] == pytest.approx(7.0 + 8.0 + 8.0 / 1.3 + 4.5, abs=0.03)

@@ -59,12 +59,12 @@ def test_the_body_rolls_outwards_in_a_bend(kind, roll_deg):
 def test_a_motorcycle_in_a_bend_has_its_force_along_its_up():
     force, rates = readings(road(lateral=5.0), "motorcycle")
     assert force == pytest.approx([0.0, sqrt(1.0 + (5.0 / G) ** 2), 0.0], abs=0.51 * COUNT_G)
-    lean = atan(5.0 / G)  # to the left
+    lean = atan(5.0 / G)  # the lean is to the left
     assert rates == pytest.approx([-degrees(0.5) * sin(lean), degrees(0.5) * cos(lean), 0.0], abs=0.51 * COUNT_DPS)
 
 
 def test_slope_and_camber_tilt_the_force():
-    """Uphill the force has a part forward. On a road that falls to the right it has a part to the left."""
+    """Uphill the force has a part forward. On a road that falls to the right the force has a part to the left."""
     force, _ = readings(road(slope=0.05, camber=0.03))
     assert force == pytest.approx([cos(0.05) * sin(0.03), cos(0.05) * cos(0.03), sin(0.05)], abs=0.51 * COUNT_G)
 
@@ -87,7 +87,7 @@ def test_noise_grows_with_the_speed_up_to_10_mps(speed, moving):
 def test_a_sensor_adds_its_errors_and_counts():
     sensor = VehicleSensor(turn_of(90.0, (0, 0, 1)), np.array([0.1, 0.0, 0.0]), np.full(3, 2.0), np.array([1.0, 0, 3]))
     force, rates = readings(road(), sensor=sensor)
-    assert force == pytest.approx([0.5 * (1.0 - 0.1), 0.0, 0.0], abs=0.51 * COUNT_G)  # its x axis points up
+    assert force == pytest.approx([0.5 * (1.0 - 0.1), 0.0, 0.0], abs=0.51 * COUNT_G)  # the sensor's x axis points up
     assert rates == pytest.approx([1.0, 0.0, 3.0], abs=0.51 * COUNT_DPS)
     assert force / COUNT_G == pytest.approx(np.round(force / COUNT_G))
     assert rates / COUNT_DPS == pytest.approx(np.round(rates / COUNT_DPS))
@@ -116,8 +116,8 @@ def test_a_receiver_is_late_and_has_a_rate():
     assert [speed for speed, _ in seen.values()] == pytest.approx([10.0, 10.5, 11.5, 12.5])
     assert [utc_s for _, utc_s in seen.values()] == pytest.approx([1000.0, 1001.0, 1002.0, 1003.0])
     assert list(received(Receiver(0.5))) == [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5]
-    assert received(Receiver())[1.0][0] == pytest.approx(10.7)  # usually it is 0.3 s late
-    assert len(received(Receiver(0.001))) == 200  # never more than one speed per sample
+    assert received(Receiver())[1.0][0] == pytest.approx(10.7)  # by default a speed is 0.3 s late
+    assert len(received(Receiver(0.001))) == 200  # a sample never has more than one speed
 
 
 def test_a_receiver_may_end_or_send_another_unit():

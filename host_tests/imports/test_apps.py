@@ -25,10 +25,11 @@ from support.recordings.app_exports import PHONE, START_UTC_S, Riding
 PAGE = Path(__file__).resolve().parents[2] / "tools" / "docs" / "recordings.md"
 ON_PHONE = api.CalibrationFile(vehicle_from_sensor=PHONE.T, aligned=True)
 ON_BIKE = api.CalibrationFile(aligned=True)
-ON_THE_BIKE = ("RaceBox", "VBO", "AiM")  # the axes of these apps are the bike's, not the phone's
-WITHOUT_DATE = ("AiM", "Sensor Kinetics")  # the times of these apps have no date
-WITHOUT_SPEED = ("Sensor Kinetics",)  # this app does not use the satellite receiver
-# Largest rms difference between a replay and the true lean. The original ride has 0.28 at 100 samples per second.
+ON_THE_BIKE = ("RaceBox", "VBO", "AiM")  # apps that record along the bike's axes, not the phone's
+WITHOUT_DATE = ("AiM", "Sensor Kinetics")  # apps whose times have no date
+WITHOUT_SPEED = ("Sensor Kinetics",)  # the app does not use the satellite receiver
+# Largest rms difference between a replay and the true lean. The replay of the original ride has 0.28 degrees at 100
+# samples per second.
 WITHIN_DEG = 0.5
 
 

@@ -143,7 +143,7 @@ def test_a_time_column_increases_and_is_named():
     steps = np.arange(100) * 10
     assert found(x=steps % 70, millis=steps).columns == ["millis"]
     assert found(millis=steps).unit == "ms" and found(millis=steps).why == "millis says ms"
-    assert found(n=steps, b=steps * 1.5).columns == ["b"]  # n only numbers the rows
+    assert found(n=steps, b=steps * 1.5).columns == ["b"]  # column n only counts the rows
     assert found(a=np.arange(100)) is None and found(a=-steps) is None
     assert "in ms there are 100 samples per second" in found(a=steps * 1.01, b=steps[::-1]).why.replace("99", "100")
     assert found(time=np.arange(100) * 50_000_000, x=steps).unit == "ns"

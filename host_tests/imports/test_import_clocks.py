@@ -36,7 +36,8 @@ def test_a_single_wrong_time_is_damaged():
     assert damaged(0, 600, 20, 30) == [1] and damaged(600, 1200, 50, 1300) == [2]
     assert damaged(511, 10, 20, 30) == [0] and damaged(509, 10, 20, 30) == []
     assert damaged(1000, 1010, 1020, 519) == [3] and damaged(1000, 1010, 1020, 521) == []
-    assert damaged(0, 2000, 1001, 1011) == []  # not judged, because the times around it are a second apart
+    # These times are not judged, because the times around them are a second apart
+    assert damaged(0, 2000, 1001, 1011) == []
 
 
 def test_late_samples_are_sorted_up_to_half_a_second():
@@ -76,8 +77,8 @@ def test_a_slower_sensor_is_interpolated_and_gaps_are_not():
 
 
 def test_a_faster_sensor_is_averaged():
-    """The mean over 20 ms around 30 ms contains the samples after 20 ms and up to 40 ms. These are two samples at steps
-    of 10 ms, or four at steps of 5 ms."""
+    """The mean over 20 ms around 30 ms contains the samples after 20 ms and up to 40 ms. This window has two samples at
+    steps of 10 ms, or four at steps of 5 ms."""
     values = np.array([0.0, 1.0, 4.0, 9.0, 16.0, 25.0, 36.0])[:, None] * [1.0, 1.0, 1.0]
     fast = sensor(np.arange(7) * 10.0, values)
     # Samples are not averaged if the step of the clock, here 15 ms, is at most 1.5 steps of the sensor

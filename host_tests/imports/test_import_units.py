@@ -167,13 +167,14 @@ def test_a_sheet_finds_its_columns_in_the_order_of_names():
 def test_a_common_beginning_of_names_is_not_repeated():
     sheet = Sheet("f", ["gyroscopeX (g)", "gyroscopeY", "gyroscopeZ", "accelX", "accelY", "accelZ"], [])
     assert sheet.named([0, 1, 2]) == "f: gyroscopeX, …Y, …Z"
-    assert sheet.named([3, 4, 5]) == "f: accelX, accelY, accelZ"  # the common beginning is too short: 5 letters
+    # The names' common beginning has 5 letters, which is too short
+    assert sheet.named([3, 4, 5]) == "f: accelX, accelY, accelZ"
     assert sheet.named([0, 1]) == "f: gyroscopeX, gyroscopeY"
 
 
 def test_a_rate_leaves_gaps_and_marks_out():
     time_ns = np.array([0, 10, 20, 30, 40, 90, 100, 110]) * MS
-    assert recording.rate_hz(time_ns) == pytest.approx(100.0)  # the gap of 5 steps is left out
+    assert recording.rate_hz(time_ns) == pytest.approx(100.0)  # the gap of 5 steps does not count
     assert recording.rate_hz(np.array([0, 10, 20, 30, 40, 89, 99]) * MS) == pytest.approx(6 / 0.099)
     assert recording.rate_hz(np.append(time_ns, units.REPEATED)) == pytest.approx(100.0)
     assert recording.rate_hz(time_ns[:1]) == recording.rate_hz(time_ns[:1].repeat(3)) == 0.0

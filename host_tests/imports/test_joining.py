@@ -72,7 +72,7 @@ def test_fix_is_only_in_the_nearest_row():
 
 
 def test_markers_of_unknown_speed_and_position_are_dropped():
-    """A phone writes -1 for an unknown speed. It may write 0, 0 for an unknown position, which is in the sea."""
+    """A phone writes -1 for an unknown speed. A phone may write 0, 0 for an unknown position, which is in the sea."""
     t_ns = np.arange(4) * 10**9
     track = ReceiverTrack(
         t_ns, np.array([-1.0, 3.0, -1.0, 4.0]), np.array([0.0, 52.0, 91.0, 52.1]), np.array([0.0, 13.0, 13.0, 13.1])
@@ -82,7 +82,8 @@ def test_markers_of_unknown_speed_and_position_are_dropped():
 
 
 def test_repeated_values_at_standstill_are_kept_once_per_second():
-    """A logger may write the receiver's last value in each row. At a standstill this value is kept once per second."""
+    """A logger may write the receiver's last value in each row. At a standstill the repeated value is kept once per
+    second."""
     track = ReceiverTrack(np.arange(80) * 50 * MS, np.repeat([0.0, 5.0], 40), np.full(80, 52.0), np.full(80, 13.0))
     assert (track.time_ns // MS).tolist() == [0, 1000, 2000, 3000]
     assert track.speed_mps.tolist() == [0.0, 0.0, 5.0, 5.0]

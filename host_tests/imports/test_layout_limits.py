@@ -17,7 +17,7 @@ def test_the_layout_of_rows_is_found():
     comma = ["t;a;b;c", *[f"{k};1,5;2,5;3" for k in range(5)]]
     assert layout.find_grid(comma) == layout.Grid(0, 1, ";", True, 4)
     assert layout.find_grid(["1 2 3 4", "5 6 7 8"]) == layout.Grid(None, 0, " ", False, 4)
-    assert layout.find_grid(["a,b,c", "1,2,3", "4,5,6"]) is None  # three numbers are too few
+    assert layout.find_grid(["a,b,c", "1,2,3", "4,5,6"]) is None  # a table needs more than three numbers per row
     assert layout.find_grid(["1,2,3,4"]) is None and layout.find_grid(["t,a,b,c", "1,2,3,4"]) is not None
     units_below = ["t,a,b,c", "(s),(g),(g),(g)", "1,2,3,4", "2,2,3,4"]
     found = layout.sheet_in(file("\n".join(units_below)))
@@ -54,8 +54,8 @@ def test_labels_before_the_values():
 
 
 def test_labels_of_under_half_of_the_rows_are_left_out():
-    """The label u is in two or three of five rows, and then in two of four rows. It becomes a column only in a majority
-    of rows."""
+    """The label u is in two or three of five rows, and then in two of four rows. A label becomes a column only if the
+    majority of rows has it."""
     full, short = "t: {0} x: 2 y: 3 z: 4 u: 5", "t: {0} x: 2 y: 3 z: 4"
     for count, there in ((2, False), (3, True)):
         text = "\n".join((full if k < count else short).format(k) for k in range(5)) + "\n"
@@ -67,7 +67,7 @@ def test_labels_of_under_half_of_the_rows_are_left_out():
 
 
 def test_lines_with_labels_are_the_majority():
-    """Seven of ten lines are labelled. There are at least 1.5 labels per line."""
+    """Seven of ten lines are labelled. The lines have at least 1.5 labels each on average."""
     row = "t: 1 x: 2 y: 3 z: 4"
     assert layout._labelled("n", "\n".join([row] * 7 + ["text"] * 3)) is not None
     assert layout._labelled("n", "\n".join([row] * 6 + ["text"] * 4)) is None
@@ -75,7 +75,7 @@ def test_lines_with_labels_are_the_majority():
 
 
 def test_a_joined_table_has_the_names_of_its_files():
-    """The first columns of the joined table are the times. Each of its rows comes from one file."""
+    """The first columns of the joined table are the times. Each row of the joined table comes from one file."""
     one = file("t,x,y,z\n" + "".join(f"{k},1,2,3\n" for k in range(5)), "acc.csv")
     other = file("t,x,y,z\n" + "".join(f"{k + 0.5},4,5,6\n" for k in range(4)), "gyro.csv")
     found = layout.joined_sheet([one, other])

@@ -39,7 +39,7 @@ def exported(ride, app, said):
         ("VBO", "velocity furlongs", 3.6, "km/h"),
         *[("RaceBox", f"Speed ({unit})", 3.6, unit) for unit in IN_MPS],
         ("RaceBox", "KPH", 3.6, "km/h"),
-        ("RaceBox", "Speed", 3.6, "km/h"),  # without a unit in the name, the positions decide
+        ("RaceBox", "Speed", 3.6, "km/h"),  # if the name has no unit, the positions decide
         ("RaceBox", "Speed (furlongs)", 3.6, "km/h"),
     ],
 )

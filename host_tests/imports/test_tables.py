@@ -117,7 +117,8 @@ def column(texts):
 @pytest.mark.parametrize("name", TIMES)
 def test_times_of_any_kind_without_a_unit(name):
     found = units.times_ns(column(TIMES[name]))
-    assert np.allclose(np.diff(found), 10_000_000, atol=600)  # a double rounds a time in ns since 1970
+    # A double rounds times in ns since 1970 by some hundred ns
+    assert np.allclose(np.diff(found), 10_000_000, atol=600)
     if "1970" in name or "zone" in name or name == "UTC":
         assert found[0] == pytest.approx(START_NS, abs=600)
 
@@ -218,7 +219,7 @@ def test_columns_are_whole_numbers_floats_or_text():
     assert floats.tolist() == ["0.5", " 1.5 ", "", "x"]
     assert np.allclose(csv_reader.numbers_of(floats), [0.5, 1.5, np.nan, np.nan], equal_nan=True)
     assert words.tolist() == ["start", "", 'a, "b"', "1_0"]
-    assert np.all(np.isnan(csv_reader.numbers_of(words)))  # 1_0 is not a number
+    assert np.all(np.isnan(csv_reader.numbers_of(words)))  # Python would read 1_0 as a number
     assert left_out == 0
     assert few.dtype.kind == "f" and np.isnan(few[1]) and csv_reader.filled(few).tolist() == [True, False, True, True]
 

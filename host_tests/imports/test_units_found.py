@@ -79,7 +79,7 @@ def test_positions_show_the_unit_of_the_speed(said, unit, per_degree, east):
         (20.0, 20.0, {"places": (None, 2)}, ""),
         (20.0, 20.0, {"places": (1, None)}, ""),
         (3.1, 3.1, {}, "m/s"),
-        (2.9, 2.9, {}, ""),  # at this speed the errors of positions are too large
+        (2.9, 2.9, {}, ""),  # below 3 m/s the errors of positions are too large
         (20.0, 20.0, {"rows": 21}, ""),  # 21 rows give 19 steps of one second, but the check needs 20
         (20.0, 20.0, {"rows": 22}, "m/s"),
         (24.9, 20.0, {}, "m/s"),  # the two speeds differ by a factor below 1.25

@@ -79,7 +79,7 @@ def toggled(low, high):
     return lambda column: np.where(np.arange(len(column)) % 3 == 0, low, high)
 
 
-ILL = [  # each entry has the text of a notice and the fault that causes this notice
+ILL = [  # for each fault: the text of its notice, and the fault
     ("Gyro x dead", stuck(4, lambda column: 0 * column)),
     ("Gyro y dead", stuck(5, lambda column: 0 * column - 1)),
     ("Gyro z dead", stuck(6, lambda column: 0 * column + 317)),
@@ -88,8 +88,8 @@ ILL = [  # each entry has the text of a notice and the fault that causes this no
     ("Accel xyz stuck", stuck(slice(0, 3), lambda columns: 0 * columns + 55)),
     ("Gyro x dead", stuck(4, toggled(0, -1))),
     ("Gyro y dead", stuck(5, toggled(-700, 900))),
-    ("Gyro z dead", stuck(6, lambda column: column & ~0xFF | 0x40)),  # the low byte is stuck
-    ("Gyro x dead", stuck(4, lambda column: column & ~1)),  # the lowest bit is stuck
+    ("Gyro z dead", stuck(6, lambda column: column & ~0xFF | 0x40)),  # the low byte of gyro z is stuck
+    ("Gyro x dead", stuck(4, lambda column: column & ~1)),  # the lowest bit of gyro x is stuck
     ("Gyro xy equal", copied(4, 5)),
     ("Gyro xz equal", copied(6, 4)),
     ("Accel yz equal", copied(1, 2)),
@@ -126,8 +126,8 @@ def test_the_quietest_chip_at_rest_is_not_faulty(gyro_range, dlpf):
 
 
 def test_no_axis_is_faulty_in_a_ride(monkeypatch):
-    """In a ride the axes look so good that the driver does not import the module that judges them. This saves 2 KB of
-    heap."""
+    """In a ride the axes look so good that the driver does not import the module that judges them. The missing import
+    saves 2 KB of heap."""
     monkeypatch.setattr(AxisWatch, "_load", lambda watch: pytest.fail("not well"))
     for seed in range(4):
         assert judged(ride(20, seed)) == []

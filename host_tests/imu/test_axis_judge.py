@@ -103,7 +103,7 @@ def test_a_stuck_high_byte_wraps_in_two_looks():
     judge, watch = AxisJudge(1, 3), Watch()
     for seen in (wrapped, {}, wrapped):
         watch.look(judge, seen=seen)
-    assert watch.fault is None  # a changed high byte begins the count again
+    assert watch.fault is None  # a change of the high byte restarts the count
     watch.look(judge, seen=wrapped)
     assert watch.fault is not None
 
@@ -172,7 +172,7 @@ def test_two_good_looks_end_a_fault():
     judge, watch = AxisJudge(1, 3), Watch()
     assert watch.look(judge, seen={0: 1}) is True and watch.fault
     assert watch.look(judge) is False and watch.fault
-    watch.look(judge, clipped=50)  # too few good samples
+    watch.look(judge, clipped=50)  # the look has too few good samples
     assert watch.fault
     judge, watch = AxisJudge(1, 3), Watch()
     watch.look(judge, seen={0: 1})

@@ -48,7 +48,7 @@ def test_a_frame_is_seven_big_endian_numbers(engine):
 @pytest.mark.parametrize("dead", [0, -1])
 def test_all_zeros_or_ones_is_a_dead_frame(engine, dead):
     """A frame is dead if all three forces are zero or all bits are one. Only the frames before a dead frame count. A
-    frame with these values on only two axes is good."""
+    frame with zero force or all bits set on only two axes is good."""
     samples = noise(4)
     samples[2, 0:3] = dead
     alive = noise(1)
@@ -100,10 +100,10 @@ def test_a_sample_at_the_end_of_the_range_is_left_out(engine):
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_a_watch_records_the_low_bits_wraps_and_differences(engine):
     """For each axis the watch records the values of the lowest four bits, a change of the high byte, and a jump of the
-    low byte. It also records which axes differ from each other."""
+    low byte. The watch also records which axes differ from each other."""
     samples = np.full((8, 7), 700) + np.arange(7)
-    samples[:, 0] = 5, 6, 5, 6, 5, 6, 5, 6  # only two values
-    samples[:, 1] = 2, 194, 5, 6, 7, 198, 9, 8  # the low byte jumps, and the high byte stays the same
+    samples[:, 0] = 5, 6, 5, 6, 5, 6, 5, 6  # axis 0 has only two values
+    samples[:, 1] = 2, 194, 5, 6, 7, 198, 9, 8  # on axis 1 the low byte jumps, and the high byte stays the same
     samples[:, 2] = -1, 0, 1, 2, 3, 4, 5, 6
     samples[:, 4] = samples[:, 6] = np.arange(8) * 3 - 8
     chosen, python = engines.run(engine, [("add_up", ([frames(samples[:1]), frames(samples)], LIMIT))])[0]

@@ -29,7 +29,7 @@ def sensor_i2c():
 
 
 def test_the_example_in_the_drivers_docstring_runs(board, capsys):
-    """The example runs for a second. It prints the chip's name and temperature, then about 200 samples."""
+    """The example runs for a second. The example prints the chip's name and temperature, then about 200 samples."""
     from kickstand.imu import mpu6050
 
     example = re.search(r"\n\n((?:    .*\n|\n)+)", mpu6050.__doc__ or "")

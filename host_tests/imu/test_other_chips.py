@@ -7,8 +7,8 @@ OTHER, MOTION, SUPPORTED = 0, 1, 2
 WHO_AM_I, PWR_MGMT_1 = 0x75, 0x6B
 # Registers of two clocks that show 23:59:37 in binary-coded decimals: seconds, minutes, hours. The order of the next
 # four registers depends on the chip.
-DS3231 = [0x37, 0x59, 0x23, 0x05, 0x26, 0x11, 0x26, 0, 0, 0]  # then the day of the week, date, month and year
-PCF8523 = [0, 0, 0, 0x37, 0x59, 0x23, 0x26, 0x04, 0x11, 0x26]  # then the date, day of the week, month and year
+DS3231 = [0x37, 0x59, 0x23, 0x05, 0x26, 0x11, 0x26, 0, 0, 0]  # after the time: day of the week, date, month, year
+PCF8523 = [0, 0, 0, 0x37, 0x59, 0x23, 0x26, 0x04, 0x11, 0x26]  # after the time: date, day of the week, month, year
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ MPU6500, MPU6886 = 0x70, 0x19
 
 @pytest.fixture(autouse=True)
 def time():
-    """Return the clock of a simulated board. The driver waits by this clock."""
+    """Return the clock of a simulated board. The driver's waits advance the clock."""
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)) as board:
         yield board.clock
 
@@ -94,7 +94,7 @@ def test_setup_writes_the_values_of_the_register_map(time):
     reset, awake, configured, *_ = wires.times_us
     assert awake - reset >= 100_000  # longest duration of a reset (p. 41)
     assert configured - awake >= 30_000  # start-up time of the gyro (PS-MPU-6000A, 6.1)
-    assert wires.times_us[6] - wires.times_us[5] >= 4 * 4800  # the wait for the slowest usual low-pass
+    assert wires.times_us[6] - wires.times_us[5] >= 4 * 4800  # the wait for the widest delay among the usual low-passes
     assert wires.times_us[-1] - reset < 200_000
 
 
@@ -131,7 +131,7 @@ def test_the_delay_of_each_low_pass():
     from kickstand.imu.mpu6050 import GYRO_DELAY_S
 
     assert GYRO_DELAY_S == {dlpf: DLPF_DELAY_US[dlpf] / 1e6 for dlpf in range(1, 7)}
-    assert lean_filter.DELAY_S == GYRO_DELAY_S[3]  # the delay of the default low-pass
+    assert lean_filter.DELAY_S == GYRO_DELAY_S[3]  # the filter's default is the delay of the default low-pass
 
 
 @pytest.mark.parametrize(
@@ -188,7 +188,7 @@ def test_an_unknown_number_is_an_unknown_chip_unless_accepted():
     wires = Wires(0x55)
     accepted = started(wires, accept=0x55, dlpf=4)
     assert (ACCEL_CONFIG2, 4) in wires.log
-    wires.registers[ACCEL_CONFIG2] = 0  # a register that the chip may lack
+    wires.registers[ACCEL_CONFIG2] = 0  # the chip may lack ACCEL_CONFIG2
     assert accepted.configured()
     assert accepted.temperature_c(333.87) == pytest.approx(22.0)
     assert Mpu6050(Wires(0x68), accept=0x55).identify() == 0x68
@@ -244,7 +244,7 @@ def test_how_many_frames_are_read_and_left(frames, read, left):
 
 @pytest.mark.parametrize(("who_am_i", "most"), [(0x68, 72), (MPU6500, 35), (0x98, 35), (MPU6886, 35)])
 def test_a_fifo_that_may_have_overflowed_is_emptied(who_am_i, most):
-    """The FIFO has 1024 bytes, or 512 bytes (MPU-6500 register map p. 31). It is full if fewer than 14 bytes are
+    """The FIFO has 1024 bytes, or 512 bytes (MPU-6500 register map p. 31). The FIFO is full if fewer than 14 bytes are
     free."""
     wires = Wires(who_am_i)
     chip = started(wires)
@@ -272,12 +272,12 @@ def test_a_frame_that_is_being_written_is_waited_for_once():
         assert (chip.frames_left, chip.overflows) == (left, 0)
     wires.waiting = 33
     assert chip.fetch() == 0
-    wires.waiting = 47  # a number that stays odd means that an overflow has cut off part of a frame
+    wires.waiting = 47  # two odd numbers in a row mean that an overflow has cut off part of a frame
     assert chip.fetch() == 0
     assert (chip.overflows, chip.frames_left) == (1, 0)
     wires.waiting = 5
     assert chip.fetch() == 0
-    assert chip.overflows == 1  # the first odd count after the FIFO was emptied
+    assert chip.overflows == 1  # the emptied FIFO has an odd number of bytes for the first time
 
 
 @pytest.mark.parametrize(("rate_hz", "good"), [(200, 20), (100, 10)])
@@ -347,8 +347,8 @@ def test_a_write_or_a_read_that_fails_is_repeated_once():
 
 
 def test_the_low_pass_of_a_rate_is_the_widest_under_half_of_it():
-    """The values of DLPF_CFG are from the register map, p. 13. They select the gyro's bandwidth; the value 0 selects
-    256 Hz."""
+    """The values of DLPF_CFG are from the register map, p. 13. DLPF_CFG selects the gyro's bandwidth; the value 0
+    selects 256 Hz."""
     from kickstand.imu.mpu6050 import MIN_DLPF
 
     hz = [256, 188, 98, 42, 20, 10, 5]

@@ -42,7 +42,7 @@ def test_samples_are_a_period_apart():
     assert own.step(1, 15_000) == PERIOD_US
     assert own.step(3, 30_000) == 3 * PERIOD_US
     own.restart()
-    assert own.step(4, 100_000) == 3 * PERIOD_US  # time from the first to the fourth sample after the restart
+    assert own.step(4, 100_000) == 3 * PERIOD_US  # three periods pass from the first to the fourth sample
     assert own.step(1, 105_000) == PERIOD_US
 
 

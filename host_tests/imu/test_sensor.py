@@ -1,4 +1,4 @@
-"""The class Sensor keeps the chip working. In these tests the chip is replaced by a class that the test controls."""
+"""The class Sensor keeps the chip working. A class that the test controls replaces the chip."""
 
 import pytest
 from kickstand_tools.simulated_board.simulator import Board
@@ -23,7 +23,7 @@ class Chip:
         from kickstand.imu.fifo_frames import AxisWatch
 
         self.axes = AxisWatch(200, 3, 1, 3, 20)
-        self.axes.notes[9] = 1 << 29  # the next check of the axes is never reached
+        self.axes.notes[9] = 1 << 29  # let the next check of the axes never come
         self.waiting, self.setups, self.states = [], [], []
         self.bad = 0
         self.overflows = self.frames_left = 0
@@ -108,8 +108,8 @@ def test_a_new_chip_is_at_fault_until_its_first_sample(board):
 
 
 def test_a_chip_that_is_prepared_starts_with_the_first_fetch(board):
-    """The chip was prepared earlier, but its FIFO starts only with the first fetch. So the FIFO contains no older
-    samples."""
+    """The chip was prepared earlier, but its FIFO starts only with the first fetch. So the FIFO never contains samples
+    from before the first fetch."""
     sensor, chip = made(board)
     for now_ms in range(0, 1000, 15):
         sensor.prepare(now_ms)
@@ -268,7 +268,7 @@ def test_the_fifo_is_tested_if_set_ups_do_not_help(board):
         said.append(code(sensor))
         now_ms = set_up(sensor, now_ms)
     assert said == ["sensor-silent", "sensor-silent", "sensor-fifo", "sensor-fifo"]
-    assert asked == [None]  # the test takes 0.3 s, so it runs only once
+    assert asked == [None]  # the test of the FIFO runs only once, because it takes 0.3 s
     chip.waiting = []
     sensor.fetch(now_ms + 5)
     assert code(sensor) is None

@@ -1,4 +1,4 @@
-"""`kickstand join` reads GPX and FIT and keeps the lines of the ride. It refuses wrong input in one line."""
+"""`kickstand join` reads GPX and FIT and keeps the lines of the ride. The command refuses wrong input in one line."""
 
 import gzip
 

@@ -1,4 +1,4 @@
-"""Tests `kickstand compare`. It puts the logs of two devices on one clock and compares their leans."""
+"""Tests `kickstand compare`. The command puts the logs of two devices on one clock and compares their leans."""
 
 import json
 

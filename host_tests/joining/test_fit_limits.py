@@ -29,8 +29,8 @@ def made_segments(begins_s, steps=30) -> Segments:
 
 
 def test_small_errors_weigh_as_half_a_sigma():
-    """Errors are divided by their usual size, but at least by 0.5. So an error of 0.1 becomes e = 0.2. Its weight is 4
-    * 1.25 / (1 + 0.04 / 4).
+    """Errors are divided by their usual size, but at least by 0.5. So an error of 0.1 becomes e = 0.2. The weight of
+    this error is 4 * 1.25 / (1 + 0.04 / 4).
     """
     assert fit._robust_weights(np.full((1, 3), 0.1), np.ones((1, 3))) == pytest.approx(np.full((1, 3), 5.0 / 1.01))
 

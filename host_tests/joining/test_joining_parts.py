@@ -38,7 +38,8 @@ def test_times_are_converted_by_offset_and_drift():
 
 
 def test_up_is_the_force_weighted_by_the_rate():
-    """The weight is limited. So a rate of 40 deg/s has the same weight as a rate of 20 deg/s."""
+    """The weight is limited. Larger rates are limited, so a rate of 40 deg/s has the same weight as a rate of 20
+    deg/s."""
     moved = CellMotion(
         np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), np.array([[0.0, 0.0, 10.0], [0.0, 40.0, 0.0]]),
         np.ones(2, dtype=bool), False, False,
@@ -217,14 +218,15 @@ def test_a_tracks_change_of_course_is_over_four_seconds():
     whose cosine is 0.98741."""
     change, known = match._changes_of_track(steps(30))
     assert change[20] == pytest.approx(36.0 * 0.98741, abs=0.001)
-    assert len(change) == 60 and np.flatnonzero(known)[[0, -1]].tolist() == [4, 56]  # the cells from 2 to 28 s
+    # The change is known in the cells from 2 to 28 s
+    assert len(change) == 60 and np.flatnonzero(known)[[0, -1]].tolist() == [4, 56]
     known = match._changes_of_track(steps(30, bad=[15]))[1]  # the bad step is from 15 to 16 s
     assert known[25] and not known[27:36].any() and known[37]  # the 4 s around 12.5 and 18.5 s exclude the bad step
 
 
 def test_a_rides_change_of_course_is_over_four_seconds():
     there = np.ones(600, dtype=bool)
-    there[300:307] = False  # a gap of 0.35 s; up to 0.4 s of 4 s may be missing
+    there[300:307] = False  # a gap of 0.35 s is allowed, because up to 0.4 s of 4 s may be missing
     moved = cells(np.tile([0.0, 9.0, 0.0], (600, 1)), there)
     change, known = match._changes_of_ride(moved)
     assert change[20] == pytest.approx(36.0)
@@ -305,8 +307,8 @@ def test_least_squares_leave_out_what_has_no_weight():
 def test_the_standard_deviation_of_a_fit_by_hand():
     """The variance of the shift is a sum of three terms.
 
-    * Three segments pull by 1, 1 and -2. The sum of the squares is 6. This gives 6 * 3 / 1 * 0.1^2 = 0.18 s2.
-    * The end is 70 s from the middle. There a drift with a standard deviation of 0.01 gives 0.49 s2.
+    * Three segments pull by 1, 1 and -2. The sum of the squares is 6, which gives 6 * 3 / 1 * 0.1^2 = 0.18 s2.
+    * The end is 70 s from the middle, where a drift with a standard deviation of 0.01 gives 0.49 s2.
     * The receiver's delay has a standard deviation of 0.05 s, which gives 0.0025 s2.
     """
     turned = np.array([[1.0, -1.0], [2.0, 0.0], [0.0, -2.0]])

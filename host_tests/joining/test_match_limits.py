@@ -48,8 +48,8 @@ def matched(monkeypatch):
 
 
 def test_a_match_by_hand(matched):
-    """The ride lasts 80 s, the track 99 s. If the ride begins at 10 s of the track, 80 s are in common. If it begins at
-    40 s, 59 s are in common."""
+    """The ride lasts 80 s, the track 99 s. If the ride begins at 10 s of the track, 80 s are in common. If the ride
+    begins at 40 s, 59 s are in common."""
     found = matched(None, found_fit(), found_fit(30.0, 43.9))
     assert (found.start_utc_s, found.drift, found.sigma_s, found.correlation) == (1010.0, 0.0, 0.1, 0.95)
     assert found.common_s == pytest.approx(80.0)
@@ -71,7 +71,8 @@ def test_the_evidence_and_correlation_that_a_match_needs(matched):
 def test_another_shift_needs_six_less_evidence(matched):
     assert matched(found_fit(40.0, 44.1), found_fit()).startswith("the track fits at two times, 30 s apart")
     assert matched(found_fit(40.0, 44.0), found_fit()).start_utc_s == 1010.0
-    assert matched(found_fit(16.0, 49.0), found_fit()).start_utc_s == 1010.0  # still the same shift 6 s away
+    # A fit 6 s away still counts as the same shift
+    assert matched(found_fit(16.0, 49.0), found_fit()).start_utc_s == 1010.0
     assert matched(found_fit(3.9, 49.0), found_fit()).startswith("the track fits at two times, 6 s apart")
 
 

@@ -11,7 +11,8 @@ from kickstand_tools.signals import EARTH_M
 from support.recordings import phone_tracks
 
 PROFILES = ("street", "track", "sweeper", "city", "hills")
-SECONDS = {"sweeper": 450.0, "city": 300.0, "street": 300.0}  # rides with few bends must be longer
+# Duration of the ride; rides with few bends must be longer
+SECONDS = {"sweeper": 450.0, "city": 300.0, "street": 300.0}
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +100,8 @@ def test_another_rides_track_is_refused(rides, profile, other):
 
 @pytest.mark.parametrize(("profile", "differs"), [("street", 0.03), ("track", 0.08), ("city", 0.08), ("hills", 0.03)])
 def test_the_same_roads_on_another_day_are_refused(rides, profile, differs):
-    """The other ride has the same bends. Its speed differs by some per cent, and this difference changes every 20 s."""
+    """The other ride has the same bends. The speed of the other ride differs by some per cent, and this difference
+    changes every 20 s."""
     ride = rides[profile]
     knots_s = np.arange(0.0, ride.time[-1] + 40.0, 20.0)
     faster = np.interp(ride.time, knots_s, 1.0 + np.random.default_rng(6).normal(0.0, differs, len(knots_s)))
@@ -152,7 +154,7 @@ def test_frozen_readings_and_gaps_are_left_out(rides):
     joined = api.join_track(broken, phone_tracks.track(ride))
     assert [notice.code for notice in joined.notices] == ["frozen-readings"]
     assert abs(error_s(joined, 0.5)) < 0.2
-    assert joined.match.correlation > 0.97  # with the frozen readings, the correlation would be 0.8
+    assert joined.match.correlation > 0.97  # if the frozen readings counted, the correlation would be 0.8
 
 
 def test_course_turns_are_scaled_by_the_lean():

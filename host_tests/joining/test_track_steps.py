@@ -83,9 +83,9 @@ def test_a_trend_is_subtracted_by_weight():
 
 
 def test_an_outlier_weighs_less_by_students_distribution():
-    """Four errors have a weight of 1. Their sizes are 1, 1, 1 and 4, with the median 1. The standard deviation s is the
-    median divided by 0.6745, so s is 1.4826. With f degrees of freedom, the new weight of an error e is
-    (1 + 1 / f) / (1 + (e / s)^2 / f) / s^2."""
+    """Four errors have a weight of 1. The sizes of the errors are 1, 1, 1 and 4, with the median 1. The standard
+    deviation s is the median divided by 0.6745, so s is 1.4826. With f degrees of freedom, the new weight of an error e
+    is (1 + 1 / f) / (1 + (e / s)^2 / f) / s^2."""
     f, usual = fit._FREEDOM, 1.0 / 0.6745
     error = np.array([[1.0, -1.0, 1.0, 4.0, 9.0]])
     weight = np.array([[1.0, 1.0, 1.0, 1.0, 0.0]])

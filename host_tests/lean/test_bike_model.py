@@ -21,7 +21,7 @@ from kickstand.lean.bike_model import (
 from kickstand.units import STANDARD_GRAVITY
 
 STEP_S = 0.01
-DISTANCE = 1e-4  # change of a state for a numerical derivative
+DISTANCE = 1e-4  # step of a state for a numerical derivative
 TOLERANCE = 1e-6
 MOTION = ("lean_row", "pitch_row", "speed_row")
 FORCES = ("left_row", "up_row")
@@ -30,7 +30,7 @@ FORCES = ("left_row", "up_row")
 def random_state(chance):
     """Return a random state, force and rate.
 
-    The state has no errors of the gyro's scale and axes. Its speed is so high that no step brings it to zero.
+    The state has no errors of the gyro's scale and axes. The speed is so high that no step brings it to zero.
     """
     x = np.zeros(STATES)
     x[[LEAN, PITCH, SPEED, YAW_ERROR]] = chance.uniform([-1.0, -0.3, 5.0, -0.2], [1.0, 0.3, 40.0, 0.2])
@@ -133,8 +133,8 @@ def test_the_state_stays_within_its_bounds():
 @pytest.mark.parametrize("lean", [-0.6, 0.0, 0.6])
 @pytest.mark.parametrize("pitch", [-0.2, 0.2])
 def test_pitch_seen_by_the_yaw_error_is_not_lean(lean, pitch):
-    """The test takes the direction of the vertical in the bike's axes. It rotates this direction into the axes of a
-    sensor that is turned about up, and computes lean and pitch there. Equation (7) must return the bike's lean."""
+    """The test takes the direction of the vertical in the bike's axes. The test rotates this direction into the axes of
+    a sensor that is turned about up, and computes lean and pitch there. Equation (7) must return the bike's lean."""
     yaw_error = 0.1
     left, up, forward = math.cos(pitch) * math.sin(lean), math.cos(pitch) * math.cos(lean), math.sin(pitch)
     s, c = math.sin(yaw_error), math.cos(yaw_error)

@@ -14,7 +14,7 @@ WINDOW_S = 0.2
 def windows(judge, seconds, left=0.0, up=0.0, sideways=0.0, pitch=0.0, push=0.0, lean=0.0, yaw_rate=0.0, shaken=0.0):
     """Judge equal windows for some seconds. Return the number of misfits.
 
-    shaken: force that is added to left and up. Its sign alternates from window to window.
+    shaken: force that is added to left and up. The sign of this force alternates from window to window.
     """
     failed = 0
     for _ in range(int(seconds / WINDOW_S + 0.5)):

@@ -36,7 +36,7 @@ def test_no_dive_is_found_beyond_that_of_any_bike():
 
 def test_until_the_bike_has_braked_an_average_dive_is_assumed():
     assert Dive().share == PRIOR_SHARE
-    assert ridden(0.1, 10.0, speed=4.0).share == PRIOR_SHARE  # at this low speed the dive cannot be found
+    assert ridden(0.1, 10.0, speed=4.0).share == PRIOR_SHARE  # the dive cannot be found below 5 m/s
 
 
 def test_the_dive_is_the_speed_times_the_springs_pitch_rate():
@@ -57,5 +57,5 @@ def test_after_lost_readings_the_dive_found_before_holds():
     dive = ridden(radians(4.0), 100.0)
     before = dive.share
     dive.restart()
-    assert dive.update(0.9, 1.0, 20.0, WINDOW_S) == 0.0  # no earlier force exists for a comparison
+    assert dive.update(0.9, 1.0, 20.0, WINDOW_S) == 0.0  # the first window has no earlier force to compare with
     near(dive.share, before, 1e-9)

@@ -34,8 +34,8 @@ def test_before_the_first_window_nothing_is_known():
 def test_power_on_under_way_leaves_lean_and_speed_uncertain():
     """At rest the force shows the vertical. A rate, or a force other than 1 g, shows that the bike moves."""
     for force, rate, moves in (
-        (LEVEL, [0.0, 0.0, 0.015], False),  # this small rate can be the gyro's bias
-        ([0.0, 0.96, 0.0], NO_RATE, False),  # this small difference can be the accelerometer's error
+        (LEVEL, [0.0, 0.0, 0.015], False),  # a rate of 0.015 rad/s can be the gyro's bias
+        ([0.0, 0.96, 0.0], NO_RATE, False),  # a difference of 0.04 g can be the accelerometer's error
         (LEVEL, [0.0, 0.03, 0.0], True),
         ([0.0, 1.08, 0.0], NO_RATE, True),
     ):
@@ -71,7 +71,8 @@ def test_a_changing_measured_speed_counts_less():
 
 
 def test_coming_to_rest_the_force_is_the_vertical():
-    """The earlier estimate does not matter. Here the bike has a lean of 10 degrees that the gyro did not measure."""
+    """At rest the force sets the lean, whatever the filter estimated before. In this test the bike has a lean of 10
+    degrees that the gyro did not measure."""
     estimator = LeanFilter()
     hold(estimator, 3.0)
     hold(estimator, 4.0, [0.0, 1.0, 2.0 / GRAVITY_MPS2])
@@ -146,7 +147,8 @@ def test_a_lean_beyond_half_a_turn_comes_from_the_other_side():
 
 def test_a_large_correction_is_made_once():
     """The power is switched on in a turn of 30 degrees. The first measured speed then shows the lean. During the
-    computation, more innovations are summed up. They still contain the old error, which must not be corrected twice."""
+    computation, more innovations are summed up. These innovations still contain the old error, which must not be
+    corrected twice."""
     estimator, leans = LeanFilter(), []
     force, rate = force_and_rate(30.0, 20.0)
     for k in range(400):
@@ -172,7 +174,7 @@ def test_rest_corrects_a_large_bias_at_once():
 
 def test_a_sensor_pointing_up_or_down_comes_to_rest():
     """Before the alignment, the filter's forward axis may point straight up or down, for example with the board on a
-    table. Then lean has no meaning, but the filter must not fail."""
+    table. In this position lean has no meaning, but the filter must not fail."""
     for forward in (1.0, -1.0):
         for left, up in ((0.0, 0.0), (1e-5, 0.0), (1e-4, -1e-4), (0.01, 0.02), (0.0, -0.3)):
             estimator, rested = LeanFilter(), False

@@ -64,8 +64,8 @@ def test_sequential_measurements_give_the_textbooks_gain(terms):
 
 @pytest.mark.parametrize(("innovation", "variance"), [(4.9, 1.0), (-4.9, 1.0), (10.0, 4.0), (-50.0, 100.0)])
 def test_beyond_five_sigma_an_innovation_counts_for_less(innovation, variance):
-    """The variance of a larger innovation is raised until the innovation is five standard deviations. Otherwise the
-    variance is 1."""
+    """The variance of a larger innovation is raised until the innovation is five standard deviations. For all other
+    innovations the variance is 1."""
     p = Covariance([0.5])
     list(p.update(((0, 1.0),), innovation, 0.5))
     assert p.correction[0] == pytest.approx(innovation * 0.5 / variance)

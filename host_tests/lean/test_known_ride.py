@@ -1,10 +1,10 @@
-"""The lean filter's results for one ride are compared with known results. A change of these results changes every
-rider's lean, so it must be intended.
+"""The lean filter's results for one ride are compared with known results. A change of the results changes every rider's
+lean, so the change must be intended.
 
 The ride has everything that affects the filter: rest, bias, a yaw error, scale errors, slopes, vibration, turns, slow
 samples, measured speeds, lost samples, and a restart while riding. Other tests show the effect of each parameter. This
-test notices that a parameter has changed. After an intended change, run this in host_tests/lean, with firmware and
-tools on PYTHONPATH:
+test notices that a parameter has changed. After an intended change, run the following line in host_tests/lean, with
+firmware and tools on PYTHONPATH:
 
     python test_known_ride.py > known_ride.csv
 
@@ -37,7 +37,7 @@ LEGS = (
     (4, 0, 0, 0, False),
     (6, 0, 0, 0, False),
     (4, 0, 14, 0, False),
-    (2, -35, 14, 0, False),  # the filter is restarted in this leg
+    (2, -35, 14, 0, False),  # the filter restarts in this leg
     (6, -33, 15, 0, False),
     (2, 7, 16, 0, False),
     (12, 7, 16, 0, False),

@@ -43,7 +43,7 @@ def held_turns(seconds):
 
 
 def weaving(seconds):
-    """Return lean and speed of a ride at 8 to 22 m/s. It has turns of up to 40 degrees, and straights."""
+    """Return lean and speed of a ride at 8 to 22 m/s. The ride has bends of up to 40 degrees, and straights."""
     t = np.arange(int(seconds * HZ)) / HZ
     riding = 1.0 - np.exp(-np.maximum(t - 10.0, 0.0))
     lean = riding * (0.5 * np.sin(0.31 * t) + 0.2 * np.sin(0.83 * t + 1.0)) * (np.sin(0.021 * t) > -0.3)
@@ -73,7 +73,8 @@ def slope(shown, true):
 
 
 def test_vibration_of_the_gyro_does_not_make_held_turns_read_low():
-    """The filter multiplies the yaw rate by the speed. Noise of the yaw rate must not bias this product."""
+    """The filter multiplies the yaw rate by the speed. Noise of the yaw rate must not bias the product of yaw rate and
+    speed."""
     lean, speed = held_turns(240.0)
     force, rate = shaken(*balanced(240.0, lean, speed))
     shown = leans(force.tolist(), rate.tolist())
@@ -83,8 +84,8 @@ def test_vibration_of_the_gyro_does_not_make_held_turns_read_low():
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_gyros_scale_and_cross_axis_errors_are_found(seed):
-    """The data sheet allows scale errors of 3 % and cross-axis errors of 2 %. After five minutes with these errors, the
-    lean is right within a degree."""
+    """The data sheet allows scale errors of 3 % and cross-axis errors of 2 %. After five minutes with errors of this
+    size, the lean is right within a degree."""
     chance = np.random.default_rng(seed)
     lean, speed = weaving(420.0)
     force, rate = shaken(*balanced(420.0, lean, speed))
@@ -151,7 +152,7 @@ def test_power_on_in_the_hand_and_laid_down(seed):
     rate, push, up, lean = np.zeros(3), np.zeros(3), np.array([0.0, 1.0, 0.0]), 0.0
     for k in range(60 * HZ):
         moving = k < 20 * HZ
-        rate = 0.98 * rate + math.radians(8.0) * rng.normal(size=3) if moving else np.zeros(3)  # 40 deg/s rms
+        rate = 0.98 * rate + math.radians(8.0) * rng.normal(size=3) if moving else np.zeros(3)  # rates of 40 deg/s rms
         push = 0.95 * push + 0.06 * rng.normal(size=3) if moving else np.zeros(3)  # 0.2 g
         up = up - np.cross(rate, up) / HZ
         up /= np.linalg.norm(up)
@@ -228,7 +229,8 @@ def test_the_stated_sigma_fits_the_error_of_the_lean():
 
 @pytest.mark.parametrize("doubts", [1, 2])
 def test_a_doubt_keeps_what_the_six_positions_measured(doubts):
-    """The six positions have measured the gyro's scale and cross-axis errors. These errors stay known after a doubt."""
+    """The six positions have measured the gyro's scale and cross-axis errors. The measured errors stay known after a
+    doubt."""
     tested = lean_filter.LeanFilter(gyro_variances=[1e-5] * 5)
     for _ in range(HZ):
         tested.update((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), DT_US)

@@ -74,7 +74,7 @@ def test_a_bike_that_lies_on_its_side_for_a_second_has_fallen():
         assert ride(shown, 0.7, lean_deg=lying).fallen
         assert not roll(shown, lying, sign * 60.0).fallen
         roll(shown, sign * 60.0, lying)
-        assert not ride(shown, 0.5, lean_deg=lying).fallen  # the second is counted from the latest fall
+        assert not ride(shown, 0.5, lean_deg=lying).fallen  # the time of a fall counts from the latest fall
         assert ride(shown, 0.7, lean_deg=lying).fallen
         shown.restart()
         assert not shown.fallen
@@ -83,7 +83,7 @@ def test_a_bike_that_lies_on_its_side_for_a_second_has_fallen():
 
 def test_the_lean_of_a_fall_is_no_maximum():
     shown = ride(roll(ride(meter(), 3.0), 0.0, 63.0), 0.2, lean_deg=63.0)
-    near(shown.max_right_deg, 63.0, 0.5)  # the delay of the low-pass is compensated
+    near(shown.max_right_deg, 63.0, 0.5)  # the lean is extrapolated by the delay of the low-pass
     roll(shown, 63.0, 85.0)
     assert shown.lean_deg > 80.0
     assert shown.max_right_deg < 65.0
@@ -149,7 +149,8 @@ def test_a_lean_shorter_than_150_ms_is_not_a_maximum():
 
 
 def test_only_a_long_gap_restarts_the_filter():
-    """The filter bridges a short gap. It computes the movement during the gap from the rate at its end."""
+    """The filter bridges a short gap. The filter computes the movement during the gap from the rate at the end of the
+    gap."""
     shown = ride(meter(), 3.0)
     shown.update(reading(*force_and_rate(4.0, roll_dps=10.0)), 400_000)
     near(shown.lean_deg, 4.0, 0.3)
@@ -260,8 +261,8 @@ def test_the_g_shown_follows_smoothly_whether_aligned_or_not():
 
 
 def test_a_smoothed_force_that_is_not_updated_is_nan():
-    """For an aligned motorcycle the smoothed forces left and up are not updated. With an unaligned calibration they are
-    updated."""
+    """For an aligned motorcycle the smoothed forces left and up are not updated. With an unaligned calibration the
+    forces left and up are updated."""
     aligned, other = Calibration(), Calibration()
     aligned.aligned = True
     shown = meter(aligned)

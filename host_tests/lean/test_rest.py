@@ -21,8 +21,9 @@ def test_rest_takes_ten_seconds_if_the_bike_seems_to_roll():
     assert rested_after(RestDetector(), 12.0, rolling=True) == 10.0
     detector = RestDetector()
     rested_after(detector, 5.0, rolling=True)
-    assert rested_after(detector, 3.0) == 1.5  # counted from the time when nothing indicates rolling any more
-    assert rested_after(detector, 3.0, rolling=True) == 2.0  # ten seconds of stillness in all, with and without rolling
+    assert rested_after(detector, 3.0) == 1.5  # the 1.5 s count from the end of the signs that the bike rolls
+    # Rest needs ten seconds of stillness in all, with and without signs that the bike rolls
+    assert rested_after(detector, 3.0, rolling=True) == 2.0
 
 
 def test_a_movement_about_or_along_any_axis_ends_the_rest():
@@ -37,8 +38,8 @@ def test_a_movement_about_or_along_any_axis_ends_the_rest():
 
 
 def test_after_a_movement_the_count_begins_again():
-    """The detector's moving average has a time constant of half a second. So two windows exceed the limit after the
-    movement."""
+    """The detector's moving average has a time constant of half a second. So after the movement two windows still
+    exceed the limit."""
     detector = RestDetector()
     rested_after(detector, 1.25)
     assert rested_after(detector, 4.0, force=(0.0, 1.0, 0.03)) == 0.5 + 1.5
@@ -55,7 +56,8 @@ def test_a_steady_rate_is_bias_only_before_the_first_rest():
         detector = RestDetector()
         rested_after(detector, 3.0)
         assert rested_after(detector, 60.0, rates) is None
-        assert rested_after(RestDetector(), 12.0, [3.0 * rate for rate in rates]) is None  # too large for a bias
+        # The rate is too large for a bias
+        assert rested_after(RestDetector(), 12.0, [3.0 * rate for rate in rates]) is None
 
 
 def test_the_known_bias_is_not_a_turn():
@@ -64,8 +66,8 @@ def test_the_known_bias_is_not_a_turn():
 
 
 def test_a_wrong_estimate_of_the_bias_does_not_hide_rest():
-    """Rest is also found if the rate is small before the estimated bias is subtracted. The calibration's bias is right
-    in this case."""
+    """Rest is also found if the rate is small before the estimated bias is subtracted. In this test the calibration's
+    bias is right, and the estimated bias is wrong."""
     assert rested_after(RestDetector(False), 3.0, bias=(0.05, 0.0, 0.0)) == 1.5
     assert rested_after(RestDetector(False), 12.0, rates=(0.03, 0.0, 0.0), bias=(0.06, 0.0, 0.0)) is None
 

@@ -1,5 +1,5 @@
-"""The whole device on a virtual radio. Both sides use bumble's Bluetooth LE stack. The central knows only what the
-published documents say."""
+"""The whole device on a virtual radio. Board and phone both use bumble's Bluetooth LE stack. The central knows only
+what the published documents say."""
 
 import asyncio
 import collections

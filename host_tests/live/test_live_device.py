@@ -33,7 +33,7 @@ def run(request, tmp_path, capsys):
 
 def test_racechrono_gets_the_requested_packets(run):
     """The phone first denies all packets, and then requests two of them at two rates. The packets have the values of
-    the display. Later it denies all packets again, and then allows all."""
+    the display. Later the phone denies all packets again, and then allows all."""
     acts = [[20.0, "connect"], [20.1, "write", "filter", [0]], [20.1, "write", "filter", [2, 0, 100, 0, 0, 0, 1]]]
     acts += [[20.2, "write", "filter", [2, 0, 40, 0, 0, 0, 2]], [20.2, "write", "filter", [2, 0, 40, 0, 0, 0, 77]]]
     acts += [[40.0, "write", "filter", [0]], [42.0, "write", "filter", [1, 0, 100]]]
@@ -82,7 +82,7 @@ def test_our_page_gets_every_packet_without_side_effects(run):
 
 
 def test_a_lean_that_is_not_trusted_is_never_a_number(run):
-    """At first there is no alignment, and later no sensor. RaceChrono gets no lean either."""
+    """At first there is no alignment, and later no sensor. At these times no packet contains a lean."""
     acts = [[3.0, "connect"], [3.1, "write", "rate", [40, 0]], [3.1, "write", "filter", [1, 0, 40]]]
     faults = [["unplug_sensor", [30.0, 4.0]]]
     plan = {**device_plans.ALIGNED, **LIVE, "phones": [acts], "until": 40}
@@ -110,8 +110,8 @@ def test_a_lean_that_is_not_trusted_is_never_a_number(run):
 
 
 def test_the_second_phone_waits_for_the_first(run):
-    """The second phone can connect only after the first has left. The board forgets the requests of the first phone. It
-    disconnects a phone that requests nothing. The display shows which phone is connected."""
+    """The second phone can connect only after the first has left. The board forgets the requests of the first phone.
+    The board disconnects a phone that requests nothing. The display shows which phone is connected."""
     first = [[22.0, "connect", 1], [22.1, "write", "filter", [1, 0, 100]], [26.0, "leave"]]
     second = [[24.0, "connect", 2], [27.5, "connect", 2], [30.0, "write", "rate", [100, 0]], [33.0, "leave"]]
     third = [[35.0, "connect", 3]]

@@ -58,7 +58,7 @@ def act(dice, phone, radio):
     elif kind == 3:  # a phone writes faster than the loop reads
         for _ in range(40):
             phone.write("filter", nonsense(dice))
-    elif kind == 4:  # the phone disconnects and connects again between two turns of the loop
+    elif kind == 4:  # the phone disconnects and connects again between two passes of the loop
         phone.leave()
         radio.found = radio.found or b""
         phone.connect(dice.randrange(256))
@@ -67,7 +67,7 @@ def act(dice, phone, radio):
 
 
 def test_random_acts_of_a_phone_do_no_harm():
-    # An ESP32's radio drops the packets that it cannot send. A Pico W's radio keeps these packets.
+    # An ESP32's radio drops the packets that it cannot send. A Pico W's radio keeps the packets that it cannot send.
     for drops in (True, False):
         board = Board(Sensor(seed=3).world(standing([[0, 10]])))
         board.radio = radio = Radio(board.clock, drops)

@@ -53,9 +53,9 @@ def test_too_large_values_are_limited_and_never_unknown(buffer):
     ("data", "asked"),
     [
         ([1, 0, 100], [100, 100, 100]),
-        ([1, 0, 0], [40, 40, 40]),  # as fast as possible
+        ([1, 0, 0], [40, 40, 40]),  # an interval of 0 means as fast as possible
         ([2, 3, 232, 0, 0, 0, 2], [0, 1000, 0]),
-        ([2, 0, 50, 0, 0, 0, 0], [0, 0, 0]),  # no such packet
+        ([2, 0, 50, 0, 0, 0, 0], [0, 0, 0]),  # the request names a packet that does not exist
         ([2, 0, 50, 1, 0, 0, 1], [0, 0, 0]),
     ],
 )

@@ -1,4 +1,5 @@
-"""Tests the largest values that a log may have. Both readers refuse slightly larger values and name the unit."""
+"""Tests the largest values that a log may have. Both readers of logs refuse slightly larger values and name the
+unit."""
 
 import contextlib
 import io
@@ -43,7 +44,7 @@ def test_values_out_of_range_are_refused(name, quoted):
                 rows.append(",".join(cells.values()))
             rows[0] = rows[0].replace("0", '"0"', quoted)
             log = io.StringIO("\n".join([HEADER, *rows]) + "\n")
-            if name == "t_s":  # a step this large means that the unit is ms, which another check refuses
+            if name == "t_s":  # a time step of this size means that the unit is ms, which another check refuses
                 words = "milliseconds" if good else "line 6: t_s is '.*', past any reading: its unit is seconds"
                 with pytest.raises(InputError, match=words):
                     read_log(log)

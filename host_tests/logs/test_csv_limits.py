@@ -42,7 +42,7 @@ def test_rows_are_converted_in_blocks(monkeypatch):
     sizes = []
     monkeypatch.setattr(csv_reader, "_typed", lambda cells: sizes.append(len(cells)) or np.zeros(len(cells)))
     csv_reader.columns_of([["1"] * 40] * 5, 40)
-    assert sizes == [2] * 40 + [2] * 40 + [1] * 40  # a part has 20 * ROWS cells, so 80 // 40 rows
+    assert sizes == [2] * 40 + [2] * 40 + [1] * 40  # a part has 20 * ROWS cells: 80 cells, so 2 rows of 40 cells
 
 
 def test_the_first_row_may_be_wider_than_the_names():

@@ -12,7 +12,7 @@ def numbers(digits):
     chance = np.random.default_rng(digits)
     many = [chance.normal(scale=scale, size=300) for scale in (1e-6, 1e-2, 1.0, 30.0, 1e6, 1.7e9)]
     middles = (np.arange(-40, 40) + 0.5) * 10.0**-digits  # halfway between two texts, as closely as a double allows
-    decimals = np.round(chance.normal(size=300), digits + 1)  # one number of ten is halfway, too
+    decimals = np.round(chance.normal(size=300), digits + 1)  # one number of ten is halfway between two texts
     return np.concatenate((*many, middles, np.nextafter(middles, 9.0), decimals))
 
 

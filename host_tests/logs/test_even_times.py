@@ -50,7 +50,7 @@ def test_fine_or_even_times_are_unchanged():
     chance = np.random.default_rng(1)
     for times in (
         np.arange(1000) / 100.0,
-        np.delete(np.arange(1000) / 100.0, [5, 500, 501]),  # samples were lost
+        np.delete(np.arange(1000) / 100.0, [5, 500, 501]),  # some samples are lost
         np.round(np.cumsum(0.01 + 0.002 * chance.random(1000)), 4),
         1.7e9 + np.arange(1000) / 200.0,
     ):

@@ -101,7 +101,7 @@ def test_log_without_frozen_readings_has_gaps():
 def test_commands_report_frozen_readings(tmp_path):
     ride = analysis_rides.short(tmp_path, speed_hz=1)
     header, *rows = ride.read_text().splitlines()
-    for k in range(1300, 1500):  # during the first turn
+    for k in range(1300, 1500):  # the samples of the first bend
         rows[k] = rows[k].partition(",")[0] + "," + ",".join(rows[1300].split(",")[1:7]) + ","
     ride.write_text("\n".join([header, *rows]) + "\n")
     out = tmp_path / "out.csv"

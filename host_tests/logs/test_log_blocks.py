@@ -44,8 +44,8 @@ def test_blocks_add_up_to_the_log(tmp_path, monkeypatch, name, block_bytes):
 
 
 def test_the_readers_of_numbers_agree(tmp_path):
-    """The reader of cells reads blocks with an exponent or with a column of text. It finds the same numbers as the
-    reader of columns."""
+    """The reader of cells reads blocks with an exponent or with a column of text. The reader of cells finds the same
+    numbers as the reader of columns."""
     quick = write(tmp_path / "quick.csv", [HEADER, *[row.replace("1e0", "1") for row in rows(800)]])
     plain = write(tmp_path / "plain.csv", [HEADER, *rows(800)])
     noted = write(tmp_path / "noted.csv", [HEADER + ",note", *[row + ',"a, ""b"""' for row in rows(800)]])
@@ -88,7 +88,7 @@ def test_mistake_far_down_is_reported_with_its_line(tmp_path, monkeypatch, row, 
 
 def test_memory_does_not_grow_with_the_log(tmp_path, monkeypatch):
     """To check the text columns, only the cells of the last hour stay in memory. In this test, only the cells of half a
-    minute stay there."""
+    minute stay in memory."""
     monkeypatch.setattr(reader, "BLOCK_BYTES", 1 << 16)
     monkeypatch.setattr(cells, "KEPT", 300)
     peaks = []

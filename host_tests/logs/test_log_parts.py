@@ -223,7 +223,7 @@ def test_readings_are_frozen_after_half_a_second_and_ten_samples():
 
 
 def test_a_stopped_clock_is_refused():
-    """The clock has stopped if over 50 samples have the same time, and if these are over ten times as many as usual."""
+    """The clock has stopped if over 50 samples have the same time, and if they are over ten times as many as usual."""
     for count, stopped in ((50, False), (51, True)):
         t_s = np.concatenate((np.arange(100) * 0.01, np.full(count, 1.0), 1.01 + np.arange(100) * 0.01))
         if stopped:

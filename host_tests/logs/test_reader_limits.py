@@ -178,8 +178,8 @@ def marks(readings, step_s=0.01, blocks_of=10**6):
 
 
 def coarse(digit_g, digit_dps, jump_g=0.0, jump_dps=0.0, equal=80):
-    """Return readings in steps of these digits. They change, are equal for 0.8 s, and change again around the same
-    values or around other values."""
+    """Return readings in steps of these digits. The readings change, are equal for 0.8 s, and change again around the
+    same values or around other values."""
     chance, n = np.random.default_rng(1), 200 + equal
     readings = np.zeros((n, 7))
     readings[:, :3] = digit_g * chance.integers(-2, 3, (n, 3))
@@ -205,7 +205,7 @@ def test_the_temperature_does_not_count():
     found = marks(readings)[0]
     assert np.flatnonzero(found).tolist() == list(range(101, 180))
     readings[140, 3] = 1e9
-    readings[140, 6] = 1e-10  # the smallest change of a reading counts as a change
+    readings[140, 6] = 1e-10  # even the smallest change of a reading counts
     assert not marks(readings)[0].any()
     assert frozen.FrozenFinder().notices() == []
 

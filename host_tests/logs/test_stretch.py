@@ -99,8 +99,8 @@ def test_replay_and_report_accept_a_stretch(tmp_path):
 
 @pytest.mark.parametrize("name", ["replay", "smooth", "export"])
 def test_lean_of_a_stretch_equals_that_of_the_whole_ride(tmp_path, name):
-    """The firmware also uses the readings before and after the stretch. Without them the lean would be wrong or
-    unknown."""
+    """The firmware also uses the readings before and after the stretch. Without the other readings the lean would be
+    wrong or unknown."""
     ride = analysis_rides.short(tmp_path, rate_hz=50)
     whole, part = tmp_path / "whole.csv", tmp_path / "part.csv"
     form = ("--to", "csv") if name == "export" else ()
@@ -127,7 +127,7 @@ def test_stretch_warns_of_another_mounts_calibration(tmp_path):
 def test_exported_stretch_keeps_its_time_of_day(tmp_path):
     """A log without a time of day is assumed to end when its file was written. A stretch that ends before the log does
     must get an earlier end."""
-    ride = analysis_rides.short(tmp_path)  # lasts 34 s
+    ride = analysis_rides.short(tmp_path)  # a ride of 34 s
     os.utime(ride, (1_700_000_100, 1_700_000_100))
     out = tmp_path / "out.csv"
     api.export(api.open_ride(Stretch(ride, 10.0, 20.0)), "racechrono", out)

@@ -108,7 +108,7 @@ def test_a_gopros_gyro_finds_the_offset(tmp_path):
     api.write_log(log, api.Log.from_readings(made.readings, made.rate_hz))
     kickstand, upright = (api.Log.from_readings(pose, made.rate_hz) for pose in (made.kickstand, made.upright))
     api.write_calibration(tmp_path / "RIDE.cal.json", api.fit_two_positions(kickstand, upright).calibration)
-    begin = 9005  # at 200 Hz, a time in the middle of one of the compared cells of 0.05 s
+    begin = 9005  # index at 200 Hz; its time is in the middle of a compared cell of 0.05 s
     turned = made.readings[begin : begin + 30 * 200, 4:] @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     noise = np.random.default_rng(2).normal(0.0, 0.5, turned.shape)
     film = gopro.with_telemetry(gopro.film(tmp_path / "GX01.mp4", 30.0), turned + noise + [1.0, -2.0, 0.5], 200.0)

@@ -123,4 +123,5 @@ def test_values_are_interpolated_but_not_across_gaps():
     assert np.allclose(at.lean_deg, [NAN, 5.0, NAN, NAN, 25.0, NAN], equal_nan=True)
     assert at.speed_mps[1] == pytest.approx(10.1)
     assert np.isnan(at.speed_mps[[0, 5]]).all()
-    assert at.right_deg.tolist() == [0.0, 0.0, 10.0, 10.0, 20.0, 30.0]  # the maxima so far
+    # The largest lean to the right so far, at each sample
+    assert at.right_deg.tolist() == [0.0, 0.0, 10.0, 10.0, 20.0, 30.0]

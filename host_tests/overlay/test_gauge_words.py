@@ -1,4 +1,5 @@
-"""Tests the words, numbers and directions of the gauge. Their places and sizes are design and are not tested."""
+"""Tests the words, numbers and directions of the gauge. The places and sizes of the words are design and are not
+tested."""
 
 import math
 

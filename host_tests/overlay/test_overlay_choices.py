@@ -1,4 +1,5 @@
-"""Files and options that an overlay accepts, messages about others, and the picture at the ends of a ride."""
+"""Files and options that an overlay accepts, messages about refused files and options, and the picture at the ends of a
+ride."""
 
 import math
 from pathlib import Path
@@ -154,6 +155,6 @@ def test_the_spot_of_the_forces_stays_in_its_circle(drawn):
 
 @pytest.mark.parametrize(("video_height", "height"), [(1080, 324), (600, 216), (480, 216), (200, 90)])
 def test_the_gauge_is_legible_in_a_small_video(video_height, height):
-    """It has 30 % of the video's height, but at least 216 pixels, and these only up to 45 %."""
+    """The gauge has 30 % of the video's height, but at least 216 pixels, and the 216 pixels only up to 45 %."""
     made = Gauge(video_height)
     assert made.height == height and made.width % 2 == 0

@@ -183,7 +183,7 @@ def test_over_a_video_the_gauge_follows_its_smaller_side(monkeypatch, tmp_path):
 def offset(monkeypatch):
     """Return a function that finds the offset from the result of each shift, {place: (correlation, evidence)}.
 
-    The video has 200 cells of 50 ms. Its readings begin 0.3 s after its first picture."""
+    The video has 200 cells of 50 ms. The camera's readings begin 0.3 s after the video's first picture."""
 
     def result(given, common=160):
         monkeypatch.setattr(camera_match, "correlations", lambda *_: (found, np.full(799, common)))

@@ -30,7 +30,8 @@ def test_shown_values_are_those_of_the_display(ride):
     braking = seen.at(np.array([seen.t_s[-1] - 6.0]))
     assert braking.forward_g[0] < -0.2
     turning = np.abs(seen.lean_deg) > 25.0
-    assert np.all(np.sign(seen.left_g[turning]) == -np.sign(seen.lean_deg[turning]))  # to the right in a right turn
+    # In a right turn the force is to the right
+    assert np.all(np.sign(seen.left_g[turning]) == -np.sign(seen.lean_deg[turning]))
 
 
 def test_brief_or_untrusted_lean_is_no_maximum(ride, monkeypatch):

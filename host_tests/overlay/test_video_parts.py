@@ -91,7 +91,7 @@ def test_a_gyro_is_divided_by_its_scale():
     three = item(b"SCAL", b"s", 2, 3, struct.pack(">3h", 1, 2, 4)) + item(b"GYRO", b"s", 6, 2, rows)
     assert next(gpmf._of_stream(three, b"GYRO"))[0].tolist() == [100.0, 100.0, 75.0]
     two = item(b"SCAL", b"s", 2, 2, struct.pack(">2h", 10, 2)) + item(b"GYRO", b"s", 4, 3, rows)
-    assert list(gpmf._of_stream(two, b"GYRO")) == []  # two axes are too few
+    assert list(gpmf._of_stream(two, b"GYRO")) == []  # a stream with two axes is not a gyro
     four = item(b"GYRO", b"s", 8, 1, rows)
     assert next(gpmf._of_stream(four, b"GYRO")).tolist() == [[100.0, 200.0, 300.0]]
 
@@ -124,7 +124,7 @@ def offset(monkeypatch):
     """Return a function that returns the offset, or the refusal, for a given match at some shifts. The first argument
     is {index of the shift: (correlation, evidence)}.
 
-    The video has 200 cells of 50 ms. Its readings begin 0.3 s after its first picture.
+    The video has 200 cells of 50 ms. The camera's readings begin 0.3 s after the video's first picture.
     """
 
     def result(given, common=160):

@@ -128,7 +128,7 @@ def test_the_trim_that_riding_found_is_used(tmp_path):
 
 
 def test_times_of_the_log_are_kept_exactly(tmp_path):
-    """The times of a log may begin at a Unix time. The replay keeps them to the microsecond."""
+    """The times of a log may begin at a Unix time. The replay keeps such times to the microsecond."""
     cal = command.write_cal(tmp_path / "CAL.json")
     tables = []
     for start_s in 1_700_000_000.0, 0.0:
@@ -165,8 +165,8 @@ def test_lean_of_a_real_recording_matches_gravity(tmp_path, shared_data):
 
 
 def test_calibration_beside_the_log_is_used(tmp_path):
-    """The commands report, plot and export also use this calibration. These commands refuse the output of replay as a
-    log."""
+    """The commands report, plot and export use the same calibration as replay. The three commands refuse the output of
+    replay as a log."""
     log = analysis_rides.short(tmp_path)
     beside = log.with_name(log.name.split(".")[0] + ".cal.json")
     beside.unlink(missing_ok=True)

@@ -1,5 +1,5 @@
-"""The commands replay, report and plot use a fast loop. For each sample it gives the result of the firmware's meter.
-LEAN.csv contains exactly these results."""
+"""The commands replay, report and plot use a fast loop. For each sample the loop gives the result of the firmware's
+meter. LEAN.csv contains exactly these results."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -12,7 +12,7 @@ from kickstand_tools.replay import replay, replay_engine
 from kickstand_tools.replay.meter_along import MeterAlong
 from support.recordings import smoothed_rides
 
-# numpy computes these two columns. The arc functions of numpy may differ in the last digit of a double.
+# Two columns that numpy computes. The arc functions of numpy may differ in the last digit of a double.
 BY_NUMPY = ("lean_formula_deg", "static_lean_deg")
 
 

@@ -10,7 +10,7 @@ from support.recordings import ride_writer
 
 
 def some_turns(count):
-    """Return turns that are the same in every version of Python."""
+    """Return passes of the loop that are the same in every version of Python."""
     for i in range(count):
         n = (2, 2, 3, 1, 8, 2)[i % 6]
         yield [n * (i * k * 7919 % 4001 - 2000) for k in range(1, 8)], n, n * 5000 + i * 37 % 400 - 200
@@ -20,8 +20,8 @@ FORMAT_1 = 1672459265  # check sum of the bytes that the next test writes
 
 
 def test_the_bytes_of_a_block_are_those_of_format_1(monkeypatch):
-    """Rides of older firmware must stay readable. If you change these bytes, change the format's number and keep the
-    reader of the old format."""
+    """Rides of older firmware must stay readable. If you change the bytes that are written, change the format's number
+    and keep the reader of the old format."""
     monkeypatch.setattr(block_format, "__version__", "0.0.0")
     block = RideBlock(5000)
     block.begin(4092, 7, 3, 123456789012, ride_writer.CHIP, 200, bytes(range(80)))
@@ -47,10 +47,11 @@ def places(block):
 
 @pytest.mark.parametrize("length", range(700, 720))
 def test_the_worst_turn_and_a_position_fit_into_any_block(length):
-    """A quiet turn needs few bits. In a violent turn after quiet turns, every number needs the longest code."""
+    """A pass of the loop with quiet readings needs few bits. In a pass with violent readings after quiet passes, every
+    number needs the longest code."""
     quiet = [800] * 7, 8, 40_000
     count = 0
-    # the first round counts the quiet turns; in the second round the last turn is violent
+    # the first round counts the quiet passes; in the second round the last pass has violent readings
     for violent in (False, True):
         block = RideBlock(5000)
         for sequence in range(2):  # only the second block reserves room for a position from its beginning on

@@ -155,7 +155,7 @@ def test_readings_that_are_missing_in_a_ride_are_reported(board, tmp_path, monke
 
 def test_a_board_without_rides_or_without_the_recorder(board, tmp_path):
     assert "no rides on the board" in command.works("pull", "--out", tmp_path / "out").out
-    del board.modules["kickstand.rides"]  # as on a board with release 0.2.0, which has no such package
+    del board.modules["kickstand.rides"]  # remove a package that release 0.2.0 did not have
     words = "kickstand flash brings it up to date"
     command.refused(tmp_path, "pull", "--out", tmp_path / "out", words=words)
     command.refused(tmp_path, "pull", "--out", tmp_path / "out" / "a" / "b", words="make it first")

@@ -42,7 +42,7 @@ class Clocks:
 class Stream(fake_board.Serial):
     """A serial port with the board's output.
 
-    end: the event after this output. It is "ctrl-c" or another signal, "error", "unplug", "silence" or "asleep".
+    end: the event after this output: "ctrl-c" or another signal, "error", "unplug", "silence" or "asleep".
     last: the board's output after Ctrl-C.
     """
 
@@ -107,7 +107,7 @@ def half_seconds(count):
 
 @pytest.fixture
 def signals():
-    """Restore the handlers after each test. With the default handlers these signals would end pytest itself."""
+    """Restore the handlers after each test. With the default handlers a signal of a test would end pytest itself."""
     numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
     before = [signal.signal(number, lambda *_: None) for number in numbers]
     yield
@@ -194,13 +194,14 @@ def test_a_disturbed_vehicle_name_does_not_end_the_recording(streaming, tmp_path
 
 
 def at_rest(count, seed=0):
-    """Yield turns as ride_writer.turns() does, for an upright bike at rest."""
+    """Yield passes of the loop as ride_writer.turns() does, for an upright bike at rest."""
     for i in range(count):
         yield [2 * mean for mean in (-40, 83, 4096, 0, i % 2, 98, 0)], 2, 10_000
 
 
 def braking_in_a_left_bend(count, seed=0):
-    """Yield turns as ride_writer.turns() does, for a car with forces of 0.2 g backward and 0.3 g to the left."""
+    """Yield passes of the loop as ride_writer.turns() does, for a car with forces of 0.2 g backward and 0.3 g to the
+    left."""
     for _ in range(count):
         yield [2 * mean for mean in (-851, 1324, 4096, 0, 0, 98, 0)], 2, 10_000
 
@@ -215,7 +216,7 @@ def test_a_closed_terminal_loses_nothing(streaming, tmp_path, monkeypatch):
     streaming(data, "ctrl-c")
     terminal = Watched()
     terminal.closed_after = 300
-    with contextlib.suppress(OSError):  # the command cannot write its last output
+    with contextlib.suppress(OSError):  # OSError: the command cannot write its last output
         watched(monkeypatch, terminal, "record", "--out", tmp_path / "ride.csv")
     assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
 
@@ -273,8 +274,8 @@ def test_the_data_before_a_broken_stream_are_kept(end, words, streaming, tmp_pat
 
 
 def test_a_computer_that_slept_is_reported(streaming, tmp_path, monkeypatch):
-    """While the computer slept, the board stopped streaming. The command notices this quickly. It waits longer for a
-    board whose sensor is off."""
+    """While the computer slept, the board stopped streaming. The command notices quickly that the board has stopped.
+    The command waits longer for a board whose sensor is off."""
     monkeypatch.setattr(board_console, "_AWAY_SILENT_S", 0.1)
     data, turns = half_seconds(3)
     streaming(data, "asleep")

@@ -1,7 +1,7 @@
 """No command loses existing data if the power is cut, the disk is full or the cable is pulled at a random moment.
 
-Each case runs a command in a fork of this process. Then a timer's signal ends the fork without a handler, like kill -9,
-or the disk or the cable of the fork fails. The test then examines the remaining files.
+Each case runs a command in a fork of this process. A timer's signal ends the fork without a handler, like kill -9, or
+the disk or the cable of the fork fails. The test then examines the remaining files.
 """
 
 import contextlib
@@ -29,7 +29,8 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has
 
 WEATHER = b"# my weather station\nwhile True: pass\n"
 OFTEN = [("record", "full"), ("pull", "kill"), ("pull", "cable"), ("flash", "cable"), ("smooth", "kill")]
-# number of random moments: FAST for each case in OFTEN, and ALL for each case in KINDS in a nightly run
+# number of random moments at which each case is tested: FAST for the cases in OFTEN, and ALL for all cases in a nightly
+# run
 FAST, ALL = 2, 10
 
 

@@ -47,7 +47,7 @@ def test_a_row_has_the_speed_and_the_place_of_its_turn():
 
 def test_a_turn_that_is_late_by_over_two_samples_is_a_gap():
     """The samples are 5 ms apart. If two samples arrive after 20 ms, they are late by 10 ms, which is exactly two
-    samples. After 20.001 ms they are late by a microsecond more."""
+    samples. If the two samples arrive after 20.001 ms, they are late by a microsecond more."""
     assert block([turn(1_020_000)]).missing_s() == []
     assert block([turn(1_020_001)]).missing_s() == [0.010001]
     assert block([turn(1_010_000), turn(1_520_000)]).missing_s() == [0.5]
@@ -115,8 +115,10 @@ def test_a_file_is_copied_again_if_its_check_sum_is_wrong(monkeypatch):
     found, came = sent(monkeypatch, lines_of(b"abc", b"deX", crc=1), lines_of(b"abcdef"))
     assert found == (b"abcdef", True) and len(came) == 3  # the second attempt is not reported
     assert sent(monkeypatch, lines_of(b"abcd", crc=1), lines_of(b"ab", crc=1))[0] == (b"abcd", False)
-    assert sent(monkeypatch, lines_of(b"abcde"), lines_of(b"abcde"))[0] == (b"abcde", False)  # shorter than announced
-    assert sent(monkeypatch, lines_of(b"abcdefg"))[0] == (b"abcdefg", True)  # a ride may grow
+    # The content is shorter than announced
+    assert sent(monkeypatch, lines_of(b"abcde"), lines_of(b"abcde"))[0] == (b"abcde", False)
+    # The content is longer, because a ride may grow
+    assert sent(monkeypatch, lines_of(b"abcdefg"))[0] == (b"abcdefg", True)
     assert sent(monkeypatch, [b"YWJj", b"YWJ"], [b"YWJj"])[0] == (b"abc", False)
 
 
@@ -197,7 +199,8 @@ def streamed(given, live=None, fails=0):
 
 
 def whole_block(sequence=0, time_us=1_000_000, turns=2, car=False, changed=0) -> StoredBlock:
-    """A block with the calibration of a sensor that is not aligned, and turns of two samples in each 10 ms."""
+    """A block with the calibration of a sensor that is not aligned, and passes of the loop with two samples in each 10
+    ms."""
     calibration = Calibration()
     calibration.set_scale(16384, 131.0)
     calibration.gyro_bias[0] = float(changed)
@@ -236,7 +239,7 @@ def test_a_stream_ends_with_a_full_disk_or_a_new_calibration():
 
 @pytest.mark.parametrize("car", [False, True])
 def test_the_live_readings_of_a_block(car):
-    """The sensor is not aligned, so neither lean nor force is shown. There are 2 turns in 20 ms."""
+    """The sensor is not aligned, so neither lean nor force is shown. The block has 2 entries in 20 ms."""
     seen: list = []
     streamed([whole_block(car=car), whole_block(1, 1_020_000, 0)], seen.append)
     first, second = seen

@@ -71,8 +71,8 @@ def computed(monkeypatch):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_a_recorded_ride_replays_as_the_display_showed(engine, tmp_path, computed):
-    """The board records from power-on. It records one ride before the alignment and one after it. A power cut ends the
-    second ride."""
+    """The board records from power-on. The board records one ride before the alignment and one after it. A power cut
+    ends the second ride."""
     flash = tmp_path / "flash"
     flash.mkdir()
     record = device_plans.run(engine, flash, {**ALIGNED, "seed": 2, "config": {"RECORD": True}})
@@ -115,8 +115,8 @@ def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
 
 
 def test_a_wheel_is_not_misread_while_flash_is_erased(tmp_path, monkeypatch):
-    """Interrupts are off for 45 ms once per block. In this time the firmware notices only one of the wheel's edges, and
-    notices it late."""
+    """Interrupts are off for 45 ms once per block. In these 45 ms the firmware notices only one of the wheel's edges,
+    and notices it late."""
     boards, writes = [], []
     fit, write = Board.fit_wheel, RideRing.write
 
@@ -160,7 +160,7 @@ def test_the_menu_starts_and_ends_a_ride(tmp_path):
     assert record.at(15.9)[0].startswith("Rec         0:0") or record.at(15.9)[0].endswith("*")
     assert record.at(20.8)[0] in ("Rec         0:05", "Rec         0:06")
     assert record.at(20.8)[1].startswith("room ")
-    assert record.at(27)[0] == "Lean  10° right*"  # the filter has settled
+    assert record.at(27)[0] == "Lean  10° right*"  # by now the filter has settled
     assert 34 < record.first("Stop recording") < 36
     assert record.first("Recording ended") < 38
     assert record.at(39.5)[0] == "Lean  10° right "

@@ -94,7 +94,7 @@ def start(recorder):
 
 
 def add(recorder, turns, clock=None, tick=True):
-    """Add `turns` turns of 10 ms, with the same two samples in each turn."""
+    """Add `turns` passes of the loop of 10 ms, with the same two samples in each pass."""
     for _ in range(turns):
         if clock:
             clock.advance(TURN_US)
@@ -115,7 +115,7 @@ def times(keeper):
 
 def test_a_ride_after_an_alignment_begins_like_its_replay(keeper):
     """After an alignment the meter knows that the bike is upright, but a replay does not know it. So the meter restarts
-    without this knowledge."""
+    without knowing that the bike is upright."""
     from kickstand.rides.recording import Recording
 
     settings = SimpleNamespace(SD_SPI=None, RECORD=True, SAMPLE_HZ=200)
@@ -128,7 +128,7 @@ def test_a_ride_after_an_alignment_begins_like_its_replay(keeper):
 
     recording = Recording(settings, ride_writer.CHIP, None, Calibration(), keeper)
     recording.calibration_changed()
-    assert keeper.steps == []  # nothing is being recorded
+    assert keeper.steps == []  # no ride is being recorded
     start(recording.recorder)
     recording.calibration_changed()
     assert keeper.steps == ["begin", "restart", "end", "begin"]
@@ -161,13 +161,13 @@ def test_a_block_is_written_256_bytes_per_turn(recorder, keeper):
     while not keeper.taken:
         before = len(keeper.steps)
         add(recorder, 1)
-        assert len(keeper.steps) == before + 2  # one call of ready(), and one other step
+        assert len(keeper.steps) == before + 2  # the recorder called ready() and did one other step
         written.append(len(keeper.begun))
     assert written == [256, 512, 700, 0]
     assert [len(data) for data in keeper.taken] == [700]
     before = len(keeper.steps)
     recorder.tick()
-    assert len(keeper.steps) == before  # no data wait to be written
+    assert len(keeper.steps) == before  # tick() does nothing, because no block waits to be written
 
 
 def test_all_blocks_have_their_ride_and_sequence(recorder, keeper, clock):
@@ -248,7 +248,7 @@ def test_a_gap_belongs_to_its_own_ride(recorder, keeper, clock):
 
 
 def test_a_position_and_a_speed_belong_to_the_next_turn_only(recorder, keeper):
-    """A turn may have a position without a speed, or a speed without a position. Zero is a valid speed."""
+    """A pass of the loop may have a position without a speed, or a speed without a position. Zero is a valid speed."""
     start(recorder)
     recorder.add_fix(None, ride_writer.place(0))
     recorder.add_fix(None, ride_writer.place(1))  # the newest position is recorded

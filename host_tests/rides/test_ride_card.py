@@ -9,7 +9,7 @@ from support.mpy import run_mpy
 SECTOR_S = 3.1e-3  # time to transfer a sector at 1.32 MHz, including the commands
 TURN_S, BEGIN_S = 0.1, 1.0
 
-# A card of 32 GB. Only its sectors that are not zero are kept in RAM. Its clusters have the usual 32 KB.
+# A card of 32 GB. Only the card's sectors that are not zero are kept in RAM. The card's clusters have the usual 32 KB.
 _CARD = """
 import json, os
 from kickstand.rides import flash_ring, ride_paths
@@ -85,13 +85,13 @@ def test_no_turn_waits_long_for_a_card(rides, parts):
     script = _CARD + _MANY.replace("RIDES", str(rides)).replace("PARTS", str(parts))
     took = json.loads(run_mpy(script))
     worst = {name: max(sectors) for name, sectors in took.items() if name != "begin"}
-    print(rides, parts, "sectors:", took["begin"], worst)  # for pytest -s
+    print(rides, parts, "sectors:", took["begin"], worst)  # printed with pytest -s
     assert took["begin"] * SECTOR_S < BEGIN_S
     assert all(sectors * SECTOR_S < TURN_S for sectors in worst.values()), worst
 
 
-# The board records four rides of three blocks. The first ride is removed to make room for the fourth. Then the power is
-# cut before each write of a sector. Completed blocks must be kept, and the next ride must be recorded.
+# The board records four rides of three blocks. The first ride is removed to make room for the fourth. The power is cut
+# before each write of a sector. Completed blocks must be kept, and the next ride must be recorded.
 _CUTS = """
 states = []
 safe = {}  # blocks of each ride
@@ -195,5 +195,6 @@ print(len(opened))
 
 
 def test_a_folder_in_the_flash_is_not_the_card():
-    """A copy of a card's files may leave a folder /sd in the flash. Rides must not be written to this folder."""
+    """A copy of a card's files may leave a folder /sd in the flash. Rides must not be written to a folder /sd in the
+    flash."""
     assert int(run_mpy(_FOLDER)) == 1

@@ -1,4 +1,4 @@
-"""The format of recorded rides. It is exact on both engines. A reader skips damaged blocks, but no other blocks."""
+"""The format of recorded rides is exact on both engines. A reader skips damaged blocks, but no other blocks."""
 
 import io
 import math
@@ -28,8 +28,8 @@ _EXTREMES = [
     ([1, -1, 4096, 0, 0, -1, 1], 2, 9999),
 ]
 
-# Encode random entries with machine code and with Python. Most entries are typical. Both must give the same states and
-# bytes.
+# Encode random entries with machine code and with Python. Most entries are typical. Machine code and Python must give
+# the same states and bytes.
 _BOTH = """
 import random
 from array import array
@@ -74,13 +74,13 @@ def written(turns):
 
 
 def held(block):
-    """Return [(sums, n, dt_us), ...] of the loop turns in a block."""
+    """Return [(sums, n, dt_us), ...] of the entries in a block."""
     times = [block.time_us] + [turn.time_us for turn in block.turns]
     return [(t.sums, t.n, t.time_us - before) for t, before in zip(block.turns, times[:-1], strict=True)]
 
 
 def test_every_turn_comes_back_exactly():
-    """The written turns include turns with the largest numbers."""
+    """The written passes of the loop include passes with the largest numbers."""
     turns = [*_EXTREMES, *ride_writer.turns(200), *_EXTREMES]
     data = written(turns)
     block = block_reader.parse(data)
@@ -170,7 +170,7 @@ def test_a_block_with_impossible_values_is_bad(tmp_path):
     start = head + store.BODY_LENGTH
     forged = []
     fields = struct.unpack_from(block_format.HEAD, good)
-    for i in (7, 8, 9):  # these fields are the units of force and rate, and the samples per second
+    for i in (7, 8, 9):  # fields 7 to 9 are the units of force and rate, and the samples per second
         forged.append(struct.pack(block_format.HEAD, *fields[:i], 0, *fields[i + 1 :]) + good[head:])
     for value in (math.nan, math.inf, 1e38):
         at = start - 4 * len(ride_writer.calibration().parameters())

@@ -1,4 +1,4 @@
-"""Positions in recorded rides are exact, belong to the right turn, and displace no other data."""
+"""Positions in recorded rides are exact, belong to the right samples, and displace no other data."""
 
 import struct
 
@@ -11,7 +11,7 @@ from support import device_plans, engines
 from support.recordings import ride_writer
 from test_recorder import rides
 
-MIDNIGHT_S = 1_798_761_600.0  # 1 January 2027
+MIDNIGHT_S = 1_798_761_600.0  # 1 January 2027 in Unix time
 DEGREE = 6_000_000  # one degree in units of 0.00001 minutes
 
 
@@ -21,7 +21,7 @@ def expected(k: int) -> tuple[float, float, float]:
 
 
 def found(blocks) -> list[tuple[int, tuple[float, float, float | None]]]:
-    """Return [(number of the turn, position), ...] of all positions in the blocks."""
+    """Return [(number of the loop's pass, position), ...] of all positions in the blocks."""
     turns = [turn for block in blocks for turn in block.turns]
     return [(i, (t.place.lat_deg, t.place.lon_deg, t.place.utc_s)) for i, t in enumerate(turns) if t.place]
 
@@ -43,7 +43,8 @@ def test_no_turn_is_lost_and_positions_keep_their_turn(every, length):
     assert [turn.speed_mps for block in blocks for turn in block.turns][:101:100] == [0.0, 1.0]
     for block, content in zip(blocks, data):
         free = content[: -6 - 16 * sum(bool(turn.place) for turn in block.turns)]
-        assert len(free) - len(free.rstrip(b"\0")) < 16 + 60  # the unused bytes have room for one turn only
+        # The unused bytes have room for the samples of one pass only
+        assert len(free) - len(free.rstrip(b"\0")) < 16 + 60
 
 
 def said(*values: int) -> list:
@@ -107,8 +108,8 @@ def test_a_log_has_no_empty_columns(tmp_path):
 
 
 def test_an_older_reader_finds_all_but_the_positions():
-    """An older reader takes the number of positions for a byte of the version's name. It ignores the positions' bytes,
-    where it expects zeros."""
+    """An older reader takes the number of positions for a byte of the version's name. The older reader ignores the
+    positions' bytes, where it expects zeros."""
     data, _ = ride_writer.blocks(3, places_every=10)
     for content in data:
         fields = struct.unpack_from("<4sHHIIqhHHH11sB", content)

@@ -156,7 +156,7 @@ def test_faults_have_their_codes():
 
 
 def test_ending_closes_once_and_abandoning_raises_nothing(root, monkeypatch):
-    RideRing(FLASH).end()  # no part is open
+    RideRing(FLASH).end()  # end() of a ring without an open part
     file = File(error=OSError(5))
     ring = begun(file, monkeypatch)
     ring.abandon()
@@ -178,7 +178,7 @@ def test_numbers_of_rides_continue(root):
     Path("rides").mkdir()
     assert ride_paths.newest_ride("rides") == 0
     old_ride(root, 99)
-    (root.path / "rides/002").mkdir()  # without parts, as after a power cut before the first block
+    (root.path / "rides/002").mkdir()  # a group without parts, as after a power cut before the first block
     ring = RideRing(FLASH)
     assert ring.begin() == ring.begin() == 100
     write_block(ring)

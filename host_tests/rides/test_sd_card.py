@@ -58,8 +58,8 @@ def test_without_a_card_nothing_waits_for_one(tmp_path):
 
 
 def test_a_card_busy_within_the_specification_loses_nothing(tmp_path):
-    """The card is busy for 250 ms at each block, once in eight seconds. The sensor's FIFO keeps readings for a longer
-    time."""
+    """The card is busy for 250 ms at each block, once in eight seconds. The sensor's FIFO keeps readings for more than
+    250 ms."""
     record = run(tmp_path, {"faults": [[5.0 + 8.0 * i, "busy_next_s", 0.25] for i in range(4)]})
     assert len(blocks(record)) >= 3
     assert missing_s(record) == []
@@ -82,8 +82,8 @@ def test_a_failing_card_ends_the_ride_without_a_restart(fault, tmp_path):
 
 
 def test_a_cards_room_is_counted_before_the_watchdog_runs(tmp_path):
-    """The card has no valid count of its free room (FSINFO). Reading its whole FAT takes longer than the watchdog's
-    time-out."""
+    """The card has no valid count of its free room (FSINFO). Reading the whole FAT of the card takes longer than the
+    watchdog's time-out."""
     record = run(tmp_path, {"sectors": 1 << 24, "read_s": 0.006, "fsinfo": False}, until=40)
     assert record.first("SD card") < 1.0
     assert record.first("Raw   20°") < 30

@@ -17,11 +17,11 @@ def test_the_deadline_stops_the_clock_and_stays():
     clock.set_deadline(None)
     clock.advance(1)
     assert clock.now_us == 501
-    assert not issubclass(PowerOff, Exception)  # so PowerOff also ends firmware that catches every Exception
+    assert not issubclass(PowerOff, Exception)  # firmware that catches every Exception cannot catch PowerOff
 
 
 def test_pace_follows_the_host():
-    """In this test the host's time passes only in sleep()."""
+    """The host's time passes only in sleep()."""
     before, slept_s = (clock_module._host_ns, clock_module._host_sleep), []
     clock_module._host_ns = lambda: 1_000_000_000_000 + round(1e9 * sum(slept_s))
     clock_module._host_sleep = slept_s.append

@@ -11,7 +11,7 @@ OLEDS = ("ssd1306", "sh1106")
 KINDS = ("lcd",) + OLEDS
 BUS_HZ = (None, 100_000)
 TURN_MS = 10
-LONGEST_US = 7500  # longest time of the transfers in a turn of 10 ms
+LONGEST_US = 7500  # longest time of the transfers in a pass of 10 ms
 OLD, NEW = ("Lean  19\xdf right", "first"), ("Lean  28\xdf left", "second line")
 
 
@@ -28,7 +28,7 @@ def open_display(board, hz=None, kind="auto", wiring=1):
 
 
 def turns(board, display, count, after=lambda: None):
-    """Run this many turns of the loop. Return the duration of the longest turn in us."""
+    """Run this many passes of the loop. Return the duration of the longest pass in us."""
     from time import sleep_us, ticks_diff, ticks_ms, ticks_us  # type: ignore[attr-defined]
 
     longest = 0
@@ -81,7 +81,8 @@ def test_no_turn_delays_the_loop(board, display):
     for k in range(20):
         display.show(f"{k * 1234567:016d}", f"{k * 7654321:016d}")
         longest = turns(board, display, 10)
-        limit = LONGEST_US if not board.lcd.address == 0x27 else 12_800  # dashes first, then the new line
+        # An LCD needs longer: dashes first, then the new line
+        limit = LONGEST_US if not board.lcd.address == 0x27 else 12_800
         assert longest <= limit, longest
 
 
@@ -116,7 +117,8 @@ def test_after_any_unplug_it_returns_and_shows_nothing_old(board, display):
         turns(board, display, 40)
         display.show(*NEW)
         turns(board, display, gap_turns % 7)  # the display may be removed during a transfer of the new lines
-        for begun in (0, 12) if isinstance(board.lcd, Lcd) else (0,):  # again during the initialisation
+        # An LCD is also removed during its initialisation
+        for begun in (0, 12) if isinstance(board.lcd, Lcd) else (0,):
             turns(board, display, begun)
             board.remove_lcd()
             board.clock.advance(1000 * gone_ms)
@@ -256,7 +258,7 @@ def test_a_status_that_is_never_on_leaves_no_oled_dark(board, display):
 
 def test_no_status_leaves_an_oled_dark():
     """The driver recognises the two kinds of controller by their status. The driver sends the supply commands of both
-    kinds to every controller. If it mistakes one kind for the other, the picture is only two columns off."""
+    kinds to every controller. If the driver mistakes one kind for the other, the picture is only two columns off."""
     for kind in OLEDS:
         for identity in range(16):
 
@@ -313,7 +315,7 @@ def test_each_wiring_of_a_backpack_works():
 
 def test_the_rows_of_a_larger_display_are_blanked():
     """The third and fourth row of a 20x4 display show the memory behind the first two rows. An earlier program may have
-    written to this memory."""
+    written to the memory behind the rows."""
 
     def run(board):
         board.lcd.ddram[0x10:0x28] = board.lcd.ddram[0x50:0x68] = b"x" * 24

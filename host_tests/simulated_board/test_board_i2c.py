@@ -93,18 +93,18 @@ def edges_in_a_transfer(machine, pulses_per_s):
 
 
 def test_interrupts_of_an_esp32_wait_for_the_end_of_a_transfer():
-    """During a transfer, an ESP32 keeps at most eight interrupts. The handlers of these interrupts run after the
-    transfer, and see the pin's level at that time. On a Pico the handlers run at once."""
+    """During a transfer, an ESP32 keeps at most eight interrupts. The interrupts' handlers run after the transfer, and
+    see the pin's level at that time. On a Pico the handlers run at once."""
     assert edges_in_a_transfer("pico", 300)[0] in (5, 6, 7)
     during, after = edges_in_a_transfer("esp32", 300)
     assert during == 0 and len(after) in (5, 6, 7) and len(set(after)) == 1
     during, after = edges_in_a_transfer("esp32", 1000)
-    assert during == 0 and len(after) in (8, 9)  # one more edge may follow the transfer
+    assert during == 0 and len(after) in (8, 9)  # one more edge may come after the transfer
 
 
 def test_a_classic_esp32_crashes_if_a_flash_pin_is_driven():
     def drive(number):
-        Pin(number)  # a Pin without a mode is harmless
+        Pin(number)  # creating a Pin without a mode changes nothing
         Pin(number, Pin.OPEN_DRAIN)
 
     for machine, number, outcome in (
@@ -118,7 +118,7 @@ def test_a_classic_esp32_crashes_if_a_flash_pin_is_driven():
 
     def read(board):
         assert isinstance(raised(drive, 34), ValueError)
-        assert Pin(34, Pin.IN, Pin.PULL_UP).value() == 0  # the pin floats
+        assert Pin(34, Pin.IN, Pin.PULL_UP).value() == 0  # without a pull-up the pin floats
         assert Pin(33, Pin.IN, Pin.PULL_UP).value() == 1
 
     check(read, machine="esp32")

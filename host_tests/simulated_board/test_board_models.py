@@ -291,8 +291,8 @@ def test_a_panel_is_dark_without_its_own_supply(kind, supply, off):
 
 @pytest.mark.parametrize("kind", ["ssd1306", "sh1106"])
 def test_each_command_takes_its_arguments(kind):
-    """After each of these commands and its arguments, the next command is understood. So no command takes too many or
-    too few bytes."""
+    """After each of these commands and its arguments, the next command is understood. The test shows that no command
+    takes too many or too few bytes."""
     for code in (0x81, 0xA8, 0xD3, 0xD5, 0xD9, 0xDA, 0xDB):
         oled = Oled(Clock(), kind=kind)
         commands(oled, code, 0x12, 0x45)
@@ -385,7 +385,7 @@ def test_pins_are_those_of_the_controllers(board):
 
 
 def test_a_sentence_ends_with_its_check_sum():
-    """This is a real receiver's sentence."""
+    """The sentence is from a real receiver."""
     body = "GPGGA,092750.000,5321.6802,N,00630.3372,W,1,8,1.03,61.7,M,55.2,M,,"
     assert sentence(body) == f"${body}*76\r\n"
 

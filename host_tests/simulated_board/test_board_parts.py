@@ -149,7 +149,7 @@ def test_any_fault_of_the_cards_driver_is_a_card_error(error, reason, monkeypatc
 
 
 def oled():
-    """Return the driver's module. Its import needs a board's `time`."""
+    """Return the driver's module. The import of the module needs a board's `time`."""
     found = []
 
     def program(board):
@@ -220,7 +220,8 @@ def test_a_picture_is_redrawn_only_for_other_values():
 
 @pytest.mark.parametrize(("free", "turns"), [(1_000_000, 50), (100_000, 10), (61_000, 3), (0, 3)])
 def test_garbage_is_collected_more_often_in_a_small_heap(free, turns, monkeypatch):
-    """One pass of the loop uses 2000 bytes. Half of the present heap may fill up. The heap may still grow by 60 KB."""
+    """One pass of the loop uses 2000 bytes of heap. Between two collections, the passes may use half of the present
+    free heap. The heap may still grow by 60 KB."""
     from kickstand.board import port
 
     heap = types.SimpleNamespace(HEAP_DATA=4, idf_heap_info=lambda _: [(9, 9, 20_000, 9), (9, 9, 60_000, 9)])
@@ -245,7 +246,7 @@ def fresh_port(monkeypatch, machine):
         assert on_board(program, machine="tested")[0] == "returned"
         return types.SimpleNamespace(**vars(found[0]))
     finally:
-        assert on_board(program)[0] == "returned"  # the other tests' board is a Pico
+        assert on_board(program)[0] == "returned"  # the board of the other tests is a Pico
 
 
 CLASSIC = (1, 3, 6, 7, 8, 9, 10, 11)
@@ -267,7 +268,8 @@ CLASSIC = (1, 3, 6, 7, 8, 9, 10, 11)
     ],
 )
 def test_pins_that_the_chip_needs_are_taken(chip, taken, monkeypatch):
-    """An output on one of these pins would stop the board. Only a classic chip has pins without outputs."""
+    """An output on a pin that the chip itself needs would stop the board. Only a classic chip has pins without
+    outputs."""
     port = fresh_port(monkeypatch, f"Some board with {chip}")
     assert port.IS_ESP32 and port.TAKEN_PINS == taken
     assert port.INPUT_PINS == ((34, 35, 36, 37, 38, 39) if taken == CLASSIC else ())
@@ -293,7 +295,8 @@ def test_known_boards_have_usual_pins(machine, sensor, gps, button, monkeypatch)
     ("entries", "opened"),
     [
         ([("lib", 0x4000, 0, 0), ("sd", 0x4000, 0)], 0),
-        ([("sd", 0x4000, 0, 0), ("other", 0x4000, 0)], 1),  # a folder in flash, and another mounted file system
+        # The listing has a folder in flash, and another mounted file system
+        ([("sd", 0x4000, 0, 0), ("other", 0x4000, 0)], 1),
     ],
 )
 def test_a_card_is_mounted_once(entries, opened, monkeypatch):

@@ -5,7 +5,7 @@ from kickstand_tools.simulated_board.simulator import Board
 from support.board_access import level
 from test_board_speed import Listing
 
-DAY = 26 << 9 | 11 << 5 | 21  # 21 November 2026
+DAY = 26 << 9 | 11 << 5 | 21  # 21 November 2026, in the form of Gps.place()
 NOON = 12 * 3600 * 1000
 
 
@@ -51,9 +51,9 @@ def test_an_invalid_position_is_none_and_does_no_harm():
     assert places_of(rmc(mode=",N")) == []
     assert places_of(rmc(mode=",E")) == []
     assert places_of(sentence("GPRMC,,V,,,,,,,,,,N")) == []
-    assert places_of(sentence("GPRMC,120000.00,A,4807.038,N,01131.000,E,19.4"))[0][0] == 0  # has no date
+    assert places_of(sentence("GPRMC,120000.00,A,4807.038,N,01131.000,E,19.4"))[0][0] == 0  # the sentence has no date
     assert places_of(sentence("GPVTG,84.4,T,,M,19.438,N,36.0,K,A")) == []
-    assert places_of(rmc() + rmc(), step_ms=10) == places_of(rmc())  # the same fix again
+    assert places_of(rmc() + rmc(), step_ms=10) == places_of(rmc())  # a repeated fix gives no second position
 
 
 def test_a_date_that_is_not_known_yet_is_0():
@@ -87,7 +87,7 @@ def test_an_old_position_is_not_returned_as_new():
         assert gps.place(5000) is None
         gps._uart = Listing(rmc(time="120005.00").encode())
         assert [gps.poll(ms) is None for ms in (5990, 6000)] == [True, False]
-        for ms in (7000, 8000, 9000, 10000):  # then only VTG arrives, whose speed is used if RMC is 3 s old
+        for ms in (7000, 8000, 9000, 10000):  # only VTG arrives, whose speed is used if the last RMC is 3 s old
             gps._uart = Listing(sentence("GPVTG,84.4,T,,M,19.438,N,36.0,K,A").encode())
             assert (gps.poll(ms) is None) == (ms < 9000), ms
             assert gps.place(ms) is None, ms

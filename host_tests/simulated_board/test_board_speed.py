@@ -33,9 +33,9 @@ def speeds_of(text, piece=1000, step_ms=10, steps=60):
 
 
 def busy_with_transfers():
-    """Return turn(number), which simulates an ESP32's SoftI2C transfers. Call it in each turn of the loop.
+    """Return turn(number), which simulates an ESP32's SoftI2C transfers. Call turn(number) in each pass of the loop.
 
-    The sensor's transfer takes 1.3 ms in each turn. The display's transfers take 12 ms every 100 ms.
+    The sensor's transfer takes 1.3 ms in each pass. The display's transfers take 12 ms every 100 ms.
     """
     from machine import Pin, SoftI2C  # type: ignore[import-not-found]
 
@@ -153,8 +153,8 @@ def test_damaged_lines_are_refused_and_the_next_is_read():
         # A sentence whose first two letters are damaged is still read. Every speed that is read is true.
         assert (10000 in speeds_of(bad)) <= (at in (1, 2)), bad
     for at in range(1, len(good) - 3):
-        assert speeds_of(good[at:] + later) == [5000]  # the beginning is missing
-        assert speeds_of(good[:at] + later) == [5000]  # the end is missing
+        assert speeds_of(good[at:] + later) == [5000]  # the beginning of the first sentence is missing
+        assert speeds_of(good[:at] + later) == [5000]  # the end of the first sentence is missing
     assert speeds_of("$" * 1000 + good) == [10000]
     assert speeds_of("\x00\xff".encode() * 500 + b"\n" + good.encode()) == [10000]
 
@@ -182,9 +182,9 @@ def test_a_delayed_fix_is_rejected_or_has_its_age():
         assert hear(gps, 1, 1300) == ([True], 0)
         assert hear(gps, 2, 2200) == ([True], 0)
         assert hear(gps, 3, 3700) == ([True], 500)
-        assert hear(gps, 4, 6700)[0] == []  # 2.5 s late
+        assert hear(gps, 4, 6700)[0] == []  # the fix is 2.5 s late
         assert hear(gps, 7, 7210) == ([True], 10)
-        assert hear(gps, 30, 8210) == ([True], 0)  # the receiver's clock was corrected
+        assert hear(gps, 30, 8210) == ([True], 0)  # the receiver has corrected its clock
         assert hear(gps, 31, 9210) == ([True], 0)
 
 
@@ -236,7 +236,8 @@ def ride(t_s):
 
 
 def check_wheel(got, tolerance):
-    assert not [1 for t_s, _, _ in got if t_s < 5.0]  # a wheel that has never turned may be unplugged
+    # Before the first pulse there is no speed, because the wheel may be unplugged
+    assert not [1 for t_s, _, _ in got if t_s < 5.0]
     for t_s, speed, age_us in got:
         true = ride(t_s - age_us / 1e6)
         assert abs(speed - true) < tolerance or true < 1.5 or t_s > 45.0, (t_s, speed, true)
@@ -258,8 +259,8 @@ def test_a_contact_that_bounces_is_counted_once():
 
 
 def test_a_storm_of_pulses_is_reported_and_the_speed_returns():
-    """The firmware disables the interrupt of the wheel for some time. Here the pulses last twice as long, so they still
-    come when the interrupt is enabled again."""
+    """The firmware disables the interrupt of the wheel for some time. The pulses of this test last twice as long, so
+    they still come when the interrupt is enabled again."""
     for port, pulses_per_s in (("rp2", 50_000), ("esp32", 6_000)):
 
         def fit(board, pulses_per_s=pulses_per_s):
@@ -296,8 +297,8 @@ def wheel_on_an_esp32(pulses_per_metre, speed_mps, seconds=21.0, **kind):
 
 
 def test_an_esp32_counts_pulses_that_fall_into_a_transfer():
-    """Interrupts wait during a transfer. If a contact closes and opens in that time, two interrupts see only the open
-    contact."""
+    """Interrupts wait during a transfer. If a contact closes and opens during a transfer, two interrupts see only the
+    open contact."""
     for pulses, hz in ((0.5, 13.3), (3.0, 149.3), (50.0, 290.0)):
         mean, deviation, faults = wheel_on_an_esp32(pulses, hz / pulses)
         assert abs(mean * pulses - hz) < 0.025 * hz, (pulses, hz, mean)
@@ -306,7 +307,7 @@ def test_an_esp32_counts_pulses_that_fall_into_a_transfer():
 
 
 def test_a_contact_that_bounces_is_counted_once_on_an_esp32_too():
-    """The contact may bounce during a transfer, at any speed and at any time of the loop's turn."""
+    """The contact may bounce during a transfer, at any speed and at any time in a pass of the loop."""
     for speed in (1.3, 7.77, 33.3):
         mean, _, _ = wheel_on_an_esp32(0.5, speed, bounce_us=2000)
         assert abs(mean - speed) < 0.01 * speed, (speed, mean)
@@ -387,7 +388,7 @@ def test_sentences_without_a_speed_are_named():
 
 
 def test_u_blox_s_binary_protocol_is_named():
-    """The message is a NAV-PVT of 92 bytes. Its bytes may contain line ends anywhere."""
+    """The message is a NAV-PVT of 92 bytes. The message's bytes may contain line ends anywhere."""
     for filler in (b"\x00", b"\x0a", b"\x24"):
         assert fault_of(b"\xb5b\x01\x07\x5c\x00" + filler * 92 + b"\x12\x34") == ("gps-other", "UBX")
     assert fault_of(bytes(range(256))) == ("gps-garbled",)

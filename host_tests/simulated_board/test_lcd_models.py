@@ -52,8 +52,8 @@ def status(made):
     ("lines", "begin", "direction", "after"),
     [
         (2, 0x00, 0x06, 0x01),
-        (2, 0x27, 0x06, 0x40),  # the end of the first line
-        (2, 0x67, 0x06, 0x00),  # the end of the second line
+        (2, 0x27, 0x06, 0x40),  # at the end of the first line
+        (2, 0x67, 0x06, 0x00),  # at the end of the second line
         (2, 0x40, 0x04, 0x27),  # backwards
         (2, 0x00, 0x04, 0x67),
         (1, 0x27, 0x06, 0x28),
@@ -82,7 +82,7 @@ def test_the_display_shifts_against_its_text():
     made = written(lcd(), "0123456789abcdefXY", 0x80)
     send(made, 0x18)  # the text moves left
     assert made.text()[0] == "123456789abcdefX"
-    send(made, 0x1C, 0x1C)  # the text moves right; the end of the line is before its start
+    send(made, 0x1C, 0x1C)  # the text moves right, so the end of the line is shown before its beginning
     assert made.text()[0] == " 0123456789abcde"
     send(made, 0x02)
     made.clock.advance(1520)
@@ -193,7 +193,7 @@ def test_other_backpacks_have_other_pins(wiring, rs, enable, light, lit, data):
     made = lcd()
     made.wiring = wiring
     send(made, 0x80)
-    for half in (0x4, 0x1):  # the letter A
+    for half in (0x4, 0x1):  # the two halves of the code of the letter A
         for pulse in (1, 0):
             made.write_byte(half << data | 1 << rs | pulse << enable | lit << light)
             made.clock.advance(90)
@@ -234,7 +234,7 @@ def test_the_lean_of_the_lean_page(line, lean):
         ([0, 0x18, 0x18, 0x18, 0x18, 0, 0, 0], "?"),
         ([0x0A] * 8, "?"),
         ([0x10, 0x18] * 4, "?"),
-        ([0xE0] * 8, " "),  # only five dots of a row exist
+        ([0xE0] * 8, " "),  # a row has only five dots
     ],
 )
 def test_patterns_look_like_letters(rows, letter):

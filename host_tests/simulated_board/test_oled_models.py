@@ -35,7 +35,7 @@ def test_page_addressing_stays_within_its_page():
     assert places(made) == {(2, 126): 1, (2, 127): 2, (2, 0): 3}
     other = oled("sh1106", 0xB7, 0x02, 0x18)
     store(other, 1, 2, 3)
-    assert places(other, 132) == {(7, 130): 1, (7, 131): 3}  # it stays at its last column
+    assert places(other, 132) == {(7, 130): 1, (7, 131): 3}  # the address stays at the last column
 
 
 def test_horizontal_and_vertical_addressing_use_a_window():
@@ -45,10 +45,10 @@ def test_horizontal_and_vertical_addressing_use_a_window():
     made = oled("ssd1306", 0x20, 1, 0x21, 5, 6, 0x22, 1, 2)
     store(made, 1, 2, 3, 4, 5)
     assert places(made) == {(1, 5): 5, (2, 5): 2, (1, 6): 3, (2, 6): 4}
-    made = oled("ssd1306", 0x20, 0)  # the whole memory at first
+    made = oled("ssd1306", 0x20, 0)  # at first the window is the whole memory
     store(made, *range(1, 130))
     assert (made.ram[127], made.ram[128]) == (128, 129)
-    order(made, 0x05, 0x13)  # these commands act only in page addressing
+    order(made, 0x05, 0x13)  # the commands for page and column act only in page addressing
     store(made, 99)
     assert places(made)[1, 1] == 99
 
@@ -77,7 +77,7 @@ def test_a_pixel_is_where_the_settings_put_it(kind):
     order(made, 0xD3, 0, 0xA8, 31)
     assert lit(made) == [(10, 3)] and made.rows == 32
     order(made, 0xA8, 9)
-    assert lit(made) == []  # only the first ten rows are driven
+    assert lit(made) == []  # the panel drives only the first ten rows
     order(made, 0xA8, 10)
     assert lit(made) == [(10, 3)]
 
@@ -106,7 +106,7 @@ def test_the_settings_after_a_reset():
     for kind, contrast, status_off in (("ssd1306", 0x7F, 0x43), ("sh1106", 0x80, 0x48)):
         made = Oled(Clock(), kind=kind)
         assert (made.contrast, made.read_byte(), made.rows, made.alternate) == (contrast, status_off, 64, True)
-        assert not made.on and any(made.ram)  # its memory has arbitrary content
+        assert not made.on and any(made.ram)  # after power-on the memory has arbitrary content
         first = bytes(made.ram)
         made.power_on()
         assert bytes(made.ram) != first

@@ -1,4 +1,4 @@
-"""The models of contacts, the SD card and the chips' pins, by known numbers."""
+"""The models of contacts, the SD card and the chips' pins are compared with known numbers."""
 
 import pytest
 from kickstand_tools.simulated_board.clock import Clock
@@ -38,7 +38,7 @@ def test_presses_now_follow_each_other():
         button.press(None, 100_000)
     found = [at_us for at_us, level in edges(button, clock, 1_000_000) if level == 0]
     assert found[0] == 5000 and min(at_us for at_us in found if at_us > 200_000) == 5000 + 100_000 + 150_000
-    button.press(None, 1000)  # later presses begin at once
+    button.press(None, 1000)  # after the earlier presses, a press begins at once
     assert edges(button, clock, 1_000_001)[0] == (1_000_000, 0)
 
 
@@ -66,7 +66,8 @@ def test_a_capacitor_holds_the_pin_low():
     ("speed", "per_metre", "count"), [(10.0, 0.5, 5), (20.0, 0.5, 10), (10.0, 2.0, 20), (0.02, 50.0, 0)]
 )
 def test_a_wheel_closes_once_per_turn(speed, per_metre, count):
-    """The magnet closes the contact for a tenth of the way between two pulses. At first it is half a turn away."""
+    """The magnet closes the contact for a tenth of the way between two pulses. At first the magnet is half a turn
+    away."""
     clock = Clock()
     wheel = Wheel(clock, lambda t_s: speed, per_metre)
     found = edges(wheel, clock, 1_000_000)
@@ -201,9 +202,9 @@ def test_a_cards_size_is_in_its_csd():
     assert command(made, 9) == 0x00
     assert exchanged(made, 0xFF, 0xFF)[1] == 0xFE
     csd = made.exchange(b"\xff" * 16)
-    assert int.from_bytes(csd[7:10], "big") == 3  # (3 + 1) * 512 KB
+    assert int.from_bytes(csd[7:10], "big") == 3  # the size is (3 + 1) * 512 KB
     assert csd[0] == 0x40 and csd[1:7] == bytes(6) == csd[10:]
-    assert exchanged(made, 0xFF, 0xFF, 0xFF) == [0xFF] * 3  # the check sum and the end
+    assert exchanged(made, 0xFF, 0xFF, 0xFF) == [0xFF] * 3  # two bytes of check sum, and one after the data
     assert (made.ioctl(4, 0), made.ioctl(5, 0), made.ioctl(1, 0)) == (4096, 512, 0)
     made.writeblocks(2, b"a" * 512 + bytes(512) + b"c" * 512)
     assert sorted(made.data) == [2, 4]  # sectors of zeros are not stored

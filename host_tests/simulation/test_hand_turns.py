@@ -23,7 +23,7 @@ from kickstand_tools.simulation.scripted import sensor_errors
 )
 def test_the_rates_of_a_hand_turn_gravity_to_the_next_pose(before, after, degrees):
     """The test integrates the direction up, u, in the sensor's axes: du/dt = -rate x u. The turn lasts from 1 to 3 s.
-    Halfway, at 2 s, its rate is largest: 15 / 8 of the mean rate."""
+    Halfway through the turn, at 2 s, the rate is largest: 15 / 8 of the mean rate."""
     part = SimpleNamespace(vehicle_from_sensor=np.eye(3).ravel().tolist(), world=lambda motion: motion)  # no errors
     world = sensor_errors.turning(part, before, after, 1.0, 3.0)
     up, step_s = np.array(before) / np.linalg.norm(before), 0.002
@@ -42,7 +42,7 @@ def test_the_rates_of_a_hand_turn_gravity_to_the_next_pose(before, after, degree
 
 def test_a_low_pass_of_second_order_at_its_own_frequency():
     """The gain is 1 at 0 Hz. At the natural frequency the gain is 1 / (2 damping), and the delay a quarter of a period.
-    Far above this frequency, the gain falls with the square of the frequency."""
+    Far above the natural frequency, the gain falls with the square of the frequency."""
     rate_hz, t_s = 1000.0, np.arange(4000) / 1000.0
     inner = slice(1000, 3000)
     assert second_order(np.ones(4000), 10.0, 0.7, rate_hz)[inner] == pytest.approx(np.ones(2000), abs=1e-6)

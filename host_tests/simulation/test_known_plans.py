@@ -1,6 +1,7 @@
 """A profile and a seed give the same ride as in earlier versions, because published figures depend on it.
 
-The figures here describe the plans of each profile, and one ride. If you change a profile on purpose, update its line.
+The figures in this file describe the plans of each profile, and one ride. If you change a profile on purpose, update
+its line.
 """
 
 import numpy as np
@@ -18,7 +19,8 @@ def figures(name: str) -> list[float]:
     """Return seven figures of a profile's plans, each summed over all seeds.
 
     The first is the number of legs. The next five are sums over the legs: duration, speed, lean, roll time, and all
-    other values. In these sums each value is multiplied by the number of its leg. The last is a sum of the conditions.
+    other values. In the sums over the legs each value is multiplied by the number of its leg. The last is a sum of the
+    conditions.
     """
     found = np.zeros(7)
     for seed in SEEDS:

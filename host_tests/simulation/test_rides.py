@@ -62,7 +62,8 @@ def test_balance_has_no_side_force_and_the_right_yaw_rate():
 
 
 def test_kickstand_and_upright_poses_have_their_leans():
-    assert Ride([kickstand(5, lean_deg=15)]).motion(1.0)[0] == pytest.approx(np.sin(np.radians(15)))  # on the right
+    # The kickstand is on the right
+    assert Ride([kickstand(5, lean_deg=15)]).motion(1.0)[0] == pytest.approx(np.sin(np.radians(15)))
     ride = Ride([kickstand(5), upright(5)])
     assert ride.truth(0.0)[3] == "kickstand"
     assert ride.truth(1.0)[0] == pytest.approx(KICKSTAND_DEG)
@@ -71,7 +72,7 @@ def test_kickstand_and_upright_poses_have_their_leans():
     assert up == pytest.approx(np.cos(np.radians(KICKSTAND_DEG)))
     assert forward == 0.0 and not any(rates)
     lean = np.array([ride.truth(x)[0] for x in np.arange(7.0, 12.0, 0.01)])
-    assert 0.01 < np.abs(lean).max() < 0.2  # held by a person
+    assert 0.01 < np.abs(lean).max() < 0.2  # a person holds the bike, so it sways
     assert ride.truth(9.0)[1:] == (0.0, 0.0, "upright")
 
 
@@ -93,11 +94,11 @@ def test_bike_steered_by_hand_stays_in_balance():
     bike = HandBike(vibration_g=0.0)
     assert bike.truth(1.0)[3] == "kickstand"
     bike.command("left")
-    assert bike.truth(2.0)[:2] == (pytest.approx(KICKSTAND_DEG), 0.0)  # not from the kickstand
+    assert bike.truth(2.0)[:2] == (pytest.approx(KICKSTAND_DEG), 0.0)  # the bike does not ride off from the kickstand
     bike.command("upright")
     assert bike.truth(5.0)[0] == pytest.approx(0.0, abs=0.2)
     for _ in range(5):
-        bike.command("left")  # the first sets off
+        bike.command("left")  # the first command only sets the bike off
     lean, speed, yaw_rate, phase = bike.truth(16.0)
     assert (lean, speed) == (pytest.approx(-20.0, abs=0.6), pytest.approx(CRUISE_MPS, rel=0.01))
     assert phase == "held turn" and yaw_rate > 0

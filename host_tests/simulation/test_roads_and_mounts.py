@@ -55,7 +55,7 @@ def test_gyro_measures_the_sagging_of_a_holder():
     holder = Holder(np.full(3, 20.0), np.full(3, 0.5), np.radians([1.0, 0.0, 1.0]))
     pushed = np.zeros((8000, 3))
     pushed[:, 1] = 1.0
-    pushed[3000:5000, 2] = 0.5  # pushed forward for two seconds
+    pushed[3000:5000, 2] = 0.5  # two seconds of a force of 0.5 g forward
     force, rates = holder.shaken(pushed, np.zeros((8000, 3)), 1000.0)
     assert np.sum(rates[2000:4000, 0]) / 1000.0 == pytest.approx(0.5, abs=0.02)
     lean_of_force = np.degrees(np.arctan2(force[4000, 2] - 0.5, force[4000, 1]))
@@ -70,8 +70,8 @@ def test_bad_mount_changes_readings_but_not_the_ride(rides, mount):
 
 
 def test_aliased_engine_vibration_appears_at_low_frequencies(rides):
-    """The road shakes the bike below 25 Hz. The additional vibration at these frequencies is engine vibration above 100
-    Hz, aliased."""
+    """The road shakes the bike below 25 Hz. The additional vibration below 25 Hz is engine vibration above 100 Hz,
+    aliased."""
     plain, aliased = (bands_of(*in_vehicle(rides("A", mount)), 200.0)[QUANTITIES[1]] for mount in (None, "aliasing"))
     assert aliased[4] > 1.05 * plain[4]
 

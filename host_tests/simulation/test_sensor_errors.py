@@ -33,7 +33,7 @@ def test_readings_contain_the_stated_errors():
     read = np.array([sensor.read(ride.motion(x), x) for x in t])
     assert (read[:, 6] == 25.0).all()
     matrix = np.reshape(sensor.vehicle_from_sensor, (3, 3))
-    force, rate = truth[:, :3] @ matrix, truth[:, 3:] @ matrix  # the transpose, for rows
+    force, rate = truth[:, :3] @ matrix, truth[:, 3:] @ matrix  # vectors are rows, so the matrix acts as its transpose
     force_error = read[:, :3] - (sensor.accel_scale * force + sensor.accel_offset_g)
     rate_error = read[:, 3:6] - (sensor.gyro_scale * rate + sensor.gyro_bias_dps)
     assert np.abs(force_error.std(axis=0) / ACCEL_NOISE_G - 1).max() < 0.1

@@ -119,7 +119,7 @@ def test_hanging_off_to_the_inside_reduces_the_lean():
 def test_a_turn_begins_with_countersteering():
     rolled, _ = held_turn(35.0, Bike(), roll_s=1.0)
     entry = rolled.yaw_rate[3000:3500]
-    assert entry.max() > 0.05  # a moment of yaw to the left before the turn to the right
+    assert entry.max() > 0.05  # before a turn to the right, the bike yaws to the left for a moment
     assert rolled.yaw_rate[9000] < -0.2
 
 

@@ -15,7 +15,7 @@ G = 9.80665
 
 
 def test_a_smooth_step_is_half_way_in_the_middle():
-    """The step is u^3 (10 - 15 u + 6 u^2). At u = 1 / 4 this is 0.015625 * 6.625."""
+    """The step is u^3 (10 - 15 u + 6 u^2). At u = 1 / 4 the step is 0.015625 * 6.625."""
     found = signals.smoothstep(np.array([-1.0, 0.0, 0.25, 0.5, 1.0, 2.0]))
     assert found == pytest.approx([0.0, 0.0, 0.103515625, 0.5, 1.0, 1.0])
     assert script._glide(2.0, 6.0, 0.25, 2.0) == pytest.approx((2.4140625, 4.0 * 30.0 * 0.0625 * 0.5625 / 2.0))
@@ -44,8 +44,8 @@ def test_smoothing_and_noise_have_their_size():
 
 
 def test_legs_become_signals():
-    """In the first leg the bike stands for 2 s. In the second it reaches 10 m/s within 4 s. In the third it rides at
-    10 m/s for 4 s, and reaches a lean of 30 degrees within 2 s."""
+    """In the first leg the bike stands for 2 s. In the second leg the bike reaches 10 m/s within 4 s. In the third leg
+    it rides at 10 m/s for 4 s, and reaches a lean of 30 degrees within 2 s."""
     made = commands([Leg("a", 2.0, 0.0), Leg("b", 4.0, 10.0), Leg("a", 4.0, lean_deg=30.0, roll_s=2.0)], 100.0)
     assert len(made.time) == 1000 and made.time[100] == 1.0
     assert made.speed[[100, 400, 800]] == pytest.approx([0.0, 5.0, 10.0], abs=0.01)
@@ -56,7 +56,8 @@ def test_legs_become_signals():
 
 
 def test_values_of_a_leg_settle_within_their_times():
-    """Hang, lift, engine and wind settle within 1 s, and the bank within 3 s. In a short leg they settle by its end."""
+    """Hang, lift, engine and wind settle within 1 s, and the bank within 3 s. In a short leg all five settle by the end
+    of the leg."""
     more = {"hang_m": 0.1, "lift_deg": 10.0, "engine": 1.0, "crosswind_mps2": 2.0, "bank_deg": 6.0}
     made = commands([Leg("a", 1.0, 5.0), Leg("b", 5.0, **more)], 100.0)  # type: ignore[arg-type]
     half = [made.hang[150], np.degrees(made.lift[150]), made.engine[150], made.crosswind[150]]
@@ -67,7 +68,7 @@ def test_values_of_a_leg_settle_within_their_times():
 
 
 def test_the_slope_changes_with_the_distance():
-    """At 10 m/s the road is level for 50 m. Over the next 50 m its slope rises to 10 %."""
+    """At 10 m/s the road is level for 50 m. Over the next 50 m the road's slope rises to 10 %."""
     made = commands([Leg("a", 5.0, 10.0, slope_percent=0.0), Leg("b", 5.0, slope_percent=10.0)], 100.0)
     assert np.tan(made.slope[[250, 750, 999]]) * 100.0 == pytest.approx([0.0, 5.0, 10.0], abs=0.03)
     still = commands([Leg("a", 1.0, 0.0, slope_percent=10.0), Leg("b", 1.0, slope_percent=5.0)], 100.0)
@@ -89,7 +90,7 @@ def test_a_plan_goes_on_until_45_s_before_its_end():
     assert plan.going_on
     plan.add("a", 0.2)
     assert not plan.going_on and plan.seconds == pytest.approx(55.1)
-    short = a_plan(30.0)  # a plan continues for at least 20 s
+    short = a_plan(30.0)  # the plan continues for at least 20 s
     short.add("a", 19.9)
     assert short.going_on
     short.add("a", 0.1)
@@ -265,7 +266,8 @@ def test_bumps_are_added_to_the_road():
     road.add_bumps(slope, [2.0, 3.5], 0.015, 1.0)
     height = np.cumsum(slope) * 0.02
     assert height[99] == pytest.approx(0.0) and height[124] == pytest.approx(0.015, rel=0.02)
-    assert height[149] == pytest.approx(0.0, abs=1e-9) and np.all(slope[150:] == 0.0)  # the second bump does not fit
+    # The road ends before the second bump
+    assert height[149] == pytest.approx(0.0, abs=1e-9) and np.all(slope[150:] == 0.0)
 
 
 def test_the_road_has_the_roughness_of_its_class():
@@ -279,8 +281,8 @@ def test_the_road_has_the_roughness_of_its_class():
 
 
 def test_the_chassis_moves_as_two_masses_on_two_springs():
-    """A mass of 120 kg is on a spring of 17 kN/m with a damper of 1100 Ns/m. Below it a mass of 15 kg is on a tyre of
-    150 kN/m. The equations of motion of both masses are solved at four frequencies."""
+    """A mass of 120 kg is on a spring of 17 kN/m with a damper of 1100 Ns/m. Below the spring a mass of 15 kg is on a
+    tyre of 150 kN/m. The equations of motion of both masses are solved at four frequencies."""
     for hz in (0.0, 0.1, 1.8, 15.0):
         w = 2.0 * np.pi * hz
         strut = 17e3 + 1j * w * 1100.0
@@ -358,8 +360,8 @@ def test_a_hand_holds_still_and_turns():
 
 
 def test_positions_are_integrated_from_speed_and_yaw():
-    """The vehicle goes 1000 m east in 100 s. 1000 m are 0.0089932 degrees of latitude. For the longitude this number is
-    divided by cos(47.6 degrees)."""
+    """The vehicle goes 1000 m east in 100 s. 1000 m are 0.0089932 degrees of latitude. For the longitude, 0.0089932
+    degrees are divided by cos(47.6 degrees)."""
     n = 20_000
     truth = {"speed_mps": np.full(n, 10.0), "yaw_rate_dps": np.zeros(n)}
     lat, lon, utc_s = files.positions(SimpleNamespace(truth=truth, rate_hz=200.0, time=np.arange(n) / 200.0))  # type: ignore[arg-type]
@@ -443,7 +445,7 @@ def test_a_hash_gives_numbers_of_mean_0_and_rms_1():
 
 
 def test_a_scripted_ride_knows_its_distance():
-    """The ride covers 20 m while it accelerates from 0 to 10 m/s in 4 s. Then it continues at 10 m/s."""
+    """The ride covers 20 m while it accelerates from 0 to 10 m/s in 4 s. Then the ride continues at 10 m/s."""
     made = script.Ride([script.upright(1), script.accelerate(10, 4), script.straight(2)], 0.0)
     assert made.seconds == 7.0  # the bike is upright from the beginning, so no time is needed to raise it
     assert made.state(5.0)[8] == pytest.approx(20.0) and made.state(7.0)[8] == pytest.approx(40.0)
@@ -461,7 +463,7 @@ def test_feet_help_below_4_mps():
 
 
 def test_the_motion_of_a_body_by_hand():
-    """The vehicle turns left with 0.5 rad/s at 10 m/s, so its lateral acceleration is 5 m/s2. First it is
+    """The vehicle turns left with 0.5 rad/s at 10 m/s, so its lateral acceleration is 5 m/s2. First the vehicle is
     upright on a road that rises by 0.1 rad. Then it leans by 30 degrees on a level road."""
     left, up, forward, w_left, w_up, w_forward = script.body_motion(0.0, 0.2, 10.0, 2.0, 0.5, 0.1, 0.03)
     assert left * G == pytest.approx(5.0 * np.cos(0.1)) and up * G == pytest.approx(G * np.cos(0.1) + 0.3)

@@ -96,7 +96,7 @@ def test_each_profile_has_its_special_condition():
     assert np.ptp(ride_of("temperature").readings[:, 3]) > 5.0
     windy = ride_of("crosswind")
     straight = (windy.phase == "straight") & (windy.truth["speed_mps"] > 10.0)
-    straight[: len(straight) // 2] = False  # the wind turns in the middle of the ride
+    straight[: len(straight) // 2] = False  # leave out the first half, because the wind turns in the middle of the ride
     assert np.abs(np.mean(windy.truth["lean_deg"][straight])) > 1.8
 
 
@@ -158,7 +158,7 @@ def test_calibration_of_the_previous_ride_is_removed(tmp_path):
 
 
 def test_memory_of_a_ride_is_limited():
-    """An hour has 3.6 million rows at the chip's 1 kHz. The result keeps none of these rows in memory."""
+    """An hour has 3.6 million rows at the chip's 1 kHz. The result keeps none of the rows in memory."""
     seconds = 400.0
     column = seconds * RATE_HZ * 8  # bytes of a column with one number per row
     tracemalloc.start()

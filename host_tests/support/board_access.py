@@ -20,7 +20,7 @@ def raised(function, *args):
 
 
 def read(chip, register, count=1):
-    """Read `count` bytes from a device model in one burst. Return them as a list."""
+    """Read `count` bytes from a device model in one burst, as a list."""
     chip.start(chip.address, False)
     chip.write_byte(register)
     chip.start(chip.address, True)

@@ -15,8 +15,8 @@ from support.mpy import BOARD_HEAP, run_mpy
 
 SCRIPT = Path(device_runs.__file__)
 
-# The bike is on the stand until 8 s and upright until 18 s. Then it turns at 15 m/s, with a lean of 30 degrees to the
-# left and of 40 degrees to the right.
+# The bike is on the stand until 8 s and upright until 18 s. Then the bike rides two bends at 15 m/s, with a lean of 30
+# degrees to the left and of 40 degrees to the right.
 RIDE = [
     ["kickstand", 8.0],
     ["upright", 8.0],
@@ -25,7 +25,7 @@ RIDE = [
     ["turn", 40.0, 5.0],
     ["straight", 6.0],
 ]
-LEFT_S, RIGHT_S, STRAIGHT_S = 30.0, 38.0, 44.0  # a time near the end of each turn, and in the straight after the turns
+LEFT_S, RIGHT_S, STRAIGHT_S = 30.0, 38.0, 44.0  # times near the end of each bend, and on the straight after the bends
 PRESSES = [[2, 0.15], [12, 0.15]]
 ALIGNED = {"ride": RIDE, "presses": PRESSES, "until": 46}
 
@@ -78,7 +78,8 @@ def run(engine, flash, plan, capsys=None):
     if engine == "cpython":
         before = os.getcwd()
         os.chdir(flash)
-        gc.freeze()  # the app collects garbage often; scanning the objects of other tests would take minutes
+        # Exclude the objects of earlier tests, because the app collects garbage often and scanning them takes minutes
+        gc.freeze()
         try:
             answer = json.loads(json.dumps(device_runs.run_device(plan)))
         finally:
@@ -93,7 +94,8 @@ def run(engine, flash, plan, capsys=None):
 
 @functools.cache
 def _aligned_once():
-    """Return a directory with the content of the flash after a run of ALIGNED. It exists until this process ends."""
+    """Return a directory with the content of the flash after a run of ALIGNED. The directory exists until this process
+    ends."""
     directory = tempfile.TemporaryDirectory()
     run("cpython", directory.name, ALIGNED)
     return directory

@@ -16,11 +16,12 @@ from support import sd_cards, simulated_phones
 from support.page_turner import PageTurner
 
 FRAME_S = 0.1
-PRESS_EVERY_S = 0.4  # while searching a page
+PRESS_EVERY_S = 0.4  # time between two presses while a page is searched
 
 
 class CarRide(script.Ride):
-    """A ride by car. The car has the yaw rate of a motorcycle with the same lean. Its body rolls a little outwards."""
+    """A ride by car. The car has the yaw rate of a motorcycle with the same lean. The car's body rolls a little
+    outwards."""
 
     ROLL_SHARE = -0.08  # the car's roll as a share of the motorcycle's lean
 
@@ -33,7 +34,8 @@ RAISE_S = 0.3  # duration of the change from one lean of standing() to the next
 
 
 def standing(plan):
-    """Return motion(t_s) of a bike at rest, held at one lean after the other. It moves to each lean within RAISE_S.
+    """Return motion(t_s) of a bike at rest, held at one lean after the other. The bike moves to each lean within
+    RAISE_S.
 
     plan: [[from_s, lean_deg], ...].
     """
@@ -52,7 +54,8 @@ def standing(plan):
 
 
 def poses_of(seed, steps):
-    """Return world(t_s) of a sensor that is held in the hand. It is shaken before the first pose and after the last.
+    """Return world(t_s) of a sensor that is held in the hand. The sensor is shaken before the first pose and after the
+    last.
 
     steps: [[from_s, up], ...]. `up` is the direction up in the sensor's axes, or None while the sensor is turned.
     """
@@ -138,7 +141,7 @@ class Device:
         self.board.every(FRAME_S, self._watch)
         self.board.every(PRESS_EVERY_S, self._turn_page)
         self.board.install()
-        # The firmware must be imported on the board. So first remove the modules that the host has imported.
+        # The firmware must be imported on the board. First remove the modules that the host has imported.
         before = take_firmware() if self.board.poses else {}
         try:
             from kickstand import settings, start

@@ -56,7 +56,7 @@ def samples(legs, vehicle="car", tilt_deg=0.0, noise_g=0.003, start_mps=0.0):
             if vehicle == "car":
                 force[0] += side
             else:
-                lean = math.atan(side)  # positive, to the left, in a left turn
+                lean = math.atan(side)  # the lean is positive, to the left, in a left turn
                 force[1] = math.sqrt(1.0 + side * side)
                 rate[0], rate[1] = yaw_dps * math.sin(lean), yaw_dps * math.cos(lean)
             for i in range(3):
@@ -127,7 +127,7 @@ def drive(legs, mount, options):
     source = SpeedSource(**options.get("source", {}))
     method = DriveAlignment
     if options.get("method") == "published":
-        from kickstand_tools.calibration.published import PublishedAlignment as method  # on CPython only
+        from kickstand_tools.calibration.published import PublishedAlignment as method  # runs on CPython only
     alignment = method(vehicle, options.get("up"), options.get("bias"))
     moved_at, other = options.get("moved", [1e9, mount])
     bias = options.get("gyro_bias", [0.0, 0.0, 0.0])

@@ -23,7 +23,7 @@ def need(chip: str) -> None:
         pytest.skip(reason)
 
 
-@functools.cache  # do not download a missing package for each test
+@functools.cache  # cached, so that a missing package is not downloaded for each test
 def _lacking(chip: str) -> str:
     """Return the reason why this chip cannot be emulated, or "" if it can."""
     from kickstand_emulator import esp32_library, image

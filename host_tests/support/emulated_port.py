@@ -68,7 +68,7 @@ class EmulatedPort:
 
 
 def plug_in(monkeypatch, device, meanwhile=lambda: None):
-    """Connect this Pico to the port NAME. mpremote and the tools at this port then use emulated time."""
+    """Connect a Pico to the port NAME. mpremote and the tools at this port then use emulated time."""
     port = EmulatedPort(device, meanwhile)
 
     def open_port(_name, timeout, **_options):

@@ -32,7 +32,7 @@ class FakeBoard(Transport):
     root: the directory that simulates the flash.
     mpy: value of sys.implementation._mpy.
     written: paths in the order in which they were opened for writing. A renamed file has its new name.
-    on_write(path, data): called before each write. It returns the bytes that are really written.
+    on_write(path, data): called before each write. on_write() returns the bytes that are really written.
     before_change(): called before each change of the flash.
     """
 
@@ -56,7 +56,7 @@ class FakeBoard(Transport):
                 return self.modules[name]
             if name == "kickstand":
                 return self._kickstand()
-            if name.startswith("kickstand."):  # never import the package installed on the host
+            if name.startswith("kickstand."):  # never import the firmware that is installed on the host
                 raise ImportError(f"no module named '{name}'")
             return __import__(name, *rest)
 
@@ -77,7 +77,7 @@ class FakeBoard(Transport):
             with contextlib.redirect_stdout(out):
                 exec(command, self._globals)
         except ConnectionError:
-            raise  # the cable failed, not the board
+            raise  # raised if the cable failed, not the board
         except OSError as error:
             number = error.errno or 0
             text = f"OSError: [Errno {number}] {errno.errorcode[number]}"

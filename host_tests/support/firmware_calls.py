@@ -96,7 +96,8 @@ def add_up(batches, limit):
 
 
 def decode(batch):
-    """Decode frames of 14 bytes, by the board's machine code and by Python. Return two lists of each frame's counts."""
+    """Decode frames of 14 bytes, by the board's machine code and by Python. Return two lists, one per version, with the
+    counts of each frame."""
     data = b"".join([bytes(frame) for frame in batch])
     out = []
     for function in (fifo_frames.decode, fifo_frames.decode_python):

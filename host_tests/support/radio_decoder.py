@@ -1,6 +1,6 @@
 """Decodes the radio's packets with the equations for RaceChrono and the tables of bytes in firmware/docs/live.md.
 
-It uses nothing else, so it also tests that page.
+The decoder uses nothing else, so it also tests that document.
 """
 
 import re

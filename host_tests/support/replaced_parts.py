@@ -12,7 +12,7 @@ class Calls(list):
     """A list of (name, arguments) of all calls of its parts."""
 
     def part(self, name, **given) -> Any:
-        """Return a part of the app. Its methods, other than `given`, add their calls to this list."""
+        """Return a part of the app. The methods of the part, other than `given`, add their calls to this list."""
         calls = self
 
         class Part:
@@ -34,7 +34,7 @@ class Calls(list):
 def run_app(use, **config):
     """Run use(app, calls, board) on a board at rest, with replaced parts, and return its result.
 
-    app.samples is the number of new samples in each turn, at first 0. config: values of config.py.
+    app.samples is the number of new samples in each pass of the loop, at first 0. config: values of config.py.
     """
     with Board(level) as board:
         from kickstand import app as module, devices

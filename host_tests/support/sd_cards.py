@@ -7,7 +7,7 @@ import binascii
 import os
 
 MOUNT = "/sd"
-READER = "/reader"  # where the card is mounted to read it, as a computer does
+READER = "/reader"  # the folder on which a computer would mount the card
 
 
 def format_card(card, formatted=True, fsinfo=True):

@@ -1,5 +1,5 @@
-"""A phone beside the simulated board, without a radio stack. It follows a plan and keeps what it receives. Runs on
-CPython and MicroPython."""
+"""A phone beside the simulated board, without a radio stack. The phone follows a plan and keeps what it receives. Runs
+on CPython and MicroPython."""
 
 CHRONO, FILTER = (0x1FF8, 0x0001), (0x1FF8, 0x0002)
 _OWN = "7b6f000%d-3c1e-4d5a-9a55-6b69636b7374"

@@ -11,10 +11,10 @@ DRAWN = 4_000_000  # longest output to wait for, in characters: more than a minu
 
 
 class Terminal:
-    """A context manager that runs a command. It kills the process at its end."""
+    """A context manager that runs a command, and kills the process at the end."""
 
     def __init__(self, command: list[str]) -> None:
-        import pty  # not on Windows
+        import pty  # imported here, because Windows has no pty
 
         self._master, slave = pty.openpty()
         environment = os.environ | {"TERM": "xterm", "COLUMNS": "80", "LINES": "24"}
@@ -60,7 +60,7 @@ class Terminal:
         return self.process.returncode
 
     def _read(self) -> str:
-        with contextlib.suppress(OSError):  # there is no process, or it has ended
+        with contextlib.suppress(OSError):  # OSError: the process never existed, or it has ended
             return os.read(self._master, 1 << 20).decode(errors="replace")
         return ""
 

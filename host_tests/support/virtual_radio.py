@@ -1,5 +1,6 @@
 """Connects the simulated board's radio, as a peripheral, to bumble's virtual radio, with a central on the other side.
-Both sides have a whole Bluetooth LE stack. The stacks use the board's clock and run when its time advances."""
+Peripheral and central each have a whole Bluetooth LE stack. The stacks use the board's clock and run when its time
+advances."""
 
 import asyncio
 import contextlib
@@ -13,7 +14,7 @@ from bumble.host import Host
 from kickstand_tools.simulated_board import radio as model
 
 PUMP_S = 0.005
-ROUNDS = 12  # turns of the event loop per call of pump(), because a packet passes several layers
+ROUNDS = 12  # rounds of the event loop per call of pump(), because a packet passes several layers
 ADDRESSES = "F0:00:00:00:00:01", "F1:00:00:00:00:02"
 ASKED = {model.READ_PAIRED: "READ", model.WRITE_PAIRED: "WRITE"}
 

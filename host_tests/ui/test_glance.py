@@ -89,8 +89,8 @@ def test_an_acceleration_is_drawn_as_number_and_bar(glance, forward_g, digits, w
     ],
 )
 def test_a_lean_is_drawn_as_number_arc_and_side(glance, lean_deg, digits, columns, side):
-    """The arc has one column per degree, at most 60. Its upper edge is a circle of radius 100 that begins in row 2. So
-    at column 60 it is in row 102 - 80 = 22."""
+    """The arc has one column per degree, at most 60. The arc's upper edge is a circle of radius 100 that begins in row
+    2. So at column 60 the edge is in row 102 - 80 = 22."""
     canvas = drawn(glance, glance.lean, lean_deg=lean_deg)
     assert canvas.calls[0] == ("scale", 0, 0)
     assert canvas.digits == digits
@@ -103,7 +103,7 @@ def test_a_lean_is_drawn_as_number_arc_and_side(glance, lean_deg, digits, column
 
 
 def test_the_arrow_points_to_the_side_and_rec_is_below(glance):
-    """The arrow has 24 columns. Its point is one pixel high, and its back is 29 pixels high."""
+    """The arrow has 24 columns. The arrow's point is one pixel high, and its back is 29 pixels high."""
     canvas = drawn(glance, glance.lean, recording=True, lean_deg=20.0)
     arrow = [call for call in canvas.calls if call[0] == "vline" and call[1] > 101]
     assert (len(arrow), arrow[0], arrow[-1]) == (24, ("vline", 125, 40, 1, 1), ("vline", 102, 26, 29, 1))

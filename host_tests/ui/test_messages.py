@@ -11,15 +11,15 @@ from kickstand.ui import messages
 from kickstand_tools.calibration import drive_refusals, pose_refusals
 from kickstand_tools.common import firmware_path
 
-POSES = {"CaptureError", "SickSensor", "CalibrationError", "GyroError"}  # the tools raise these codes, too
+POSES = {"CaptureError", "SickSensor", "CalibrationError", "GyroError"}  # exceptions whose codes the tools raise, too
 
 CLASSES = {name for name in vars(errors) if name[0].isupper()}
-# The firmware passes these codes as a variable, so codes() does not find them.
+# Codes that the firmware passes as a variable, so codes() does not find them.
 INDIRECT = {"other-side", "mount-moved", "incomplete", "no-memory", "out-of-memory", "out-of-room"}
 INDIRECT |= {"sensor-lost", "sensor-frozen", "sensor-silent", "sensor-reset", "flash-fault", "card-fault", "usb-fault"}
-# For these codes the display shows the setting's name
+# Codes for which the display shows the setting's name
 OTHER_SETTINGS = {"not-allowed", "card-pins", "one-i2c", "no-such-pin", "i2c-pins", "uart-pins", "aliasing"}
-CONSOLE_ONLY = {"wrong-code"}  # reported during imports, before there is a display
+CONSOLE_ONLY = {"wrong-code"}  # codes that are reported during imports, before a display exists
 # Values for the words of each code. Some are long numbers and long names.
 VALUES = {"dead-axis": ("x", 0.1), "odd-axis": ("x", 0.1, 1.0), "side-tilted": ("+x", 25.0, 20.0)}
 VALUES |= {"not-one-g": ("kickstand", 1.23), "mount-moved": ("between-stops", 12.0), "few-events": (4, 5, 12)}

@@ -10,7 +10,7 @@ SHORT, LONG = 1, 2  # as in board/button.py
 
 
 class Drive:
-    """Replaces alignment by driving. It has a question until the rider answers."""
+    """Replaces alignment by driving. The alignment has a question until the rider answers."""
 
     shown = False
 
@@ -106,7 +106,7 @@ def test_a_fault_hides_the_pages_and_the_menu_the_fault(sensor, screen):
 
 def test_pages_of_the_owner_follow_the_last_page(screen):
     screen.pages.own += [lambda: ("one", ""), lambda: ("two", "")]
-    screen._meter.trusted = False  # without a trusted lean, each page always shows the same lines
+    screen._meter.trusted = False  # while the lean is not trusted, each page always shows the same lines
     shown = []
     from kickstand.ui import page_ring
 
@@ -157,7 +157,7 @@ def test_the_menu_asks_for_alignment_by_driving(drive, screen):
         screen.press(SHORT, 100 * k + 50)
     screen.press(LONG, 1500)
     assert asked == [True]
-    assert screen.pages._at == len(page_ring.MOTORCYCLE)  # the page after the motorcycle's pages
+    assert screen.pages._at == len(page_ring.MOTORCYCLE)  # the page that follows the motorcycle's pages
 
 
 def test_the_problem_of_a_pose_is_known_until_the_next_pose(screen):
@@ -174,7 +174,7 @@ def test_the_problem_of_a_pose_is_known_until_the_next_pose(screen):
 def test_a_menu_ends_20_s_after_the_last_press(screen):
     screen.press(LONG, 0)
     screen.press(SHORT, 15_000)
-    assert first_line(screen, 34_900).startswith("\x7e")  # arrow before the chosen entry
+    assert first_line(screen, 34_900).startswith("\x7e")  # the code of the arrow before the chosen entry
     assert first_line(screen, 35_000).startswith("Lean")
     assert screen.menu is None
 

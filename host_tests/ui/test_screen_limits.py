@@ -18,7 +18,7 @@ def _board():
 
 
 def screen(leans=True, drive: Any = None, **given) -> Any:
-    """Return a Screen of an aligned vehicle. The list `calls` collects what its menu does."""
+    """Return a Screen of an aligned vehicle. The list `calls` collects what the screen's menu does."""
     from kickstand.ui.screen import Screen
 
     calls: list = []
@@ -101,7 +101,7 @@ def test_a_recording_from_the_menu_is_shown_or_refused():
     assert shown.calls == ["start"] and shown.lines(0) == ("Rec. stopped", "no room")
     shown = screen()
     choose(shown, "Record ride")
-    assert shown.front is shown.pages  # the recording waits
+    assert shown.front is shown.pages  # the recording waits in the background
     shown = screen()
     shown._rides.start = lambda: setattr(shown.recorder, "active", True)
     choose(shown, "Record ride")
@@ -119,7 +119,7 @@ def test_a_short_press_closes_the_sensor_info(monkeypatch):
     shown.press(SHORT, 3000)
     assert shown.lines(3000)[0] != "info"
     choose(shown, "Sensor info")
-    shown.press(LONG, 3000)  # opens the menu in front of the sensor's page
+    shown.press(LONG, 3000)  # open the menu in front of the sensor's page
     assert shown.menu is not None and shown._info_open
 
 
@@ -195,7 +195,7 @@ def test_the_page_of_the_drive_follows_or_is_first(monkeypatch):
     shown._drive.shown = False
     assert shown.lines(2999) == ("not aligned", "2") and shown.pages.name == "not_aligned"
     shown.press(SHORT, 0)
-    assert shown.wizard is not None and shown.wizard.state == 1  # the press was for the kickstand pose
+    assert shown.wizard is not None and shown.wizard.state == 1  # the press counts for the kickstand pose
 
 
 @pytest.mark.parametrize(

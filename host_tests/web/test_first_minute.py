@@ -11,7 +11,7 @@ from support.web.rider import Rider
 
 LEAN_DEG = 30
 RIDING_S = 6
-SLOWED = 4  # factor by which a slow phone is slower than the reference computer
+SLOWED = 4  # a slow phone is slower than the reference computer by this factor
 # result of _loop_s() on the reference computer, for which the limit of the processor time is set
 REFERENCE_LOOP_S = 0.06
 
@@ -55,13 +55,14 @@ def first_minute(rider):
     true_deg, shown_deg = rider.leans()
     assert true_deg < 4 - LEAN_DEG
     assert shown_deg == pytest.approx(true_deg, abs=2.0)
-    # Chromium cannot slow down workers. So convert the workers' processor time to the time of the reference computer.
-    # This time must leave room for a processor that is SLOWED times slower.
+    # Chromium cannot slow down workers. Instead, convert the workers' processor time to the time of the reference
+    # computer. The converted time must leave room for a processor that is SLOWED times slower.
     assert 0.0 < used_s * REFERENCE_LOOP_S / _loop_s() < RIDING_S / SLOWED
 
 
 def _loop_s():
-    """Return the processor time of a loop of a million sums on this computer, in s. It is the median of five runs."""
+    """Return the processor time of a loop of a million sums on this computer, in s. The result is the median of five
+    runs."""
     times_s = []
     for _ in range(5):
         begin_s = time.process_time()
@@ -77,7 +78,7 @@ def pull_the_wire(rider):
     rider.guide_says("wire is out")
     rider.reads("No sensor")
     rider.page.wait_for_selector("#shown-lean:has-text('a fault')")
-    rider.click("#do")  # plug it in
+    rider.click("#do")  # the guide's button: plug the board in
     rider.reads("Lean")
     rider.wait(1)
 

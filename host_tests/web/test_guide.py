@@ -200,7 +200,7 @@ def test_after_power_on_in_a_bend_it_says_what_ends_the_doubt(stages):
 
 
 def test_it_rides_straight_is_not_said_of_a_bike_that_leans(guide):
-    """The guide does not say so before or after the first lean."""
+    """Before and after the first lean the guide asks for ten seconds on a straight."""
     tick = {"powered": True, "plugged": True, "pose": "ride", "phase": "ride", "stage": 0}
     tick.update(t_s=1.0, lean_deg=-7.5)
     said = [
@@ -217,7 +217,7 @@ def test_a_disarmed_save_is_whole(drive):
     assert said[0][2].startswith("Done")
 
 
-# In messages.py each kind of refusal or fault is one paragraph of lines. This list has the codes of each paragraph.
+# In messages.py each kind of refusal or fault is one paragraph of lines. The list has the codes of each paragraph.
 _PARAGRAPHS = [[line.split("|")[0] for line in part.split("\n")] for part in messages._LINES.strip().split("\n\n")]
 SPOILT, _, UNLIKE, FLASH, _, FAULTS = _PARAGRAPHS[:6]
 

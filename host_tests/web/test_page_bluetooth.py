@@ -69,8 +69,8 @@ def lean_reads(rider, pattern):
 
 
 def test_lean_fills_the_screen_and_returns(on_the_bar, tmp_path):
-    """In a left turn of 30 degrees the page shows the lean. When the connection is lost it shows "--", and later the
-    lean again. Then the rider stops and saves the ride."""
+    """In a left turn of 30 degrees the page shows the lean. When the connection is lost the page shows "--", and later
+    the lean again. At the end the rider stops and saves the ride."""
     rider, bridge = on_the_bar
     page = rider.page
     page.evaluate("boardThere = false")

@@ -12,7 +12,7 @@ from support.web.serial_line import SerialLine
 LEAN_DEG = 20.0
 
 
-@pytest.mark.nightly  # other tests cover `flash` on the same board, and the page with a fake board
+@pytest.mark.nightly  # other tests cover `flash` on an emulated board, and the page with a fake board
 @pytest.mark.chip
 def test_board_is_updated_and_watched(chromium, address, tmp_path):
     """The board keeps its calibration. The page shows the display's lean, and saves the log of `kickstand record`."""
@@ -39,7 +39,8 @@ def test_board_is_updated_and_watched(chromium, address, tmp_path):
         rider.page.click("#stop")
         rider.page.wait_for_selector("#files li", timeout=120_000)
     assert rider.text("#live-said") == "Stopped."
-    rider.page.wait_for_function("document.querySelector('#lean').textContent === '--'")  # no new value
+    # Wait until the gauge gets no new value
+    rider.page.wait_for_function("document.querySelector('#lean').textContent === '--'")
     blocks = streamed(bytes(line.said))
     assert len(blocks) > 1
     assert list(saved(rider, tmp_path).values()) == recorded(blocks)

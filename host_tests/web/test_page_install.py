@@ -168,7 +168,7 @@ def test_unsuitable_board_is_not_changed(line, board, differs, platform, words):
 
 
 def test_file_that_is_no_esp32_image_is_not_written(line, board, tmp_path):
-    """The page also refuses an image for another chip. In this test no chip answers."""
+    """The page also refuses an image for another chip. No chip answers in this test."""
     page = line.rider.page
     page.click("a[href='#micropython']")
     page.click("text=ESP32: a file that ends in .bin")
@@ -225,7 +225,7 @@ def test_browser_without_serial_ports_is_told_so(chromium, address):
         first = rider.page.locator("main section:visible").first
         assert first.get_attribute("id") == "unable"
         assert "in Chrome or Edge on a computer" in first.inner_text() and "Firefox, Safari" in first.inner_text()
-        if name == "install.html":  # each step is shown with the command for the terminal
+        if name == "install.html":  # the page shows each step with the command for the terminal
             assert rider.page.locator("main h2:visible").count() == 5
             assert rider.text("#here") == address + name
             rider.page.evaluate("document.querySelectorAll('details').forEach((one) => (one.open = true))")

@@ -23,7 +23,7 @@ PLAYED = """async () => {
 }"""
 REFUSED = "() => Object.defineProperty(window, 'indexedDB', { value: { open() { throw new Error('refused'); } } })"
 
-half_seconds = functools.partial(ride_writer.blocks, length=lambda _: 512)  # blocks as short as the blocks of a stream
+half_seconds = functools.partial(ride_writer.blocks, length=lambda _: 512)  # blocks of half a second, as in a stream
 
 
 @pytest.fixture(scope="module")
@@ -48,8 +48,8 @@ def board(tmp_path):
 
 
 def test_pulled_cable_leaves_the_log(line, rider, board, tmp_path):
-    """After the cable is pulled, the gauge shows no lean. Before that, it shows "--" while the bike sways too much for
-    a certain lean."""
+    """After the cable is pulled, the gauge shows no lean. Before the cable is pulled, the gauge shows "--" while the
+    bike sways too much for a certain lean."""
     blocks, _ = half_seconds(3)
     line.plug_in(RawPrompt(board, blocks))
     rider.page.click("#start")
@@ -84,7 +84,8 @@ def test_car_shows_g_instead_of_a_lean(line, rider, board, tmp_path, monkeypatch
 
 
 def braking_in_a_left_bend(count, seed=0):
-    """Yield turns as ride_writer.turns() does, for a car with forces of 0.2 g backward and 0.3 g to the left."""
+    """Yield passes of the loop as ride_writer.turns() does, for a car with forces of 0.2 g backward and 0.3 g to the
+    left."""
     for _ in range(count):
         yield [2 * mean for mean in (-851, 1324, 4096, 0, 0, 98, 0)], 2, 10_000
 
@@ -98,7 +99,7 @@ def test_failed_loading_of_tools_can_be_repeated(chromium, address, board):
     line = SerialLine(chromium, address + "live.html", service_workers="block")
     rider = line.rider
     line.plug_in(RawPrompt(board, half_seconds(3)[0]))
-    for name in ("python.mjs", "pyodide.asm.wasm"):  # Pyodide itself does not report that the second file is missing
+    for name in ("python.mjs", "pyodide.asm.wasm"):  # Pyodide itself does not report that pyodide.asm.wasm is missing
         rider.page.route(f"**/{name}", lambda route: route.abort())
         rider.page.click("#start")
         rider.page.wait_for_selector("#live-said:has-text('Is there a network? Press the button again')")
@@ -196,7 +197,7 @@ def test_port_without_signals_is_closed_again(line):
 
 
 def test_port_with_a_stuck_stream_is_closed(line):
-    """Without closing it, the page could not open the port again."""
+    """If the page did not close the port, it could not open the port again."""
     script = """async () => {
       const { SerialLine } = await import("./cable/cable.mjs");
       const said = [];

@@ -44,7 +44,7 @@ def test_a_phones_first_screen_has_all_for_the_first_minute(chromium, address):
 
 
 def test_a_phone_leans_the_motorcycle_if_it_has_motion_data(chromium, address):
-    """The page's introduction is visible. A screen reader clicks without a pointer, and this also presses the
+    """The page's introduction is visible. A screen reader clicks without a pointer, and such a click also presses the
     button."""
     rider = Rider(chromium, address, **PHONE)
     rider.page.set_viewport_size({"width": 820, "height": 1180})

@@ -54,7 +54,7 @@ def test_the_charts_are_those_of_the_command(page, ride, calibration):
     assert "Plotly.newPlot" in html and "src=" not in html.split("<body>")[0].rpartition("</script>")[2]
     assert '<script src="' not in html and "<h1>RIDE</h1>" in html
     frame = page.page.locator("#plot").bounding_box()
-    assert frame["height"] > 900  # the frame is as high as its charts, so it needs no scroll bar
+    assert frame["height"] > 900  # the frame is as high as its charts and needs no scroll bar
 
 
 def test_the_lean_of_each_sample_is_that_of_the_command(page, ride, calibration, tmp_path):
@@ -85,7 +85,7 @@ def test_page_does_not_wait_for_impossible_charts(page, ride, calibration):
     page.page.evaluate("given()")
     page.give(ride, calibration)
     page.page.wait_for_function("document.querySelector('#drawing').hidden")
-    page.rider.errors[:] = before  # forget the errors of the frame without the library
+    page.rider.errors[:] = before  # ignore the errors of the frame, whose library is missing
 
 
 def test_too_short_ride_is_reported_at_the_top(page, calibration, tmp_path):
@@ -131,7 +131,7 @@ def test_values_at_the_pointer_are_in_one_line(page, ride, calibration):
     raise AssertionError("nothing is said")
 
 
-@pytest.mark.nightly  # the usual tests cover the page Install, which is built in the same way
+@pytest.mark.nightly  # the tests outside the nightly run cover the page Install, which is built in the same way
 def test_once_used_it_works_without_a_network(chromium, address, ride, calibration):
     rider = Rider(chromium, address + "rides.html", **LAPTOP)
     page = Rides(rider)

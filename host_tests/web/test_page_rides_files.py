@@ -20,7 +20,7 @@ PULLED = Path(__file__).with_name("keep_pulled.js").read_text()
 
 
 def test_cut_gzip_file_is_shown_with_a_warning(page, ride, calibration, tmp_path):
-    """A recorder that loses power leaves such a file."""
+    """A recorder that loses power leaves a file that is cut off."""
     page.give()
     packed = gzip.compress(ride.read_bytes())
     files = [("RIDE.csv.gz", packed[: len(packed) // 2]), ("RIDE.cal.json", calibration.read_bytes())]
@@ -146,9 +146,9 @@ def test_the_columns_of_a_table_can_be_named(page, tmp_path):
     log.write_text(app_exports.any_table(riding).replace("Acc_X", "Quantity 1", 1))
     assert page.give(log).endswith("and no acceleration found in it: say what its columns are.")
     assert page.page.eval_on_selector("[name=ay]", "select => select.value") == "Acc_Y"
-    assert page.page.locator("#first-seconds polyline").count() == 3  # the gyro's three axes
+    assert page.page.locator("#first-seconds polyline").count() == 3  # one line for each of the gyro's three axes
     page.page.click("#table button")
-    assert page.page.is_visible("#table")  # one column has no name yet
+    assert page.page.is_visible("#table")  # one column still has no name
     page.page.select_option("[name=ax]", "Quantity 1")
     page.page.select_option("[name=a]", "m/s2")
     page.page.select_option("[name=g]", "deg/s")
@@ -221,7 +221,7 @@ def test_pulled_rides_are_opened_once(page, address, ride, calibration):
     page.page.evaluate(PULLED, [[path.name, path.read_text()] for path in (ride, calibration)])
     page.page.goto(address + "licences.txt")
     page.page.goto(address + "rides.html#pulled")
-    page.page.wait_for_selector("#report", timeout=WAIT_MS)  # the report appears a while after the page has loaded
+    page.page.wait_for_selector("#report", timeout=WAIT_MS)  # the report appears some time after the page has loaded
     assert page.said() == ""
     assert page.page.inner_text("#report-title") == "RIDE.csv"
     page.page.goto(address + "licences.txt")

@@ -11,7 +11,8 @@ from kickstand_tools.web import sample_ride
 
 
 def test_the_sample_ride_is_a_log_with_an_aligned_calibration(tmp_path, monkeypatch):
-    """The ride of the page is longer. Its log has the means of two readings each, as a recording of a board has."""
+    """The ride of the page is longer. The log of the ride has the means of two readings each, as a recording of a board
+    has."""
     monkeypatch.setattr(sample_ride, "SECONDS", 20.0)
     sample_ride._ride.cache_clear()
     made = sample_ride._ride()
@@ -72,7 +73,7 @@ def test_the_names_of_the_sides_are_at_the_largest_lean(drawn):
 def test_the_road_is_coloured_by_the_side_of_the_lean(drawn):
     (road,) = points(drawn, "road")
     left, right = points(drawn, "road left"), points(drawn, "road right")
-    assert len(road) == 80 and (len(left), len(right)) == (19, 40)  # each piece is half a second
+    assert len(road) == 80 and (len(left), len(right)) == (19, 40)  # a piece of the path lasts half a second
     assert all(len(piece) == 2 for piece in left + right)
     assert np.array([piece[0] for piece in left]) == pytest.approx(road[:19])
     assert np.array([piece[1] for piece in right]) == pytest.approx(road[40:])
@@ -82,10 +83,10 @@ def test_the_road_has_north_above_and_one_scale(drawn):
     """The ride begins to the east and turns left, which is to the north. Each piece is 5 m long."""
     (road,) = points(drawn, "road")
     steps = np.diff(road, axis=0)
-    assert steps[0][0] > 0.0 > steps[0][1]  # y is downward
+    assert steps[0][0] > 0.0 > steps[0][1]  # in the drawing y points down
     lengths = np.hypot(*steps.T)
     assert lengths == pytest.approx(np.full(79, lengths.mean()), rel=0.02)
     width, height = (float(size) for size in re.findall(r'viewBox="0 0 (\S+) (\S+)"', drawn)[0])
     ((_, end),) = points(drawn, "zero")
     assert road[:, 0].min() > 0.0 and road[:, 0].max() < width == end[0]
-    assert road[:, 1].min() > 2.0 * end[1] and road[:, 1].max() < height  # below the chart
+    assert road[:, 1].min() > 2.0 * end[1] and road[:, 1].max() < height  # the map is below the chart

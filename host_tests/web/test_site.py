@@ -279,7 +279,7 @@ def test_silent_connections_do_not_hold_the_page():
 
 
 def test_pages_get_no_other_installed_packages(tmp_path, monkeypatch):
-    """In this test the tools are installed in the same directory as numpy and rich."""
+    """The tools of this test are installed in the same directory as numpy and rich."""
     shutil.copytree(firmware_path.TOOLS / "kickstand_tools", tmp_path / "kickstand_tools")
     for name in "numpy", "rich":
         (tmp_path / name).mkdir()

@@ -11,7 +11,7 @@ from kickstand_tools.web.device import STATE, WHOLE_TICKS, PageDevice, display
 
 @pytest.fixture
 def board(tmp_path, monkeypatch):
-    """Return the board of the page Try. Its flash is a new folder."""
+    """Return the board of the page Try. The board's flash is a new folder."""
     monkeypatch.chdir(tmp_path)
     device = PageDevice()
     yield device
@@ -37,9 +37,9 @@ def test_the_page_gets_a_record_every_20_ms(board):
     assert any("On stand: press" in text for text in texts(found))
     assert found[-1]["phase"] == "kickstand" and found[-1]["lean_deg"] == pytest.approx(-12.0, abs=0.1)
     assert found[-1]["powered"] and found[-1]["speed_mps"] == 0.0
-    assert last(found, "meter") == [None, None]  # not aligned yet
+    assert last(found, "meter") == [None, None]  # the board is not aligned yet
     assert "display" in found[1]  # the dark display is sent too
-    assert sum("display" in tick for tick in found) < 10  # only changes are sent
+    assert sum("display" in tick for tick in found) < 10  # a display is sent only if it has changed
     shown = last(found, "display")
     assert shown["codes"][0][:4] == list(b"Raw ") and found[1]["display"]["codes"] == [[0x20] * 16] * 2
     assert shown["lit"] and len(shown["cgram"]) == 64 and shown["shown_deg"] is None
@@ -125,7 +125,7 @@ def test_a_record_has_the_true_motion_in_its_unit(board):
 
 
 def test_the_meter_is_sent_with_its_digits(board):
-    """The lean has one digit, the forward force three. Both are missing before the alignment."""
+    """The lean has one digit, the forward force three. Lean and forward force are missing before the alignment."""
     assert last(ticks(board, 2.0), "meter") == [None, None]
     sent = [tick["meter"] for tick in align(board)]
     lean_deg, forward_g = sent[-1]
@@ -160,7 +160,7 @@ def test_time_goes_on_in_safe_mode(board):
     be switched off."""
     board.run_to(2.0)
     board.order("power", False)
-    assert board.order("power", False) == pytest.approx(2.0, abs=0.1)  # nothing more can be switched off
+    assert board.order("power", False) == pytest.approx(2.0, abs=0.1)  # the board is already off
     board.order("button", True)
     board.run_to(2.2)
     board.order("power", True)
@@ -207,11 +207,11 @@ def test_a_display_fitted_without_power_stays_dark(board):
     board.order("power", False)
     board.order("display", "lcd")
     found = ticks(board, 1.5)
-    shown = last(found, "display")  # sent again, because it is another display
+    shown = last(found, "display")  # the display is sent again, because it was exchanged
     assert not shown["lit"] and shown["text"] == [" " * 16] * 2
     board.order("power", True)
     assert last(ticks(board, 3.0), "display")["lit"]
-    board.order("display", "sh1106")  # with power it is lit after its start
+    board.order("display", "sh1106")  # a display that has power lights up after its initialisation
     assert "pixels" in last(ticks(board, 6.0), "display")
 
 

@@ -54,7 +54,7 @@ def test_each_file_is_served_with_its_type(connection, method, path, name, kind)
     assert answer.status == (404 if name is None else 200)
     assert answer.headers["Content-Type"] == kind
     assert int(answer.headers["Content-Length"]) == len(content)
-    assert answer.headers["Cache-Control"] == "no-cache"  # a new version is shown at once
+    assert answer.headers["Cache-Control"] == "no-cache"  # browsers load a new version at once
     assert answer.headers["X-Content-Type-Options"] == "nosniff"
 
 
@@ -92,7 +92,7 @@ def test_the_65th_connection_ends_the_oldest_silent_one():
         with pytest.raises(BlockingIOError):
             connections[1].recv(1)
         latest = connect()
-        assert connections[0].recv(1) == b""  # it was ended
+        assert connections[0].recv(1) == b""  # the server has ended the connection
         with pytest.raises(BlockingIOError):
             connections[1].recv(1)
         latest.sendall(b"GET / HTTP/1.0\r\n\r\n")
@@ -106,7 +106,8 @@ def test_the_same_files_give_the_same_zip():
     assert packed == archives.zipped(other) and len(packed) < 1000
     archive = zipfile.ZipFile(io.BytesIO(packed))
     assert archive.namelist() == ["a/c", "b"]
-    assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}  # the earliest date of a ZIP
+    # The earliest date that a ZIP file can have
+    assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
     assert {name: archive.read(name) for name in archive.namelist()} == one
 
 
@@ -142,7 +143,7 @@ def test_the_pages_get_all_modules_that_they_import():
 
 
 def test_each_architecture_gets_its_machine_code(monkeypatch):
-    """Only files with machine code differ between the boards. The third byte of a file says if it has any."""
+    """Only files with machine code differ between the boards. The third byte of a file says if it has machine code."""
 
     def compiled(source, architecture):
         return b"M\x06" + bytes([source.stem.endswith("viper")]) + architecture.encode()
@@ -229,7 +230,8 @@ class Npm:
 
 
 def test_npm_installs_the_packages_of_the_lists_once(tmp_path, monkeypatch):
-    """The home directory is new, so the folder for the packages is made. npm gets the two lists and five minutes."""
+    """The home directory is new, so the folder for the packages is created. npm gets the two lists, and a time limit of
+    five minutes."""
     monkeypatch.setattr(npm_packages.Path, "home", lambda: tmp_path / "new" / "home")
     npm = Npm(monkeypatch)
     found = npm_packages.find()
@@ -327,7 +329,7 @@ def test_the_site_has_every_page_filled_in(monkeypatch):
     made_later = site.site_files()
     assert made_later["service_worker.js"] == made["service_worker.js"]
     monkeypatch.setattr(site, "home", lambda: "")
-    assert site.site_files()["service_worker.js"] != made["service_worker.js"]  # another version of the site
+    assert site.site_files()["service_worker.js"] != made["service_worker.js"]  # the site has another version now
 
 
 def test_the_tables_of_wiring_name_each_wire():

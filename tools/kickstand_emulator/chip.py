@@ -23,12 +23,13 @@ from .i2c_controller import TimedI2C
 # Keys of rp2040py's table of peripherals. A key is a peripheral's address, shifted right by 12 bits
 _SSI = 0x18000
 _I2C = (0x40044, 0x40048)
-_OSCILLATORS = WDSEL_XOSC | WDSEL_ROSC  # the SDK makes the watchdog's reset spare these oscillators
+_OSCILLATORS = WDSEL_XOSC | WDSEL_ROSC  # oscillators that the SDK excludes from the watchdog's reset
 _ACCESS = ("read_uint8", "read_uint16", "read_uint32", "write_uint8", "write_uint16", "write_uint32")
 
 
 class EmulatedClock:
-    """Replaces simulated_board.clock.Clock. Its time follows the processor's cycles, in whole microseconds."""
+    """Replaces simulated_board.clock.Clock. The time of the clock follows the processor's cycles, in whole
+    microseconds."""
 
     def __init__(self, clock: IClock) -> None:
         self._clock = clock
@@ -128,8 +129,9 @@ class EmulatedChip:
         """Double the emulation's speed on the host. The emulated results stay the same.
 
         At each memory access, rp2040py's compiled core looks up a method by name. Python then creates a method object,
-        unless the instance has an attribute with that name. So this function stores the methods in the instance. After
-        every instruction the core also polls both PIO blocks. MicroPython does not use them, so they are removed.
+        unless the instance has an attribute with that name. To avoid this, the function stores the methods in the
+        instance. After every instruction the core also polls both PIO blocks. MicroPython does not use the PIO blocks,
+        so they are removed.
         """
         for name in _ACCESS:
             self.rp2040.__dict__[name] = getattr(self.rp2040, name)

@@ -9,8 +9,8 @@ from rp2040py.usb.cdc import USBCDC
 class QuietConsole(USBCDC):
     """The board's USB console, for a host that sends nothing while it has no data.
 
-    A real host behaves in this way. rp2040py's USB host answers every ready buffer with an empty packet. With that
-    host, the Pico would spend two thirds of its time on 34,000 empty packets per second.
+    A real host sends nothing either. rp2040py's USB host answers every ready buffer with an empty packet. With
+    rp2040py's host, the Pico would spend two thirds of its time on 34,000 empty packets per second.
 
     received: Function that is called with the board's output.
     """

@@ -23,7 +23,8 @@ class GuestError(Exception):
 
 
 class EmulatedDevice(ABC):
-    """An emulated board. It is off until power_on(). A `with` statement switches the board on, and off at its end.
+    """An emulated board. The board is off until power_on(). A `with` statement switches the board on, and off at its
+    end.
 
     Times are emulated seconds. The time continues through resets and power cycles.
 
@@ -50,7 +51,7 @@ class EmulatedDevice(ABC):
         self.powered = False
         self.resets = 0  # number of resets since the start, not counting power cycles
         self._awaited = b""
-        self._raw = False  # True while the console is in the raw REPL
+        self._raw = False  # True while the console is at MicroPython's raw prompt
         self._wire(board.button_pin)
 
     def __enter__(self):

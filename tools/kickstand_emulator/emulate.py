@@ -78,8 +78,8 @@ class ScriptedBike:
 def emulate(port: int, say: Callable[[str], None], chip: str = "rp2040", display: str = "lcd") -> None:
     """Serve an emulated board's console on socket://127.0.0.1:port until the user quits. Raises InputError.
 
-    In a terminal the user steers the bike with keys. Otherwise say() receives each new text of the display. The bike
-    then follows the demo's ride as soon as the firmware runs.
+    In a terminal the user steers the bike with keys. Without a terminal, say() receives each new text of the display,
+    and the bike follows the demo's ride as soon as the firmware runs.
 
     say: Function that prints a text.
     chip: "rp2040" or "esp32".

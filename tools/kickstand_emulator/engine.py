@@ -28,7 +28,7 @@ def rp2040(records: Iterator[bytes], progress: Progress | None) -> Iterator[IO[b
     """
     from . import image, native
 
-    image.find()  # called first: it raises InputError if something is not installed, before an import below fails
+    image.find()  # called before the imports below: raises InputError if something is not installed
     native.build()
     from . import flash_image
     from .host_link import GUEST, HostLink

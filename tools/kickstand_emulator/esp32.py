@@ -39,8 +39,8 @@ from .esp32_machine import (
 )
 
 _IMAGE_AT, _FLASH_SIZE = 0x1000, 4 << 20
-_ROM_STARTS = b"ets Jul 29 2019"  # the chip's ROM prints this first
-_READY = b">>> ", b"Ctrl-C stops it."  # the board prints one of these when MicroPython accepts input
+_ROM_STARTS = b"ets Jul 29 2019"  # the first text that the chip's ROM prints
+_READY = b">>> ", b"Ctrl-C stops it."  # the board prints one of these texts when MicroPython accepts input
 _BOOT_S = 5.0
 _CHUNK = 64  # number of bytes that are sent to the console at once, half of the chip's FIFO
 _CHUNK_US = 10 * _CHUNK * 1_000_000 // 115_200
@@ -144,7 +144,7 @@ class Sink:
     def _kill(self) -> None:
         if self._process:
             if self._process.poll() is None:
-                self._sync()  # save the writes to the flash that the board has completed
+                self._sync()  # store the writes to the flash that the board has completed
             self._process.kill()
             self._process.wait()
             self._link.close()
@@ -172,7 +172,7 @@ class Sink:
     # Messages (see esp32_machine.py)
 
     def _command(self, kind: int, a: int = 0, b: int = 0, value: int = 0) -> None:
-        with contextlib.suppress(OSError):  # _serve() reports that QEMU has ended
+        with contextlib.suppress(OSError):  # OSError is ignored, because _serve() reports that QEMU has ended
             self._link.sendall(COMMAND.pack(kind, a, b, value))
 
     def _serve(self) -> None:

@@ -1,6 +1,6 @@
 """Finds QEMU's library for the ESP32, the chip's ROM and MicroPython's image.
 
-These files are not part of Kickstand.
+Library, ROM and image are not part of Kickstand.
 """
 
 import ctypes

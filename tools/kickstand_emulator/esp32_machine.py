@@ -92,7 +92,7 @@ class _Notifier(c.Structure):
 
 
 class _RemoteBus(Bus):
-    """An I2C bus whose devices are in the other process. This process only knows whether a device holds SDA."""
+    """An I2C bus whose devices are in the other process. The bus only knows whether a device holds SDA."""
 
     def __init__(self, machine: "Machine", number: int, sda: int, scl: int) -> None:
         super().__init__(None, sda, scl)
@@ -129,7 +129,8 @@ class Machine:
         self._inputs: dict[int, int] = {}  # levels set from outside the chip, by pin
         self._wires_of: dict[int, tuple[Wires, int, int]] = {}
         self._driven = [1] * _PINS
-        self._stale: list[int] = []  # pins whose input must be corrected, because QEMU set it to the chip's own output
+        # Pins whose input must be corrected, because QEMU set the input to the chip's own output
+        self._stale: list[int] = []
         # _may_reset is True while the processors wait for a reset, _resetting while the main loop executes it
         self._may_reset = self._resetting = False
         self._fuses: _Timer | None = None
@@ -149,7 +150,7 @@ class Machine:
         self.tell(kind, a, b)
         answer = self._link.recv(1)
         if not answer:
-            os._exit(0)  # the other process has ended or has cut the power
+            os._exit(0)  # end, because the other process has ended or has cut the power
         return answer[0]
 
     def _receive(self, size: int) -> bytes:
@@ -206,7 +207,8 @@ class Machine:
             wires[0].driven(self._driven[wires[1]], self._driven[wires[2]])
 
     def _sync(self, number: int, what: int) -> None:
-        """Correct the inputs of stale pins. QEMU calls this before it reads the inputs, and when it sets up a pin."""
+        """Correct the inputs of stale pins. QEMU calls this function before it reads the inputs, and when it sets up a
+        pin."""
         if what == -1 and self._stale:
             for pin in self._stale:
                 self._qemu.qemu_picsimlab_set_pin(pin + 1, self._inputs[pin])
@@ -217,9 +219,10 @@ class Machine:
             self._qemu.timer_mod_ns(c.addressof(self._stop), self._qemu.qemu_clock_get_ns(_VIRTUAL))
 
     def _on_reset(self, _: object) -> None:
-        """Wait until the processors' thread sleeps. Otherwise chance would decide which processor continues first.
+        """Wait until the processors' thread sleeps. Without this wait chance would decide which processor continues
+        first.
 
-        QEMU calls this in its main loop during a reset, while the processors are stopped.
+        QEMU calls this function in its main loop during a reset, while the processors are stopped.
         """
         if self._state >= 0:
             while not self._sleeps(_SHORTEST_S):
@@ -231,8 +234,9 @@ class Machine:
     # Time
 
     def _begun(self) -> None:
-        """Prepare the emulation. QEMU calls this in the processors' thread, before the first instruction."""
-        # Keep one thread state of Python. Otherwise each call from QEMU would create a thread state, which is slow
+        """Prepare the emulation. QEMU calls this function in the processors' thread, before the first instruction."""
+        # Keep one thread state of Python. Without a kept thread state each call from QEMU would create one, which is
+        # slow
         c.pythonapi.PyGILState_Ensure()
         self._state = os.open(f"/proc/self/task/{threading.get_native_id()}/stat", os.O_RDONLY)
         self._calm_timers()
@@ -261,7 +265,7 @@ class Machine:
     def _hold_main_loop(self, _: object, poll) -> None:
         """Let the main loop continue only while the processors sleep or wait for a reset.
 
-        QEMU calls this before and after the main loop waits for an event, with QEMU's lock held.
+        QEMU calls this function before and after the main loop waits for an event, with QEMU's lock held.
         """
         if poll.contents.state == 0 or self._state < 0:
             return
@@ -293,9 +297,9 @@ class Machine:
     def _guard(self, _: object) -> None:
         """Start a requested reset, and end reads of the eFuses early.
 
-        QEMU calls this every millisecond, between two turns of the processors. At its start the ROM waits for three
-        reads of the eFuses. On a real chip they take microseconds. In QEMU they take 100 ms, as long as the rest of the
-        start.
+        QEMU calls this function every millisecond, between two time slices of the processors. At its start the ROM
+        waits for three reads of the eFuses. On a real chip the three reads take microseconds. In QEMU they take 100 ms,
+        as long as the rest of the start.
         """
         now_ns = self._qemu.qemu_clock_get_ns(_VIRTUAL)
         if self._fuses and self._fuses.expires > now_ns:
@@ -309,7 +313,7 @@ class Machine:
     def _await_reset(self, _cpu: object, _data: object) -> None:
         """Release QEMU's lock so that the main loop can execute a reset, and wait for the reset.
 
-        QEMU calls this in the processors' thread, with its lock held.
+        QEMU calls this function in the processors' thread, with its lock held.
         """
         if not self._qemu.qemu_reset_requested_get():
             return
@@ -362,7 +366,8 @@ def _end(unraisable) -> None:
 
 
 def main() -> None:
-    sys.unraisablehook = _end  # ends this process too if the other process has ended
+    # An exception in a call from QEMU ends this process; one cause is that the other process has ended
+    sys.unraisablehook = _end
     number, folder, flash, *wires = sys.argv[1:]
     link = socket.socket(fileno=int(number))
     pairs = [(int(sda), int(scl)) for sda, scl in (pair.split(",") for pair in wires)]

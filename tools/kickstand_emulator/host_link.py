@@ -12,7 +12,7 @@ from rp2040py.peripherals.peripheral import BasePeripheral
 
 from .chip import EmulatedChip
 
-_PLACE = 0x40068  # address of the registers, shifted right by 12 bits. This address is reserved on the real chip
+_PLACE = 0x40068  # address of the registers, shifted right by 12 bits. On the real chip the address is reserved
 _COUNT, _FILL, _TAKE = 0x0, 0x4, 0x8
 
 GUEST = """
@@ -55,8 +55,8 @@ class HostLink(BasePeripheral):
     def write_uint32(self, offset: int, value: int) -> None:
         """Write a register.
 
-        COUNT sets the number of bytes. FILL copies this number of bytes from the source to the address `value` in RAM.
-        TAKE copies them from this address to the sink.
+        COUNT sets the number of bytes. FILL copies COUNT bytes from the source to the address `value` in RAM. TAKE
+        copies COUNT bytes from the address `value` to the sink.
         """
         start = value - RAM_START_ADDRESS
         if offset == _COUNT:

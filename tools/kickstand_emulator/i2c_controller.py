@@ -28,8 +28,8 @@ class TimedI2C(RPI2C):
     """rp2040py's I2C controller on a bus of simulated_board. The SCL count registers set the length of a bit.
 
     The SDK waits for the end of each byte in a loop that only reads registers. Emulating this loop would make a
-    transfer ten times as slow on the host. So the first of these reads advances the time to the end of the byte. As a
-    result, interrupts are late by up to the duration of a byte.
+    transfer ten times as slow on the host. To avoid this, the first read of a register in the loop advances the time to
+    the end of the byte. As a result, interrupts are late by up to the duration of a byte.
     """
 
     def __init__(self, rp2040: RP2040, name: str, irq: int, bus: Bus) -> None:
@@ -110,7 +110,7 @@ class TimedI2C(RPI2C):
 
     def _connect(self, address: int, read: bool) -> None:
         answer = self.bus.start(address, read)
-        # None means that a device holds SDA. Then the transfer lasts until the software gives up
+        # None means that a device holds SDA. A transfer with a held SDA lasts until the software gives up
         if answer is not None:
             self.complete_connect(answer)
 

@@ -1,7 +1,7 @@
 """Connects the I2C devices to GPIO pins, bit by bit.
 
 rp2040py emulates only the I2C controllers, but software also drives the pins directly. MicroPython drives the pins for
-SoftI2C and for writes of length 0, as in I2C.scan(). The firmware drives them to free a stuck bus.
+SoftI2C and for writes of length 0, as in I2C.scan(). The firmware drives the pins to free a stuck bus.
 """
 
 from collections.abc import Callable
@@ -59,7 +59,7 @@ class Wires:
         if self._mode == _LISTENS and self._bit <= 8:
             self._byte = self._byte << 1 | self._driven_sda
         elif self._mode == _SENDS and self._bit == 9 and self._driven_sda:
-            self._mode = _IDLE  # the chip does not acknowledge the last byte that it reads
+            self._mode = _IDLE  # wait for a START, because the chip does not acknowledge the last byte that it reads
 
     def _clock_falls(self) -> None:
         if self._mode == _LISTENS and self._bit == 8:
@@ -70,7 +70,7 @@ class Wires:
             self._pull = 0 if self._bit == 8 or self._byte >> (7 - self._bit) & 1 else 1
 
     def _take(self) -> int:
-        """Pass the received byte to the bus. Returns 1 if the device acknowledges it."""
+        """Pass the received byte to the bus. Returns 1 if the device acknowledges the byte."""
         if not self._address:
             return 1 if self._bus.write_byte(self._byte) else 0
         return 1 if self._bus.start(self._byte >> 1, bool(self._byte & 1)) else 0

@@ -39,7 +39,7 @@ def _download(to: Path) -> None:
     try:
         with urllib.request.urlopen(URL, timeout=_TIMEOUT_S) as response:
             data = response.read()
-    except OSError as error:  # also URLError, which holds the original error in its attribute `reason`
+    except OSError as error:  # includes URLError, which holds the original error in its attribute `reason`
         why = cause(getattr(error, "reason", error) or error)
         raise InputError(
             f"no MicroPython image for the Pico: {URL} cannot be downloaded ({why}); put that file into {to.parent}"

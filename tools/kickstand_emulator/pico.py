@@ -81,8 +81,8 @@ class Pico(EmulatedDevice):
     def stall(self, seconds: float) -> None:
         """Advance the time while the processor is stopped, as during a long flash operation.
 
-        A program never starts such an operation in the middle of an I2C transfer. So this method first waits until
-        there has been no transfer for a millisecond.
+        A program never starts such an operation in the middle of an I2C transfer. The method therefore first waits for
+        a millisecond without a transfer.
         """
         before = None
         while before != (begun := [dict(bus.transfers) for bus in self.board.buses]) or self._transferring():

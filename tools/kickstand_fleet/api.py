@@ -5,7 +5,7 @@
     fleet = api.run_fleet(api.read_manifest("MANIFEST.csv"), "results")
     print(fleet.seen.statuses)
 
-The functions return data and print nothing. They raise InputError, with one line of text, if the input is wrong.
+The functions return data and print nothing. If the input is wrong, they raise InputError with one line of text.
 """
 
 from kickstand_tools.common.errors import InputError as InputError

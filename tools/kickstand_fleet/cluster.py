@@ -1,14 +1,14 @@
 """Runs a function on many items with Dask, on this computer or on a cluster.
 
 Workers on this computer and their scheduler communicate over 127.0.0.1 with TLS. Each run creates its own keys, and
-only its processes have them. Another user of the computer can connect, but can neither read nor run anything. Unix
-sockets would exclude other users, but Dask does not support them. Dask's web pages are off. Without Dask, a process
-pool would need its own crash handling.
+only the processes of the run have them. Another user of the computer can connect, but can neither read nor run
+anything. Unix sockets would exclude other users, but Dask does not support them. Dask's web pages are off. Without
+Dask, a process pool would need its own crash handling.
 
-A task that kills its worker must not harm other tasks. By default Dask retries such a task on other workers. The task
-kills them too, and Dask then recomputes their finished results. So this module forbids retries, submits only a few
-tasks at a time, and lets Dask keep no results. A task whose worker died runs a second time, alone, after all other
-tasks. If its worker dies again, the task is the cause.
+A task that kills its worker must not harm other tasks. By default Dask retries such a task on other workers. A task
+that kills its worker would kill the other workers too, and Dask would recompute their finished results. For this reason
+the module forbids retries, submits only a few tasks at a time, and lets Dask keep no results. A task whose worker died
+runs a second time, alone, after all other tasks. If a worker dies again, the task is the cause.
 """
 
 import contextlib
@@ -31,8 +31,9 @@ _LOOK_S = 0.5  # time between two checks for tasks that take too long
 _TOPIC = "kickstand-fleet"  # topic of the messages by which a worker announces that it begins a task
 Outcome = tuple[int, Any | None, str, str]
 _LOCAL_PATIENCE_S, _REMOTE_PATIENCE_S = 60.0, 20.0  # longest time to wait for the first worker
-_RESTART_S = 120.0  # longest wait for the restart of a worker. A later restart would end the worker's next task, too
-_LOST_S = 60.0  # longest time without any worker. Dask replaces a dead worker sooner, if it can
+# Longest wait for the restart of a worker. A restart after this time would end the worker's next task, too
+_RESTART_S = 120.0
+_LOST_S = 60.0  # longest time without a worker. Dask replaces a dead worker sooner, if it can
 
 
 def run_tasks(
@@ -85,7 +86,7 @@ class Cluster:
             raise InputError("a fleet needs Dask: " + extra("fleet")) from error
 
         class Undisturbed(WorkerPlugin):
-            """Makes workers ignore Ctrl-C in a terminal. The main process ends them instead."""
+            """Makes workers ignore Ctrl-C in a terminal. The main process ends the workers instead."""
 
             def setup(self, worker: Any) -> None:
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -189,7 +190,7 @@ class Cluster:
             if status == "finished":
                 try:
                     result = future.result()
-                except Exception:  # the task's worker died before the result was fetched
+                except Exception:  # the worker of the task died before the result was fetched
                     suspects.append(index)
                 else:
                     yield index, result, "", ""
@@ -207,7 +208,7 @@ class Cluster:
         yield from self._end_overdue_tasks()
 
     def _check_workers(self) -> None:
-        """Raise InputError if no worker has existed for _LOST_S. The tasks would wait for ever."""
+        """Raise InputError if no worker has existed for _LOST_S. Without a worker the tasks would wait for ever."""
         now = time.monotonic()
         if self._client.scheduler_info(n_workers=1)["workers"]:
             self._working_s = now
@@ -237,7 +238,7 @@ class Cluster:
 
 @contextlib.contextmanager
 def _without_interrupts() -> Iterator[None]:
-    """A context that defers Ctrl-C to its end. Processes started in this context never receive Ctrl-C.
+    """A context that defers Ctrl-C to its end. Processes that are started in the context never receive Ctrl-C.
 
     Without this context, an interrupt while Dask starts or connects would make Dask print pages of errors.
     """

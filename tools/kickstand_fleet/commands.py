@@ -38,7 +38,7 @@ def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **how: Any
     from .run import run_fleet
 
     manifest = manifests[0]
-    if len(manifests) > 1:  # the shell has expanded a pattern to file names
+    if len(manifests) > 1:  # more than one argument: the shell has expanded a pattern to file names
         raise click.UsageError("One manifest, or one pattern in quotation marks.")
     periods = by_pattern(manifest, vehicle) if is_pattern(manifest) else read_manifest(manifest)
     try:

@@ -14,7 +14,7 @@ car, bends show which way is left, just as braking shows which way is forward.
 
 A sensor ahead of the rear axle is accelerated sideways when a bend begins and ends. Drivers brake and speed up at the
 same moments, so this acceleration would falsify forward. The coefficient arm takes up this acceleration. The length of
-arm is the distance from the sensor to the rear axle.
+the vector `arm` is the distance from the sensor to the rear axle.
 
 A motorcycle leans into bends. The force stays along the motorcycle's own up, and grows to sqrt(1 + c^2). So for a
 motorcycle
@@ -51,15 +51,15 @@ SWING_S = 0.2  # averaging time of the yaw rate at each end of an interval
 # Sway is the mean force over the first time minus the mean force over the second time. The first mean removes noise,
 # the difference removes braking, speeding up and bends
 SWAY_S = 0.05, 0.3
-# Yaw rate at which an interval of a car has half of its usual weight. In a tight turn, a sensor ahead of the rear axle
-# does not move along the vehicle's heading. The sensor's direction of motion differs by an angle: its distance from
-# that axle divided by the turn's radius.
+# Yaw rate at which an interval of a car has half of its usual weight. In a tight bend, a sensor ahead of the rear axle
+# does not move along the vehicle's heading. Its direction of motion differs from the heading by an angle: the distance
+# from sensor to rear axle, divided by the bend's radius.
 TIGHT_DPS = 20.0
 
 
 @dataclass
 class Intervals:
-    """n intervals of a log. Each lasts from one speed to the next speed.
+    """n intervals of a log. Each interval lasts from one speed to the next speed.
 
     t_s: Middle of each interval, shape (n), in s from the log's beginning.
     force: Mean force of each interval, shape (n, 3), in g along the sensor's axes.
@@ -125,8 +125,9 @@ def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
     standing = (mean_mps < STANDING_MPS) & (np.abs(a) < 0.01)
     if kind == MOTORCYCLE:
         terms = np.column_stack((np.sqrt(1.0 + c * c), a, np.zeros_like(a), np.zeros_like(a)))
-        weight = length * (mean_mps > MOVING_MPS)  # at lower speeds the rider has a foot on the ground
-        shown = np.zeros_like(a)  # sway is not used: a motorcycle sways about its tyre contacts and with its rider
+        # A motorcycle at a lower speed has no weight, because the rider may have a foot on the ground
+        weight = length * (mean_mps > MOVING_MPS)
+        shown = np.zeros_like(a)  # no sway, because a motorcycle sways about its tyre contacts and with its rider
     else:
         around = [np.clip(time + ahead, log.t_s[0], log.t_s[-1]) for ahead in (-SWING_S / 2.0, SWING_S / 2.0)]
         sooner, later = (_integrals(rate.T, log.t_s, step, at) for at in around)
@@ -206,8 +207,9 @@ def frame_of(up: Array, ahead: Array) -> Array:
 def handedness(found: Array, varied: Array) -> float:
     """Divide the lateral force measured in bends by the lateral force computed from speed and yaw rate.
 
-    The ratio is about 1. It is about -1 if the gyro's signs or the axes are mirrored. It is 0 without bends, and for a
-    motorcycle, because a motorcycle leans into bends. The arguments are the two results of fits(), with k left out.
+    The ratio is about 1. The ratio is about -1 if the gyro's signs or the axes are mirrored. The ratio is 0 without
+    bends, and for a motorcycle, because a motorcycle leans into bends. The arguments are the two results of fits(),
+    with k left out.
     """
     if varied[1] < 0.05:
         return 0.0
@@ -219,12 +221,12 @@ def handedness(found: Array, varied: Array) -> float:
 def _without_road(log: Intervals) -> tuple[Array, Array]:
     """Return the terms and the force with the slope and camber of the road filtered out.
 
-    Slope and camber stay similar for some hundred metres. They tilt the measured level, so neighbouring intervals share
-    an error. An ordinary regression would mistake the slope during braking for a part of forward.
+    Slope and camber stay similar for some hundred metres. Slope and camber tilt the measured level, so neighbouring
+    intervals share an error. An ordinary regression would mistake the slope during braking for a part of forward.
 
     Therefore a filter follows the road, modelled as a first-order Gauss-Markov process in distance. The filter predicts
     each value from the earlier intervals. The function returns the differences from the predictions, divided by their
-    standard deviations. These differences are uncorrelated, so ordinary least squares can be used on them.
+    standard deviations. The differences are uncorrelated, so ordinary least squares can be used on them.
     """
     rows = np.hstack((log.terms, log.force))
     driven = log.speed * np.diff(log.t_s, prepend=log.t_s[0])

@@ -27,7 +27,7 @@ def file_stem(readable: str, *exact: str) -> str:
     """Return a unique file name without its ending. The name is the same in every run.
 
     readable: Text that begins the name. Characters that a file system does not allow are encoded.
-    exact: Texts that identify the file. The name ends with a hash of them.
+    exact: Texts that identify the file. The name ends with a hash of these texts.
 
     >>> file_stem(".bus 12", "bus 12", "front")
     'bus%2012-e9a9b5c8f0'
@@ -45,7 +45,7 @@ def folder_value(value: str) -> str:
 
 
 def printable(text: str) -> str:
-    """Return text with each byte that is not UTF-8 replaced by its code. Such bytes occur in names of files."""
+    """Return text with each byte that is not UTF-8 replaced by its code. Names of files may contain such bytes."""
     return text.encode("utf-8", "backslashreplace").decode()
 
 
@@ -117,7 +117,7 @@ def identities(paths: Iterable[str]) -> dict[str, str]:
             try:
                 stat = Path(path).stat()
                 known[path] = f"{stat.st_size}-{stat.st_mtime_ns}"
-            except (OSError, ValueError):  # a name that contains a NUL
+            except (OSError, ValueError):  # OSError or ValueError: the name contains a NUL
                 known[path] = ""
             continue
         parent = path.rpartition("/")[0]
@@ -147,7 +147,7 @@ class _Named(io.BytesIO):
 def listed(parent: str) -> dict[str, str]:
     """List a directory of a store. Raises InputError if the directory cannot be read.
 
-    Returns the mark of each file (see identities()), by its path. The result is empty without such a directory.
+    Returns the mark of each file (see identities()), by its path. If the directory does not exist, the result is empty.
     """
     marks: dict[str, str] = {}
     with _in_store(parent, "read") as (fs, place), contextlib.suppress(FileNotFoundError):
@@ -197,7 +197,7 @@ def write_bytes(path: str, content: bytes) -> None:
             fs.pipe_file(place, content)
         return
     directory = Path(path).parent
-    try:  # a directory created here stays if the write fails, because other workers use it too
+    try:  # a new directory stays if the write fails, because other workers use it too
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{directory} cannot be made: {cause(error)}") from error
@@ -207,7 +207,8 @@ def write_bytes(path: str, content: bytes) -> None:
 
 @contextlib.contextmanager
 def to_write(path: str) -> Iterator[Path]:
-    """A context that yields a temporary path to write to. At its end the complete file is moved to `path`.
+    """A context that yields a temporary path to write to. At the end of the context the complete file is moved to
+    `path`.
 
     Raises InputError if the file cannot be written.
     """

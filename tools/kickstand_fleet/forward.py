@@ -1,9 +1,10 @@
 """Computes forward, with its standard error, from all braking and all bends in the logs of one mount.
 
 The firmware's regression cannot separate the slope of the road during braking from an error of forward. This module
-uses whole logs, from which the slope can be filtered out (see evidence.py). This halves the error on simulated buses,
-which brake gently and seldom. On recorded drives, neither method is always better. If the firmware finds an alignment,
-forward is therefore the mean of both results, weighted by their variances. Up is then always the firmware's.
+uses whole logs, from which the slope can be filtered out (see evidence.py). The filter halves the error on simulated
+buses, which brake gently and seldom. On recorded drives, neither method is always better. If the firmware finds an
+alignment, forward is therefore the mean of both results, weighted by their variances. The direction up is then always
+the firmware's.
 """
 
 from dataclasses import dataclass
@@ -16,13 +17,14 @@ from kickstand_tools.signals import Array, rotation_vector
 from . import evidence
 from .evidence import Intervals
 
-SENSOR_DEG = 0.3  # standard error of forward, in degrees, if the scales of the sensor's axes differ by 1 %
-CORRELATION = 0.5  # correlation between the errors of the two methods, which use the same braking
+SENSOR_DEG = 0.3  # standard error of forward, in degrees, caused by a scale difference of 1 % between the sensor's axes
+# Correlation between the errors of the firmware's and this module's forward, which use the same braking
+CORRELATION = 0.5
 # Largest difference between the two methods, in standard deviations, that does not increase the standard error of
 # forward
 APART_SIGMAS = 2.0
 # Number of coefficients of evidence.py that are fitted: level, forward and left. The fourth coefficient, arm, is useful
-# only to compare parts of a drive. When it was fitted to whole drives, forward was wrong by 2 degrees in one of three
+# only to compare parts of a drive. When arm was fitted to whole drives, forward was wrong by 2 degrees in one of three
 # recorded drives. Without arm, the error was at most 0.6 degrees in all three drives.
 _TERMS = 3
 _LEAST_BLOCKS = 4

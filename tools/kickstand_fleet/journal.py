@@ -46,7 +46,7 @@ class Journal:
                 if not self._note(line) and line.strip():
                     self.damaged += 1
                     self._file.seek(self._end)
-                    # Overwrite the damaged line with blanks. Otherwise the next run would count it again
+                    # Overwrite the damaged line with blanks. If the line stayed, the next run would count it again
                     self._file.write(b" " * (len(line) - 1) + b"\n")
                 self._end += len(line)
             self._file.flush()
@@ -89,7 +89,7 @@ class Journal:
         return key in self._places and key not in self._again
 
     def add(self, key: str, result: PeriodResult, again: bool = False) -> None:
-        """Save a result. again: True if the next run should recompute it.
+        """Save a result. again: True if the next run should recompute the result.
 
         Raises InputError if the result cannot be written. Earlier results stay in the file.
         """

@@ -1,7 +1,8 @@
 """Finds mounts that rotated by a few degrees or more, between two logs or during a log.
 
-The firmware refuses a drive only if the mount moved by some 7 to 30 degrees. This module also finds smaller rotations.
-At every moment in all logs of a mount, it compares the alignment before that moment with the alignment after it.
+The firmware refuses a drive only if the mount moved by some 7 to 30 degrees. The module also finds smaller rotations.
+At every moment in all logs of a mount, the module compares the alignment before that moment with the alignment after
+it.
 
 A rotation that tilts the sensor shows in gravity. A rotation about the vertical shows only in three things: in braking,
 in bends, and in the direction in which the vehicle sways on its springs. The sway also shows on a straight road without
@@ -23,8 +24,10 @@ LEAST_DEG = 3.2  # smallest rotation that is reported. Roads, load and temperatu
 # Smallest rotation that is reported, in standard deviations. The limit is higher within a log than between two logs,
 # because a log has many moments, and one of them may exceed a low limit by chance
 BETWEEN_SIGMAS, WITHIN_SIGMAS = 3.3, 4.3
-SUDDEN_SIGMAS = 3.8  # this limit is used within a log for a moment at which the vertical jumps
-SUSPECTED_SHARE = 0.7  # factor on the three limits if the firmware suspects that the mount moved
+SUDDEN_SIGMAS = 3.8  # the limit within a log for a moment at which the vertical jumps
+# BETWEEN_SIGMAS, WITHIN_SIGMAS and SUDDEN_SIGMAS are multiplied by this value if the firmware suspects that the mount
+# moved
+SUSPECTED_SHARE = 0.7
 # Standard deviations, in degrees, of the errors that are constant before the moment or after it. The three values are
 # for pitch, yaw and roll (about left, up and forward). ROAD_DEG is for two parts of one log, OTHER_ROAD_DEG for two
 # logs
@@ -35,20 +38,20 @@ LEAST_BLOCKS = 7
 # Forward is computed on one side of a moment if braking, speeding up and bends vary by at least this much, in g^2 s
 LEAST_VARIED = 0.2
 # The jackknife underestimates the variance if a few blocks agree by chance. So the yaw gets an additional standard
-# deviation. YAW_PRIOR_DEG is its value at a variation of 1 g^2 s
+# deviation. YAW_PRIOR_DEG is this standard deviation at a variation of 1 g^2 s
 YAW_PRIOR_DEG = 0.4
 # SWAY_DEG is the standard deviation, in degrees, of the direction of sway on each side of a moment, caused by the
 # roads. The sway is not used if its standard deviation over both sides is above SWAY_WORST_DEG. The sway is also not
 # used if it contradicts the braking by more than SWAY_SIGMAS standard deviations
 SWAY_DEG, SWAY_WORST_DEG, SWAY_SIGMAS = 0.7, 5.0, 3.0
 # A tilt larger than this within a log, in degrees, is reported even if it is gradual. The slopes of roads differ by
-# less
+# less than SURELY_DEG
 SURELY_DEG = 8.0
-TILT_DEG = 2.2  # a rotation with a smaller tilt counts as a rotation about the vertical
+TILT_DEG = 2.2  # a rotation with a smaller tilt, in degrees, counts as a rotation about the vertical
 # To find a jump, the vertical during the STEP_S before a moment is compared with the vertical during the STEP_S after
-# it. STEP_GAP_S on each side of the moment are left out
+# it. The readings within STEP_GAP_S of the moment are left out
 STEP_S, STEP_GAP_S = 8.0, 1.0
-STEP_SHARE = 0.7  # a tilt is sudden if more than this share of it happens at one moment
+STEP_SHARE = 0.7  # a tilt is sudden if more than this share of the tilt happens at one moment
 
 
 @dataclass
@@ -108,7 +111,8 @@ def _search(logs: list[Intervals], whole: Blocks, share: float) -> list[Move]:
         score = move.sigmas / share / (BETWEEN_SIGMAS if between else SUDDEN_SIGMAS if tilted else WITHIN_SIGMAS)
         if move.angle_deg < LEAST_DEG or score < 1.0 or (best and score <= best[0]):
             continue
-        # A slope of the road looks like a tilt without a change of yaw. So such a tilt is reported only if it is sudden
+        # A slope of the road looks like a tilt without a change of yaw. So a tilt without a change of yaw is reported
+        # only if it is sudden
         if not between and tilted and abs(turn[1]) < WITHIN_SIGMAS * sigma[1]:
             moment = _moment_of_jump(logs[move.log], move)
             if moment is None:
@@ -211,9 +215,11 @@ def _moment_of_jump(log: Intervals, move: Move) -> float | None:
     if np.count_nonzero(near) < 10:
         return None
     found, varied = fits(terms[near].T @ terms[near], terms[near].T @ force[near])
-    level = (force - terms[:, 1:] @ found[1:]) / terms[:, :1]  # the vertical: the force minus the effects of driving
+    # The vertical: the measured force minus the effects of driving
+    level = (force - terms[:, 1:] @ found[1:]) / terms[:, :1]
     left, _, forward = frames(found, varied)
-    tips = (left * move.turn_deg[2] - forward * move.turn_deg[0]) / tilt  # unit vector in which the vertical moves
+    # Unit vector of the direction in which the vertical moves
+    tips = (left * move.turn_deg[2] - forward * move.turn_deg[0]) / tilt
     best, moment = 0.0, move.at_s
     for now in time[np.abs(time - move.at_s) < 2.5 * STEP_S]:
         early = (time > now - STEP_GAP_S - STEP_S) & (time < now - STEP_GAP_S)

@@ -39,7 +39,7 @@ _REPORTED = (CutLine, CutGzip, NulEnd, FrozenReadings, AxisDead, GyroSaturated, 
 # Refusals of the firmware whose cause may be a move of the mount
 _SUSPECTS = (MOVED, "parts-differ", "uncertain")
 _PLOTTED = 160  # largest number of intervals in a picture
-_AGAINST = -0.5  # if evidence.handedness() is below this, the gyro or the axes are mirrored
+_AGAINST = -0.5  # value of evidence.handedness() below which the gyro or the axes are mirrored
 
 Row = dict[str, Any]
 
@@ -77,7 +77,7 @@ def work_on_period(period: Period, signals_to: str | None = None) -> PeriodResul
         return failed(period, NO_MEMORY, "its logs take more memory than there is")
     except OSError as error:
         return failed(period, UNREADABLE, cause(error))
-    except Exception as error:  # a bug in Kickstand must not affect other vehicles
+    except Exception as error:  # any exception, because a bug in Kickstand must not affect other vehicles
         where = traceback.extract_tb(error.__traceback__)[-1]
         message = f"{type(error).__name__}: {error} ({Path(where.filename).name}, line {where.lineno})"
         return failed(period, FAULT, message)
@@ -152,7 +152,8 @@ def _drive(period: Period, logs: list[Log]) -> _Drive:
 
 
 def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
-    """Return the reason why the vehicle is not aligned, as a code and a sentence. Both are empty if it is aligned."""
+    """Return the reason why the vehicle is not aligned, as a code and a sentence. Both are empty if the vehicle is
+    aligned."""
     fit, found = drive.fit, drive.found
     if drive.moves:
         return MOVED, _moved_words(drive.moves, logs)
@@ -160,7 +161,8 @@ def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
     if _mirrored(drive.intervals):
         reason = LeftHanded()
     elif fit.reason == MOVED:
-        late = fit_problem(fit.lag_s or 0.0, 1.0)  # a late speed makes braking look like a moved mount
+        # The problem of a late speed, which makes braking look like a moved mount
+        late = fit_problem(fit.lag_s or 0.0, 1.0)
         reason = of_firmware(late) if late else None
     elif found and found.sure:
         return "", ""
@@ -284,7 +286,8 @@ def _utc_s(log: Log, at_s: float) -> float | None:
 def _picture(drive: _Drive) -> list[list[float]]:
     """Compute the points of the picture (see PeriodResult).
 
-    If the mount moved, the alignment is a mean over several mountings. The scatter of the points then shows the move.
+    If the mount moved, the alignment is a mean over several mountings. If the mount moved, the scatter of the points
+    shows the move.
     """
     if not drive.found:
         return []

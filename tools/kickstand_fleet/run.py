@@ -20,9 +20,9 @@ from .period import AFTERWARDS, CHANGED, DISK_FULL, PeriodResult, failed, work_o
 from .show import plot
 from .show.page import Glance
 
-RESULTS_VERSION = 4  # a new number makes the next run recompute all earlier results
+RESULTS_VERSION = 4  # version of the results; a new number makes the next run recompute all earlier results
 PLOTS, SIGNALS = "plots", "signals"
-TIMEOUT_S = 600.0  # longest time for one mount of one vehicle
+TIMEOUT_S = 600.0  # longest time for the logs of one mount of one vehicle
 # Shortest pause before the tables are written again during a run: _WRITE_S seconds, and _SHARE times the duration of
 # the last writing
 _WRITE_S, _SHARE = 15.0, 20.0
@@ -33,7 +33,7 @@ class FleetRun:
     """The numbers of results in a run, and their summary.
 
     vehicles: Number of results, one for each mount of each vehicle.
-    new: Number of results that this run computed. An earlier run computed the other results.
+    new: Number of results that this run computed. Earlier runs computed the remaining results.
     damaged: Number of earlier results that could not be read and are recomputed.
     seen: Summary of all results.
     """
@@ -85,7 +85,7 @@ def run_fleet(
             journal = opened.enter_context(StoreJournal(files.join(directory, "journal")))
         else:
             check_directory(Path(out))
-            directory = str(Path(out).resolve())  # workers may have another working directory
+            directory = str(Path(out).resolve())  # absolute, because workers may have another working directory
             opened.enter_context(new_directory(Path(directory) / PLOTS))
             journal = opened.enter_context(Journal(Path(directory) / "journal.jsonl"))
         marks = _marks(periods)
@@ -113,7 +113,8 @@ def run_fleet(
                     last_s = time.monotonic()
                     pause_s = max(_WRITE_S, _SHARE * (last_s - before_s))
         except BaseException:  # including Ctrl-C
-            with contextlib.suppress(InputError):  # if the disk is full, the first error already reports it
+            # An InputError is ignored: if the disk is full, the first error already reports it
+            with contextlib.suppress(InputError):
                 if next(journal.results(keys), None):
                     write_results(directory, journal.results(keys), len(keys))
             raise

@@ -1,6 +1,6 @@
 """Writes accelerations along the vehicle's axes as Parquet.
 
-The files are in one directory per vehicle and day. Libraries for data frames read them as one table.
+The files are in one directory per vehicle and day. Libraries for data frames read all files as one table.
 """
 
 import datetime
@@ -34,7 +34,7 @@ def write(directory: str, period: Period, log: Log, calibration: CalibrationFile
     """Write a log to DIRECTORY/vehicle=.../day=.../NAME.parquet, one file per day of Universal Time.
 
     The day is "unknown" if the log has no Universal Time. NAME consists of the mount, the log's name and a hash of the
-    log's path. So two logs never share a file, and a second run overwrites the same files.
+    log's path. The hash keeps the files of two logs apart, and a second run overwrites the same files.
 
     calibration: must be aligned. Returns the paths of the files. Raises InputError if a file cannot be written.
     """

@@ -11,8 +11,8 @@ driver.
 
 begin(i2c, address, hz, fresh)  prepares for a display that has just answered. fresh: True if the display may have been
                                 powered just now.
-show(line1, line2, picture)     stores the lines and the picture to show. A line has 16 characters. It is bytes, or a
-                                str with codes below 256.
+show(line1, line2, picture)     stores the lines and the picture to show. A line is bytes, or a str with codes below
+                                256, of 16 characters.
 tick(now_ms)                    does one step and uses the bus for 3 ms (OLED) or at most 13 ms (LCD). Raises OSError if
                                 the display does not answer.
 busy                            True while something must still be sent.
@@ -36,13 +36,14 @@ _OLED_ADDRESSES = const((0x3C, 0x3D))
 ADDRESSES = (0x27, 0x3F) + _OLED_ADDRESSES
 _FAMILY = tuple(range(0x20, 0x27)) + tuple(range(0x38, 0x3C)) + (0x3E,)  # other addresses of a backpack
 LCD_HZ, OLED_HZ = 100_000, 400_000  # fastest clocks of a PCF8574 and of the OLEDs
-STOPPED = "Kickstand", "stopped"  # shown after the firmware has ended
+STOPPED = "Kickstand", "stopped"  # text of the display after the firmware has ended
 KINDS = ("auto", "lcd", "ssd1306", "sh1106", "ssd1306-32")
 _PROBE_MS = const(200)  # time between two searches for a missing display
-# Longest time between two searches. While a driver cannot be loaded, the time doubles up to this limit
+# Longest time between two searches. While a driver cannot be loaded, the time is doubled, but not beyond MOST_WAIT_MS
 MOST_WAIT_MS = 60_000
-_REOPEN_PROBES = const(5)  # after this number of searches without a display, the bus is freed
-_POWER_UP_MS = const(40)  # a display found within this time may have been powered together with the board
+_REOPEN_PROBES = const(5)  # number of searches without a display after which the bus is freed
+# A display found within this time after the start may have been powered together with the board
+_POWER_UP_MS = const(40)
 _FLUSH_STEPS = const(60)
 _STEP_MS = const(5)
 
@@ -70,7 +71,7 @@ class Display:
         self._addresses = addresses
         self._look = contrast, inverted
         self._wiring = wiring
-        self._oled = False  # the driver is an Oled
+        self._oled = False  # True if the driver is an Oled
         self._i2c = self._driver = None
         self._wanted = "", "", None
         self._status = bytearray(1)
@@ -83,12 +84,12 @@ class Display:
 
     def show(self, line1, line2, picture=None):
         """Set the lines and the picture that tick() will send."""
-        self._wanted = line1, line2, picture  # kept for a display that is plugged in later
+        self._wanted = line1, line2, picture  # stored for a display that is plugged in later
         if self._driver:
             self._driver.show(line1, line2, picture)
 
     def tick(self, now_ms):
-        """Do the next step of the display's work. Call it about every 10 ms. now_ms: ticks_ms().
+        """Do the next step of the display's work. Call this method about every 10 ms. now_ms: ticks_ms().
 
         Raises SettingsError for pins that cannot be used, and nothing else."""
         try:
@@ -112,10 +113,11 @@ class Display:
             sleep_ms(_STEP_MS)
 
     def end(self, line1, line2):
-        """Show two lines until power-off, because the firmware ends. Raises nothing; Ctrl-C does not interrupt it.
+        """Show two lines until power-off, because the firmware ends. Raises nothing; Ctrl-C does not interrupt this
+        method.
 
         The display is set up again, because a transfer may have been interrupted."""
-        interrupt = getattr(micropython, "kbd_intr", None)  # computers have none
+        interrupt = getattr(micropython, "kbd_intr", None)  # MicroPython on a computer has no kbd_intr
         if interrupt:
             interrupt(-1)
         try:
@@ -124,7 +126,7 @@ class Display:
                 self._fresh = True
                 self.show(line1, line2)
                 self.flush()
-        except Exception:  # nothing can report an error any more, because the firmware has ended
+        except Exception:  # ignored, because nothing can report an error after the firmware has ended
             pass
         finally:
             if interrupt:
@@ -132,7 +134,7 @@ class Display:
 
     def _probe(self):
         """Look for the display at each address."""
-        if self._probes % _REOPEN_PROBES == 0:  # not at every search, because freeing a stuck bus takes long
+        if self._probes % _REOPEN_PROBES == 0:  # only at some searches, because freeing a stuck bus takes long
             self._i2c = self._reopen(self._bus_hz or LCD_HZ)
         self._probes += 1
         for address in self._addresses:
@@ -141,7 +143,7 @@ class Display:
         other = _FAMILY[self._probes % len(_FAMILY)]
         if self._addresses is ADDRESSES and self._kind in ("auto", "lcd") and self._answers(other):
             return
-        # Not found. A display that answers later has just been powered, and may be another display
+        # No display was found. A display that answers later has just been powered, and may be another display
         self._fresh = True
         self._wait_ms = _PROBE_MS
 
@@ -151,7 +153,7 @@ class Display:
         except OSError:
             return False
         self._probes = 0
-        if attempt(self._begin, address):  # False if its driver is missing or memory is short
+        if attempt(self._begin, address):  # attempt() reports a missing driver or too little memory
             self._wait_ms = min(2 * self._wait_ms, MOST_WAIT_MS)
         else:
             self.address, self._wait_ms = address, _PROBE_MS

@@ -1,8 +1,9 @@
 """Driver for an HD44780 character display, 16x2 or larger, behind a PCF8574 port expander (the usual I2C backpack).
 display.py finds it and describes its methods.
 
-Sources: data sheets Hitachi HD44780U (ADE-207-272) and NXP PCF8574. The driver uses the 4-bit mode. It sends the
-changed part of a line in two transfers: first dashes, then the text. A transfer of a whole line takes 6 ms at 100 kHz.
+Sources: data sheets Hitachi HD44780U (ADE-207-272) and NXP PCF8574. The driver uses the 4-bit mode. The driver sends
+the changed part of a line in two transfers: first dashes, then the text. A transfer of a whole line takes 6 ms at 100
+kHz.
 
 Different backpacks connect the pins of the PCF8574 in different ways, see WIRINGS. The bit of R/W is between the bits
 of RS and E, and stays low.
@@ -12,12 +13,12 @@ from time import ticks_diff, ticks_ms
 
 from micropython import const
 
-# Index: LCD_WIRING - 1. The bits of RS, E and the backlight, then True if D4 to D7 are P0 to P3
+# Index: LCD_WIRING - 1. Each row has the bits of RS, E and the backlight, then True if D4 to D7 are wired to P0 to P3
 WIRINGS = (
-    (0x01, 0x04, 0x08, False),  # the usual wiring: P0 RS, P2 E, P3 light
-    (0x40, 0x10, 0x00, True),  # MJKDZ, GY-IICLCD: P6 RS, P4 E, P7 light, on while low
-    (0x10, 0x40, 0x80, True),  # P4 RS, P6 E, P7 light
-    (0x01, 0x04, 0x00, False),  # like the first wiring, but the light is on while P3 is low
+    (0x01, 0x04, 0x08, False),  # the usual wiring: RS at P0, E at P2, backlight at P3
+    (0x40, 0x10, 0x00, True),  # MJKDZ, GY-IICLCD: RS at P6, E at P4, backlight at P7, on while P7 is low
+    (0x10, 0x40, 0x80, True),  # RS at P4, E at P6, backlight at P7
+    (0x01, 0x04, 0x00, False),  # like the first wiring, but the backlight is on while P3 is low
 )
 _LINE_ADDRESSES = (0x80, 0xC0)  # instruction "set DDRAM address" for the beginning of each line (table 6)
 _CGRAM_ADDRESS = const(0x40)  # instruction "set CGRAM address" (table 6)
@@ -27,7 +28,7 @@ _DASHES = b"-" * _COLUMNS
 _NO_TEXT = "\n"
 _NEVER = b"\xfe" * _COLUMNS  # marks a line that was not written yet; no text uses this code
 # Time between two initialisations. After electrical noise the display may combine the wrong nibbles into bytes. Only an
-# initialisation repairs this.
+# initialisation repairs such a display.
 _REINIT_MS = const(10_000)
 _PROBE_MS = const(200)  # time between two checks that the display is connected
 _STEP_MS = const(5)  # time between two steps of the initialisation, which requires waits of up to 4.1 ms
@@ -40,8 +41,8 @@ _POWER_UP = const(-8)  # number of the first step after power-up, because the di
 _NIBBLES = (0x30, 0x30, 0x30, 0x20)
 _COMMANDS = b"\x28\x0c\x06\x02"
 _GLYPH_PARTS = const(4)  # the 64 bytes of character patterns are sent 16 at a time
-# Number of characters to blank behind each line, one line per step. A larger display (20x4 or 20x2) would show
-# characters from other memory there.
+# Number of characters to blank behind each line, one line per step. Without the blanks, a larger display (20x4 or 20x2)
+# would show characters from other memory.
 _BEHIND = const(24)
 _STEPS = len(_NIBBLES) + 1 + _GLYPH_PARTS + 2
 
@@ -68,7 +69,7 @@ class Lcd:
         self._wanted = [bytearray(b" " * _COLUMNS), bytearray(b" " * _COLUMNS)]
         self._shown = [bytearray(_COLUMNS), bytearray(_COLUMNS)]
         self._texts = [_NO_TEXT, _NO_TEXT]  # the last text of each line, if it was a str
-        self._changed = True  # a line may need sending
+        self._changed = True  # True if a line may still have to be sent
         self._packed = bytearray(4 * (_BEHIND + 1))
         self._port = bytearray(1)
         self._glyphs = _bar_glyphs()
@@ -76,7 +77,7 @@ class Lcd:
     def begin(self, i2c, address, hz, fresh):
         self._i2c = i2c
         self._address = address
-        # Step of the initialisation. It is negative while the display powers up
+        # Number of the next step of the initialisation, negative while the display powers up
         self._step = _POWER_UP if fresh else 0
         self._acted_ms = ticks_ms()  # time of the last transfer
         self._seen_ms = 0  # time of the display's last answer
@@ -89,7 +90,7 @@ class Lcd:
     def show(self, line1, line2, picture=None):
         """Set the two lines that tick() sends.
 
-        A line is str or bytes. It is padded or cut to 16 characters. Codes 0 to 7 show the patterns of _bar_glyphs().
+        A line is str or bytes, and is padded or cut to 16 characters. Codes 0 to 7 show the patterns of _bar_glyphs().
         Other codes show the characters of the display's ROM. picture: not used."""
         self._put(0, line1)
         self._put(1, line2)
@@ -106,7 +107,8 @@ class Lcd:
                 self._initialise(self._step)
             self._step += 1
             self._init_ms = self._seen_ms = now_ms
-        elif self._changed and self._refresh():  # new text is sent first, because the shown text may be too old
+        # New text is sent before the checks, because the shown text may be too old
+        elif self._changed and self._refresh():
             self._seen_ms = self._acted_ms = now_ms
         elif ticks_diff(now_ms, self._seen_ms) >= _PROBE_MS:
             self._seen_ms = self._acted_ms = now_ms
@@ -118,7 +120,7 @@ class Lcd:
     def _put(self, number, text):
         line = self._wanted[number]
         if isinstance(text, str):
-            if text == self._texts[number]:  # the text is usually unchanged, and skipping its conversion saves 0.2 ms
+            if text == self._texts[number]:  # the text is usually the same, and skipping its conversion saves 0.2 ms
                 return
             self._texts[number] = text
             for i in range(_COLUMNS):
@@ -148,8 +150,8 @@ class Lcd:
     def _kept_power(self):
         """Return False if the display has lost its power since the last transfer, even for a moment.
 
-        The PCF8574's pins are high after power-up, but every transfer leaves E low. So this check must run before the
-        next transfer. Raises OSError if the display does not answer."""
+        The PCF8574's pins are high after power-up, but every transfer leaves E low. So call this method before the next
+        transfer. Raises OSError if the display does not answer."""
         self._i2c.readfrom_into(self._address, self._port)
         return not self._port[0] & self._e
 
@@ -189,7 +191,7 @@ class Lcd:
         """Put a byte into _packed as two nibbles. Each nibble is sent with E high, then with E low, because the falling
         edge of E latches it.
 
-        RS changes together with the rise of E. At 100 kHz this is 90 us before E falls."""
+        RS changes together with the rise of E. At 100 kHz, RS changes 90 us before E falls."""
         packed, enable = self._packed, self._e
         if self._low:
             high = value >> 4 | control

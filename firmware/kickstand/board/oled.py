@@ -18,10 +18,10 @@ WIDTH, HEIGHT = 128, 64
 _PART = 32
 _PARTS, _PARTS_SLOW, _SLOW_HZ = 3, 2, 200_000
 _PROBE_MS = const(200)  # time between two checks that the display has kept its power
-_REFRESH_MS = const(10_000)  # time until everything is sent again, to repair the effects of electrical noise
+_REFRESH_MS = const(10_000)  # time until the whole picture is sent again, to repair the effects of electrical noise
 _POWER_UP_MS = 40
 _OFF = 0x40  # bit of the status that is set while the panel is off
-# Low half of the status of an SH1106. An SSD1306 has 3 or 6 there, and a clone may have any value
+# Low half of the status of an SH1106. The low half of an SSD1306's status is 3 or 6, and a clone may have any value
 _SH1106_STATUS = (0x08, 0x00, 0x0C)
 _SH1106_OFFSET = 2  # first visible column of an SH1106
 # Numbers of rows by which the picture is shifted to avoid burn-in, one after the other. Each shift lasts for
@@ -53,7 +53,7 @@ class Canvas(framebuf.FrameBuffer):
         self._pixels = pixels
 
     def tall(self, line, page, inverted=False):
-        """Write up to 16 letters of 8x16 pixels across the display. Their top is at row 8 * page.
+        """Write up to 16 letters of 8x16 pixels across the display. The letters' top is at row 8 * page.
 
         line: str or bytes, as in show()."""
         for i in range(min(16, len(line))):
@@ -121,8 +121,8 @@ class Oled:
         return not self._lit or self._changed or self._drawn is not self._wanted
 
     def show(self, line1, line2, picture=None):
-        """Set the picture. Without a picture, set the two lines, in letters of double height. The lines have the
-        character codes of hd44780.py."""
+        """Set what tick() shows: the picture or, without a picture, the two lines in letters of double height. The
+        lines have the character codes of hd44780.py."""
         wanted = (self.draws and picture) or tuple(
             [line if isinstance(line, str) else bytes(line) for line in (line1, line2)]
         )
@@ -143,14 +143,14 @@ class Oled:
             self._seen_ms = self._refresh_ms = now_ms
         elif self._lit and ticks_diff(now_ms, self._seen_ms) >= _PROBE_MS:
             self._seen_ms = now_ms
-            if self._state() & _OFF and self._reports_off:  # the display has lost its power
+            if self._state() & _OFF and self._reports_off:  # the panel is off, so the display has lost its power
                 self._restart()
         elif self._changed:
             self._send()
         elif not self._lit:
             self._command(b"\x00\xaf")
             self._lit = True
-            self._reports_off = not self._state() & _OFF  # some clones never report "off"
+            self._reports_off = not self._state() & _OFF  # False for clones that never report "off"
         elif ticks_diff(now_ms, self._refresh_ms) >= _REFRESH_MS:
             self._refresh_ms = now_ms
             self._refreshes += 1

@@ -10,8 +10,8 @@ import sys
 import machine
 
 # Collect garbage often while the other modules are loaded. Otherwise lasting objects would be placed behind the
-# garbage, far along the heap. Then every later collection would scan all of that heap. App resets the threshold before
-# its loop begins.
+# garbage, far along the heap. Then every later collection would scan the heap up to those objects. App resets the
+# threshold before its loop begins.
 gc.threshold(80_000)
 
 IS_ESP32 = sys.platform == "esp32"
@@ -24,10 +24,10 @@ if IS_ESP32:
     GPS_UART, GPS_PINS, WHEEL_PIN = 2, (17, 16), 27  # (TX, RX)
     if "SPIRAM" in MACHINE:  # MicroPython's image for PSRAM uses pins 16 and 17 itself, and has no Pin for them
         GPS_PINS = None, None
-    # Extra arguments of Pin.irq(). This port has only soft interrupts, and SoftI2C transfers delay them
+    # Extra arguments of Pin.irq(). An ESP32 has only soft interrupts, and transfers by SoftI2C delay them
     PIN_IRQ = {}
     I2C_NUMBERED = False  # see open_i2c()
-    SD_SPI = (2, 3)  # the slots of machine.SDCard that are SPI
+    SD_SPI = (2, 3)  # slots of machine.SDCard that use SPI
     # Pins that the chip itself needs. An output on a pin of the chip's USB disconnects the board from the computer
     # until BOOT is held. An output on a pin of a classic chip's flash (6 to 11) crashes the board at each start. Pins 1
     # and 3 of a classic chip are the console.
@@ -37,12 +37,12 @@ if IS_ESP32:
         _CHIP, (1, 3, 6, 7, 8, 9, 10, 11) if _CLASSIC else ()
     )
     INPUT_PINS = (34, 35, 36, 37, 38, 39) if _CLASSIC else ()  # pins without output and without pull-up
-else:  # Raspberry Pi Pico and Pico 2, and other makers' boards with the same pins and name
+else:  # Raspberry Pi Pico and Pico 2, and boards of other makers with the same pins and name
     _KNOWN = sys.platform != "rp2" or "Pico" in MACHINE
     SENSOR_PINS, LCD_PINS, BUTTON_PIN = (4, 5), (6, 7), 15
     GPS_UART, GPS_PINS, WHEEL_PIN = 1, (8, 9), 14
     PIN_IRQ = {"hard": True}  # soft interrupts would be lost during a transfer to the display
-    I2C_NUMBERED = True  # two buses must have two different numbers
+    I2C_NUMBERED = True  # two I2C buses must have two different controller numbers
     SD_SPI = (0, 1)  # the numbers of machine.SPI
     TAKEN_PINS = INPUT_PINS = ()
 if not _KNOWN:  # an unknown board may lack these pins or use them for something else
@@ -56,7 +56,7 @@ _SOFT_I2C_HZ = 250_000
 _TURN_BYTES = 2000  # bytes of heap that one pass of the app's loop uses; 3000 while aligning by driving
 _FEWEST_TURNS = 3
 
-_WATCHDOG_MS = 8000  # a Pico allows at most 8388
+_WATCHDOG_MS = 8000  # the watchdog of a Pico allows at most 8388 ms
 _WEEK_MS = 604_800_000  # a week. An ESP32 counts a time-out in 32 bits, with four counts per ms, so it allows 12 days
 
 _watchdog = None
@@ -65,9 +65,10 @@ _watchdog = None
 def open_i2c(controller, sda, scl, frequency, timeout_us):
     """Open a machine.I2C, or a SoftI2C on an ESP32. Raises ValueError for pins that the controller cannot use.
 
-    An ESP32's machine.I2C has three problems. Up to MicroPython 1.28 it ignores the time-out, and waits up to 0.1 s for
-    each byte of a stalled transfer. The whole transfer then takes longer than the watchdog allows. Later versions count
-    the time-out in ticks of 10 ms, so with 5 ms every transfer fails. And a C3 has only one I2C controller.
+    An ESP32's machine.I2C has three problems. Up to MicroPython 1.28 machine.I2C ignores the time-out, and waits up to
+    0.1 s for each byte of a stalled transfer. The whole transfer then takes longer than the watchdog allows. Later
+    versions count the time-out in ticks of 10 ms, so with 5 ms every transfer fails. And a C3 has only one I2C
+    controller.
 
     Args:
         controller: number of the controller, not used on an ESP32.
@@ -81,7 +82,7 @@ def open_i2c(controller, sda, scl, frequency, timeout_us):
 
 
 def turns_to_collect(most):
-    """Return the number of passes of the app's loop between two garbage collections. It is `most` or smaller.
+    """Return the number of passes of the app's loop between two garbage collections, at most `most`.
 
     An ESP32's heap starts with 64 KB and grows only after a collection that frees too little. In such a small heap,
     `most` passes would use up the heap, and collections would often run in the middle of a pass."""
@@ -109,7 +110,8 @@ def rest_watchdog():
     if _watchdog is None:
         return
     if IS_ESP32:
-        machine.WDT(timeout=_WEEK_MS)  # an ESP32 accepts a new time-out, and a soft reset keeps it
+        # A long time-out instead: an ESP32 accepts a new time-out, and a soft reset keeps it
+        machine.WDT(timeout=_WEEK_MS)
         return
     # Data sheets RP2040 section 4.7.6 and RP2350 section 12.9.7: ENABLE is bit 30 of the watchdog's CTRL, at its base
     # address. Sections 2.1.2 and 2.1.3: a write to address + 0x3000 clears the bits that are 1.

@@ -11,9 +11,9 @@ MOUNT = "/sd"
 
 
 def mount(settings):
-    """Mount the card unless it is already mounted. Return its directory. settings: a Settings. Raises CardError.
+    """Mount the card unless it is already mounted. Return the card's directory. settings: a Settings. Raises CardError.
 
-    If the card does not become ready, this takes 5 s or more."""
+    If the card does not become ready, the attempt takes 5 s or more."""
     # The directory of a mounted card is listed without a size. A folder in flash with the same name has a size.
     if any(entry[0] == MOUNT[1:] and len(entry) == 3 for entry in os.ilistdir("/")):
         return MOUNT

@@ -11,7 +11,7 @@ from sdcard import SDCard  # type: ignore[import-not-found]
 
 from ..units import const
 
-_CLOCK_HZ = const(10_000_000)  # with the driver's default of 1.32 MHz, a block of a ride would take 25 ms
+_CLOCK_HZ = const(10_000_000)  # at the driver's default of 1.32 MHz, one block of a ride would take 25 ms
 # a card may be busy for 250 to 500 ms (SD Physical Layer Simplified Specification, section 4.6.2.2)
 _BUSY_MS = const(1000)
 _ACCEPTED = 0x05  # data response, section 7.3.3.1
@@ -33,13 +33,13 @@ class CheckedCard(SDCard):
             raise OSError(self._fault)
 
     def write(self, token, buf):
-        """Write one sector. The driver calls this method for each sector. After a fault it skips the remaining
+        """Write one sector. The driver calls this method for each sector. After a fault the method skips the remaining
         sectors."""
         if self._fault:
             return
         self._send(token)
         self.spi.write(buf)
-        self.spi.write(b"\xff\xff")  # a check sum, which the card ignores
+        self.spi.write(b"\xff\xff")  # two bytes of a check sum, which the card ignores
         if self._receive() & 0x1F == _ACCEPTED:
             self._wait()
         else:

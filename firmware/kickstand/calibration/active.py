@@ -12,7 +12,8 @@ _TRIM_MS = const(60_000)  # shortest time between two saves of the trim, because
 class ActiveCalibration:
     """The Calibration in use, and its store.
 
-    The trim is the correction of the roll misalignment, in degrees. It is estimated while riding: see Calibration.
+    The trim is the correction of the roll misalignment, in degrees. The trim is estimated while riding: see
+    Calibration.
 
     Args:
         meter: the LeanMeter that uses the Calibration.
@@ -87,7 +88,7 @@ class ActiveCalibration:
             return False
         try:
             self._store.save(self.value)
-        except StoreError as error:  # not fatal, because the next ride estimates the trim again
+        except StoreError as error:  # a failed save is not fatal, because the next ride estimates the trim again
             report(error)
         return True
 

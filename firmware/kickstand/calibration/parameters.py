@@ -33,8 +33,8 @@ class Calibration:
         gyro_matrix: scale and cross-axis errors of the gyro.
         gyro_sigma: standard error of each entry of gyro_matrix (9 values); 0 if not measured.
         vehicle_from_sensor: the alignment, a rotation matrix with the rows left, up, forward.
-        trim_deg: the correction of the roll misalignment, found while riding. Without it the lean would read this many
-            degrees too far to the right.
+        trim_deg: the correction of the roll misalignment, found while riding. Without this correction the lean would be
+            this many degrees too far to the right.
         six_done: True if offset and slope were measured.
         aligned: True if vehicle_from_sensor was measured.
         by_drive: True if the alignment was measured or refined by driving.
@@ -131,9 +131,11 @@ class Calibration:
     def in_vehicle(self):
         """Return calibration and alignment combined, as matrices and offsets for raw counts.
 
-        The results combine Nicolae's equations (18)-(20), accel_matrix and gyro_matrix, and equation (15). They convert
-        a reading with 18 multiplications: force = force_matrix * counts + force_offset, and rate = rate_matrix * counts
-        + rate_offset.
+        The results combine Nicolae's equations (18)-(20), accel_matrix and gyro_matrix, and equation (15). The results
+        convert a reading with 18 multiplications:
+
+            force = force_matrix * counts + force_offset
+            rate = rate_matrix * counts + rate_offset
 
         Returns:
             force_matrix: 9 values, in g per count.

@@ -5,10 +5,10 @@ from ..units import const
 from .still_pose import StillPose
 
 _SETTLE_MS = const(500)
-_GIVE_UP_MS = const(10_000)  # longest time to wait for stillness
+_GIVE_UP_MS = const(10_000)  # longest time to wait until the sensor is still
 
 # The states that step() returns
-SETTLING = 0  # waiting for stillness
+SETTLING = 0  # waiting until the sensor is still
 SETTLED = 1  # returned once, when the sensor has been still for _SETTLE_MS and averaging begins
 AVERAGING = 2
 DONE = 3  # returned once, when the pose is complete
@@ -24,9 +24,9 @@ class PoseTaker:
         seconds: duration of the average.
 
     Attributes:
-        settled: the mean reading of the accelerometer (3 values, in g) in the half second before averaging. It is
-            available from SETTLED on.
-        pose: the StillPose. It is finished at DONE.
+        settled: the mean reading of the accelerometer (3 values, in g) in the half second before averaging. This mean
+            is available from SETTLED on.
+        pose: the StillPose, which is finished at DONE.
     """
 
     def __init__(self, chip, rate_hz, seconds):
@@ -44,8 +44,8 @@ class PoseTaker:
         self.pose = self._new(self._settle_count)
 
     def step(self, counts):
-        """Take one sample of 7 counts in the chip's order. Return one of the states above. Raises CaptureError, which
-        ends the pose."""
+        """Take one sample of 7 counts in the chip's order. Return SETTLING, SETTLED, AVERAGING or DONE. Raises
+        CaptureError, which ends the pose."""
         if self._state == SETTLING:
             return self._settle(counts)
         if self._state == AVERAGING:

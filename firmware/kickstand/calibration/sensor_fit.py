@@ -1,14 +1,14 @@
 """Calibrates accelerometer and gyro from still poses and the turns between them, by least squares.
 
-The 18 unknowns are those of two models:
+The fit has 18 unknowns, 9 in the model of each sensor:
 
     force = (I + N) (slope * reading + offset)      accelerometer; N is symmetric with a diagonal of 0; 9 unknowns
     rate = (I + X) (reading - bias)                 gyro; X is any 3x3 matrix; 9 unknowns
 
-In each pose the force must have a length of 1 g. Each turn rotates the force of the first pose into the axes of the
-second pose. There it must equal the force of the second pose. The priors come from the data sheet. The fit takes five
-Gauss-Newton steps in 32-bit floats. To save memory, the lower triangle of the normal equations (171 numbers) is
-factorised in place (A.-L. Cholesky).
+In each pose the force must have a length of 1 g. Each turn rotates the force of the pose before it into the sensor's
+axes after it. The rotated force must equal the force of the pose after the turn. The priors come from the data sheet.
+The fit takes five Gauss-Newton steps in 32-bit floats. To save memory, the lower triangle of the normal equations (171
+numbers) is factorised in place (A.-L. Cholesky).
 """
 
 from array import array
@@ -25,7 +25,7 @@ _STEPS = const(5)
 _SIGMA_FORCE = const(0.0015)  # standard deviation of a pose's force, in g
 _SIGMA_TURN = const(0.0015)  # standard deviation of a turn's angle, caused by the poses at its ends, in rad
 # Random walk of the gyro's bias during a turn, in deg/s per sqrt(s). The poses at both ends measure the bias, so the
-# variance of the angle is walk^2 seconds^3 / 12.
+# variance of the turn's angle is _BIAS_WALK_DPS^2 seconds^3 / 12, in degrees^2.
 _BIAS_WALK_DPS = const(0.008)
 # Standard deviations of the priors. SIGMA_OFFSET is in g. SIGMA_SKEW is for N, SIGMA_SCALE for the diagonal of X, and
 # SIGMA_CROSS for the rest of X. The data sheet allows errors of 0.03 in the gyro's scale and of 0.02 between its axes.
@@ -34,15 +34,17 @@ SIGMA_OFFSET, SIGMA_SLOPE, SIGMA_SKEW = 0.1, 0.1, 0.012
 SIGMA_SCALE, SIGMA_CROSS = 0.03, 0.02
 # Limits for accepting the fit
 _MAX_SCALE_ERROR = const(0.10)  # largest scale error of a working gyro
-# Largest cross-axis error of the gyro, three times the data sheet's value. A larger error means that one axis is late.
+# Largest cross-axis error of the gyro, three times the data sheet's value. A larger error means that the readings of
+# one axis are late.
 _MAX_CROSS_ERROR = const(0.06)
 _MAX_MISFIT = const(0.012)  # largest misfit of a turn after the fit, in rad
-# Largest misfit of a turn before the fit, in rad. The errors in the data sheet add up to 0.2 in half a turn.
+# Largest misfit of a turn before the fit, in rad. In a turn of 180 degrees the errors that the data sheet allows add up
+# to 0.2 rad.
 _GROSS_MISFIT = const(0.25)
-# An axis of a faulty gyro may read the true rate times one of these factors. Each factor is tried on each axis.
+# Factors by which the readings of a faulty gyro axis may differ from the true rate. Each factor is tried on each axis.
 _READS = const((-1.0, 0.25, 0.5, 0.75, 1.3, 2.0, 4.0))
-_DEAD_RAD = const(0.2)  # an axis that measured less than this angle in every turn is dead
-# Largest standard error of a measured scale. With a larger standard error, no turn about this axis has measured the
+_DEAD_RAD = const(0.2)  # largest angle of a dead axis in any turn
+# Largest standard error of a gyro axis' scale. With a larger standard error, no turn about this axis has measured the
 # scale.
 _PROOF_SIGMA = const(0.025)
 

@@ -2,8 +2,8 @@
 
 The closed form, equations 16-17, assumes that each axis points exactly up or down. A pose that is 10 degrees off causes
 an error of 0.6 degrees of lean. fit() uses the same six mean readings, but only assumes that each calibrated reading
-has a length of 1 g. That is true in any pose. The fit starts from the closed form and takes a few Gauss-Newton steps.
-The error of the fit is about 0.1 degrees.
+has a length of 1 g, as it has in any pose. The fit starts from the closed form and takes a few Gauss-Newton steps. The
+error of the fit is about 0.1 degrees.
 
 Six poses determine six numbers exactly, so their residual proves nothing. Only a seventh, free pose can verify the
 result.
@@ -74,7 +74,7 @@ def fit(poses):
     Arguments and results are those of closed_form(). Raises CalibrationError."""
     offset, slope = closed_form(poses)
     rows = [[0.0] * 7 for _ in range(6)]
-    for _ in range(8):  # 3 to 5 steps are enough
+    for _ in range(8):  # more than enough: 3 to 5 steps suffice
         for pose, row in zip(poses, rows):
             square = 0.0
             for i in range(3):
@@ -107,7 +107,8 @@ def check_plausible(offset, slope, poses):
 
 
 def check_free_pose(offset, slope, accel):
-    """Verify offset and slope with a seventh, slanted pose. Return by how much its force exceeds 1 g.
+    """Verify offset and slope with a seventh, slanted pose. Return by how much the calibrated force of this pose
+    exceeds 1 g.
 
     Args:
         offset, slope: as returned by fit().

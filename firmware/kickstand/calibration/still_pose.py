@@ -1,7 +1,7 @@
 """Averages the readings of one pose, and checks that the sensor was still.
 
-A dead sensor must not be accepted as a still sensor. So each axis must change by a count from time to time, because a
-working axis has noise. A gyro axis must not be too noisy.
+A dead sensor must not be accepted as a still sensor. Because a working axis has noise, each axis must change by a count
+from time to time. A gyro axis must not be too noisy.
 
 The sums are integers, because 32-bit floats would lose the digits that averaging gains.
 """
@@ -9,16 +9,17 @@ The sums are integers, because 32-bit floats would lose the digits that averagin
 from ..errors import CaptureError, SickSensor
 from ..units import AXES, const
 
-# Largest difference between a sample and the first sample. A larger difference is a knock. These limits are ten times
-# the chip's noise with its widest filter.
+# Largest difference between a sample and the first sample. A larger difference is a knock. The limits of force and rate
+# are ten times the chip's noise with its widest filter.
 _PEAK_G = const(0.08)
 _PEAK_DPS = const(5.0)
 # Largest noise of a gyro axis, fifteen times the chip's noise with its usual filter. The noise is computed from the
 # differences between successive samples. A slow sway of the hand hardly changes these differences.
 _NOISE_DPS = const(0.6)
 _SPREAD_G = const(0.02)  # largest standard deviation of an axis of the accelerometer
-_DRIFT_G = const(0.007)  # largest difference between the means of the two halves, equal to a tilt of 0.4 degrees
-_MAX_REST_RATE_DPS = const(45.0)  # the data sheet allows 20 deg/s of gyro offset, plus 20 over temperature
+_DRIFT_G = const(0.007)  # largest change of force between the two halves of the pose, equal to a tilt of 0.4 degrees
+# The gyro at rest; the data sheet allows an offset of 20 deg/s, plus 20 deg/s over temperature
+_MAX_REST_RATE_DPS = const(45.0)
 _MIN_SAMPLES = const(20)
 
 _AXES = (0, 1, 2, 4, 5, 6)  # indices of accelerometer and gyro in a sample; index 3 is the temperature
@@ -52,7 +53,7 @@ class StillPose:
         self._first = [0] * 7
         # A deviation is the difference between a sample and the first sample, a small integer.
         self._sums = [0] * 7  # sums of the deviations
-        self._early = [0] * 7  # sums of the deviations in the first half
+        self._early = [0] * 7  # sums of the deviations in the first half of the pose
         self._squares = [0] * 7  # sums of the squared deviations
         self._last = [0] * 7  # deviations of the last sample
         self._changes = [0] * 7  # sums of the squared differences between successive deviations

@@ -1,4 +1,4 @@
-"""Stores the calibration in flash. Two files are written alternately, so one is still valid after a power cut.
+"""Stores the calibration in flash. Two files are written alternately, so one file is still valid after a power cut.
 
 Each file holds a record with these parts:
 * magic, version, length, sequence number
@@ -25,7 +25,7 @@ _VERSION = const(1)
 _WHOLE_VERSION = const(2)  # version of a record with the matrices
 _MAGIC = b"KSTD"
 _HEAD = "<4sHHI"  # magic, version, length of the whole record in bytes, sequence number
-_BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, how aligned; the 19 numbers of parameters()
+_BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, how aligned; 19 numbers of Calibration.parameters()
 _NOT_ALIGNED, _BY_POSES, _BY_DRIVE = 0, 1, 2  # the values of "how aligned"
 _WHOLE = "<27f"  # accel_matrix, gyro_matrix, gyro_sigma
 BODY_LENGTH = struct.calcsize(_BODY)
@@ -33,7 +33,7 @@ WHOLE_BODY_LENGTH = BODY_LENGTH + struct.calcsize(_WHOLE)
 _HEAD_LENGTH = struct.calcsize(_HEAD)
 _LENGTHS = {_VERSION: _HEAD_LENGTH + BODY_LENGTH + 4, _WHOLE_VERSION: _HEAD_LENGTH + WHOLE_BODY_LENGTH + 4}
 MAX_BIAS_DPS = 60.0  # largest plausible bias of the gyro
-MAX_TRIM_DEG = 3.6  # the limit in lean/upright_trim.py plus a margin for 32-bit rounding
+MAX_TRIM_DEG = 3.6  # MAX_TRIM of lean/upright_trim.py in degrees, plus a margin for 32-bit rounding
 
 
 class Store:
@@ -54,7 +54,7 @@ class Store:
         self._chip = (who_am_i, accel_range_g)
         self._directory = directory
         self.message = ""
-        self._sequence = 0  # sequence number of the record in use, 0 for none
+        self._sequence = 0  # sequence number of the record in use, 0 without a record
         self._problems = []  # faults of the invalid records, in words
 
     def load(self):
@@ -71,8 +71,8 @@ class Store:
     def unchanged(self):
         """Return True if both files read the same as in load() or save().
 
-        If they differ, a file was misread, for example in a voltage sag. Then the loaded record may be the older of the
-        two, and the newer record must not be overwritten."""
+        If the files read differently, a file was misread, for example in a voltage sag. After a misread the loaded
+        record may be the older of the two, and the newer record must not be overwritten."""
         sequence, _, problems = self._newest()
         return sequence == self._sequence and problems == self._problems
 
@@ -107,7 +107,7 @@ class Store:
                 with open(self._path(name), "rb") as file:
                     record = file.read(_LENGTHS[_WHOLE_VERSION] + 1)
             except OSError as error:
-                if error.args[0] != ENOENT:  # a missing file is normal: save() creates it
+                if error.args[0] != ENOENT:  # a missing file is no problem, because save() creates it
                     problems.append("%s unreadable" % name)
                 continue
             sequence, found, problem = self._unpack(record)

@@ -14,14 +14,15 @@ from math import radians
 from ..errors import NO_MACHINE_CODE, checked
 from ..units import const
 
-# The integer that represents the largest scale. Its product with the sum of eight samples still fits in 32 bits.
+# The integer that represents the largest scale. The product of this integer and the sum of eight samples still fits in
+# 32 bits.
 _ONE = const(2048)
 
 
 def products_python(matrices, sums, n, out):
     """Compute out[0:3] = A (sums[0:3], n) and out[3:6] = B (sums[4:7], n). The last column of A and B has the offsets.
 
-    On the board, products() is the machine code of transform_viper.py. On a computer it is this function.
+    On the board, products() is the machine code of transform_viper.py. On a computer, products() is this function.
 
     Args:
         matrices: the 3x4 matrices A and B, row by row, array('i', 24).

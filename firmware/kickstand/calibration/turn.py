@@ -15,10 +15,10 @@ from math import cos, radians, sin
 
 from ..units import const
 
-# a step ends when the sensor has turned by this angle about one axis; a smaller angle is more exact
+# a step of the integration ends when the sensor has turned by this angle about one axis; a smaller angle is more exact
 _STEP_RAD = const(0.02)
-_STEP_US = const(60_000)  # a step also ends after this time
-# 0.95 of the gyro's range, in counts. It is less than the full range, because the low-pass of the chip hides single
+_STEP_US = const(60_000)  # longest duration of a step
+# 0.95 of the gyro's range, in counts. The limit is below the full range, because the low-pass of the chip hides single
 # readings at the end of the range.
 _QUICK = const(31_000)
 
@@ -29,7 +29,7 @@ class Turn:
     Args:
         lsb_per_dps: counts per deg/s.
         period_us: nominal time between two samples.
-        quick: absolute counts of a rate that is too fast.
+        quick: a rate with this absolute value in counts, or more, is too fast.
 
     Attributes:
         quick: True if the rate was too fast at any time since start().
@@ -68,8 +68,8 @@ class Turn:
             sums: sums of the samples' counts in the chip's order, 7 values.
             n: number of samples.
             dt_us: microseconds since the previous samples.
-            hold: True if the samples belong to a still pose that may end the turn. They are added to the turn only if
-                that pose fails.
+            hold: True if the samples belong to a still pose that may end the turn. The samples are added to the turn
+                only if that pose fails.
         """
         if not self.running:
             return
@@ -151,7 +151,7 @@ class Turn:
         own[0] = own[1] = own[2] = 0
         self._n = self._us = 0
         steps = (x, y, z, seconds)
-        small = 1.0 - (x * x + y * y + z * z) / 6  # makes the angle correct to the fifth order
+        small = 1.0 - (x * x + y * y + z * z) / 6  # with this factor the angle is correct to the fifth order
         x, y, z = small * x, small * y, small * z
         r, s = self.r, self.s
         for a in range(3):

@@ -1,6 +1,6 @@
 """Aligns the sensor by two still poses, on the kickstand and upright (A. Nicolae, section 2).
 
-Three things differ from the paper:
+This module differs from the paper in three points:
 * Equation (4) is the cross product of the upright and the tilted reading. As printed, the product is zero.
 * Equation (5) takes y from the upright reading and divides y by its own length.
 * If the kickstand is on the right, the paper's x and z point right and backward. So the signs of x and z are changed.
@@ -27,7 +27,8 @@ _CALIBRATED_TOLERANCE_G = const(0.05)
 # * GYRO_TILT_SHARE times the tilt, for uncalibrated sensors and the gyro's scale error
 # * GYRO_TURN_SHARE times the whole turn, for cross-axis errors, for example while the bike is pushed about
 # * GYRO_DRIFT, the drift of the gyro's bias in rad/s, times the duration
-# * a term with GYRO_WALK, the random walk of the gyro's bias in rad/s per sqrt(s), 3 sigma
+# * three standard deviations of the angle that the random walk of the gyro's bias causes; GYRO_WALK is in rad/s per
+#   sqrt(s)
 GYRO_RAD, GYRO_TILT_SHARE, GYRO_TURN_SHARE = 0.02, 0.15, 0.04
 GYRO_DRIFT, GYRO_WALK = 0.0005, 0.0002
 

@@ -27,11 +27,11 @@ from .vertical import COUNTS_S, MAX_CHANGE_DEG, MOVED_MPS, SETTLE_S, StandingVer
 CAR, MOTORCYCLE = "car", "motorcycle"
 
 # state
-WAITING_FOR_SPEED = 0  # there is no speed yet, or no new speed for STALE_US
-WAITING_FOR_STOP = 1  # only for a car, because its vertical and the gyro's bias are measured at a stop
-WAITING_FOR_BRAKING = 2  # braking must be in a straight line
-BRAKING = 3  # during a braking event
-TURNING = 4  # during a braking event in a bend, which will not count
+WAITING_FOR_SPEED = 0  # no speed has come yet, or no new speed for STALE_US
+WAITING_FOR_STOP = 1  # only in a car, whose vertical and gyro bias are measured at a stop
+WAITING_FOR_BRAKING = 2  # waiting for a braking event, which must be in a straight line
+BRAKING = 3  # a braking event in a straight line
+TURNING = 4  # a braking event in a bend, which will not count
 READY = 5  # matrix() gives the alignment; more events improve it
 REFUSED = 6  # matrix() raises `problem`
 
@@ -44,10 +44,10 @@ class DriveAlignment:
 
     Args:
         vehicle: CAR or MOTORCYCLE.
-        up: for a motorcycle, the vertical from two poses, a unit vector in the sensor's axes. If it is None, the
+        up: for a motorcycle, the vertical from two poses, a unit vector in the sensor's axes. If `up` is None, the
             vertical comes from riding straight.
-        bias: the gyro's bias, 3 values in deg/s, or None. It is subtracted until a stop measures a newer bias. Pass
-            zeros if the rates are already corrected. Without a bias no braking event counts before the first stop.
+        bias: the gyro's bias, 3 values in deg/s, or None. This bias is subtracted until a stop measures a newer bias.
+            Pass zeros if the rates are already corrected. Without a bias no braking event counts before the first stop.
 
     Attributes:
         standing: the StandingVertical, which also has the gyro's bias.
@@ -67,13 +67,13 @@ class DriveAlignment:
         self.quality = DrivingQuality(self.events, self.vertical)
         self._speed_check = SpeedCheck()
         self._bias_given = bias is not None
-        self._judged = (0, 0)  # numbers of events and stops at the last judgement of the quality
+        self._judged = (0, 0)  # numbers of events and stops when the quality was last judged
         self._sums = [0.0] * 6  # integrals of force and rate over the current bin
         self._sums_us = 0
-        self._speed_mps = -1.0  # negative before the first speed
+        self._speed_mps = -1.0  # the last speed in m/s, negative before the first speed
         self._top_mps = 0.0
-        self._silent_us = 0  # time since the last speed
-        self._means = None  # means of the last bin, None after they are processed
+        self._silent_us = 0  # time since the last speed, in us
+        self._means = None  # means of force and rate over the last bin, None after they are processed
         self._work = None  # the generator _follow(), None when it has finished
 
     @property
@@ -88,12 +88,12 @@ class DriveAlignment:
 
     @property
     def quality_deg(self):
-        """The standard error of forward's direction in degrees. It is 180 before the first estimate."""
+        """The standard error of forward's direction in degrees. The value is 180 before the first estimate."""
         return self.quality.quality_deg
 
     @property
     def state(self):
-        """The state of the drive, one of the constants above."""
+        """The state of the drive, one of this module's constants from WAITING_FOR_SPEED on."""
         if self.problem is not None:
             return REFUSED
         if self.ready:
@@ -122,8 +122,7 @@ class DriveAlignment:
 
     @property
     def reason(self):
-        """The reason why matrix() gives no alignment, an AlignmentError. It is the problem, or else the result of
-        missing()."""
+        """The reason why matrix() gives no alignment, an AlignmentError: `problem`, or else the result of missing()."""
         return self.problem or self.missing(self.counted, self.needed, self.turned)
 
     def missing(self, counted, needed, turned):
@@ -196,7 +195,7 @@ class DriveAlignment:
         if not speed_mps >= 0.0:
             speed_mps = 0.0
         self._speed_mps = speed_mps
-        if self._silent_us > STALE_US:  # the history's time may have wrapped since the last speed
+        if self._silent_us > STALE_US:  # after a long silence the history's time may have wrapped
             self.events.interrupt()
         self._silent_us = 0
         self._top_mps = max(self._top_mps, speed_mps)

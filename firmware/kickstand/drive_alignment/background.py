@@ -1,8 +1,8 @@
-"""Aligns by driving, in the background. It feeds a DriveAlignment and saves the result.
+"""Aligns by driving, in the background: feeds a DriveAlignment and saves the result.
 
-It always runs if there is a speed source. If the sensor is not aligned, or after a request in the menu, the drive's
-alignment is used as soon as it is ready. Otherwise the drive checks and refines the earlier alignment. Flash is written
-only at standstill.
+This alignment always runs if there is a speed source. If the sensor is not aligned, or after a request in the menu, the
+drive's alignment is used as soon as it is ready. In all other cases the drive checks and refines the earlier alignment.
+Flash is written only at standstill.
 """
 
 from time import ticks_add, ticks_diff
@@ -16,12 +16,12 @@ from .verdict import MOVED, REFINED, REVERSED, SAME, compare, turn_round
 
 # Number of passes of the loop whose counts are added up before they are converted to floats, to save time
 _FEED_TURNS = const(2)
-_GAP_MS = const(300)  # a longer time between two readings means that readings are missing
+_GAP_MS = const(300)  # longest time between two readings without a loss of readings
 _LOOK_MS = const(1000)  # time between two calls of _look()
-_FRESH_MS = const(3000)  # a speed older than this does not prove a standstill
-_AWAY_MPS = const(2.0)  # a faster vehicle has driven off
+_FRESH_MS = const(3000)  # largest age of a speed that proves a standstill
+_AWAY_MPS = const(2.0)  # speed above which the vehicle has driven off
 
-# The remaining bias in the corrected rates of an aligned sensor. It is 0, because the bias of the poses is already
+# The gyro's bias that remains in the rates of an aligned sensor: 0, because the bias measured in the poses is already
 # subtracted.
 _KNOWN_BIAS = (0.0, 0.0, 0.0)
 STAND_SIDE, MOUNT_MOVED = "other-side", "mount-moved"
@@ -31,8 +31,8 @@ _QUESTIONS = (STAND_SIDE, MOUNT_MOVED)  # codes of the messages that hide the le
 class BackgroundAlignment:
     """Runs the alignment by driving.
 
-    The loop calls poll() and feed() in each turn, and begin() after a change of calibration. The menu calls ask(), and
-    a press calls answer().
+    The app's loop calls poll() and feed() in each pass, and begin() after a change of calibration. The menu calls
+    ask(), and a press calls answer().
 
     Args:
         leans: True for a motorcycle, False for a car.
@@ -46,8 +46,8 @@ class BackgroundAlignment:
         state: the state to show (see alignment.py).
         shown: True if the progress has its own page (ui/drive_page.py).
         result: the Notice or AlignmentError at the end of the last drive, or None.
-        message: an AlignmentError, StoreError or Notice to show before everything else, or None. It is shown until
-            answer() is called or the vehicle drives off.
+        message: an AlignmentError, StoreError or Notice to show before everything else, or None. The message is shown
+            until answer() is called or the vehicle drives off.
     """
 
     def __init__(self, leans, speed, meter, calibration):
@@ -66,7 +66,7 @@ class BackgroundAlignment:
         """Start a new drive after a change of calibration, from flash or from a wizard.
 
         Args:
-            asked: True if the drive must replace the alignment. Otherwise the drive checks it.
+            asked: True if the drive must replace the alignment, False if it must check the alignment.
         """
         self._asked = asked
         self._answered = []  # codes of messages not to show again
@@ -85,8 +85,8 @@ class BackgroundAlignment:
         self._clear_sums()
 
     def ask(self):
-        """Drop the current drive, and start a drive that replaces the alignment. The rider requests this after
-        remounting the sensor."""
+        """Drop the current drive, and start a drive that replaces the alignment. The rider requests a new alignment
+        after remounting the sensor."""
         self.shown = True
         self.begin(True)
 
@@ -116,7 +116,7 @@ class BackgroundAlignment:
         return speed
 
     def fresh_speed(self, now_ms):
-        """Return the last speed in m/s, or None if it is old."""
+        """Return the last speed in m/s, or None if the speed is old."""
         if self._speed_ms is not None and ticks_diff(now_ms, self._speed_ms) >= _FRESH_MS:
             # forget the time, because after 6 days ticks_diff() is negative and the speed would seem new
             self._speed_ms = None
@@ -258,8 +258,8 @@ class BackgroundAlignment:
     def _save(self, vehicle_from_sensor, trim_deg):
         """Save an alignment. Return True on success. On failure return False and set `message` to the reason."""
         old, used = self._meter.calibration, self._calibration
-        # The bias of `used` was subtracted from the drive's rates. The drive measured the remaining bias. Their sum is
-        # the whole bias.
+        # The bias of `used` was subtracted from the drive's rates. The drive measured the remaining bias. The sum of
+        # both is the gyro's bias.
         bias = [used.gyro_bias[i] + self.drive.standing.bias[i] for i in range(3)]
         try:
             self._active.refine(old.with_alignment(vehicle_from_sensor, bias, trim_deg, True))

@@ -10,7 +10,8 @@ from ..units import STANDARD_GRAVITY, const
 from .history import COLUMNS, difference
 from .regression import LAG_STEP_US, LAGS, Fit, ForwardRegression
 
-# An event begins above BEGIN_MPS2, ends below END_MPS2, and changes the speed by at least _CHANGE_MPS.
+# An event begins when the absolute acceleration exceeds BEGIN_MPS2, and ends when it falls below END_MPS2. An event
+# must change the speed by at least _CHANGE_MPS.
 BEGIN_MPS2, END_MPS2 = 0.8, 0.4
 _CHANGE_MPS = const(1.5)
 _MAX_ACCELERATION_EVENTS = const(2)  # most acceleration events that count, because braking shows forward better
@@ -19,10 +20,10 @@ _MAX_ACCELERATION_EVENTS = const(2)  # most acceleration events that count, beca
 MIN_INTERVAL_US = 400_000
 MAX_INTERVAL_US = 2_200_000  # longest interval; it allows one missing value of a GPS at 1 Hz
 _MAX_WAITING = const(4)  # number of intervals that can wait while an earlier interval is processed
-# Largest yaw rate of straight driving. At 10 m/s this rate causes a lateral force of 0.036 g, a fifth of the force of
-# braking. The regression removes most of this lateral force.
+# Largest yaw rate of straight driving. At 10 m/s a yaw rate of 2 deg/s causes a lateral force of 0.036 g, a fifth of
+# the force of braking. The regression removes most of this lateral force.
 _STRAIGHT_DPS = const(2.0)
-# Lowest speed of an interval that is used. At lower speeds steering angles are large, and a stop ends with a jerk.
+# Lowest mean speed of an interval that is used. At lower speeds steering angles are large, and a stop ends with a jerk.
 _MIN_SPEED_MPS = const(1.0)
 _MAX_FORCE_G = const(3.0)  # largest mean force of an interval that is used; a larger force means a knock on the sensor
 
@@ -35,8 +36,8 @@ class EventFinder:
 
     Attributes:
         going_on: True during an event.
-        change: the change of speed in the current event or, between events, in the last event. It is in m/s and
-            negative for braking.
+        change: the change of speed in the current event or, between events, in the last event. The change is in m/s,
+            and negative for braking.
     """
 
     def __init__(self, lags):
@@ -143,10 +144,10 @@ class DrivingEvents:
         self._history = history
         self._finder = EventFinder(LAGS)
         self._fit = Fit()
-        # The next three lists describe the last interval. Each list has one entry per lag.
+        # The next three lists describe the last interval between two speeds. Each list has one entry per lag.
         self._ends = [[0] * COLUMNS for _ in range(LAGS)]  # the history's integrals at the end of the interval
-        self._known = [False] * LAGS  # True if these integrals were known
-        self._straight = [False] * LAGS  # True if the vehicle drove straight
+        self._known = [False] * LAGS  # True if the integrals at the end of the interval were known
+        self._straight = [False] * LAGS  # True if the vehicle drove straight in the interval
         self._end = [0] * COLUMNS
         self._before = (0.0, 0)  # speed and time at the end of the last interval
         self._waiting = []  # speed and time at the end of each interval that is not processed yet
@@ -198,8 +199,8 @@ class DrivingEvents:
         """Process the next interval, as a generator of short steps.
 
         Args:
-            use: True if the gyro's bias is known. Otherwise the interval is not used, because straight driving and
-                bends cannot be distinguished.
+            use: True if the gyro's bias is known. If not, the interval is not used, because straight driving and bends
+                cannot be distinguished.
         """
         before, before_us = self._before
         speed, time_us = self._before = self._waiting.pop(0)
@@ -235,7 +236,7 @@ class DrivingEvents:
         if self._finder.update(change, seconds, straight):
             yield from self._end_event()
         elif self._finder.going_on:
-            if self._finder.change == change:  # the first interval of an event
+            if self._finder.change == change:  # this interval is the first of an event
                 self.last.clear()
             if straight[self.lag]:
                 self.last.add(seconds, change_g, best_force)

@@ -22,7 +22,7 @@ class ForceHistory:
     """A ring of running integrals of force and yaw rate, with one entry for the end of each bin.
 
     Attributes:
-        now: the time at the end of the newest bin in us. It is the sum of all bins' lengths and wraps at MASK.
+        now: the time at the end of the newest bin in us. This time is the sum of all bins' lengths, and wraps at MASK.
     """
 
     def __init__(self):
@@ -70,7 +70,8 @@ class ForceHistory:
         behind = difference(self.now, time_us)
         if behind < 0 or behind >= difference(self.now, self._times[(self._newest - self._count + 1) % SIZE]):
             return False
-        # A bin may be longer than BIN_US, but hardly twice as long. So start the search this many bins back.
+        # A bin may be longer than BIN_US, but hardly twice as long. So start the search half as many bins back as bins
+        # of BIN_US would need.
         i = self._newest
         step = behind // (2 * BIN_US)
         if step < self._count:

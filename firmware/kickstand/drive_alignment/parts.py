@@ -1,10 +1,10 @@
 """Compares forward and the vertical between two parts of a drive. If forward or the vertical differs, the mount may
 have moved between the two parts.
 
-The time of a move is unknown, so the drive is split in two after each block in turn. The scatter of forward between the
-blocks within each part shows which difference is likely by chance. The variance of a part's forward falls with the
-part's weight, but not below the effect of camber and wind on one long stretch of road. A few blocks give a poor sample
-variance, so it is averaged with a prior of PRIOR_FREEDOM degrees of freedom.
+The time of a move is unknown, so the drive is split in two after each block, one block after the other. The scatter of
+forward between the blocks within each part shows which difference is likely by chance. The variance of a part's forward
+falls with the part's weight, but not below the effect of camber and wind on one long stretch of road. A few blocks give
+a poor sample variance, so it is averaged with a prior of PRIOR_FREEDOM degrees of freedom.
 """
 
 from array import array
@@ -15,7 +15,8 @@ from .regression import BLOCKS
 
 PRIOR_DEG = 1.0  # prior of the standard deviation of forward, at a weight of 1 g^2 s
 PRIOR_FREEDOM = 4
-# Standard deviation of forward that camber and wind cause on one stretch of road. It does not depend on the weight.
+# Standard deviation of forward that camber and wind cause on one stretch of road. This part does not depend on the
+# weight.
 STRETCH_DEG = 1.5
 _MIN_WEIGHT = const(0.1)  # smallest weight of a part whose forward is compared, in g^2 s
 _MIN_S = const(20.0)  # shortest straight driving in a part whose vertical is compared
@@ -59,7 +60,7 @@ class DriveParts:
         self.clear()
 
     def clear(self):
-        """Drop all blocks. Call it before the first add()."""
+        """Drop all blocks. Call this method before the first add()."""
         self.count = 0
         self.forward_deg = self.sigmas = self.roll_deg = self.pitch_deg = 0.0
 
@@ -97,7 +98,7 @@ class DriveParts:
             yield
             scatter += self._scatter(angle_two, split, self.count)
             yield
-            freedom = self.count - 2  # two means were computed from the blocks
+            freedom = self.count - 2  # two degrees of freedom less, because the scatter is about two means
             variance = STRETCH_DEG * STRETCH_DEG * (one[6] / (one[4] * one[4]) + two[6] / (two[4] * two[4]))
             sampled = blend_prior(scatter / one[4] / freedom, one[4], freedom)
             sampled += blend_prior(scatter / two[4] / freedom, two[4], freedom)
@@ -109,8 +110,8 @@ class DriveParts:
             yield
 
     def _sum(self, sums, first, last):
-        """Add up the blocks from first to last - 1. Write the 6 sums of their values and the sum of the squared weights
-        into sums."""
+        """Add up the blocks from first to last - 1. Write the 6 sums of the blocks' values and the sum of the squared
+        weights into sums."""
         for i in range(7):
             sums[i] = 0.0
         for k in range(first, last):
@@ -120,8 +121,8 @@ class DriveParts:
             sums[6] += block[4] * block[4]
 
     def _scatter(self, angle, first, last):
-        """Return the scatter of forward about an angle, over the blocks from first to last - 1. It is the sum of weight
-        times squared deviation in deg^2."""
+        """Return the scatter of forward about an angle: the sum of weight times squared deviation in deg^2, over the
+        blocks from first to last - 1."""
         total = 0.0
         for k in range(first, last):
             block = self._blocks[k]

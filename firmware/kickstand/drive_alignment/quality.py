@@ -17,25 +17,28 @@ from .vertical import MAX_CHANGE_DEG
 
 MIN_EVENTS = 5  # number of straight braking and acceleration events needed for an alignment
 MIN_EVENTS_TO_CHECK_SPEED = 2
-# Each pair of limits is a hysteresis against flicker: the limit to become ready, and the limit to stay ready.
-# Largest standard error of forward. In one drive of ten, the real error of forward is twice this standard error
+# Each of the next three pairs has the limit to become ready and a wider limit to stay ready, to avoid flicker.
+
+# Largest standard error of forward. In one of ten drives, the real error of forward is twice the standard error
 READY_DEG, STAY_READY_DEG = 1.5, 2.5
-# Largest angle between the forward directions of the two halves. The same limit holds for two parts
+# Largest angle between the forward directions of the two halves. The limits also hold for the angle between the two
+# parts of a drive
 AGREE_DEG, STAY_AGREE_DEG = 4.0, 6.0
-# A larger difference between the parts is allowed if it is within this number of standard deviations
+# Largest difference between two parts in standard deviations of the difference, if it exceeds the limit in degrees
 AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0
 # The mount moved if two parts differ by more than one of the next three limits
 # Difference of forward. A long banked motorway curve that was treated as straight caused a difference of 15 degrees
 _MOVED_DEG = const(30.0)
-PITCH_DEG = 7.0  # difference of pitch. Slopes of 6 % uphill and then 6 % downhill cause less
-# Difference of roll. The banked curve caused 6 degrees. A motorcycle leans, so it has no limit of roll
+PITCH_DEG = 7.0  # difference of pitch. A road that climbs by 6 % and then falls by 6 % causes a smaller difference
+# Difference of roll, for a car only, because a motorcycle leans. The same motorway curve caused a difference of 6
+# degrees
 ROLL_DEG = 7.0
 # The mount moved if forward from one event differs by over _EVENT_OFF_DEG from forward of the whole drive. An event is
-# judged only if its weight and the length of its forward exceed the two limits below. On recorded drives no such event
-# differed by more than 40 degrees.
+# judged only if its weight and the length of its forward exceed _MIN_EVENT_WEIGHT and _MIN_EVENT_FORWARD. On recorded
+# drives no such event differed by more than 40 degrees.
 _EVENT_OFF_DEG = const(80.0)
-_MIN_EVENT_WEIGHT = const(0.012)  # in g^2 s
-_MIN_EVENT_FORWARD = const(0.5)  # change of force per change of speed, in g per g
+_MIN_EVENT_WEIGHT = const(0.012)  # smallest weight of an event that is judged, in g^2 s
+_MIN_EVENT_FORWARD = const(0.5)  # smallest length of an event's forward, in g per g
 
 
 class DrivingQuality:
@@ -100,8 +103,8 @@ class DrivingQuality:
             yield
         if blocks < 2 or weights <= 0.0:
             return
-        # Jackknife. Each block in turn is left out, and the changes of forward give its variance. The formal error of
-        # the regression is not used, because it is too small early in a drive.
+        # Jackknife. One block after the other is left out, and the changes of forward give its variance. The formal
+        # error of the regression is not used, because it is too small early in a drive.
         freedom = blocks - 1
         variance = degrees(degrees(squares)) * freedom / blocks  # rad^2 to deg^2
         self.quality_deg = sqrt(blend_prior(variance, self.fit.weight, freedom))

@@ -3,14 +3,14 @@
     f = level + forward a + left c        a = dv/dt / g, c = v (yaw rate) / g
 
 All vectors are in the sensor's own axes, and each interval is weighted by its length. The intercept, `level`, is the
-vertical of straight driving. It is fitted too, so an error of the vertical does not affect `forward`. The term of c
-absorbs the lateral force of slight bends. A motorcycle leans into bends, so there the coefficient of c is about zero.
-The length of `forward` is 1 if the speed is in m/s, and 1/3.6 if it is in km/h. With the right lag the regression
-explains the largest part of the force.
+vertical of straight driving. `level` is fitted together with `forward`, so an error of the vertical does not affect
+`forward`. The term of c absorbs the lateral force of slight bends. A motorcycle leans into bends, so its coefficient of
+c is about zero. The length of `forward` is 1 if the speed source sends m/s, and 1/3.6 if it sends km/h. With the right
+lag the regression explains the largest part of the force.
 
-A regression block has the sums of a few events (braking or acceleration). So parts of the drive can be compared. When
-all blocks are in use, they are joined in pairs, so memory is fixed. After that at least half of the blocks are always
-in use.
+A regression block has the sums of a few events (braking or acceleration), so that parts of the drive can be compared.
+When all blocks are in use, they are joined in pairs, so memory is fixed. From then on at least half of the blocks are
+always in use.
 """
 
 from array import array
@@ -33,7 +33,7 @@ class Fit:
     Attributes:
         forward: 3 values in g per g.
         level: 3 values in g.
-        weight: variation of the change of speed in g^2 s. It measures the information about forward.
+        weight: variation of the change of speed in g^2 s. The weight measures the information about forward.
         seconds: duration of the straight driving.
         explained: the part of the force's variation that forward explains, in g^2 s.
         found: False if there was nothing to fit.

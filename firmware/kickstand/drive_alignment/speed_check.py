@@ -5,17 +5,17 @@ from math import sqrt
 from ..errors import AlignmentError
 from ..units import const
 
-_NEGATIVE_MPS = const(-0.5)  # speeds from this value up to zero are noise of a standing vehicle
-# A second is lively if its mean force differs by this much from the mean force of the previous second. At standstill no
-# second is lively. While driving, most seconds are lively.
+_NEGATIVE_MPS = const(-0.5)  # lowest speed that may be noise of a standing vehicle
+# A second is lively if its mean force differs by at least _LIVELY_G from the mean force of the previous second. At
+# standstill no second is lively. While driving, most seconds are lively.
 _LIVELY_G = const(0.03)
-_TURNING_DPS = const(5.0)  # a second with a larger yaw rate is ignored, because a bend is lively at constant speed too
-# The speed is stuck if two conditions hold. It has not changed for at least _STUCK_S lively seconds, and at least
-# _STUCK_SHARE of all seconds since its last change are lively. Four braking events together have 8 lively seconds.
+_TURNING_DPS = const(5.0)  # largest yaw rate of a second that counts, because a bend is lively at constant speed too
+# The speed is stuck if it has not changed for at least _STUCK_S lively seconds, and at least _STUCK_SHARE of all
+# seconds since its last change are lively. Four braking events together have 8 lively seconds.
 _STUCK_S = const(8)
 _STUCK_SHARE = const(0.15)
 # Limits of the ratio between the change of force and the change of speed. The ratio should be 1. The pitch of a braking
-# vehicle and a coarsely rounded speed shift it by 0.2.
+# vehicle and a coarsely rounded speed shift the ratio by 0.2.
 MIN_FORCE_RATIO, MAX_FORCE_RATIO = 0.75, 1.35
 MAX_LAG_S = 1.9
 
@@ -44,7 +44,7 @@ def fit_problem(lag_s, force_ratio):
 
 
 class SpeedCheck:
-    """Finds a negative or stuck speed. It does not need to know forward.
+    """Finds a negative or stuck speed. The check does not need to know forward.
 
     Attributes:
         problem: an AlignmentError, or None.

@@ -1,8 +1,8 @@
 """Checks whether an earlier alignment, from two poses or another drive, fits this drive.
 
 If SIDE in the settings is not the side of the kickstand, forward and backward are exchanged. The poses cannot show this
-error, but the first braking events do. A change of pitch between the poses causes a yaw error of a few degrees. This
-error is corrected after enough braking events. Any other difference means that the mount has moved.
+exchange, but the first braking events do. A change of pitch between the poses causes a yaw error of a few degrees. This
+yaw error is corrected after enough braking events. Any other difference means that the mount has moved.
 """
 
 from math import atan2, degrees
@@ -11,18 +11,21 @@ from ..rotation import angle_deg, dot
 from ..units import const
 from .regression import Fit
 
-UNKNOWN = 0  # not enough events yet
+UNKNOWN = 0  # too few events for a verdict
 SAME = 1
-REFINED = 2  # there is a yaw error of a few degrees, and the DriveAlignment's matrix() is better
+REFINED = 2  # the earlier alignment has a yaw error of a few degrees, and the DriveAlignment's matrix() is better
 REVERSED = 3  # forward points backward, and turn_round() corrects the matrix
 MOVED = 4  # the mount has moved, and the sensor must be aligned again
 
-_MIN_EVENTS_TO_REVERSE = const(2)  # smallest number of straight events that can show REVERSED; all must agree
-_SAME_DEG = const(1.0)  # yaw errors below this limit are not corrected
-# Largest yaw error of two poses. At the smallest allowed tilt, 2 degrees of pitch between the poses cause 22 degrees.
+# Smallest number of straight events that can show REVERSED; each of them must show it
+_MIN_EVENTS_TO_REVERSE = const(2)
+_SAME_DEG = const(1.0)  # smallest yaw error that is corrected
+# Largest yaw error of two poses. At the smallest allowed tilt, 2 degrees of pitch between the poses cause a yaw error
+# of 22 degrees.
 _REFINED_DEG = const(30.0)
 _REVERSED_DEG = const(135.0)  # smallest yaw error that means REVERSED
-# Largest difference between the two verticals. An inexact upright pose and the road's camber cause less.
+# Largest difference between the two verticals. An inexact upright pose and the road's camber cause a smaller
+# difference.
 _UPRIGHT_DEG = const(8.0)
 
 
@@ -53,8 +56,8 @@ def compare(drive, matrix):
 def yaw_deg(fit, matrix):
     """Return the yaw error of a matrix in degrees.
 
-    It is the angle from the matrix's forward to the Fit's forward, about the matrix's up. It is positive if the Fit's
-    forward is farther to the left."""
+    The yaw error is the angle from the matrix's forward to the Fit's forward, about the matrix's up. The yaw error is
+    positive if the Fit's forward is farther to the left."""
     return degrees(atan2(dot(matrix[0:3], fit.forward), dot(matrix[6:9], fit.forward)))
 
 

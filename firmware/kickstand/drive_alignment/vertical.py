@@ -14,24 +14,25 @@ from ..errors import AlignmentError
 from ..rotation import angle_deg, norm, normalize, vector
 from ..units import const
 
-_STANDING_MPS = const(0.5)  # lower speeds count as standing, because a GPS at rest shows speeds up to this value
-MOVED_MPS = 2.0  # if the speed was higher than this, the next stop is a new stop
+_STANDING_MPS = const(0.5)  # highest speed that counts as standing, because a GPS at rest shows speeds up to 0.5 m/s
+MOVED_MPS = 2.0  # speed that a vehicle must exceed between two stops
 SETTLE_S = 1.0  # time for which a vehicle rocks after braking
 COUNTS_S = 2.0  # time that a stop must last after SETTLE_S to count
 # Largest difference at a stop between a mean over 0.1 s and a mean with the time constant _AVERAGE_S. An idling diesel,
-# wind and passengers cause less.
+# wind and passengers cause a smaller difference.
 _STILL_G = const(0.06)
 _STILL_DPS = const(3.0)
 _AVERAGE_S = const(0.5)
-_SAME_STOP_DEG = const(1.5)  # doors and passengers tilt a standing vehicle by less than this angle
-# If the sensor stays still at another angle for longer than this, the sensor was rotated. While a vehicle drives again
-# but a late speed is still zero, the angle also differs, but not for this long.
+_SAME_STOP_DEG = const(1.5)  # largest angle by which doors and passengers tilt a standing vehicle
+# Longest time for which the angle of a sensor that was not rotated can differ from its angle at the last stop. The
+# angle also differs for a short time when the vehicle drives again but the late speed is still zero.
 _TURNED_S = const(6.0)
-# If a rate differs by more than this from the bias at the last stop, the vehicle drives in a bend and a speed of zero
-# is wrong. Warming up changes the bias by less.
+# Largest difference between a rate at a stop and the bias at the last stop. At a larger difference the vehicle drives
+# in a bend, and a speed of zero is wrong. The bias of a gyro that warms up changes by less than this limit.
 TURNING_DPS = 10.0
 _MEAN_S = const(60.0)  # time constant of the mean force, which is used until a better vertical is known
-# Largest difference of two verticals that the road's slope can cause (14 %). If it is larger, the mount moved.
+# Largest difference of two verticals that the road's slope can cause (14 %). If two verticals differ more, the mount
+# moved.
 MAX_CHANGE_DEG = 8.0
 
 
@@ -60,11 +61,11 @@ class StandingVertical:
 
     def _begin_stop(self):
         """Begin the means of a new stop, because the vehicle has driven."""
-        self._stop_force = [0.0] * 3  # means of this stop
+        self._stop_force = [0.0] * 3  # mean force during the current stop
         self._stop_bias = [0.0] * 3
         self._averaged_s = 0.0
         self._counted = False
-        self._force = None  # mean with the time constant _AVERAGE_S
+        self._force = None  # running mean of the force with the time constant _AVERAGE_S
         self._still_s = 0.0
 
     def update(self, force, rate, speed_mps, seconds):
@@ -162,13 +163,13 @@ class Vertical:
 
     @property
     def turn_axis(self):
-        """The axis of the yaw rate, 3 values with a length of about 1. It is known after the first update()."""
+        """The axis of the yaw rate, 3 values with a length of about 1. The axis is known after the first update()."""
         return (self.is_car and self._standing.up) or self._from_pose or self._mean
 
     def known(self, out, fit=None):
-        """Write the vertical into out, as a unit vector. Return False if it is not known yet.
+        """Write the vertical into out, as a unit vector. Return False if the vertical is not known yet.
 
-        In a car it is unknown until the first stop.
+        In a car the vertical is unknown until the first stop.
 
         Args:
             out: array of 3.

@@ -1,4 +1,4 @@
-"""Finds faulty axes from the notes of add_up(). It is imported only when an axis looks suspicious.
+"""Finds faulty axes from the notes of add_up(). This module is imported only when an axis looks suspicious.
 
 An axis is faulty in three cases:
 * Its counts have at most two values, or their lowest bits do not change. The axis is dead, or its low byte is stuck.
@@ -11,7 +11,7 @@ from micropython import const
 from ..errors import Notice
 from ..units import AXES
 
-# Indices in the notes of add_up(), as in fifo_frames.py. Names imported from there would take heap.
+# Indices in the notes of add_up(), as in fifo_frames.py. Imported names would take heap.
 _ENDS = const(5)
 _CLIPPED = const(6)
 _GYRO_CLIPPED = const(7)
@@ -22,10 +22,10 @@ _HIGH_BYTE = const(0x10000)
 _WRAPPED = const(0x20000)
 
 # The number of successive quiet looks that make an axis faulty. A look is quiet if the counts had at most two values,
-# or if their lowest bit did not change. The columns are dlpf 1 to 6. The gyro has a row for each range, from 250 deg/s
-# up. The limits are for the noise of the quietest chip: 100 ug/sqrt(Hz) of the accelerometer, at 16 g, and 0.004
-# deg/s/sqrt(Hz) of the gyro. With this noise a working axis at rest reaches its limit only once in 1e12 looks. 0 means
-# that the noise is too far below one count to decide.
+# or if their lowest bit did not change. The columns are for dlpf 1 to 6. The gyro has one row per range, from 250 to
+# 2000 deg/s. The limits are for the noise of the quietest chip: 100 ug/sqrt(Hz) of the accelerometer, at 16 g, and
+# 0.004 deg/s/sqrt(Hz) of the gyro. With this noise a working axis at rest reaches its limit only once in 1e12 looks. A
+# limit of 0 means that the noise is too far below one count to decide.
 _ACCEL_LOOKS = (1, 1, 1, 4, 15, 80)
 _GYRO_LOOKS = (
     (1, 1, 1, 3, 5, 11),
@@ -36,9 +36,9 @@ _GYRO_LOOKS = (
 _COLUMNS = (0, 1, 2, 4, 5, 6)  # the axes' columns in a frame
 _WRAP_LOOKS = const(2)  # number of looks with a wrap that prove a stuck high byte
 _WELL_LOOKS = const(2)  # number of successive looks without a fault that clear the fault
-# If half of the samples are at the end of the range in this many successive looks, the axis is faulty
+# Number of successive looks with half of the samples at the end of the range that make an axis faulty
 _CLIP_LOOKS = const(2)
-# If all samples are at the end of the range in this many successive looks, the axis is the cause, not vibration
+# Number of successive looks with all samples at the end of the range that prove a faulty axis instead of vibration
 _RAIL_LOOKS = const(5)
 _SETUP_LOOKS = const(25)  # number of looks between two set-ups of a chip with a faulty axis
 _QUIET_LOOKS = const(150)  # number of looks before the same notice is shown again
@@ -74,7 +74,7 @@ class AxisJudge:
         notes = watch.notes
         lost, gyro = notes[_CLIPPED], notes[_GYRO_CLIPPED]
         watch.clipped += lost
-        enough = 2 * lost < samples  # good samples to judge
+        enough = 2 * lost < samples  # True if at least half of the samples were within the range
         shaken = 10 * notes[_SHAKEN] >= samples
         if shaken or not enough:
             self._clips += 1
@@ -110,12 +110,12 @@ class AxisJudge:
                 equal |= 1 << i | 1 << (i - 1 if i & 3 else i + 2)
             seen = notes[_SEEN + i]
             values = seen & 0xFFFF
-            more = values & (values - 1)  # clears the lowest bit; the result is 0 if there was only one value
+            more = values & (values - 1)  # clears the lowest bit; the result is 0 if the counts had only one value
             if not (more & (more - 1) and values & 0x5555 and values & 0xAAAA):
                 if quiet[i] < 255:
                     quiet[i] += 1
                 if quiet[i] < limit or not limit:
-                    continue  # too early to judge, so collect the values of more looks
+                    continue  # too few values to judge, so collect the values of more looks
                 dead |= 1 << i
             else:
                 quiet[i] = 0
@@ -136,8 +136,8 @@ class AxisJudge:
 
 
 def _ill(axes, how=None):
-    """Return the Notice for faulty axes. It names the gyro's faulty axes or, if the gyro has none, the accelerometer's
-    faulty axes.
+    """Return the Notice for faulty axes. The Notice names the gyro's faulty axes or, if the gyro has none, the
+    accelerometer's faulty axes.
 
     Args:
         axes: one bit per column of a frame.

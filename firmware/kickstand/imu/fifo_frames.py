@@ -1,8 +1,9 @@
 """Decodes frames of the chip's FIFO, adds them up, and watches the counts of each axis.
 
-A frame is one sample of 14 bytes. It holds seven big-endian int16 in the order ax ay az temperature gx gy gz (register
-map RM-MPU-6000A rev 4.2, pp. 29 to 31). On the board, decode() and add_up() are the machine code of
-fifo_frames_viper.py. On a computer they are decode_python() and add_up_python(). Both pairs give the same results.
+A frame is one sample of 14 bytes: seven big-endian int16 in the order ax ay az temperature gx gy gz (register map
+RM-MPU-6000A rev 4.2, pp. 29 to 31). On the board, decode() and add_up() are the machine code of fifo_frames_viper.py.
+On a computer, decode() and add_up() are decode_python() and add_up_python(). The machine code and the Python functions
+give the same results.
 """
 
 import gc
@@ -13,34 +14,34 @@ from micropython import const
 from ..errors import NO_MACHINE_CODE, Notice, checked, tried
 
 FRAME = const(14)  # bytes
-SATURATED = const(32700)  # a reading with this absolute value or more is at the end of its range
+SATURATED = const(32700)  # smallest absolute value of a reading at the end of its range
 LOOK_MS = const(400)  # time between two looks
 
 # Indices in the notes of add_up(), an array('i', 33). The machine code repeats these numbers.
 _HASH = const(0)  # hash of the last frame
 _REPEATS = const(1)  # number of successive repetitions of the last frame
 _LIMIT = const(2)  # number of repetitions that make a frame dead
-LOST = const(3)  # number of frames with an axis at the end of its range, in this call
+LOST = const(3)  # number of frames in the last call of add_up() with an axis at the end of its range
 _ROW = const(4)  # number of successive frames with an axis at the end of its range
 # The next four entries describe the frames since the last look
-_ENDS = const(5)  # one bit per column that was at the end of its range
+_ENDS = const(5)  # a bit for each column that was at the end of its range
 _CLIPPED = const(6)  # number of frames with an axis at the end of its range
 _GYRO_CLIPPED = const(7)  # number of frames with an axis of the gyro at the end of its range
 _DIFFER = const(8)  # bits of pairs of axes that differed: x and y (bits 1 and 5), y and z (2 and 6), x and z (0 and 4)
 DUE = const(9)  # number of samples until the next look
 _HARD = const(10)  # absolute counts of the accelerometer that show hard vibration
 _SHAKEN = const(11)  # number of frames that reached _HARD since the last look
-# Each of the next three is the index of the first of seven entries, in the order of a frame
+# The next three are indices of the first of seven entries, which have the order of a frame
 _LAST = const(12)  # counts of the last frame
-_SEEN = const(19)  # bits 0 to 15; bit n is set if the lowest four bits of the counts were n since the last look
+_SEEN = const(19)  # bits 0 to 15; bit n is set if the lowest four bits of the counts have been n since the last look
 _PEAK = const(26)  # largest absolute counts since power-on
 _HIGH_BYTE = const(0x10000)  # bit in _SEEN that is set when the high byte changes
 _WRAPPED = const(0x20000)  # bit in _SEEN that is set when the counts jump by _JUMP or more within one high byte
 _JUMP = const(192)
 
 # Half of the range of 8 g or 16 g. The low-pass hides most of a vibration. If half of the range is left after the
-# low-pass, the vibration was clipped before the low-pass. Then the mean is wrong, because the readings are clipped
-# unevenly. A range below 8 g has no limit for vibration, because bends alone reach half of that range.
+# low-pass, the vibration was clipped before the low-pass. After clipping the mean is wrong, because the readings are
+# clipped unevenly. A range below 8 g has no limit for vibration, because bends alone reach half of that range.
 _HARD_COUNTS = const(16384)
 _COLUMNS = (0, 1, 2, 4, 5, 6)  # the axes' columns in a frame
 _ALL_DIFFER = const(0x77)
@@ -81,7 +82,7 @@ def add_up_python(frames, n, sums, watch):
             byte = frames[at + i]
             if i < 6 and byte == first:
                 same += 1
-            if i < 6 or i > 7:  # all but the temperature, which a working chip may repeat
+            if i < 6 or i > 7:  # all bytes but the temperature, which a working chip may repeat
                 mark = (mark * 31 + byte) & 0xFFFFFF
         if same == 6 and (first == 0 or first == 255):
             return good
@@ -204,7 +205,7 @@ class AxisWatch:
                 self.fault = None
                 return False
             self.fault = tried(self._load)
-            if self.fault:  # out of memory, or the firmware is incomplete
+            if self.fault:  # the judge could not be imported: memory is short, or the firmware is incomplete
                 return False
         return self._judge.look(self, samples)
 
@@ -215,7 +216,7 @@ class AxisWatch:
             return False
         for i in _COLUMNS:
             seen = notes[_SEEN + i]
-            more = seen & (seen - 1) & 0xFFFF  # clears the lowest bit; the result is 0 if there was only one value
+            more = seen & (seen - 1) & 0xFFFF  # clears the lowest bit; the result is 0 if the counts had only one value
             if not (more & (more - 1) and seen & 0x5555 and seen & 0xAAAA and (seen & _HIGH_BYTE or seen < _WRAPPED)):
                 return False
         for i in _COLUMNS:
@@ -224,7 +225,7 @@ class AxisWatch:
         return True
 
     def _load(self):
-        gc.collect()  # otherwise the module, which stays loaded, would be placed behind garbage
+        gc.collect()  # without a collection the imported module, which stays loaded, would be placed behind garbage
         from .axis_judge import AxisJudge
 
         self._judge = AxisJudge(*self._settings)

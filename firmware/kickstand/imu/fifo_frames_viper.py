@@ -1,7 +1,7 @@
 """The functions decode_python() and add_up_python() of fifo_frames.py as machine code.
 
-decode() takes 7 us instead of 140. Both versions must give the same results. host_tests/imu/test_batches.py compares
-them.
+As machine code decode() takes 7 us, in Python 140 us. Both versions must give the same results.
+host_tests/imu/test_batches.py compares them.
 """
 
 import micropython
@@ -54,8 +54,8 @@ def add_up(frames: ptr8, n: int, sums: ptr32, watch: ptr32) -> int:  # noqa: F82
                 ends |= 1 << i
             if value >= watch[10] and i < 3:
                 shaken = 1
-            # Read the value back from the array, as `last` was read. Then both values are unsigned on a 64-bit
-            # computer.
+            # Read the value back from the array, as `last` was read. Read back from the array, both values are unsigned
+            # on a 64-bit computer.
             value = watch[12 + i]
             seen = 1 << (value & 15)
             if value >> 8 != last >> 8:

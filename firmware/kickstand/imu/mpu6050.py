@@ -24,12 +24,12 @@ from micropython import const
 
 from .fifo_frames import FRAME, SATURATED, AxisWatch, add_up, decode
 
-# setup() writes the registers one after another, beginning with SMPLRT_DIV: SMPLRT_DIV (p. 11), CONFIG with DLPF_CFG
-# (p. 13), GYRO_CONFIG (p. 14), ACCEL_CONFIG (p. 15) and, if the chip has it, ACCEL_CONFIG2. ACCEL_CONFIG2 sets the
-# low-pass of the accelerometer alone.
+# The registers that setup() writes follow one another: SMPLRT_DIV (p. 11), CONFIG with DLPF_CFG (p. 13), GYRO_CONFIG
+# (p. 14), ACCEL_CONFIG (p. 15) and, if the chip has it, ACCEL_CONFIG2. ACCEL_CONFIG2 sets the low-pass of the
+# accelerometer alone.
 _SMPLRT_DIV = const(0x19)
 _FIFO_EN = const(0x23)  # p. 16
-_ACCEL_XOUT_H = const(0x3B)  # p. 29; the fourteen bytes from this register on belong to one sampling instant
+_ACCEL_XOUT_H = const(0x3B)  # p. 29; the fourteen bytes from this register on are one sample
 _USER_CTRL = const(0x6A)  # p. 38
 _PWR_MGMT_1 = const(0x6B)  # p. 40
 _FIFO_COUNT_H = const(0x72)  # p. 43; reading this register latches the low byte in the next register
@@ -38,7 +38,8 @@ _WHO_AM_I = const(0x75)  # p. 45
 
 _RESET = const(0x80)  # bit of PWR_MGMT_1
 _STANDBY = const(0x3F)  # bits of PWR_MGMT_2 (p. 42), the register after PWR_MGMT_1; each bit turns an axis off
-# Value of PWR_MGMT_1. This clock is accurate to 1 %. The oscillator that runs after a reset is off by up to 5 %.
+# Value of PWR_MGMT_1 that selects the gyro's clock, which is accurate to 1 %. The oscillator that runs after a reset is
+# off by up to 5 %.
 _CLOCK_PLL_GYRO_X = const(0x01)
 _FIFO_ALL = const(0xF8)  # value of FIFO_EN for the fourteen bytes of temperature, gyro and accelerometer
 _FIFO_ENABLE = const(0x40)  # bit of USER_CTRL
@@ -70,7 +71,8 @@ CHIPS = {
     0x74: ("MPU6515", 333.87, 21.0, True, 512, 0xF8),
     0x78: ("MPU6500 0x78", 333.87, 21.0, True, 512, 0xF8),
     0x98: ("ICM20689", 326.8, 25.0, True, 512, 0xF8),
-    0x19: ("MPU6886", 326.8, 25.0, True, 512, 0x18),  # no bit for the temperature, which the chip always stores
+    # FIFO_EN has no bit for the temperature, which the chip always stores
+    0x19: ("MPU6886", 326.8, 25.0, True, 512, 0x18),
 }
 _NAME = const(0)
 _LSB_PER_C = const(1)
@@ -82,7 +84,7 @@ _MAX_FRAMES = const(8)  # most frames in one transfer, which then takes 3 ms at 
 # Most frames in one transfer while fewer than _MAX_FRAMES are in the FIFO. Because of this limit, one slow pass of the
 # loop does not slow the next pass.
 _FEW_FRAMES = const(3)
-# Readings that stay equal for longer than this are a fault, because noise changes every sample of a working chip
+# Longest time for which readings may stay equal, because noise changes every sample of a working chip
 _FROZEN_MS = const(100)
 
 
@@ -103,7 +105,7 @@ class Mpu6050:
         accel_range_g: 2, 4, 8 or 16.
         gyro_range_dps: 250, 500, 1000 or 2000.
         dlpf: DLPF_CFG, the low-pass, from 1 (184 Hz) to 6 (5 Hz).
-        rate_hz: samples per second. It must be 1000 divided by an integer from 1 to 256.
+        rate_hz: samples per second. The rate must be 1000 divided by an integer from 1 to 256.
         accept: a WHO_AM_I that is not in CHIPS. A chip with this number is treated as an MPU6500.
 
     Attributes:
@@ -139,14 +141,14 @@ class Mpu6050:
         self._one, self._two, self._three = bytearray(1), bytearray(2), bytearray(3)
         self._readback = bytearray(_FIFO_EN - _SMPLRT_DIV + 1)
         self._frames = bytearray(FRAME * _MAX_FRAMES)
-        # Entry n holds the first n frames. The views are created once, because each slice takes heap.
+        # Entry n is a view of the first n frames. The views are created once, because each slice takes heap.
         self._some_frames = [memoryview(self._frames)[: FRAME * n] for n in range(_MAX_FRAMES + 1)]
         self.frames_left = self.overflows = 0
         self._most = 0  # largest number of bytes found in the FIFO
-        self._odd = False  # the last fetch() found an incomplete frame
+        self._odd = False  # True if the last fetch() found an incomplete frame
         self._settled = False  # True once a chip was started at this address, so the other address is not tried
         self._started = False  # True once setup() is complete and the FIFO fills
-        self._full = 0  # if the FIFO holds more bytes than this, it may have overflowed
+        self._full = 0  # number of bytes in the FIFO above which it may have overflowed
         self.counts, self.sums = array("h", [0] * 7), array("i", [0] * 7)
         self.axes = AxisWatch(rate_hz, accel_bits >> 3, gyro_bits >> 3, dlpf, rate_hz * _FROZEN_MS // 1000)
 
@@ -166,7 +168,8 @@ class Mpu6050:
         except (UnknownChip, OSError) as error:
             if self._settled:
                 raise
-            self.address ^= 1  # AD0 may be wired the other way, or a clock chip may use the first address
+            # Try the other address: AD0 may be wired the other way, or a clock chip may use the first address
+            self.address ^= 1
             try:
                 return self._identify()
             except (UnknownChip, OSError) as other:
@@ -175,7 +178,7 @@ class Mpu6050:
 
     def _identify(self):
         self.who_am_i = self.read_register(_WHO_AM_I)
-        # Read twice, because a misread number would select the calibration of another chip.
+        # WHO_AM_I is read twice, because a misread number would select the calibration of another chip.
         if self.read_register(_WHO_AM_I) != self.who_am_i:
             raise OSError("MPU6050 WHO_AM_I reads differently each time")
         if self.who_am_i not in CHIPS and self.who_am_i != self._accept:
@@ -199,19 +202,19 @@ class Mpu6050:
     def configure(self):
         """Do the steps of setup() except start(), as a generator.
 
-        Before each pause the generator yields the milliseconds to wait. The caller can do other work meanwhile. Raises
-        the same errors as setup()."""
+        Before each pause the generator yields the milliseconds to wait. The caller can do other work during the pauses.
+        Raises the same errors as setup()."""
         self._started = False
         self.identify()
         self.write_register(_PWR_MGMT_1, _RESET)
         yield 100
         self.write_register(_PWR_MGMT_1, _CLOCK_PLL_GYRO_X)
-        yield 60  # a write too soon after a reset is lost without an error
+        yield 60  # ms to wait, because a write too soon after a reset is lost without an error
         for i in range(5 if self._chip()[_HAS_ACCEL_CONFIG2] else 4):
             self.write_register(_SMPLRT_DIV + i, self._configuration[i])
         if not self.configured():
             raise NotKept("MPU6050 configuration does not read back")
-        yield 20  # time for the low-pass to settle
+        yield 20  # ms until the low-pass has settled
 
     def start(self):
         """Start the FIFO of a configured chip. Raises OSError as restart_fifo() does."""
@@ -240,12 +243,11 @@ class Mpu6050:
     def fetch(self):
         """Read samples from the FIFO, and set frames_left.
 
-        After an overflow the frames no longer begin at multiples of 14 bytes. This method then empties the FIFO,
-        increments overflows and returns 0. It also returns 0 while the chip is writing a frame.
+        After an overflow the frames no longer begin at multiples of 14 bytes. If the FIFO has overflowed, fetch()
+        empties the FIFO, increments overflows and returns 0. While the chip is writing a frame, fetch() returns 0 too.
 
         Returns:
-            The number of samples read. It is _MAX_FRAMES if the FIFO holds at least that many, else at most
-            _FEW_FRAMES.
+            The number of samples read: _MAX_FRAMES if the FIFO holds at least that many, else at most _FEW_FRAMES.
 
         Raises:
             OSError: a transfer on the bus failed, or restart_fifo() failed.
@@ -262,7 +264,7 @@ class Mpu6050:
             return 0
         self._odd = odd
         n = waiting // FRAME
-        if odd:  # the chip may be writing a frame; if the next count is also odd, an overflow has cut a frame
+        if odd:  # the chip may be writing a frame; if the next fetch() finds a part too, an overflow has cut a frame
             self.frames_left = n + 1
             return 0
         taken = _MAX_FRAMES if n >= _MAX_FRAMES else _FEW_FRAMES if n > _FEW_FRAMES else n
@@ -316,8 +318,9 @@ class Mpu6050:
         self._read_into(_FIFO_COUNT_H, self._two)
         return self._two[0] << 8 | self._two[1]
 
-    # A failed transfer of a register is tried once more. Otherwise a moment of bad contact would require a whole set-up
-    # of the chip. A failed read of the FIFO is not repeated, because the chip has already dropped the bytes.
+    # A failed transfer of a register is tried once more. Without this second attempt a moment of bad contact would
+    # require a whole set-up of the chip. A failed read of the FIFO is not repeated, because the chip has already
+    # dropped the bytes.
 
     def read_register(self, register):
         """Return the content of a register. Raises OSError from the bus."""

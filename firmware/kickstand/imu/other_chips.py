@@ -108,8 +108,8 @@ def is_clock(i2c, address):
         time = i2c.readfrom_mem(address, 0, _TIME_BYTES)
     except OSError:
         return False
-    # The registers hold seconds, minutes, hours, day of the week, date, month and year. In a PCF8523 they begin at
-    # register 3, and the date comes before the day of the week.
+    # The registers hold seconds, minutes, hours, day of the week, date, month and year. In a PCF8523 these seven begin
+    # at register 3, and the date comes before the day of the week.
     return _is_time(time, 0, 4, 3) or _is_time(time, 3, 6, 7)
 
 

@@ -9,15 +9,15 @@ from .fifo_frames import DUE, LOST
 from .mpu6050 import UnknownChip
 
 _RETRY_MS = const(50)  # time between two attempts to set the chip up
-_FAILURES = const(3)  # number of successive failed transfers that are a fault; one or two NACKs are tolerated
-_SILENT_MS = const(100)  # longest time without a sample; a longer time is a fault
+_FAILURES = const(3)  # number of successive failed transfers that are a fault; one or two are tolerated
+_SILENT_MS = const(100)  # longest time without a sample before a fault is reported
 # Longest time without a sample while the FIFO overflows, because the board has no time to read the FIFO
 _STALE_MS = const(500)
-_SETTLED_MS = const(1000)  # if a fault returns within this time, the set-up did not help
+_SETTLED_MS = const(1000)  # a set-up did not help if a fault comes within this time after it
 _FRUITLESS = const(3)  # number of successive set-ups that did not help before the FIFO is tested
 # The fault is explained after EXPLAINED successive failed set-ups, and again every EXPLAINED_EVERY set-ups (about 1 s)
 EXPLAINED, EXPLAINED_EVERY = 3, 20
-_CORRECTION_SHIFT = const(4)  # SampleClock.emptied() corrects by 1/16 of the difference between the two clocks
+_CORRECTION_SHIFT = const(4)  # SampleClock.emptied() corrects by 1/16 of the clocks' difference
 
 
 class Sensor:
@@ -27,7 +27,7 @@ class Sensor:
         chip: an Mpu6050.
         reopen: reopen() frees the bus and returns it as a machine.I2C.
         explain: a function, or None. explain(chip, error) returns a Notice with the reason for a failed set-up, and
-            the addresses that answer. explain(chip, None) tests the FIFO. It returns a Notice if the FIFO is broken,
+            the addresses that answer. explain(chip, None) tests the FIFO, and returns a Notice if the FIFO is broken,
             else None, and the addresses.
 
     Attributes:
@@ -35,7 +35,7 @@ class Sensor:
         fault: the Notice of a fault, or None.
         restarts: number of gaps in the samples. A gap is a set-up, _STALE_MS without a sample, or a faulty axis.
         clipped: number of samples that fetch() skipped because an axis was at the end of its range. The caller resets
-            it to 0.
+            clipped to 0.
     """
 
     def __init__(self, chip, reopen, explain=None):
@@ -74,7 +74,7 @@ class Sensor:
             now_ms: ticks_ms().
 
         Returns:
-            The number of samples, at most eight. It is 0 while an axis is faulty or the chip does not run.
+            The number of samples, at most eight. The number is 0 while an axis is faulty or the chip does not run.
 
         Raises:
             SettingsError: the pins cannot be used. This method raises nothing else.
@@ -142,7 +142,7 @@ class Sensor:
         was just emptied."""
         if self._overflows != self.chip.overflows:
             self._overflows = self.chip.overflows
-            if self._sample_ms != self._emptied_ms:  # at least one sample was read since the last overflow
+            if self._sample_ms != self._emptied_ms:  # True if a sample was read since the last overflow
                 self._read_ms = self._sample_ms
             # now_ms may have been read before the long pause that caused the overflow
             self._sample_ms = self._emptied_ms = ticks_ms()
@@ -161,18 +161,18 @@ class Sensor:
             self.fault = fault
 
     def _named_fifo(self):
-        """Return the current fault if it says that the FIFO is broken, else None. This fault stays until a sample
+        """Return the current fault if it says that the FIFO is broken, else None. Such a fault stays until a sample
         arrives."""
         return self.fault if self.fault is not None and self.fault.code == "sensor-fifo" else None
 
     def _fifo_fault(self):
-        """Return a Notice if the chip measures but its FIFO does not work, else None. The test takes up to 0.3 s. It
-        is skipped if the current fault already says that the FIFO is broken."""
+        """Return a Notice if the chip measures but its FIFO does not work, else None. The test takes up to 0.3 s. The
+        test is skipped if the current fault already says that the FIFO is broken."""
         return self._named_fifo() or (self.explain(self.chip, None)[0] if self.explain else None)
 
     def check(self, now_ms):
-        """Check that the chip is still configured. Call this before readings are shown, because a supply dip during a
-        transfer can corrupt half a sample. The check takes 0.6 ms. Raises nothing.
+        """Check that the chip is still configured. Call this method before readings are shown, because a supply dip
+        during a transfer can corrupt half a sample. The check takes 0.6 ms. Raises nothing.
 
         After a failed transfer nothing is checked, because a restart of the FIFO may be incomplete.
 
@@ -182,7 +182,7 @@ class Sensor:
         if not self._running or self._failures:
             return
         try:
-            if not self.chip.configured():  # a supply dip has reset the chip
+            if not self.chip.configured():  # the chip has lost its configuration in a supply dip
                 self._fail("sensor-reset", now_ms)
         except OSError:
             self._missed(now_ms)
@@ -242,7 +242,7 @@ class Sensor:
         except OSError as error:
             self._not_set_up(error)
             return
-        self._running = True  # the fault stays until a good sample arrives
+        self._running = True  # the chip runs, but the fault stays until a good sample arrives
         self._refused = 0
         self._started_ms = now_ms
         self.restarts += 1
@@ -254,8 +254,8 @@ class SampleClock:
     """Computes the times of the samples.
 
     The chip samples at a steady rate, independent of the program. The chip's clock may be off by 1 %. The board's clock
-    corrects this error. Times are integers in microseconds, because a 32-bit float would lose microseconds after 17
-    seconds.
+    corrects the error of the chip's clock. Times are integers in microseconds, because a 32-bit float would lose
+    microseconds after 17 seconds.
 
     Args:
         period_us: nominal time from one sample to the next.
@@ -277,7 +277,7 @@ class SampleClock:
         self._pending_us = self._skipped_us = 0
 
     def skip(self, n):
-        """Count n skipped samples. The next step() includes their time."""
+        """Count n skipped samples. The next step() includes the time of these samples."""
         self.lost += n
         if self._sample_us is not None:
             self._skipped_us += n * self._period_us
@@ -300,7 +300,7 @@ class SampleClock:
         return dt_us
 
     def emptied(self, now_us):
-        """Correct the clock. Call this when the chip's FIFO is empty and all its samples were counted.
+        """Correct the clock. Call this method when the chip's FIFO is empty and all its samples were counted.
 
         At that time the last sample is half a period old on average.
 

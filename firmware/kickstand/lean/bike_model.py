@@ -13,7 +13,7 @@ State                                       Measured (a vector with [3] has the 
     s_x, c_xy        SCALE_LEFT, CROSS_LEFT_UP: scale error of the gyro's left axis, and its reading of a rate about up
     c_zx, c_zy, s_z  CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD: errors of the gyro's forward axis
 The data sheet allows 3 % of scale error and 2 % of cross-axis sensitivity. A filter without these states would mistake
-these errors for bias in a long turn, and for lean in a quick roll. The up axis has no such states: without a measured
+these errors for bias in a long bend, and for lean in a quick roll. The up axis has no such states: without a measured
 speed its scale error cannot be distinguished from an error of the speed.
 
 Equations, with ' for the derivative by time
@@ -34,10 +34,10 @@ tan(lean of the bike) = tan t / cos psi.
 d is the part of the pitch rate q' that the springs cause. The wheels do not rise with this pitch. Braking causes most
 of d, see (8) in dive.py. h is the height of the sensor above the roll axis.
 
-(4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a steady turn they cannot separate lean from speed. The
-reason is that the derivatives by lean and by speed have the same ratio in (4) and (5). In such a turn the ratio of two
-rates gives the lean: by (6) the pitch does not change, so by (2) w_x / w_y is tan t. At the beginning of a turn the
-speed measured before the turn is still valid, and with this speed (4) gives the lean.
+(4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a steady bend the two equations cannot separate lean
+from speed, because the derivatives by lean and by speed have the same ratio in (4) and (5). In a steady bend the ratio
+of two rates gives the lean: by (6) the pitch does not change, so by (2) w_x / w_y is tan t. At the beginning of a bend
+the speed estimated before the bend is still valid, and with this speed (4) gives the lean.
 """
 
 from math import cos, radians, sin, sqrt, tan
@@ -59,11 +59,11 @@ MIN_PITCH = -MAX_PITCH  # stored as a constant, because a negation for each samp
 # turn_rates() uses the yaw rate of a bike in balance if the speed is above _BALANCE_MIN_SPEED, the lean's standard
 # deviation is below BALANCE_SIGMA, and the measured rate differs by less than
 # _BALANCE_RATE + _BALANCE_SHARE x |balanced rate|. The form of the comments is explained in measurements.py.
-_BALANCE_MIN_SPEED = const(4.0)  # m/s. Larger: the balanced rate is not used in slow turns.
+_BALANCE_MIN_SPEED = const(4.0)  # m/s. Larger: the balanced rate is not used in slow bends.
 _BALANCE_RATE = const(0.1)  # rad/s. Larger: the balanced rate is used with a wrong lean or speed.
 _BALANCE_SHARE = const(0.5)  # ratio. Larger: the balanced rate is used with a wrong lean or speed.
 BALANCE_SIGMA = radians(20.0)  # rad. Larger: the balanced rate is used with a more uncertain lean.
-# ratio: lower bound of cos(lean). Larger: in deep leans the rate about left is too small.
+# ratio: lower bound of cos(lean) in a division. Larger: in deep leans the rate about left is too small.
 _BALANCE_MIN_COS = const(0.3)
 
 
@@ -131,10 +131,10 @@ def possible_pitch(pitch):
 def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
     """Return the rates about left and up, in rad/s, to use in derivatives that multiply a rate by a state.
 
-    A bike in balance has the rate v w_y / g = -cos q sin t about up. If the measured rate about up is close to this
-    rate, the function returns the rates of a bike in balance. Otherwise, and with a speed of 0, it returns the measured
-    rates. In a product of rate and state, the noise of a measured rate would be squared. This would make the estimated
-    speed and lean too small (errors in variables).
+    A bike in balance has the rate v w_y / g = -cos q sin t about up. If the measured rate about up is close to the
+    balanced rate, the function returns the rates of a bike in balance. If the rates differ more, or the speed is 0, the
+    function returns the measured rates. In a product of rate and state, the noise of a measured rate would be squared.
+    Squared noise would make the estimated speed and lean too small (errors in variables).
     """
     if speed > _BALANCE_MIN_SPEED:
         balanced = -STANDARD_GRAVITY * cos_pitch * sin_lean / speed
@@ -167,7 +167,7 @@ class Linearisation:
         speed, yaw_error = x[SPEED], x[YAW_ERROR]
         st, ct, sq = sin(x[LEAN]), cos(x[LEAN]), sin(x[PITCH])
         cq = sqrt(1.0 - sq * sq)
-        yaw_rate = wx * st + wy * ct  # rate about the vertical if there is no pitch
+        yaw_rate = wx * st + wy * ct  # rate about the vertical at a pitch of 0
         per_rate = speed / STANDARD_GRAVITY  # centripetal acceleration in g per rad/s of yaw rate
         sideways = per_rate * wy
         acceleration = forward - sq + sideways * yaw_error
@@ -216,6 +216,6 @@ class Linearisation:
         self.pitching = per_rate * self.pitch_rate  # in g
 
     def lean_by_pitch(self, x):
-        """Return the part of the state's lean that (7) subtracts, in rad. In this part, the yaw error makes pitch of
-        the bike look like lean."""
+        """Return the part of the state's lean that (7) subtracts, in rad. This part is pitch of the bike that looks
+        like lean because of the yaw error."""
         return x[YAW_ERROR] * self.cos_lean * (tan(x[PITCH]) + 0.5 * x[YAW_ERROR] * self.sin_lean)

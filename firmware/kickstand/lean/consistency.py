@@ -1,20 +1,20 @@
 """Checks that the readings fit the lean filter's model, by the innovations of the filter.
 
 A filter's covariance does not reveal a partly failed sensor, but its innovations do. An innovation is a measured value
-minus the expected value. Its square divided by its expected variance is called the normalised innovation squared. The
-mean of this value is 1 if everything fits (Y. Bar-Shalom and others, Estimation with Applications to Tracking and
-Navigation, section 5.4). This module averages the root of this value, with the innovation's sign. In this mean,
-vibration and bumps cancel. A dead or mirrored axis, a halved scale, a jump of the bias and a slipped mount do not
-cancel. The forces to the left and up have two means each. The short mean shows large errors within two seconds. The
-long mean shows small errors after some seconds.
+minus the expected value. The square of an innovation divided by its expected variance is called the normalised
+innovation squared. The mean of this value is 1 if everything fits (Y. Bar-Shalom and others, Estimation with
+Applications to Tracking and Navigation, section 5.4). This module averages the root of this value, with the
+innovation's sign. Vibration and bumps cancel in the mean. A dead or mirrored axis, a halved scale, a jump of the bias
+and a slipped mount do not cancel. The forces to the left and up have two means each. The short mean shows large errors
+within two seconds. The long mean shows small errors after some seconds.
 
 Three more means are of quantities that never stay large for long on a real ride:
     the force to the side, because a bike is in balance
     the pitch
     the part of the pitch that the forward force does not confirm
-On a real slope the forward force contains a part of gravity, sin(pitch). If this part is missing, the pitch is wrong,
-because wrong rates were integrated. The filter then mistakes the missing force for an acceleration. So the bike seems
-to brake uphill or to accelerate downhill for longer than a real bike does.
+On a real slope the forward force contains a part of gravity, sin(pitch). If the forward force lacks this part, the
+pitch is wrong, because wrong rates were integrated. The filter then mistakes the missing force for an acceleration. So
+the bike seems to brake uphill or to accelerate downhill for longer than a real bike does.
 
 Each mean is compared with its own spread, as in Student's t-test. On a road rougher than the filter expects, single
 innovations are large, and their means vary more.
@@ -22,8 +22,8 @@ innovations are large, and their means vary more.
 A misfit is a mean above its limit. After a misfit the lean is doubted: it is hidden until everything has fitted for a
 while. Repeated misfits mean a faulty sensor.
 
-There is one more check after a doubt. If the gyro's rate about up is wrong, a straight can look like an endless bend,
-with all forces as expected. So a lean that stays on one side for long is not shown.
+After a doubt the lean itself is checked too. If the gyro's rate about up is wrong, a straight can look like an endless
+bend, with all forces as expected. So a lean that stays on one side for long is not shown.
 """
 
 from math import sqrt
@@ -32,19 +32,20 @@ from ..units import const
 
 # The comment of each parameter has its unit, its meaning and, after "Larger:", the effect of a larger value.
 
-# s: time constant of the short means. Larger: fewer right leans are hidden, and wrong leans are hidden later.
+# s: time constant of the short means. Larger: fewer correct leans are hidden, and wrong leans are hidden later.
 _SHORT_S = const(3.0)
-# s: time constant of all other means. Larger: fewer right leans are hidden, and wrong leans are hidden later.
+# s: time constant of all means except the short means. Larger: fewer correct leans are hidden, and wrong leans are
+# hidden later.
 _LONG_S = const(10.0)
-# standard deviations: larger innovations are reduced to this value. Larger: a single blow counts for more.
+# standard deviations: limit to which larger innovations are reduced. Larger: a single blow counts for more.
 _MOST = const(4.0)
-# Limits of the means. Larger: fewer right leans and fewer wrong leans are hidden. Each comment gives the largest mean
-# in rides without a fault, on good and bad roads and mounts.
+# Limits of the means. Larger: fewer correct leans and fewer wrong leans are hidden. "Largest without a fault" is the
+# largest mean in rides without a fault, on good and bad roads, with good and bad mounts.
 LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations. Largest without a fault: 0.4 and 0.25
 UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations. Largest without a fault: 0.7 and 0.25
-# ratio: factor on the limits of up if the six positions were not done. The data sheet allows the accelerometer a scale
-# error of 3 % and an offset of 80 mg. Without the six positions, these errors show only at rest. Larger: fewer leans
-# are hidden.
+# ratio: factor on UP_SHORT and UP_LONG if the six positions were not done. The data sheet allows the accelerometer a
+# scale error of 3 % and an offset of 80 mg. Without the six positions, the filter notices these errors only at rest.
+# Larger: fewer leans are hidden.
 _UNMEASURED = const(2.0)
 # ratio: force to the side divided by force up, minus the trim. Largest without a fault: 0.12
 _SIDEWAYS = const(0.15)
@@ -52,22 +53,24 @@ _STEEP = const(0.21)  # rad: pitch. Largest without a fault: 0.14
 # rad: root mean square of the pitch that the forward force does not confirm. Largest on a recorded ride without a
 # fault: 0.096
 _SLOPE = const(0.12)
-# square of standard deviations: above this spread, the limits of left and up grow with the root of the spread. The
-# spread is the mean of half the squared change of the innovation from window to window. Larger: more leans are hidden
-# on the roughest roads.
+# squared standard deviations: above this spread of the innovations, the limits of left and up grow with the root of the
+# spread. The spread is the mean of half the squared change of the innovation from window to window. Larger: more leans
+# are hidden on the roughest roads.
 _SPREAD = const(0.4)
-# rad: limit of a steady mean lean after a doubt. Larger: fewer leans are hidden in bends, and on straights that look
-# like bends.
+# rad: after a doubt, a larger steady mean lean is hidden. Larger: fewer leans are hidden in bends, and on straights
+# that look like bends.
 _ONE_SIDE = const(0.13)
 # rad: a steady lean above this value is hidden only after _LONG_S, because the upward force confirms it. Smaller:
 # fewer leans are hidden.
 _SURE_LEAN = const(0.3)
-# ratio: the lean is steady if its squared mean exceeds this share of its mean square. Larger: fewer leans are hidden.
+# ratio: the lean is steady if the square of its mean exceeds this share of the mean of its square. Larger: fewer leans
+# are hidden.
 _STEADY = const(0.75)
-# ratio: larger forces to the side are reduced to this value. Larger: a single blow counts for more.
+# ratio: limit to which larger forces to the side are reduced. Larger: a single blow counts for more.
 _MOST_SIDEWAYS = const(0.5)
 _STRICT = const(0.85)  # ratio: factor on the limits after a doubt. Larger: a lasting fault is detected later.
-# ratio: share of the limits below which the means fit again during a doubt. Larger: the lean is shown again sooner.
+# ratio: during a doubt, the means fit again when they are below this share of their limits. Larger: the lean is shown
+# again sooner.
 _FIT = const(0.6)
 # s: time for which everything must fit after the first doubt, after the second doubt, and so on. Larger: after a fault
 # the lean stays hidden for longer.
@@ -75,13 +78,13 @@ HOLDS_S = (3.0, 4.0, 4.0, 20.0, 60.0)
 # s: time for which everything must fit after a gap in the readings. Larger: after a gap the lean stays hidden for
 # longer.
 _GAP_S = const(4.5)
-# After more doubts than this, only time in turns counts as fitting, because on a straight nearly everything fits.
+# Number of doubts after which only time in bends counts as fitting, because on a straight nearly everything fits.
 MILD = 3
-# s: shortest time between two doubts after more than MILD doubts, so that rest can be detected. Larger: errors that
-# have changed are found later.
+# s: shortest time between two doubts after more than MILD doubts. The time between two doubts is needed to detect rest.
+# Larger: errors of the sensor that have changed are found later.
 _AGAIN_S = const(12.0)
-_TURNING = const(0.05)  # rad/s: smallest yaw rate of a turn. Larger: the lean stays hidden for longer.
-# s: after this time of fitting, one doubt is forgotten. Larger: after a repeated fault the lean is hidden for longer.
+_TURNING = const(0.05)  # rad/s: smallest yaw rate of a bend. Larger: the lean stays hidden for longer.
+# s: time of fitting after which one doubt is forgotten. Larger: after a repeated fault the lean is hidden for longer.
 FORGET_S = 60.0
 
 last_odd = None  # the last code of `odd`, for `kickstand status`
@@ -103,7 +106,7 @@ class Consistency:
         self.doubts = 0
         self._fits_s = 0.0
         self._since_s = 0.0  # time since the last doubt
-        self._in_rest = True  # rest counts as fitting
+        self._in_rest = True  # True if time at rest counts as fitting
         self._forget_means()
 
     def _forget_means(self):
@@ -123,7 +126,7 @@ class Consistency:
     def one_sided(self):
         """True if a misfit is not yet forgotten, and the mean lean is steadily over _ONE_SIDE.
 
-        From _SURE_LEAN on, this must have lasted for _LONG_S."""
+        From _SURE_LEAN on, the lean must have been steady for _LONG_S."""
         lean = abs(self._lean)
         if not self.doubts or lean <= _ONE_SIDE or lean * lean <= _STEADY * self._lean_square:
             return False
@@ -147,7 +150,7 @@ class Consistency:
         self._up_long += long_gain * (up - self._up_long)
         self._side += long_gain * (max(-_MOST_SIDEWAYS, min(_MOST_SIDEWAYS, sideways)) - self._side)
         self._pitch += long_gain * (pitch - self._pitch)
-        # pitch * pitch if none of the pitch is in the forward force
+        # `square` is pitch * pitch if the forward force confirms none of the pitch
         square = -pitch * max(-abs(pitch), min(abs(pitch), push))
         self._slope_square += gain * (square - self._slope_square)
         change = left - self._left_before

@@ -1,8 +1,8 @@
 """Suspension dive: estimates while riding how far braking and acceleration pitch the bike on its springs.
 
 In braking a telescopic fork dives, by 2.8 degrees per g on a superbike. In acceleration the rear sits down, by 1.3
-degrees per g. The wheels do not rise, so this pitch rate times the speed is not an acceleration. The springs' pitch is
-nearly proportional to the forward acceleration a. With ' for the derivative by time, its rate is
+degrees per g. The wheels do not rise with this pitch, so its rate times the speed is not an acceleration. The springs'
+pitch is nearly proportional to the forward acceleration a. With ' for the derivative by time, the rate of this pitch is
 
     dive' = share a'                                                                  (8)
 
@@ -14,12 +14,12 @@ from ..units import STANDARD_GRAVITY, const
 
 # The comment of each parameter has its unit, its meaning and, after "Larger:", the effect of a larger value.
 
-# rad per g: share before the first braking, 1.5 degrees per g. Larger: before the share is found, more pitch counts as
-# dive.
+# rad per g: share before the first braking, equal to 1.5 degrees per g. Larger: before the share is found, more of the
+# pitch counts as dive.
 PRIOR_SHARE = 0.026
-# (g/s)^2: weight of PRIOR_SHARE in the sum of a'^2. Larger: the share is found later, and varies less.
+# (g/s)^2: weight of PRIOR_SHARE, as a part of the sum of a'^2. Larger: the share is found later, and varies less.
 _PRIOR_SQUARE = const(5.3)
-_MIN_SHARE = const(-0.035)  # rad per g: smallest share. It is negative, because an anti-dive fork may lift the nose
+_MIN_SHARE = const(-0.035)  # rad per g: smallest share, negative because an anti-dive fork may lift the nose
 _MAX_SHARE = const(0.14)  # rad per g: largest share, 8 degrees per g, as with soft, long forks
 _MIN_SPEED = const(5.0)  # m/s: lowest speed of a window that counts. Larger: the share is found later.
 _MAX_JERK = const(3.0)  # g/s: largest a' that counts. Larger: bumps and lost readings count as braking.

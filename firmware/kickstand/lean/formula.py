@@ -8,12 +8,12 @@ With lean t > 0 to the right, s the centripetal acceleration in g (> 0 in a left
 
 from math import asin, atan2, degrees, sqrt
 
-_TOO_SMALL = 0.01  # (0.1 g)^2: smallest squared force that has a direction. In free fall the force is smaller
+_TOO_SMALL = 0.01  # smallest squared force with a direction, (0.1 g)^2. In free fall the force is smaller than 0.1 g
 
 
 def static_lean_deg(force):
-    """Return the lean of a standing bike in degrees, > 0 to the right. This is equation (21) with a sign. It is exact
-    near upright.
+    """Return the lean of a standing bike in degrees, > 0 to the right. This lean is equation (21) with a sign, and is
+    exact near upright.
 
     force: left, up, forward in g.
     """
@@ -30,12 +30,12 @@ def centripetal_g(left_g, up_g, yaw_rate):
 
 
 def formula_lean_deg(force, yaw_rate):
-    """Return Nicolae's lean by (25) and (26), in degrees, > 0 to the right. In free fall (under 0.1 g) it is 0.
+    """Return Nicolae's lean by (25) and (26), in degrees, > 0 to the right. In free fall (under 0.1 g) the lean is 0.
 
     force: left, up, forward in g. yaw_rate: in any unit, because only its sign counts.
 
-    In turns it is right on average. Near upright it is noisy: 1 % of vibration causes an error of 8 degrees, always to
-    the side of the yaw rate.
+    In bends this lean is right on average. Near upright this lean is noisy: 1 % of vibration causes an error of 8
+    degrees, always to the side of the yaw rate.
     """
     left, up = force[0], force[1]
     square = left * left + up * up

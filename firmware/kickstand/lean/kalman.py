@@ -1,8 +1,8 @@
 """The covariance of a Kalman filter, updated in steps short enough for the time of one sample.
 
-Nearly all of the work is sums of products. On a board a product of floats takes 12 us and 32 bytes of heap. There,
-machine code computes these sums on arrays, without heap. The long methods are generators, which yield where the work
-may be interrupted. Rows of Jacobians are written as ((state, value), ...), because most of their values are zero.
+Nearly all of the work is sums of products. On a board a product of floats takes 12 us and 32 bytes of heap. So on a
+board machine code computes these sums on arrays, without heap. The long methods are generators, which yield where the
+work may be interrupted. Rows of Jacobians are written as ((state, value), ...), because most of their values are zero.
 """
 
 from array import array
@@ -11,11 +11,13 @@ from math import sqrt
 from ..errors import NO_MACHINE_CODE, checked
 from ..units import const
 
-_MIN_VARIANCE = const(1e-10)  # a lower bound, because rounding in 32-bit floats could make a variance negative
-# Terms of a Jacobian's row between two yields. Without machine code three terms take a millisecond.
+# Lower bound of a variance, because rounding in 32-bit floats could make a variance negative
+_MIN_VARIANCE = const(1e-10)
+# Number of terms of a Jacobian's row that are processed between two yields. Without machine code three terms take a
+# millisecond.
 _TERMS_PER_STEP = const(3)
-# Largest squared innovation, in variances, with full weight (5 sigma). Larger innovations get less weight. They are not
-# rejected, because the state may be wrong.
+# Largest squared innovation, in variances, with full weight (5 sigma). Larger innovations get less weight. No
+# innovation is rejected, because the state may be wrong.
 _GATE = const(25.0)
 
 
@@ -24,7 +26,7 @@ def add_products_python(out, factors, source, n, rows):
 
     out, factors, source: arrays of floats. rows: 1, or n for a symmetric matrix. Half of a symmetric matrix is computed
     and copied to the other half. On the board add_products() is the machine code of kalman_viper.py, for array("f").
-    Elsewhere it is this function.
+    Elsewhere add_products() is this function.
     """
     for i in range(rows):
         factor = factors[i]
@@ -45,7 +47,7 @@ else:
     _TRIAL = array("f", (0.65625, 0, 0, -0.75, 8388609, 0, 1e-9, 3e9, -0.984))
     _FACTORS, _SOURCE = array("f", (1.5, -2.6875, 0.75)), array("f", (-0.4375, 98304.5, 1.3125))
     add_products = checked(add_products, add_products_python, _TRIAL, _FACTORS, _SOURCE, 3, 3)
-_KIND = "d" if add_products is add_products_python else "f"  # of the arrays
+_KIND = "d" if add_products is add_products_python else "f"  # type of the arrays' elements
 
 
 class Covariance:
@@ -74,7 +76,7 @@ class Covariance:
         # Parts of _p. The type checker treats the elements of a memoryview as integers.
         self.rows = [every[n * i : n * (i + 1)] for i in range(n)]  # type: list
 
-    def __getstate__(self):  # copy and pickle on a computer cannot copy a memoryview
+    def __getstate__(self):  # without the memoryviews in `rows`, which copy and pickle on a computer cannot copy
         return {name: value for name, value in self.__dict__.items() if name != "rows"}
 
     def __setstate__(self, state):
@@ -89,7 +91,8 @@ class Covariance:
         p[i * n + i] = variance
 
     def add_noise(self, i, variance):
-        """Add process noise to the variance of state i. Use this for states that do not depend on other states."""
+        """Add process noise to the variance of state i. Use this method for states that do not depend on other
+        states."""
         self._p[i * self.n + i] += variance
 
     def propagate_row(self, i, derivatives, seconds, noise):
@@ -117,8 +120,8 @@ class Covariance:
         """Apply one scalar measurement: K = P H^T / (H P H^T + R), correction += K innovation, P -= K H P. A generator.
 
         derivatives: H, ((state, d measurement / d state), ...). innovation: the measured value minus the value expected
-        from the states before this window's corrections. variance: R, in the measurement's unit squared. Beyond _GATE
-        the innovation's expected variance is raised until the innovation is at the gate.
+        from the states before this window's corrections. variance: R, in the measurement's unit squared. If the squared
+        innovation exceeds _GATE times its expected variance, this variance is raised until they are equal.
         """
         p, rows, column, gain, factor = self._p, self.rows, self._column, self._gain, self._factor
         correction, n = self.correction, self.n

@@ -57,7 +57,7 @@ def add_products(out: ptr32, factors: ptr32, source: ptr32, n: int, rows: int): 
                         value <<= 1
                         exponent -= 1
                     if exponent > 254:
-                        value = 0 - 1  # not-a-number: all bits are 1
+                        value = 0 - 1  # not-a-number, in which all bits are 1
                     elif exponent > 0:
                         value = sign << 31 | (exponent << 23) + ((value + 32) >> 6) - 0x800000
                     else:

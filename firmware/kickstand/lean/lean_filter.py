@@ -6,8 +6,8 @@ linearise   five times per second: compute the model's partial derivatives at th
 update      propagate the covariance over the window, and apply each measurement of the window
 inject      add the corrections to the state
 
-The steps from linearise to inject take longer than one sample. They are a generator, spread over the samples of the
-next window. Each sample runs the generator to its next yield. Forces are in g, speeds in m/s, angles in rad.
+The steps from linearise to inject take longer than one sample. These steps are a generator, spread over the samples of
+the next window. Each sample runs the generator to its next yield. Forces are in g, speeds in m/s, angles in rad.
 """
 
 from math import atan2, degrees, pi, sin, sqrt
@@ -35,10 +35,10 @@ from .upright_trim import UprightTrim
 _WINDOW_US = const(200_000)
 _FIRST_WINDOW_US = const(50_000)
 WORK_STEPS = 21  # number of steps of the work on a window; a test checks this number
-_SLOW_STEP_US = const(12_000)  # if samples are further apart than this, there is time for all steps at once
+_SLOW_STEP_US = const(12_000)  # time between two samples above which all steps are done at once
 DELAY_S = 0.0048  # delay of the MPU6050's gyro at DLPF 3
-# m/s: above this speed the filter restarts. A board that lies on its nose seems to accelerate, but standstill is
-# detected long before the estimated speed is this high.
+# m/s: estimated speed above which the filter restarts. A board that lies on its nose seems to accelerate, but
+# standstill is detected long before the estimated speed reaches this limit.
 _MAX_SPEED = const(250.0)
 
 
@@ -46,7 +46,7 @@ class LeanFilter:
     """Estimates lean from force and rate in the vehicle's axes, in fixed memory.
 
     Args:
-        delay_s: delay of the gyro's low-pass. The lean is extrapolated by this time.
+        delay_s: delay of the gyro's low-pass. The lean is extrapolated by delay_s.
         trim: in rad, see UprightTrim.
         posed: see LeanMeter.use().
         gyro_variances: see gyro_variances().
@@ -59,8 +59,8 @@ class LeanFilter:
         self._posed = posed
         self._gyro_variances = gyro_variances
         self._p = None
-        # Relative error of the force's magnitude, caused by the accelerometer's bias and scale error. It is measured at
-        # rest, where the magnitude should be 1 g.
+        # Relative error of the force's magnitude, caused by the accelerometer's bias and scale error. This error is
+        # measured at rest, where the magnitude should be 1 g.
         self._force_error = 0.0
         self.dive = Dive()
         self.consistency = Consistency(six_done)
@@ -68,8 +68,8 @@ class LeanFilter:
         # The sensor's errors (the states from BIAS_LEFT on) at two earlier times while everything fitted
         self._good = self._next_good = [0.0] * (STATES - BIAS_LEFT)
         self._good_s = 0.0
-        self._kept_speed = None  # (speed, variance) for the next start
-        self._gap = False  # True if readings were missing before the next start
+        self._kept_speed = None  # (speed, variance) for the next start of the filter
+        self._gap = False  # True if the next start of the filter follows missing readings
         self.restart()
 
     def restart(self):
@@ -87,8 +87,9 @@ class LeanFilter:
         self._p = None
         self._upright = self.trim.angle  # value of the state LEAN while the bike is upright
         self._rest = RestDetector(not self._kept)
-        # _speed: the latest measured speed, until a window uses it. _last_speed: the speed used last. _speed_s: seconds
-        # since then. _straight_s: seconds since straight_or_prior_speed() was used.
+        # _speed: the latest measured speed, until a window uses it. _last_speed: the measured speed that a window used
+        # last. _speed_s: seconds since the use of _last_speed. _straight_s: seconds since straight_or_prior_speed() was
+        # used.
         self._speed = self._last_speed = None
         self._speed_s = self._straight_s = 0.0
         self._moving_s = 0.0  # remaining time for which the last measured speed proves that the bike moves
@@ -223,7 +224,7 @@ class LeanFilter:
             return
         if not (abs(x[LEAN]) < 2 * pi and x[SPEED] < _MAX_SPEED):  # also true for NaN
             self.consistency.gap()
-            self._forget()  # the sensor's errors may be NaN too
+            self._forget()  # forget the sensor's errors too, because they may be NaN
             return
         if self._impossible(means, seconds):
             self.consistency.fail("odd-up")
@@ -242,7 +243,7 @@ class LeanFilter:
         self._rest.update(means[2:5], means[5:8], bias, seconds, self.rolling or pushed, moving)
         if self._rest.resting and not rested:
             self._stand(means)
-            return  # this window's innovations belong to the state before _stand()
+            return  # no update, because this window's innovations belong to the state before _stand()
         self._work = self._process(means, seconds, roll_acceleration)
 
     def _impossible(self, means, seconds):
@@ -259,11 +260,12 @@ class LeanFilter:
     def _start(self, means):
         """Set the first state and its covariance from the means of the first window."""
         wx, wy, wz, fx, fy, fz = means[2:8]
-        # A long turn is as calm as a standstill and has no force to the side. Only the yaw rate shows the difference.
+        # A long bend is as calm as a standstill and has no force to the side. Only the yaw rate shows the difference.
         turning = max(abs(wx), abs(wy), abs(wz)) > measurements.START_MAX_RATE
         moving = turning or abs(sqrt(fx * fx + fy * fy + fz * fz) - 1.0) > measurements.START_MAX_FORCE
         variances = [sigma * sigma for sigma in measurements.SIGMA_START]
-        posed, self._posed = self._posed, False  # only the first start comes right after the poses
+        # _posed is used once, because only the first start comes right after the poses
+        posed, self._posed = self._posed, False
         if posed:
             variances[BIAS_LEFT : BIAS_LEFT + 3] = [measurements.SIGMA_FRESH_BIAS**2] * 3
         if self._gyro_variances:
@@ -279,7 +281,7 @@ class LeanFilter:
         x = self._x
         x[LEAN] = atan2(fx, fy)
         x[PITCH] = 0.0
-        x[SPEED] = measurements.PRIOR_SPEED if moving else 0.0  # most rides begin at rest
+        x[SPEED] = measurements.PRIOR_SPEED if moving else 0.0  # without a movement the ride begins at rest
         if self._kept_speed:
             x[SPEED], variance = self._kept_speed
             self._p.set_variance(SPEED, variance)
@@ -289,7 +291,7 @@ class LeanFilter:
 
     def _stand(self, means):
         """At the beginning of rest, set lean and pitch by the force, which is now vertical, and the speed to 0. Keep a
-        bias unless it is far off, for example after the sensor was moved about by hand."""
+        bias of the gyro unless it is far off, for example after the sensor was moved about by hand."""
         fx, fy, fz = means[5:8]
         x, p = self._x, self._p
         rates = [abs(means[2 + i] + x[BIAS_LEFT + i]) for i in range(3)]
@@ -343,10 +345,12 @@ class LeanFilter:
         sideways = (means[5] - means[7] * x[YAW_ERROR]) / max(means[6], 0.5) - self.trim.angle
         if x[SPEED] < measurements.BALANCE_SPEED or p.rows[SPEED][SPEED] > measurements.SIGMA_BALANCE_SPEED**2:
             sideways = 0.0
-        if abs(means[7]) < measurements.MOST_FORWARD * abs(means[6]):  # otherwise the sensor is not on a bike
+        # A larger force forward means that the sensor is not on a bike
+        if abs(means[7]) < measurements.MOST_FORWARD * abs(means[6]):
             up_misfit = p.misfit
             if abs(x[PITCH]) > 2 * measurements.STEEP:
-                misfit = up_misfit = 0.0  # the equations do not hold in a wheelie, so only its duration is judged
+                # The equations do not hold in a wheelie, so only the duration of the pitch is judged
+                misfit = up_misfit = 0.0
             lean = x[LEAN] - self._upright
             pitch, turning = x[PITCH], model.yaw_rate
             self._failed = self.consistency.add(misfit, up_misfit, sideways, pitch, push, lean, turning, seconds)
@@ -356,10 +360,10 @@ class LeanFilter:
         self._speed_s += seconds
         self._straight_s = min(self._straight_s, seconds) + seconds
         if measured is not None and (self._last_speed is None or self._speed_s > measurements.MEASURED_SPEED_EVERY_S):
-            # The acceleration comes from measured speeds only, because a pitch error would bias the estimated
-            # acceleration
-            acceleration, since = 0.0, 2 * measurements.SPEED_SCALE_S  # the noise of the first speed is not raised
+            # With these values measured_speed() does not raise the noise of the first speed
+            acceleration, since = 0.0, 2 * measurements.SPEED_SCALE_S
             if self._last_speed is not None:
+                # The acceleration is computed from measured speeds only, because an error of the pitch biases `push`
                 acceleration, since = (measured - self._last_speed) / self._speed_s, self._speed_s
             self._speed, self._last_speed, self._speed_s = None, measured, 0.0
             yield from p.update(*measurements.measured_speed(measured, speed, acceleration, since))
@@ -384,7 +388,8 @@ class LeanFilter:
             x[i] += p.take_correction(i)
         x[SPEED] = max(0.0, x[SPEED])
         x[PITCH] = possible_pitch(x[PITCH])
-        # Not needed at rest, where the force shows the lean. The yaw error is meaningless for a sensor in the hand.
+        # At rest the force shows the lean, so no correction for the yaw error is needed. The yaw error is meaningless
+        # for a sensor in the hand.
         if not self._rest.resting:
             self._upright = self.trim.angle + model.lean_by_pitch(x)
         if x[LEAN] > pi:

@@ -32,19 +32,18 @@ SIGMA_START = (
     radians(5.0),  # rad: pitch
     15.0,  # m/s: speed
     radians(1.0),  # rad/s: drift of the gyro's bias since the calibration, left
-    radians(1.0),  # rad/s: up
-    radians(1.0),  # rad/s: forward
+    radians(1.0),  # rad/s: the same drift, up
+    radians(1.0),  # rad/s: the same drift, forward
     radians(5.0),  # rad: yaw error of the alignment, caused by pitch in the kickstand pose
     # ratio: scale error of the gyro's left axis minus the scale error of its up axis. The data sheet allows 0.03 each.
     0.020,
-    0.014,  # ratio: reading of the left axis per rate about up. The data sheet allows 0.02.
-    0.014,  # ratio: reading of the forward axis per rate about left
-    0.014,  # ratio: reading of the forward axis per rate about up
-    0.014,  # ratio: scale error of the forward axis
+    0.014,  # ratio: reading of the gyro's left axis per rate about up. The data sheet allows 0.02.
+    0.014,  # ratio: reading of the gyro's forward axis per rate about left
+    0.014,  # ratio: reading of the gyro's forward axis per rate about up
+    0.014,  # ratio: scale error of the gyro's forward axis
 )
-# If the readings no longer fit (consistency.py), the filter restarts. The first two times it keeps the speed and
-# remembered errors of the sensor. These were estimated REMEMBER_S to 2 x REMEMBER_S earlier. Later restarts keep
-# nothing.
+# If the readings no longer fit (consistency.py), the filter restarts. The first two restarts keep the speed, and the
+# errors of the sensor that were estimated REMEMBER_S to 2 x REMEMBER_S earlier. Later restarts keep nothing.
 REMEMBER_S = 10.0  # s. Larger: the remembered errors are older.
 # rad/s: standard deviation of a remembered bias. Larger: a bias that has changed is found sooner.
 SIGMA_GOOD_BIAS = radians(0.6)
@@ -62,7 +61,8 @@ IMPOSSIBLE_S = 1.0  # s
 # For MOVING_S after a measured speed above MOVING_SPEED the bike is not at rest.
 MOVING_SPEED = 2.0  # m/s. Larger: slow riding on a smooth road is mistaken for rest.
 MOVING_S = 2.5  # s. Larger: a stop is detected later.
-# A bike is in balance above BALANCE_SPEED if the speed's standard deviation is below SIGMA_BALANCE_SPEED.
+# A bike must be in balance if its speed is above BALANCE_SPEED and the speed's standard deviation is below
+# SIGMA_BALANCE_SPEED.
 BALANCE_SPEED = 2.0  # m/s. Larger: a slipped mount is detected at fewer speeds.
 SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a pushed bike is mistaken for a ridden bike.
 # ratio: largest force forward over force up on a bike. Larger: a board on a table is mistaken for a faulty sensor.
@@ -75,14 +75,15 @@ SIGMA_FRESH_BIAS = radians(0.2)
 # rad: standard deviation of the first lean if the bike moves. Larger: the lean is shown later, and follows the forces
 # more.
 SIGMA_START_LEAN_MOVING = radians(30.0)
-# m/s: assumed speed if no speed is measured. Larger: if power comes on in a turn, the estimated lean is larger.
+# m/s: assumed speed if no speed is measured. Larger: if the board is switched on in a bend, the estimated lean is
+# larger.
 PRIOR_SPEED = 15.0
 
 # Process noise, per square root of a second
 # rad: error of the integrated rates, caused by vibration. Larger: the lean follows the forces more and the gyro less.
 NOISE_ANGLE = radians(0.24)
-NOISE_SPEED = 0.35  # m/s. Larger: the estimated speed adapts sooner in turns, and is less steady on straights.
-# rad/s: a bias drifts by 0.6 deg/s in five minutes of warming up. Larger: long turns are mistaken for bias.
+NOISE_SPEED = 0.35  # m/s. Larger: the estimated speed adapts sooner in bends, and is less steady on straights.
+# rad/s: a bias drifts by 0.6 deg/s in five minutes of warming up. Larger: long bends are mistaken for bias.
 NOISE_BIAS = radians(0.01)
 # Lost readings
 # rad/s: unknown roll rate during lost readings. The unknown pitch rate is a quarter of this rate. Larger: after a gap
@@ -94,23 +95,23 @@ SIGMA_LOST_FORCE = 0.3
 # Measurement noise while riding g: noise of the force to the left. Larger: the lean follows this force less, and
 # follows the gyro and the assumption of level roads more.
 _SIGMA_LEFT = const(0.04)
-# g: noise of the upward force, which bumps disturb. Larger: in long turns scale errors are found later.
+# g: noise of the upward force, which bumps disturb. Larger: in long bends the gyro's scale errors are found later.
 _SIGMA_UP = const(0.07)
 # ratio: noise (1 sigma) of the upward force, divided by speed x pitch rate / g. The force to the left has sin(lean)
-# times this noise. The cause is that the springs pitch the bike, but its wheels do not rise. Larger: braking disturbs
-# the lean less.
+# times this noise. The noise arises because the springs pitch the bike, but its wheels do not rise. Larger: braking
+# disturbs the lean less.
 _PITCHING_SHARE = const(2.0)
-# ratio: share of the vibration's variance that stays in a window's mean. It is added to the noise of the force to the
-# left. Larger: forces count less on rough roads.
+# ratio: share of the vibration's variance that stays in a window's mean. This share is added to the variance of the
+# force to the left. Larger: forces count less on rough roads.
 _SHAKEN_SHARE = const(0.1)
 # m: h, the sensor's height above the roll axis. Larger: rolling explains more of the force.
 _ROLL_HEIGHT_M = const(0.4)
 _SIGMA_ROLL_HEIGHT_M = const(0.4)  # m: standard deviation of h. Larger: forces count less while the bike rolls quickly.
 # m/s: error of a speed from a receiver or a wheel sensor. Larger: measured speeds count for less.
 _SIGMA_MEASURED_SPEED = const(1.0)
-# ratio: scale error of the measured speed. A leaning tyre has a smaller radius, and slips. The scale error of the
-# gyro's up axis is included, because the product speed x yaw rate has both errors. Larger: measured speeds count for
-# less, most at high speed.
+# ratio: scale error of the measured speed. A leaning tyre has a smaller radius, and slips. This parameter includes the
+# scale error of the gyro's up axis, because the product speed x yaw rate has both errors. Larger: measured speeds count
+# for less, most at high speed.
 _SIGMA_SPEED_SCALE = const(0.05)
 # s: time for which the error _SIGMA_MEASURED_SPEED stays the same. Larger: measured speeds count for less.
 _MEASURED_SPEED_S = const(4.0)
@@ -119,14 +120,14 @@ _MEASURED_SPEED_S = const(4.0)
 SPEED_SCALE_S = 40.0
 # s: possible delay of a measured speed. Larger: measured speeds count for less during acceleration and braking.
 _MEASURED_SPEED_LATE_S = const(1.0)
-# s: shortest time between two measured speeds that are used. In the windows between, straight_or_prior_speed() is used.
-# Larger: the measured speeds in use are older.
+# s: shortest time between two measured speeds that are used. In the windows between them, straight_or_prior_speed() is
+# used. Larger: the measured speeds in use are older.
 MEASURED_SPEED_EVERY_S = 0.3
 
 # ratio: real standard deviation of the lean's error, divided by the filter's own standard deviation. The filter's
-# standard deviation is too large, because the noises above are increased for disturbances that last. In simulated
-# rides, two thirds of the errors are below this share of the filter's standard deviation. Larger: the claimed sigma is
-# larger, and the lean stays the same.
+# standard deviation is too large, because the noises in this file are increased for disturbances that last. In
+# simulated rides, two thirds of the errors are below this share of the filter's standard deviation. Larger: the claimed
+# sigma is larger, and the lean stays the same.
 SIGMA_SHARE = 0.46
 
 # Assumptions that take the place of measurements
@@ -138,16 +139,16 @@ _SLOPE_S = const(3.0)
 # rad: pitch at which the assumption of a level road has half its weight. At twice this pitch the assumption has a fifth
 # of its weight. Larger: wheelies are mistaken for slopes.
 STEEP = radians(6.0)
-# The bike rides straight if lean and yaw rate are below the first two of the next three limits, and the speed is above
-# the third.
-STRAIGHT_MAX_LEAN = radians(8.0)  # rad. Larger: the lean of wide turns is drawn towards upright.
-STRAIGHT_MAX_RATE = radians(2.5)  # rad/s, about the vertical. Larger: the lean of slow turns is drawn towards upright.
-STRAIGHT_MIN_SPEED = 4.0  # m/s. Larger: drift on slow straights is not removed.
-SIGMA_STRAIGHT = radians(0.8)  # rad: lean on straights, caused by wind and camber. Larger: drift is removed later.
-_STRAIGHT_S = const(3.0)  # s: duration of a lean caused by wind or camber. Larger: drift is removed later.
+# The bike rides straight if its lean and yaw rate are below these limits, and its speed is above STRAIGHT_MIN_SPEED.
+STRAIGHT_MAX_LEAN = radians(8.0)  # rad. Larger: the lean in wide bends is drawn towards upright.
+STRAIGHT_MAX_RATE = radians(2.5)  # rad/s, about the vertical. Larger: the lean in slow bends is drawn towards upright.
+STRAIGHT_MIN_SPEED = 4.0  # m/s. Larger: the gyro's drift on slow straights is not removed.
+SIGMA_STRAIGHT = radians(0.8)  # rad: lean on straights, caused by wind and camber. Larger: gyro drift is removed later.
+_STRAIGHT_S = const(3.0)  # s: duration of a lean caused by wind or camber. Larger: gyro drift is removed later.
 # m/s: difference between the real speed and PRIOR_SPEED. Larger: PRIOR_SPEED counts for less.
 _SIGMA_PRIOR_SPEED = const(20.0)
-_PRIOR_SPEED_S = const(60.0)  # s: time for which a bike keeps its speed. Larger: PRIOR_SPEED counts for less.
+# s: time for which a bike keeps about the same speed. Larger: PRIOR_SPEED counts for less.
+_PRIOR_SPEED_S = const(60.0)
 
 # Standing still
 # rad: error of lean and pitch that are set from the force when the bike comes to rest. Larger: later forces count more.
@@ -165,14 +166,15 @@ MAX_REST_PUSH = 0.08
 # for rest.
 ROLLING_SPEED = 3.0  # m/s
 ROLLING_SIGMAS = 3.0  # standard deviations of the speed
-# The trim is measured while the standard deviations of speed and lean are below these limits. Larger: the trim is found
-# sooner, but less exactly.
+# The trim is measured while the standard deviations of speed and lean are below SIGMA_TRIM_SPEED and SIGMA_TRIM_LEAN.
+# Larger: the trim is found sooner, but less exactly.
 SIGMA_TRIM_SPEED = 8.0  # m/s
 SIGMA_TRIM_LEAN = radians(1.4)  # rad
 
 
 def gyro_variances(sigma, r):
-    """Return the prior variances of the last five states, or None if the six positions have not measured the gyro.
+    """Return the prior variances of the last five states (the gyro's errors), or None if the six positions have not
+    measured the gyro.
 
     Args:
         sigma: standard errors of the gyro matrix' entries in the sensor's axes, 9 values, treated as independent. All
@@ -202,7 +204,8 @@ def forces(model, means, roll_acceleration, force_error, dive=0.0):
         force_error: relative error of the accelerometer's magnitude, as found at rest.
         dive: the result of Dive.update(), in g.
     """
-    rolling = roll_acceleration / STANDARD_GRAVITY  # in g per metre of height, like `square` below
+    # Effect of roll acceleration on the force, in g per metre of height, like `square` below
+    rolling = roll_acceleration / STANDARD_GRAVITY
     uncertain = _SIGMA_ROLL_HEIGHT_M * rolling
     left = means[0]
     shaken = max(0.0, means[8] - left * left)
@@ -212,9 +215,9 @@ def forces(model, means, roll_acceleration, force_error, dive=0.0):
     sideways = pitching * model.sin_lean
     left_variance = _SIGMA_LEFT**2 + _SHAKEN_SHARE * shaken + uncertain**2 + sideways * sideways
     left += _ROLL_HEIGHT_M * rolling * model.cos_lean + dive * model.sin_lean
-    # In a steady turn the upward force is 1 / cos(lean), so it shows the lean independently of the gyro's scale factor.
-    # One window gives little information, but a minute gives much. In a minute a constant error of this force would
-    # add up, so force_error is subtracted.
+    # In a steady bend the upward force is 1 / cos(lean), so it shows the lean independently of the gyro's scale error.
+    # This force of one window shows the lean poorly, but the windows of a minute show it well. A constant error of the
+    # force would add up in a minute, so force_error is subtracted.
     square = means[4] * means[4] / STANDARD_GRAVITY
     up = means[1] + _ROLL_HEIGHT_M * square - force_error * means[6] + dive * model.cos_lean
     up_variance = (
@@ -227,8 +230,8 @@ def forces(model, means, roll_acceleration, force_error, dive=0.0):
 
 
 def level_road(model, x, seconds):
-    """Return the measurement of (6), which assumes that roads are level on average. Its noise grows with the pitch,
-    because a large pitch may be a wheelie."""
+    """Return the measurement of (6), which assumes that roads are level on average. The measurement's noise grows with
+    the pitch, because a large pitch may be a wheelie."""
     innovation = -x[PITCH] - x[YAW_ERROR] * model.sin_lean
     steep = innovation / STEEP
     return model.level_row, innovation, SIGMA_SLOPE**2 * (1.0 + steep * steep) * 2 * _SLOPE_S / seconds
@@ -242,9 +245,9 @@ def straight_or_prior_speed(lean, speed, yaw_rate, seconds):
 
 
 def measured_speed(measured, speed, acceleration, seconds):
-    """Return the measurement of speed by a receiver or a wheel sensor. acceleration: in m/s^2. It adds noise, because
-    the speed may be late. seconds: time since the previous measured speed. Ten speeds in a second count as much as one
-    speed."""
+    """Return the measurement of speed by a receiver or a wheel sensor. acceleration: in m/s^2, which adds noise,
+    because the speed may be late. seconds: time since the previous measured speed. Ten speeds in a second count as much
+    as one speed."""
     late = _MEASURED_SPEED_LATE_S * acceleration
     scale = _SIGMA_SPEED_SCALE * measured
     variance = (_SIGMA_MEASURED_SPEED**2 + late * late) * max(1.0, 2 * _MEASURED_SPEED_S / seconds)
@@ -257,6 +260,6 @@ def at_rest(model, means, speed, axis):
     return (
         (((SPEED, 1.0),), -speed, SIGMA_REST_SPEED**2),
         (((BIAS_LEFT + axis, 1.0),), means[2 + axis], SIGMA_REST_RATE**2),
-        (model.left_row[0:2], means[0] + model.sideways, _SIGMA_REST_FORCE**2),  # only LEAN and PITCH
+        (model.left_row[0:2], means[0] + model.sideways, _SIGMA_REST_FORCE**2),  # only the terms of LEAN and PITCH
         (((PITCH, model.cos_pitch),), means[7] - model.sin_pitch, _SIGMA_REST_FORCE**2),
     )

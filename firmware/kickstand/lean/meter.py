@@ -13,13 +13,14 @@ _SMOOTH_US = const(300_000)  # time constant of smooth_force
 MAX_VARIANCE = (SIGMA_SHARE * radians(3.0)) ** 2
 DOUBTED_VARIANCE = (SIGMA_SHARE * radians(2.0)) ** 2  # largest variance of a lean that is shown after repeated misfits
 TRIM_MAX_VARIANCE = radians(0.5) ** 2  # largest variance of a trim that is kept
-_TRIM_STEP_DEG = const(0.3)  # smallest change of the trim that is saved, to protect the flash from wear
-FALLEN_DEG = 65.0  # the bike has fallen after _FALLEN_US of at least this lean
+_TRIM_STEP_DEG = const(0.3)  # smallest change of the trim that is saved; saving smaller changes would wear the flash
+FALLEN_DEG = 65.0  # smallest lean of a fallen bike; the bike has fallen if the lean lasts for _FALLEN_US
 _FALLEN_US = const(1_000_000)
 # Half of the time for which a lean must last to count as a maximum. The jerk of a pothole is shorter than the whole
 # time
 HELD_US = 75_000
-_WHEELIE_DEG = const(20.0)  # pitch. No road is so steep, and the filter's equations do not hold in a wheelie.
+# Pitch of a wheelie. No road is so steep, and the filter's equations do not hold in a wheelie.
+_WHEELIE_DEG = const(20.0)
 
 
 class LeanMeter:
@@ -54,8 +55,8 @@ class LeanMeter:
     def use(self, calibration, posed=False):
         """Use a calibration whose scale is set, and restart the filter. Another calibration clears suppressed_reason.
 
-        posed: True if the poses of the alignment have just ended. Then the bike is still, and the gyro's bias was just
-            measured."""
+        posed: True if the poses of the alignment have just ended. At that moment the bike is still, and the gyro's bias
+            was just measured."""
         if calibration is not self.calibration:
             self.suppressed_reason = None
         self.calibration = calibration
@@ -82,7 +83,7 @@ class LeanMeter:
         self._hold_again()
 
     def distrust(self, reason):
-        """Set suppressed_reason: the lean is not shown until this is called with None, or with another calibration."""
+        """Set suppressed_reason: hide the lean until distrust(None) or use() of another calibration."""
         self.suppressed_reason = reason
 
     @property
@@ -169,7 +170,7 @@ class LeanMeter:
                 self.filter.inflate_covariance(dt_us * 1e-6)
         if self._fresh:
             self._fresh = False
-            # There is no previous sample. So ignore dt_us, because the board and a replay must compute the same lean
+            # Without a previous sample ignore dt_us, because the board and a replay must compute the same lean
             dt_us, gain = 0, 1.0
         else:
             gain = dt_us / (_SMOOTH_US + dt_us)
@@ -195,8 +196,8 @@ class LeanMeter:
 
     def _hold_again(self):
         """Restart the timing of a lean above its maximum, because the lean is within its maxima or not trusted."""
-        # _over_us: time for which the lean has exceeded a maximum. After each HELD_US it starts again from 0.
-        # _least: smallest lean in this time. _least_before: smallest lean in the previous HELD_US, or 0 if the lean was
+        # _over_us: time for which the lean has exceeded a maximum. After each HELD_US it starts again from 0. _least:
+        # smallest lean since _over_us was 0. _least_before: smallest lean in the previous HELD_US, or 0 if the lean was
         # within its maxima then.
         self._over_us = 0
         self._least = 180.0

@@ -1,5 +1,5 @@
-"""Standstill detector for zero-velocity updates. It uses means over a fifth of a second, in which an idling engine
-averages out."""
+"""Standstill detector for zero-velocity updates. The detector uses means over a fifth of a second, in which an idling
+engine averages out."""
 
 from ..units import const
 
@@ -7,11 +7,11 @@ from ..units import const
 
 # Largest deviation of a window's mean from the recent average at rest. Larger: smooth roads are mistaken for rest.
 _MAX_FORCE_G = const(0.010)  # g
-_MAX_RATE_RADPS = const(0.009)  # rad/s (0.5 deg/s)
-# rad/s (1.2 deg/s): largest mean rate that may be bias. Larger: smooth turns are mistaken for rest.
+_MAX_RATE_RADPS = const(0.009)  # rad/s (equal to 0.5 deg/s)
+# rad/s (1.2 deg/s): largest mean rate that may be bias. Larger: smooth bends are mistaken for rest.
 MAX_BIAS_RADPS = 0.02
 # rad/s: largest mean rate that may be bias before the first rest, because the bias has drifted since the calibration.
-# Larger: more turns are mistaken for rest.
+# Larger: more bends are mistaken for rest.
 _MAX_FIRST_BIAS_RADPS = const(0.1)
 _REST_S = const(1.5)  # s: duration of stillness that counts as rest. Larger: rest is detected later, but more reliably.
 # s: duration of stillness that counts as rest if the bike seems to move or brake. No road is smooth for this long.
@@ -51,7 +51,7 @@ class RestDetector:
         average = self._average
         gain = min(1.0, seconds / _AVERAGE_S)
         # The average rate must be small after subtracting either the estimated bias or only the calibrated bias.
-        # Otherwise a wrong estimate, as after moving the sensor by hand, would never be corrected.
+        # With only the estimated bias, a wrong estimate, as after moving the sensor by hand, would never be corrected.
         still = near_estimate = near_calibration = True
         for i in range(6):
             deviation = readings[i] - average[i]
@@ -64,8 +64,8 @@ class RestDetector:
                 still = still and abs(deviation) < _MAX_FORCE_G
         still = still and (near_estimate or near_calibration) and not moving
         self._still_s = self._still_s + seconds if still else 0.0
-        # Steady braking looks still, so there is a second timer. With one timer, braking would count as rest as soon as
-        # the estimated speed is low.
+        # Steady braking looks still, so a second timer counts only stillness without a sign of rolling. With one timer,
+        # braking would count as rest as soon as the estimated speed is low.
         self._not_rolling_s = self._not_rolling_s + seconds if still and not rolling else 0.0
         self.resting = self._not_rolling_s >= _REST_S or self._still_s >= _REST_ROLLING_S
         if self.resting:

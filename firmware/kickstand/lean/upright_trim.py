@@ -1,40 +1,41 @@
 """Estimates the trim: the correction of the roll misalignment, because the alignment's upright pose was not quite
 upright.
 
-A bike in balance has no specific force to the side. The mean force measured on straights comes from the roll
-misalignment and from the accelerometer's drift, so both effects are subtracted from the lean. In turns wide tyres and a
-rider who hangs off add a force that changes its sign with the turn. The trim is the part that left and right turns have
-in common.
+A bike in balance has no specific force to the side. The mean force to the side on straights comes from the roll
+misalignment and from the accelerometer's drift, so both effects are subtracted from the lean. In bends wide tyres and a
+rider who hangs off add a force whose sign differs between left and right bends. The trim is the part that left and
+right bends have in common.
 """
 
 from math import radians, sin
 
 from ..units import const
 
-# rad: largest trim. It is the sum of 2 degrees for an inexact upright pose, and the accelerometer's remaining errors
+# rad: largest trim, the sum of 2 degrees for an inexact upright pose, and the accelerometer's remaining errors
 MAX_TRIM = radians(3.5)
 # The comment of each parameter has its unit, its meaning and, after "Larger:", the effect of a larger value.
 
 # rad: standard deviation of the trim after new poses. Larger: the trim is found sooner, and varies more.
 SIGMA_START = radians(2.5)
-# rad: standard deviation of a trim from an earlier ride, which was colder or hotter. Larger: the trim is found sooner,
-# and varies more.
+# rad: standard deviation of a trim from an earlier ride, because the sensor was colder or hotter then. Larger: the trim
+# is found sooner, and varies more.
 SIGMA_KEPT = radians(0.7)
 # rad: force to the side divided by force up on straights, caused by rider, camber and wind. Larger: the trim is found
 # later.
 SIGMA_STRAIGHT = radians(1.5)
-# ratio: standard deviation of the force to the side in turns, divided by sin(lean). Tyres and rider cause this force.
-# Larger: turns to one side count less.
+# ratio: standard deviation of the force to the side in bends, divided by sin(lean). Tyres and rider cause this force.
+# Larger: bends to one side count less.
 _SIGMA_LEAN_SHARE = const(0.15)
-# ratio: variation of the force to the side from turn to turn, divided by sin(lean). The rider causes it. Larger: turns
+# ratio: variation of the force to the side from bend to bend, divided by sin(lean). The rider causes it. Larger: bends
 # count less.
 _SIGMA_TURN = const(0.04)
-# rad per rad/s: additional measurement noise, divided by the yaw rate. Larger: turns count less.
+# rad per rad/s: additional measurement noise, divided by the yaw rate. Larger: bends count less.
 _SIGMA_YAW_S = const(0.03)
 # ratio: largest innovation that counts. Larger: a sensor in a hand counts as a balanced bike.
 _MAX_SIDEWAYS = const(0.1)
 _DISTURBANCE_S = const(2.0)  # s: duration of wind or camber. Larger: the trim is found later, and varies less.
-NOISE = radians(0.01)  # rad per square root of a second: process noise. Larger: changes are followed sooner.
+# rad per square root of a second: process noise of the trim. Larger: a change of the trim is found sooner.
+NOISE = radians(0.01)
 
 
 class UprightTrim:
@@ -44,7 +45,7 @@ class UprightTrim:
         angle: the trim found on earlier rides, in rad, or 0.
 
     Read-only attributes:
-        angle: the trim in rad, within MAX_TRIM. It is subtracted from the lean.
+        angle: the trim in rad, within MAX_TRIM. The trim is subtracted from the lean.
         variance: the variance of the trim in rad^2.
     """
 
@@ -61,7 +62,7 @@ class UprightTrim:
 
         Args:
             sideways: force to the left divided by force up.
-            lean: in rad. Like the yaw rate, it increases the noise in bends.
+            lean: in rad. Lean and yaw rate increase the noise in bends.
             yaw_rate: in rad/s.
             seconds: time since the previous update.
         """

@@ -10,7 +10,7 @@ class Bonds:
     """The stored keys.
 
     Args:
-        pin: the PIN. If it differs from the stored PIN, all phones must pair again.
+        pin: the PIN. If this PIN differs from the stored PIN, all phones must pair again.
     """
 
     def __init__(self, pin):
@@ -22,7 +22,7 @@ class Bonds:
                 kept = json.load(file)
             if kept["pin"] == pin:
                 self._keys = {(kind, unhexlify(key)): unhexlify(value) for kind, key, value in kept["keys"]}
-        except (OSError, ValueError, KeyError, TypeError):  # without a valid file the phones must pair again
+        except (OSError, ValueError, KeyError, TypeError):  # without a valid file all phones must pair again
             pass
 
     def get(self, kind, index, key):

@@ -10,14 +10,14 @@ from . import packets
 from .packets import LEAN, MOTION, OWN, SPEED
 
 _LOOK_MS = const(1000)
-# A phone that requests nothing for this time is disconnected, so that the next phone can connect. Typing a PIN takes
-# half of this time.
+# Time after which a phone that requests nothing is disconnected, so that the next phone can connect. Typing a PIN takes
+# up to half of this time.
 _IDLE_S = const(60)
 _SAMPLES = 8  # largest number of samples that Transform takes
 
 
 def attach(radio, app):
-    """Connect an App with a Radio. Then the app sends to phones."""
+    """Connect an App with a Radio, so that the app sends to phones."""
     app.live = app.screen.pages.live = Live(radio, app, app.settings.leans)
 
 
@@ -74,7 +74,7 @@ class Live:
             self._sums[i] = 0
 
     def feed(self, sums, n):
-        """Take the samples of a turn of the loop. Call this once per turn with samples while period_ms is not 0.
+        """Take the samples of a pass of the loop. Call this method once per pass with samples while period_ms is not 0.
 
         Args:
             sums: sums of the samples' counts, 7 values.
@@ -86,7 +86,7 @@ class Live:
         self._n += n
 
     def poll(self, now_ms):
-        """Send the packets whose time has come. Call this once per turn of the loop. Never waits."""
+        """Send the packets whose time has come. Call this method once per pass of the loop. Never waits."""
         radio = self.radio
         if radio.changed:
             self._begin()
@@ -143,7 +143,8 @@ class Live:
         send nothing."""
         period_ms = self.period_ms
         self._due_ms = ticks_add(self._due_ms, period_ms)
-        if ticks_diff(now_ms, self._due_ms) >= 0:  # the loop is late by more than a period
+        # The next packet is already due: the loop is late by more than a period
+        if ticks_diff(now_ms, self._due_ms) >= 0:
             self._due_ms = ticks_add(now_ms, period_ms)
         if not self._n:
             return
@@ -188,7 +189,7 @@ class Live:
             self._put(radio.chrono, packets.speed(buffer, speed))
 
     def lines(self):
-        """Return the two lines of the page Live. They show the receiver and the number of packets per second."""
+        """Return the two lines of the page Live. The lines show the receiver and the number of packets per second."""
         who = self.asked or ("a phone" if self.radio.phone is not None else "no phone")
         return "BLE %12s" % who, "%4d packets/s" % self.per_second
 

@@ -8,8 +8,9 @@ from struct import pack_into, unpack_from
 
 from ..units import const
 
-VERSION = 1  # version of our own packets
-LEAN, MOTION, SPEED, OWN = range(4)  # indices in a list of intervals; RaceChrono's packet ids are higher by 1
+VERSION = 1  # version of Kickstand's own packets
+# Kinds of packets, which are also the indices in `intervals`. RaceChrono's packet ids are higher by 1
+LEAN, MOTION, SPEED, OWN = range(4)
 _FASTEST_MS = const(40)  # shortest interval between two packets of the same kind
 UNKNOWN, UNKNOWN_SPEED, UNKNOWN_SIGMA = -0x8000, 0xFFFF, 0xFF
 
@@ -58,7 +59,7 @@ def now(buffer, ms, lean_deg, sigma_deg, force, rate_dps, speed_mps, state):
         ms: ticks_ms().
         lean_deg, sigma_deg: the lean and its standard deviation; both None if unknown.
         force: force to the left, up and forward, in g, or None.
-        rate_dps: rate about left, up and forward, in deg/s. It is not sent if force is None.
+        rate_dps: rate about left, up and forward, in deg/s. The rate is not sent if force is None.
         speed_mps: the speed, or None.
         state: the bits ALIGNED to NO_READINGS.
     """

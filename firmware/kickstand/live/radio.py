@@ -7,7 +7,7 @@ from ..errors import LiveError
 from ..units import __version__, const
 from . import packets
 
-# UUID of our own service. Its characteristics have 0001 to 0004 in place of the first 0000.
+# UUID of our own service. The service's characteristics have 0001 to 0004 in place of the first 0000.
 SERVICE = "7b6f0000-3c1e-4d5a-9a55-6b69636b7374"
 _ADVERTISE_US = const(150_000)
 MOST_WRITES = 16  # most writes that can wait for the loop; further writes are ignored
@@ -83,7 +83,7 @@ class Radio:
                 self.inbox.append((data[1], self._ble.gatts_read(data[1])))
         elif event == _CONNECTED or event == _DISCONNECTED:
             self.phone = data[0] if event == _CONNECTED else None
-            self.changed = True  # set first, because the next lines may run out of memory
+            self.changed = True  # set before the next lines, because they may run out of memory
             self.inbox = []
         elif event == _PASSKEY:
             getattr(self._ble, "gap_passkey")(data[0], data[1], self._pin)  # noqa: B009 missing in the stubs of rp2
@@ -111,7 +111,8 @@ class Radio:
         self._attempt(self._ble.gap_disconnect, self.phone)
 
     def save_bonds(self):
-        """Write the keys that a pairing has changed to flash. Call this in the loop, because a write takes long."""
+        """Write the keys that a pairing has changed to flash. Call this method in the loop, because a write takes
+        long."""
         if self._bonds:
             self._bonds.save()
 

@@ -17,20 +17,21 @@ The head has these fields:
 * firmware version, number of positions
 * delay of the gyro's low-pass in tenths of a millisecond; 0 in rides up to version 0.3.0
 
-An entry describes one pass of the main loop, App.turn(), called "a turn" here. It has the number of samples (n), the
-microseconds since the previous turn, and the sums of the samples' six counts (ax ay az gx gy gz). From these numbers a
-replay computes the same mean as the board. An entry can also be a speed. Then n is 0, and the speed in cm/s follows.
+An entry describes the samples of one pass of the main loop by the number of samples (n), the microseconds since the
+previous samples (dt_us), and the sums of the samples' six counts (ax ay az gx gy gz). From these numbers a replay
+computes the same mean as the board. An entry can also be a speed. Then n is 0, and the speed in cm/s follows.
 
-A position is the index of an entry (the turn that follows the fix) and the four numbers of Gps.place(). Readers up to
-version 0.4.0 do not know positions. They skip these bytes like the zeros and read the rest.
+A position has five numbers: the index of the entry with the next samples after the fix, and the four numbers of
+Gps.place(). Readers up to version 0.4.0 do not know positions. These readers skip the positions like the zeros, and
+read the rest.
 
-Each number is stored as its difference from a prediction. The prediction of the time is n sample periods. The
-prediction of the other numbers is their value in the previous turn. The difference is written in an adaptive Rice code
-(R. F. Rice, JPL publication 79-22), most significant bit first:
+Each number is stored as its difference from a prediction. The prediction of dt_us is n sample periods. The prediction
+of each other number is its value in the previous entry. The difference is written in an adaptive Rice code (R. F. Rice,
+JPL publication 79-22), most significant bit first:
 1. Zigzag coding turns the difference into a size >= 0. The differences 0, -1, 1, -2, ... become 0, 1, 2, 3, ...
 2. k is log2 of the mean of the last sizes, rounded down.
 3. The code is (size >> k) ones, a zero, and the low k bits of the size.
-4. If there would be LIMIT ones or more, the code is LIMIT ones and then the size in RAW_BITS bits.
+4. If the code would begin with LIMIT ones or more, it is LIMIT ones and then the size in RAW_BITS bits.
 """
 
 import struct
@@ -57,13 +58,14 @@ LIMIT = 12
 RAW_BITS = 31
 MEAN_SHIFT = 4  # a mean covers about the last 16 sizes, and is stored multiplied by 16
 START_MEAN = 128 << MEAN_SHIFT
-MAX_SIZE = 1 << 20  # larger sizes count as this size in the mean, because the mean must fit in 32 bits
-MAX_DT_US = 1 << 29  # the longest time between two turns that an entry can hold
+MAX_SIZE = 1 << 20  # largest size in a mean; larger sizes count as MAX_SIZE, because the mean must fit in 32 bits
+MAX_DT_US = 1 << 29  # the longest time between two passes that an entry can hold
 _HEAD_LENGTH = struct.calcsize(HEAD)
 _TAIL_LENGTH = struct.calcsize(TAIL)
 _PLACE_LENGTH = struct.calcsize(PLACE)
-_WORST = (FIELDS + 1) * (LIMIT + RAW_BITS) // 8 + 2  # the most bytes that a turn and a speed can take
-# Indices in the state of the coder, an array('i', 22). The first FIELDS values are the previous entry. The others are:
+_WORST = (FIELDS + 1) * (LIMIT + RAW_BITS) // 8 + 2  # the most bytes that samples and a speed can take together
+# Indices in the state of the coder, an array('i', 22). The first FIELDS values are the previous entry. The other values
+# are:
 # * from _MEANS on, the mean size of each of the FIELDS values
 # * _PENDING: the bits that do not yet fill a byte; _BITS: the number of these bits
 # * _AT: the index of the next byte in the buffer
@@ -75,9 +77,9 @@ def block_length(index):
     """Return the number of bytes in ride block `index` of a file. A ride block fills the littlefs block of the same
     index.
 
-    Each block of littlefs except the first begins with 4-byte pointers to earlier blocks. It has one pointer, and one
-    more pointer for each time that the block's index can be halved (littlefs, SPEC.md, CTZ skip-lists). A ride block
-    that ends together with a block of littlefs is never copied when the file grows."""
+    Each block of littlefs except the first begins with 4-byte pointers to earlier blocks. A block has one pointer, and
+    one more pointer for each time that its index can be halved (littlefs, SPEC.md, CTZ skip-lists). A ride block that
+    ends together with a block of littlefs is never copied when the file grows."""
     if index == 0:
         return BLOCK
     length = BLOCK - 4
@@ -90,8 +92,8 @@ def block_length(index):
 def encode_python(entry, state, out):
     """Append an entry to a buffer.
 
-    On the board, encode() is the machine code of block_viper.py. On a computer it is this function. Both functions
-    write the same bytes.
+    On the board, encode() is the machine code of block_viper.py. On a computer, encode() is this function. Both
+    functions write the same bytes.
 
     Args:
         entry: array('i', FIELDS).
@@ -119,7 +121,7 @@ def encode_python(entry, state, out):
             _append(state, out, (1 << LIMIT) - 1, LIMIT)
             _append(state, out, size, RAW_BITS)
         state[_MEANS + i] = mean + min(size, MAX_SIZE) - (mean >> MEAN_SHIFT)
-        if i or n:  # a speed (n = 0) does not replace the n of the previous turn
+        if i or n:  # an entry with a speed (n = 0) does not replace the n of the previous samples
             state[i] = value
 
 
@@ -141,7 +143,7 @@ except NO_MACHINE_CODE:
     encode = encode_python
 else:
     _ENTRY = array("i", (2, 9999, -30000, 30000, -1, 0, 255, -256, 0))
-    # A state to compare encode() with encode_python(). It has a previous entry, small and large means, and three
+    # A state to compare encode() with encode_python(). The state has a previous entry, small and large means, and three
     # pending bits.
     _STATE = array("i", (3, 1, -1, 29000, 70, -7, 254, 77, 0) + tuple(range(16, 160, 16)) + (5, 3, 0, 5000))
     encode = checked(encode, encode_python, _ENTRY, _STATE, bytearray(40))
@@ -165,7 +167,7 @@ class RideBlock:
         self._state = array("i", [0] * (_PERIOD + 1))
         self._state[_PERIOD] = period_us
         self._entry = array("i", [0] * FIELDS)
-        self._temperature = 0  # temperature of the last turn, in counts
+        self._temperature = 0  # temperature of the last entry, in counts
         self._reserved = 0  # bytes kept free for the next position; 0 before the first position
 
     def begin(self, length, ride, sequence, time_us, chip, sample_hz, body):
@@ -184,7 +186,7 @@ class RideBlock:
         for i in range(FIELDS):
             state[i] = 0
             state[_MEANS + i] = START_MEAN
-        state[0] = 1  # not 0, because the prediction divides by the n of the previous turn
+        state[0] = 1  # not 0, because the prediction divides by the n of the previous samples
         state[_PENDING] = state[_BITS] = 0
         state[_AT] = _HEAD_LENGTH + len(body)
         # close() replaces the two zeros by the temperature and the number of positions
@@ -196,15 +198,15 @@ class RideBlock:
         self._chip = chip
         self.length = length
         self.count = self._places = 0
-        self._end = length - _TAIL_LENGTH  # where the positions begin
+        self._end = length - _TAIL_LENGTH  # index in the buffer where the positions begin
 
     def add(self, sums, n, dt_us):
-        """Append a turn.
+        """Append the samples of a pass of the loop.
 
         Args:
             sums: the sums of the samples' seven counts.
             n: number of samples.
-            dt_us: microseconds since the previous turn.
+            dt_us: microseconds since the previous samples.
         """
         entry = self._entry
         entry[0] = n
@@ -220,14 +222,14 @@ class RideBlock:
         self.count += 1
 
     def add_speed(self, cm_per_s):
-        """Append a speed in cm/s. It belongs to the next turn."""
+        """Append the speed at the next samples, in cm/s."""
         self._entry[0] = 0
         self._entry[_SPEED] = cm_per_s
         encode(self._entry, self._state, self.buffer)
         self.count += 1
 
     def add_place(self, place):
-        """Append a position. It belongs to the next turn.
+        """Append the position at the next samples.
 
         Args:
             place: the result of Gps.place().
@@ -242,7 +244,7 @@ class RideBlock:
         self._places += 1
 
     def full(self):
-        """Return True if a turn, a speed and a position of the largest size would no longer fit."""
+        """Return True if samples, a speed and a position of the largest size would no longer fit."""
         return self._state[_AT] + _WORST + self._reserved > self._end
 
     def close(self):

@@ -14,10 +14,11 @@ from .block import BLOCK, block_length
 _DIRECTORY = 0x4000  # bit in the mode of os.stat() that marks a directory
 _ENOSPC = const(28)  # error number for a full disk; MicroPython's errno does not define it
 PART_BLOCKS = 16  # number of ride blocks in a part in flash
-# Number of ride blocks in a part on a card. A day's ride then takes 85 files. With PART_BLOCKS it would take 1300
-# files.
+# Number of ride blocks in a part on a card. A day's ride then takes 85 files. With PART_BLOCKS a day's ride would take
+# 1300 files.
 _CARD_PART_BLOCKS = const(256)
-FIRMWARE = 103 * BLOCK  # space for the compiled firmware; each file takes whole blocks, each folder takes two blocks
+# Space for the compiled firmware; each file takes whole blocks, and each folder takes two blocks
+FIRMWARE = 103 * BLOCK
 RESERVE = 63 * BLOCK  # largest free space that an update of compiled firmware needs, plus a margin
 
 
@@ -77,7 +78,8 @@ class RideRing:
         self._settings = settings
         self.stops_interrupts = settings.SD_SPI is None
         self._part_blocks = PART_BLOCKS if settings.SD_SPI is None else _CARD_PART_BLOCKS
-        self.needed = RESERVE + (self._part_blocks + 2) * BLOCK  # two more blocks, because directories grow too
+        # Two blocks more than the part, because directories grow too
+        self.needed = RESERVE + (self._part_blocks + 2) * BLOCK
         self._file = None
         self.refused = None
 
@@ -124,7 +126,7 @@ class RideRing:
         return 0 if self._wrapped else max(0, self._free + self._others - self.needed)
 
     def ready(self):
-        """Return True if a block can be written now. Otherwise do one step to make that possible, and return False.
+        """Return True if a block can be written now. If not, do one step to make writing possible, and return False.
         Raises OSError."""
         if self._file:
             return True
@@ -133,7 +135,7 @@ class RideRing:
         else:
             path = ride_paths.part_path(self._directory, self._ride, self._part)
             self._part += 1
-            if _exists(path):  # the file may be part of a ride, even if the listing does not show it
+            if _exists(path):  # the existing file may be part of a ride, even if the listing does not show it
                 return False
             self._file = open(path, "wb")
             self._left = self._part_blocks
@@ -160,7 +162,7 @@ class RideRing:
             raise OSError(_ENOSPC)
         else:
             _remove_emptied(path)
-            self._free = free_bytes(self._directory)  # in flash a directory takes two blocks
+            self._free = free_bytes(self._directory)  # measured again, because in flash a directory takes two blocks
             self._oldest, self._passed = None, ride
 
     def _find_oldest(self):

@@ -14,7 +14,7 @@ from ..units import GAP_US, const
 from .block import MAX_DT_US, RideBlock
 
 _PAGE = const(256)  # bytes in a page of the flash, the unit of writing
-_STALL_MS = const(10)  # if a write takes longer, it included an erase of the flash; a page alone takes 1 ms
+_STALL_MS = const(10)  # duration above which a write has included an erase of the flash; a page alone takes 1 ms
 
 
 class Recorder:
@@ -27,8 +27,8 @@ class Recorder:
     Attributes:
         active: True while a ride is being recorded.
         problem: None, or the reason why the recording stopped, a CardError or Notice. take_problem() clears it.
-        stalled: True if interrupts were off for longer than _STALL_MS. Then GPS bytes or wheel pulses may be lost. The
-            caller calls the speed source's after_stall() and resets stalled to False.
+        stalled: True if interrupts were off for longer than _STALL_MS. During such a stall GPS bytes or wheel pulses
+            may be lost. The caller calls the speed source's after_stall() and resets stalled to False.
     """
 
     def __init__(self, keeper, sample_hz):
@@ -40,10 +40,11 @@ class Recorder:
         self._block = self._spare = None  # two RideBlocks, which take 8 KB of heap; the first start() creates them
 
     def start(self, chip, calibration):
-        """End the current ride and begin a new one. Raises nothing: `active` and `problem` show the result.
+        """End the current ride and begin a new one. Raises nothing. Afterwards `active` and `problem` show if a ride is
+        being recorded.
 
-        A replay begins with a new filter. So the caller must restart the meter's filter too. Otherwise the replay's
-        lean will differ.
+        A replay begins with a new filter. So the caller must restart the meter's filter too, or the replay's lean will
+        differ.
 
         Args:
             chip: a running Mpu6050.
@@ -72,9 +73,9 @@ class Recorder:
         self._sequence = 0
         self._bytes = 0
         self._interrupted = False
-        self._speed = self._place = None  # the last speed (cm/s) and position since the previous turn
+        self._speed = self._place = None  # the last speed (cm/s) and position since the previous pass of the loop
         self._waiting = None  # the block being written
-        self._at = 0  # number of bytes of this block that are already written
+        self._at = 0  # number of bytes of `_waiting` that are already written
         self.active = True
         self._begin_block()
 
@@ -100,19 +101,19 @@ class Recorder:
         return problem
 
     def mark_gap(self):
-        """Mark a gap before the next turn, because the chip was set up again."""
+        """Mark a gap before the next samples, because the chip was set up again."""
         self._interrupted = True
 
     def add(self, sums, n, dt_us):
-        """Add a turn of the loop. Call this method only while active.
+        """Add the samples of a pass of the loop. Call this method only while active.
 
         Args:
             sums: the sums of the samples' seven counts.
             n: number of samples.
-            dt_us: microseconds since the previous turn.
+            dt_us: microseconds since the previous samples.
         """
         now_ms = ticks_ms()
-        if self._interrupted:  # the replay recognises a gap by its length, and restarts its filter as the board did
+        if self._interrupted:  # a replay recognises a gap by its length, and restarts its filter as the board did
             self._interrupted = False
             if self._time_us != self._start_us:
                 dt_us = max(GAP_US + 1, min(MAX_DT_US, ticks_diff(now_ms, self._before_ms) * 1000))
@@ -131,7 +132,7 @@ class Recorder:
                 self._begin_block()
 
     def add_fix(self, speed_mps, place):
-        """Keep a speed and a position until the next turn of the app's loop. They replace the values that were kept.
+        """Keep a speed and a position until the next samples are added. The new values replace earlier kept values.
 
         Args:
             speed_mps: a new speed in m/s, or None.
@@ -143,7 +144,7 @@ class Recorder:
             self._place = place
 
     def tick(self):
-        """Do one step of the writing. Call it once per turn of the loop while active."""
+        """Do one step of the writing. Call this method once per pass of the loop while active."""
         waiting = self._waiting
         if not waiting:
             return
@@ -186,7 +187,7 @@ class Recorder:
         return room * self.seconds() // self._bytes
 
     def _begin_block(self):
-        """Begin an empty block. The next turns of the app's loop fill it."""
+        """Begin an empty block. The next passes of the app's loop fill the block."""
         length, number = self.keeper.next_length(), (self._ride, self._sequence)
         self._block.begin(length, *number, self._time_us, self._chip, self._sample_hz, self._body)
         self._sequence += 1

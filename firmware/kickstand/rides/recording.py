@@ -1,5 +1,5 @@
-"""Begins and ends recordings. Before a recording it imports the required modules step by step, and tests the SD
-card."""
+"""Begins and ends recordings. Before a recording this module imports the modules that recording needs, step by step,
+and tests the SD card."""
 
 import gc
 
@@ -23,8 +23,8 @@ class Recording:
         chip: the Mpu6050.
         meter: the LeanMeter.
         calibration: the meter's ActiveCalibration.
-        keeper: the writer of the blocks, as for Recorder, or None for flash or SD card. If it is not None, recording
-            begins with the first readings.
+        keeper: the writer of the blocks, as for Recorder, or None for flash or SD card. With a keeper, recording begins
+            with the first readings.
 
     Attributes:
         recorder: the Recorder, or a NoRecorder until the Recorder is created.
@@ -48,14 +48,14 @@ class Recording:
             try:  # an ESP32 makes a directory so slowly that the first readings would be lost, so make it now
                 self.recorder.keeper.begin()
             except (OSError, MemoryError):
-                pass  # start() reports this fault
+                pass  # start() reports a failure
 
     def _make(self):
         """Create the Recorder, as a generator of short steps. Each step imports one of the modules that only recording
         needs."""
         names = ["block", "recorder"] if self._keeper else ["block", "ride_paths", "flash_ring", "recorder"]
         for name in names + ["card_trial"] * self.on_card:
-            gc.collect()  # otherwise the module, which stays loaded, would be placed behind garbage
+            gc.collect()  # without a collection the imported module, which stays loaded, would be placed behind garbage
             __import__("kickstand.rides." + name)
             yield
         from .recorder import Recorder
@@ -88,7 +88,7 @@ class Recording:
             self._refused = attempt(self._step)
 
     def try_out_card(self):
-        """Test the SD card (see card_trial.py). Call this before the watchdog runs. Raises nothing."""
+        """Test the SD card (see card_trial.py). Call this method before the watchdog runs. Raises nothing."""
         if not self._refused:
             from . import card_trial
 
@@ -97,12 +97,12 @@ class Recording:
     def start(self):
         """Begin to record a ride. Return None, or a Notice with the reason for a failure.
 
-        If the bike is at rest, the lean filter restarts too. Then a replay shows the same lean as the display, and the
-        filter estimates the gyro's errors again in the first bends. If the bike is moving, the filter does not restart.
-        Then the replay's filter at first knows the gyro's errors less well than the board's filter."""
+        If the bike is at rest, the lean filter restarts too. With this restart a replay shows the same lean as the
+        display, and the filter estimates the gyro's errors again in the first bends. If the bike is moving, the filter
+        does not restart, so the replay's filter at first knows the gyro's errors less well than the board's filter."""
         if self._meter.at_rest:
             self._calibration.restart()
-        if self._refused and not self.on_card:  # a card must be tested before the watchdog runs
+        if self._refused and not self.on_card:  # not for a card, which must be tested before the watchdog runs
             self._refused, self._steps = None, self._make()
         self._finish()
         if not self._refused:

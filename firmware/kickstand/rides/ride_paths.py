@@ -7,7 +7,7 @@ its own directory. Names have at most 8 characters and an extension of 3, so tha
 import os
 
 RIDES_IN_GROUP = 100
-RIDES_IN_ALL = 100_000  # ride numbers stay below this limit, because a group must have three digits
+RIDES_IN_ALL = 100_000  # limit of the ride numbers, because a group must have three digits
 _GROUP_DIGITS = 3
 _RIDE_DIGITS = 2
 _PART_DIGITS = 5
@@ -76,8 +76,8 @@ def newest_ride(directory, below=RIDES_IN_ALL):
 def next_ride(directory):
     """Return the number for a new ride, which is the newest number plus one. Raises OSError.
 
-    No recording reaches the largest possible number, but a directory of the board's owner may have this number. Then
-    the new ride gets a free number below it."""
+    No recording reaches the largest possible number, but a directory of the board's owner may have this number. In this
+    case the new ride gets a smaller, free number."""
     below = RIDES_IN_ALL
     while True:
         newest = newest_ride(directory, below)
@@ -87,7 +87,7 @@ def next_ride(directory):
 
 
 def parts(directory):
-    """Yield (ride, part, bytes) of every part, in any order. This takes 5 ms per ride in flash, and 20 ms on a card.
+    """Yield (ride, part, bytes) of every part, in any order. Listing takes 5 ms per ride in flash, and 20 ms on a card.
     Raises OSError."""
     for group in groups(directory):
         for ride in rides(directory, group):

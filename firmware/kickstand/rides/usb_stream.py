@@ -11,8 +11,8 @@ from time import ticks_diff, ticks_ms
 from ..console import say
 from ..units import const
 
-_LENGTH = const(512)  # bytes in a ride block, about half a second of a ride
-_SLOW_APART_MS = const(60_000)  # two slow prints within this time end the ride
+_LENGTH = const(512)  # bytes in a ride block over USB, about half a second of a ride
+_SLOW_APART_MS = const(60_000)  # time within which two slow prints end the ride
 
 
 class RideStream:
@@ -21,7 +21,7 @@ class RideStream:
     stops_interrupts = False
 
     def begin(self):
-        """Begin a ride. Its number is always 0."""
+        """Begin a ride. The number of the ride is always 0."""
         self._slow_ms = None
         return 0
 

@@ -19,19 +19,19 @@ from time import ticks_add, ticks_diff
 from ..errors import Notice
 from ..units import const
 
-# Longest sentence in bytes. The standard says 82, but receivers with many decimals exceed this length.
+# Longest sentence in bytes. The standard allows 82 bytes, but receivers with many decimals exceed this length.
 _MAX_SENTENCE = const(100)
 # Most bytes read per pass of the loop. With a pass every 10 ms, this is twice the need of 10 fixes per second.
 _MAX_CHUNK = const(64)
-_SILENT_MS = const(3000)  # fault() reports when no byte, sentence or fix has arrived for this time
-_LATE_MS = const(2000)  # a fix that waited in the receiver for longer than this is dropped
-_LOOK_MS = const(1500)  # if no sentence with a speed arrives for this time, other kinds of sentences are examined
-# Older times are replaced by times of this age, because after 6 days ticks_diff() is negative
+_SILENT_MS = const(3000)  # time without a byte, a sentence or a fix after which fault() reports it
+_LATE_MS = const(2000)  # longest time for which a fix may wait in the receiver
+_LOOK_MS = const(1500)  # time without a sentence with a speed after which other kinds of sentences are examined
+# Age to which older times are limited, because after 6 days ticks_diff() is negative
 _CARRY_MS = const(60_000)
-_TIME_JUMP_MS = const(5000)  # a larger difference is not a delay, but a correction of the receiver's clock
+_TIME_JUMP_MS = const(5000)  # smallest apparent delay of a fix that shows a correction of the receiver's clock
 # The delay of a fix is measured against a reference, which is a fix without a delay. If all fixes are late for longer
-# than _TIME_JUMP_MS, the receiver has set its clock back. Then the fix with the smallest delay becomes the new
-# reference, after at least this number of fixes.
+# than _TIME_JUMP_MS, the receiver has set its clock back. The new reference is then the fix with the smallest delay of
+# at least this number of fixes.
 _MIN_FIXES_FOR_NEW_REFERENCE = const(4)
 _KNOT_MPS = const(1852.0 / 3600.0)  # one knot in m/s
 _KMH_MPS = const(1.0 / 3.6)  # one km/h in m/s
@@ -51,15 +51,15 @@ class Gps:
         uart: a machine.UART with a time-out of 0.
 
     Attributes:
-        age_ms: the age of the speed that poll() last returned. It is the delay of its sentence relative to the sentence
-            with the smallest delay.
+        age_ms: the age of the speed that poll() last returned. The age is the delay of the speed's sentence relative to
+            the sentence with the smallest delay.
     """
 
     problem = None  # always None for a Gps; a Wheel has the same attribute and sets it
 
     def __init__(self, uart):
         self._uart = uart
-        self._line = b""  # the sentence so far
+        self._line = b""  # the part of a sentence that has arrived so far
         self._heard_ms = None  # ticks_ms() when the receiver last sent any byte
         # ticks_ms() of the last whole sentence, of the last sentence with a fix, and of the last _carry()
         self._sentence_ms = self._fix_ms = self._carried_ms = 0
@@ -67,14 +67,14 @@ class Gps:
         self._other = b""  # a received kind of sentence or message without a speed
         self._time = b""  # time of day in the last RMC
         # A fix is stored as (ticks_ms() at its arrival, its time of day in ms).
-        self._reference = None  # the fix from which delays are counted
+        self._reference = None  # the fix from which the delays of other fixes are counted
         self._earliest = None  # the fix with the smallest delay since the reference was set
-        self._earliest_delay_ms = 0  # the delay of this fix
+        self._earliest_delay_ms = 0  # the delay of the fix `_earliest`
         self._fixes = 0  # number of fixes with a delay since the reference was set
         self._since_ms = 0  # ticks_ms() when the reference was set
         self.age_ms = 0
         self._fix = None  # fields of the RMC with the last speed; None if the speed was from a VTG
-        self._day_ms = 0  # the time of day in that RMC
+        self._day_ms = 0  # the time of day in the RMC with the last speed, in ms
         self._place = array("i", (0, 0, 0, 0))
 
     def poll(self, now_ms):
@@ -109,7 +109,7 @@ class Gps:
             end = chunk.find(b"\n")
         self._line += chunk
         beyond = len(self._line) - _MAX_SENTENCE
-        if beyond > 0:  # the end of a line was lost, so keep only what may be the beginning of the next line
+        if beyond > 0:  # the end of a line was lost, so keep only bytes that may begin the next line
             self._line = self._line[max(beyond, self._line.rfind(b"$")) :]
         return speed
 

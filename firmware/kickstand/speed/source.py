@@ -13,10 +13,10 @@ from ..errors import SettingsError
 from ..units import const
 
 _MAX_MPS = const(100.0)
-_MAX_CHANGE_MPS2 = const(15.0)  # largest change of speed per second; no tyre has enough grip for more
-_NOISE_MPS = const(2.0)  # noise of a speed; a change of speed may exceed the limit by this much
-_GIVE_UP_MS = const(3000)  # if all speeds are rejected for this time, the last accepted speed was wrong
-# Bytes of half a second at 9600 baud. That is enough while flash is written or the sensor is set up.
+_MAX_CHANGE_MPS2 = const(15.0)  # largest change of speed per second; no tyre has enough grip for a larger change
+_NOISE_MPS = const(2.0)  # noise of a speed, by which a change of speed may exceed its limit
+_GIVE_UP_MS = const(3000)  # duration of rejected speeds that shows that the last accepted speed was wrong
+# Bytes of half a second at 9600 baud. This buffer is large enough while flash is written or the sensor is set up.
 _RX_BUFFER = const(512)
 
 
@@ -42,7 +42,7 @@ class Speed:
         """Return a new speed in m/s and set age_us. Return None without a new speed, or if it is rejected.
 
         A speed outside 0 to _MAX_MPS is rejected. A speed that no vehicle could have reached from the last accepted
-        speed is also rejected, but only for _GIVE_UP_MS. Call this in each turn of the loop.
+        speed is also rejected, but only for _GIVE_UP_MS. Call this in each pass of the loop.
 
         Args:
             now_ms: ticks_ms().
@@ -50,7 +50,7 @@ class Speed:
         speed = self.source.poll(now_ms)
         if self._last is not None:
             waited_ms = ticks_diff(now_ms, self._last_ms)
-            # This check is needed even without a new speed, because after 6 days ticks_diff() is negative
+            # waited_ms is checked even without a new speed, because after 6 days ticks_diff() is negative
             if waited_ms >= _GIVE_UP_MS:
                 self._last = None
         if speed is None or not 0.0 <= speed <= _MAX_MPS:

@@ -1,8 +1,8 @@
 """Measures speed from pulses of a reed contact or Hall switch at a wheel, or of a vehicle's speed signal.
 
-The interrupt only counts pulses and stores the time of the last pulse. It uses integers, because a hard interrupt must
-take no heap. A storm of pulses, for example from an ignition cable, would leave no time for anything else. In a storm
-the interrupt turns itself off, and poll() turns it on again later.
+The interrupt only counts pulses and stores the time of the last pulse. The interrupt uses integers, because a hard
+interrupt must take no heap. A storm of pulses, for example from an ignition cable, would leave no time for anything
+else. In a storm the interrupt turns itself off, and poll() turns it on again later.
 
 >>> wheel = Wheel(machine.Pin(14, machine.Pin.IN, machine.Pin.PULL_UP), 0.5, {"hard": True})
 >>> speed_mps = wheel.poll(time.ticks_ms())     # None if there is no new speed
@@ -15,10 +15,10 @@ from machine import Pin
 from ..errors import Notice
 from ..units import const
 
-_MAX_MPS = const(100.0)  # pulses that imply a higher speed are interference
-# A contact bounces if it was open for less than this time, and for less than a quarter of the shortest period
+_MAX_MPS = const(100.0)  # largest speed of a wheel; pulses that imply a higher speed are interference
+# A contact that was open for less than _BOUNCE_US, and for less than a quarter of the shortest period, bounces
 _BOUNCE_US = const(3000)
-_STOPPED_MPS = const(0.5)  # a wheel slower than this counts as standing
+_STOPPED_MPS = const(0.5)  # speed below which a wheel counts as standing
 MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # limits of the time after which a wheel without pulses counts as standing
 _REPORT_MS = const(100)  # shortest time between two speeds from poll()
 _STANDING_MS = const(200)  # shortest time between two speeds of zero from poll()
@@ -27,14 +27,14 @@ _STANDING_MS = const(200)  # shortest time between two speeds of zero from poll(
 # the time-out of a transfer. 50 pulses per metre at 70 m/s are not a storm.
 STORM_EDGES, STORM_US = 64, 8_000
 _STORM_PAUSE_MS = const(5000)  # time for which the interrupt is off after a storm
-_SOFT_PERIOD_US = const(3333)  # at shorter periods soft interrupts, such as an ESP32's, lose over 2 % of the pulses
+_SOFT_PERIOD_US = const(3333)  # period below which soft interrupts, such as an ESP32's, lose over 2 % of the pulses
 # Counts and times wrap at 30 bits. The interrupt subtracts times with this mask, because ticks_diff() would be negative
 # after nine minutes of standing.
 _TICKS = _COUNT = 0x3FFFFFFF
 
 
 class Wheel:
-    """A speed sensor with pulses.
+    """A speed sensor that gives pulses.
 
     Args:
         pin: a machine.Pin with pull-up.
@@ -55,8 +55,8 @@ class Wheel:
         self.count = 0  # number of pulses that the interrupt has counted
         self._pulse_us = ticks_us()  # time of the last pulse
         self._opened_us = ticks_us()  # time when the contact last opened
-        self._seen = 0  # the count at the last report
-        self._seen_us = None  # time of the last pulse at the last report; None if no period begins with that pulse
+        self._seen = 0  # `count` when poll() last returned a speed
+        self._seen_us = None  # time of the last pulse that _seen counts; None if no period begins with that pulse
         self._report_ms = None  # time when poll() last returned a speed
         self._moved_ms = None  # time when poll() last found a new pulse
         self.age_ms = 0
@@ -87,7 +87,7 @@ class Wheel:
             self._edges = STORM_EDGES
             if (now - self._edges_us) & _TICKS < STORM_US:
                 self._off = True
-                pin.irq(None)  # turn off here, because in a storm the loop may get no time; this call takes no heap
+                pin.irq(None)  # turned off here, because in a storm the loop may get no time; irq(None) takes no heap
             self._edges_us = now
         if pin.value():
             self._opened_us = now
@@ -129,7 +129,7 @@ class Wheel:
         if waited_ms < _REPORT_MS:
             return None
         count, pulse_us = self.count, self._pulse_us
-        while count != self.count:  # a pulse arrived between the two reads
+        while count != self.count:  # repeat if a pulse arrived between the two reads
             count, pulse_us = self.count, self._pulse_us
         pulses = (count - self._seen) & _COUNT
         if pulses:

@@ -9,7 +9,7 @@ from . import messages, pages
 from .wizard import ASKING, RESULT, Wizard
 
 _RESULT_MS = const(4000)
-# for this time after the kickstand pose the gyro's bias from the pose is valid; later the bias may drift
+# time after the kickstand pose for which the gyro's bias from this pose is valid; later the bias may drift
 _FRESH_MS = const(90_000)
 _ASK = (("On the stand,", "press button"), ("Now upright:", "hold it, press"))
 _TAKING = ("Stand: hold", "Upright: hold")
@@ -50,7 +50,7 @@ class AlignWizard(Wizard):
         self._lines = (_TAKING[self.upright], pages.progress_bar(done, total) or restless)
 
     def _spoilt(self, problem, now_ms):
-        self._show(ASKING, messages.lines(problem), problem)  # the next press takes the pose again
+        self._show(ASKING, messages.lines(problem), problem)  # with the next press the pose is taken again
 
     def _pose_done(self, pose, now_ms):
         """Keep the first pose. After the second pose compute and save the alignment.

@@ -1,4 +1,4 @@
-"""The page for alignment by driving. It shows the state, the progress and the result."""
+"""The page for alignment by driving. The page shows the state, the progress and the result."""
 
 from ..drive_alignment import alignment
 from . import messages

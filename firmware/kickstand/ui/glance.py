@@ -12,7 +12,7 @@ from . import pages
 
 DIGIT_WIDTH, DIGIT_HEIGHT = 24, 40
 _PITCH = 28  # number of columns from one digit to the next
-_ARC_RADIUS, _ARC_DEG, _ARC_WIDTH = 100, 60, 7  # one degree of lean is one column of the arc
+_ARC_RADIUS, _ARC_DEG, _ARC_WIDTH = 100, 60, 7  # the arc has one column per degree of lean
 _G_PIXELS = 60  # length of the bar for 1 g
 _SMALL_Y = 56  # top row of the last line, which has letters of 8x8 pixels
 
@@ -44,7 +44,7 @@ _ARC = bytes(2 + _ARC_RADIUS - int((_ARC_RADIUS**2 - x * x) ** 0.5 + 0.5) for x 
 
 
 def _scale():
-    """Return the arc without a lean. It is drawn only once, because this takes 6 ms."""
+    """Return the arc without a lean. The arc is drawn only once, because drawing takes 6 ms."""
     scale = framebuf.FrameBuffer(bytearray(128 * 4), 128, 32, framebuf.MONO_VLSB)
     for x in range(_ARC_DEG + 1):
         for column in (64 + x, 64 - x):
@@ -56,7 +56,7 @@ _SCALE = _scale()
 
 
 def _number(canvas, value, x, y, digits=0):
-    """Draw a number with at least `digits` digits. Return the column where it ends."""
+    """Draw a number with at least `digits` digits. Return the column where the number ends."""
     for character in "%0*d" % (digits, value):
         canvas.blit(_GLYPHS[ord(character) - 48], x, y)
         x += _PITCH
@@ -107,7 +107,7 @@ def _unsure(canvas, reason):
     for x in (38, 66):
         canvas.fill_rect(x, 18, DIGIT_WIDTH, 8, 1)
     canvas.tall(" " * ((17 - len(reason)) // 2) + reason, 5, True)
-    for y in (39, 56):  # a bright row between the letters and the edge of the band
+    for y in (39, 56):  # a bright row above and below the letters
         canvas.hline(0, y, 128, 1)
 
 

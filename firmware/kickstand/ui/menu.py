@@ -1,4 +1,4 @@
-"""The menu. A long press opens it. In the menu a short press shows the next entry, and a long press chooses the
+"""The menu, which a long press opens. In the menu a short press shows the next entry, and a long press chooses the
 entry."""
 
 from time import ticks_add, ticks_diff

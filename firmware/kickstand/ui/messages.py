@@ -3,7 +3,7 @@
 DEGREE = "\xdf"  # code of the degree sign in the display's character ROM
 
 # Each row is code|first line|second line. {0}, {1} ... are the refusal's values. As one text the words take 3 KB of
-# heap. As a dictionary they would take 7 KB.
+# heap. As a dictionary the words would take 7 KB.
 _LINES = """
 moved|Moved!|Hold it still
 vibration|Moved!|Hold it still

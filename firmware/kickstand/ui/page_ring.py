@@ -23,8 +23,7 @@ class PageRing:
             its kickstand.
 
     Attributes:
-        name: the name of the page that is shown. It is the name of its function in pages.py, or "drive", "live" or
-            "own".
+        name: the name of the page that is shown: the name of its function in pages.py, or "drive", "live" or "own".
         late: True if the lean is too old for the next page.
         live: the Live whose page is added, or None.
         draws: True if the display shows pictures.
@@ -48,7 +47,7 @@ class PageRing:
 
     def show_own(self, now_ms):
         """Go to the first of the owner's pages. The menu calls this method. Without an alignment only the menu leads to
-        these pages."""
+        the owner's pages."""
         self._own_at = 0
 
     def first(self):
@@ -75,8 +74,8 @@ class PageRing:
 
     @property
     def _driving(self):
-        """True while alignment by driving has a page. Without an alignment it is the first page. With an alignment it
-        follows the usual pages."""
+        """True while alignment by driving has a page. Without an alignment this page is the first page. With an
+        alignment this page follows the usual pages."""
         return self._drive is not None and self._drive.shown
 
     def _drive_lines(self, now_ms):

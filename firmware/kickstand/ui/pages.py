@@ -11,7 +11,7 @@ ARROW = "\x7e"  # code of an arrow in the display's character ROM
 RECORDING = "*"
 _BLOCK = 0xFF  # code of a full cell in the display's character ROM
 _HALF_BAR = 8  # number of character cells on each side of the middle
-_DEG_PER_COLUMN = 1.5  # lean per dot column; the bar ends at 60 degrees, because it has 8 cells of 5 columns
+_DEG_PER_COLUMN = 1.5  # degrees of lean per dot column; the bar ends at 60 degrees, because it has 8 cells of 5 columns
 
 FALLEN = ("Fallen over?", "Lean over 65" + DEGREE)
 
@@ -132,7 +132,7 @@ def not_aligned(meter, seconds, todo="On stand: press"):
 
 
 def sensor_info(sensor, lost, meter, seconds):
-    """The page with information about the sensor. It changes every two seconds.
+    """The page with information about the sensor. The page changes every two seconds.
 
     The first line has the chip's name and temperature. The second line shows these in turn:
     * which parts are calibrated

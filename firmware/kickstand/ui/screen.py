@@ -100,8 +100,8 @@ class Screen:
         self.front = self.pages
 
     def lines(self, now_ms):
-        """Return the content of the display: two lines and, for a display that draws, a picture. Call this about every
-        100 ms."""
+        """Return the content of the display: two lines and, for a display that draws, a picture. Call this method about
+        every 100 ms."""
         self.front, lines = self._update_front(now_ms)
         return lines
 
@@ -157,7 +157,7 @@ class Screen:
             self._notice.show(("Calibration", "stopped: fault"), now_ms, "stopped")
 
     def _update_front(self, now_ms):
-        """Find the front view, the first view in the order below that has something to show.
+        """Find the front view, the first view in this method's order that has something to show.
 
         Also drop a wizard or menu that has ended, and go back to the first page when a question is shown.
 
@@ -171,7 +171,7 @@ class Screen:
                 break
         self._drop_ended()
         if view is self._question:
-            self.pages.first()  # the first page will be shown after the rider's answer
+            self.pages.first()  # go to the first page, which is shown after the rider's answer
         return view, lines
 
     def _drop_ended(self):
@@ -214,8 +214,8 @@ class Screen:
         self._begin_align(True)
 
     # The wizards are imported only when needed, because with their own imports they take 12 KB of heap. Garbage is
-    # collected before the import. Otherwise the new modules, which stay loaded, would be placed at the far end of the
-    # heap and make each later collection longer.
+    # collected before the import. Without this collection the new modules, which stay loaded, would be placed at the
+    # far end of the heap and make each later collection longer.
 
     def _begin_align(self, pressed):
         gc.collect()

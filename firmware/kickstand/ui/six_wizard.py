@@ -85,7 +85,7 @@ class SixWizard(Wizard):
 
     def _followed(self, now_ms):
         if self.state == COMPUTING:
-            if next(self._work, True):  # None while the work continues, True at its end
+            if next(self._work, True):  # next() returns None while the work continues, and True at its end
                 self._computed(now_ms)
         elif self._spoilt_turn and not self._told and self.state in (TAKING, NOTICE):
             # The turn was too fast, or readings were lost. Readings at the end of the range are lost too, so one

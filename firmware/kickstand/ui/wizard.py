@@ -25,8 +25,8 @@ COMPUTING = 6  # computes one step in each pass of the main loop
 class Wizard:
     """A view (see screen.py) that also takes each sample until it has ended.
 
-    A subclass defines which poses it asks for and how it uses them. It may also set POSE_SECONDS, the duration of a
-    pose.
+    A subclass defines which poses it asks for and how it uses them. A subclass may also set POSE_SECONDS, the duration
+    of a pose.
 
     Args:
         chip, rate_hz: as for PoseTaker.

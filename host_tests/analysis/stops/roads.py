@@ -6,13 +6,13 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.analysis.channels import Channels
 
-RATE_HZ = 50.0  # the rate at which stops are searched
+RATE_HZ = 50.0  # samples per second in which stops are searched
 REST_S = 5.0
 
 
 class Road:
-    """A ride that consists of stretches with constant acceleration. It is level and upright unless a test changes the
-    channels."""
+    """A ride that consists of stretches with constant acceleration. The road is level and the bike upright, unless a
+    test changes the channels."""
 
     def __init__(self, *legs: tuple[float, float], rate_hz: float = RATE_HZ):
         """legs: duration in s and acceleration in m/s2 of each stretch. At speed 0 without acceleration the vehicle
@@ -21,7 +21,7 @@ class Road:
         ends = np.cumsum([seconds for seconds, _ in legs])
         steps = np.array([mps2 for _, mps2 in legs] + [0.0])
         before, after = (steps[np.searchsorted(ends, self.t_s + off)] for off in (-1e-9, 1e-9))
-        # at a corner the mean of the values before and after makes the trapezoidal rule exact
+        # where the acceleration jumps, the mean of its values before and after makes the trapezoidal rule exact
         self.mps2 = (before + after) / 2.0
         corners = np.concatenate(([0.0], np.cumsum([seconds * mps2 for seconds, mps2 in legs])))
         self.mps = np.interp(self.t_s, np.concatenate(([0.0], ends)), corners)
@@ -44,5 +44,5 @@ class Road:
 
 
 def braking(mps: float, mps2: float, before_s: float = 4.0) -> Road:
-    """Simulate a stand, acceleration to this speed at 4 m/s2, a straight, and a stop with this deceleration."""
+    """Simulate standing, acceleration at 4 m/s2 to this speed, a straight, and a stop with this deceleration."""
     return Road((REST_S, 0.0), (mps / 4.0, 4.0), (before_s, 0.0), (mps / mps2, -mps2), (REST_S, 0.0))

@@ -115,7 +115,7 @@ def test_stops_with_a_speed_match_the_truth(ride, name):
 
 
 def test_stops_without_a_speed_match_the_truth(ride):
-    """All true stops are found, and no others. The errors are at most 3 %, and their rms is at most 1 %."""
+    """All true stops are found, and no others. The errors of the MFDD are at most 3 %, and their rms is at most 1 %."""
     whole = ride[0]
     found = find_stops(whole)
     assert len(found) == len(true_stops(ride[1], ride[2]))
@@ -132,7 +132,7 @@ def test_mfdd_follows_its_definition():
     where v0 is the initial speed."""
     v = np.linspace(20.0, 0.0, 2001)
     assert mfdd_mps2(v, (20.0**2 - v * v) / (2 * 5.0)) == pytest.approx(5.0, rel=1e-9)
-    # decelerate at 3 m/s2 down to 0.8 v0, then at 8 and 5, then at 3 again
+    # decelerate at 3 m/s2 down to 0.8 v0, then at 8 and at 5 m/s2, then at 3 m/s2 again
     pieces = [(20.0, 16.0, 3.0), (16.0, 9.0, 8.0), (9.0, 2.0, 5.0), (2.0, 0.0, 3.0)]
     distance = np.cumsum([0.0, *[(high**2 - low**2) / (2 * level) for high, low, level in pieces]])
     corners = np.array([20.0, *[low for _, low, _ in pieces]])

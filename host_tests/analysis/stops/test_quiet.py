@@ -10,13 +10,13 @@ from kickstand_tools.analysis.stops.standstill import standing
 from roads import RATE_HZ, Road
 
 BEGIN_S, END_S = 10.0, 14.0
-SHAKEN = {"pitch_rate_dps": 3.0, "yaw_rate_dps": 2.0, "up_g": 0.1}  # shaking by the road, at 4.5 Hz
+SHAKEN = {"pitch_rate_dps": 3.0, "yaw_rate_dps": 2.0, "up_g": 0.1}  # the road's shaking at 4.5 Hz
 ROAD_HZ, ENGINE_HZ = RATE_HZ / 11.0, 3.0 * RATE_HZ / 7.0
 
 
 def maybe(**changed: float) -> Channels:
     """Simulate the log. The name of a channel sets its shaking in the middle part, as a share of its shaking while
-    riding; the default is 5 %. The code below shows what the other names change."""
+    riding; the default is 5 %. The code of this function shows what the other names change."""
     road = Road((24.0, 0.0))
     road.rests[:] = False
     ride = road.channels()
@@ -33,7 +33,7 @@ def maybe(**changed: float) -> Channels:
     ride.up_g += changed.get("heavier", 0.0) * middle
     ride.forward_g += changed.get("drifting", 0.0) * np.where(middle, t - BEGIN_S, 0.0)
     ride.rolling[middle] = np.arange(np.count_nonzero(middle)) % 10 < changed.get("rolling", 0.0)
-    if "rested" in changed:  # during the ride the filter found a rest, with this upward force
+    if "rested" in changed:  # "rested": the filter found a rest during the ride, with this upward force
         rest = (t >= 5.0) & (t < 7.0)
         ride.resting[rest] = 1.0
         ride.up_g[rest] = changed["rested"]
@@ -52,19 +52,21 @@ def share(ride: Channels) -> float:
 @pytest.mark.parametrize(
     ("stands", "does_not"),
     [
-        ({"pitch_rate_dps": 0.14}, {"pitch_rate_dps": 0.16}),  # 15 % of the shaking while riding
+        ({"pitch_rate_dps": 0.14}, {"pitch_rate_dps": 0.16}),  # the limit is 15 % of the shaking while riding
         ({"yaw_rate_dps": 0.14}, {"yaw_rate_dps": 0.16}),
-        ({"up_g": 0.19}, {"up_g": 0.21}),  # 20 % of the shaking while riding
+        ({"up_g": 0.19}, {"up_g": 0.21}),  # the limit is 20 % of the shaking while riding
         ({"engine": 3.0}, {"pitch_rate_dps": 1.0}),  # an idling engine shakes as strongly as the road, but faster
         ({"pitching": 0.95}, {"pitching": 1.05}),  # the limit of the mean pitch rate is 1 deg/s
         ({"pitching": -0.95}, {"pitching": -1.05}),
         ({"yawing": 0.95}, {"yawing": 1.05}),
         ({"yawing": -0.95}, {"yawing": -1.05}),
         ({"bends": 15.0}, {"bends": 15.0, "yaw_rate_dps": 0.5}),  # slow bends do not hide shaking by the road
-        ({"drifting": 0.018}, {"drifting": 0.022}),  # the forward force changes by 0.01 g in half a second
+        # The limit is a change of the forward force by 0.01 g in half a second
+        ({"drifting": 0.018}, {"drifting": 0.022}),
         ({"drifting": -0.018}, {"drifting": -0.022}),
-        ({"rolling": 4.0}, {"rolling": 6.0}),  # the filter finds rest in half of the samples of a second
-        ({"heavier": 0.115}, {"heavier": 0.125}),  # the force differs by 0.12 g, for a sensor without six positions
+        ({"rolling": 4.0}, {"rolling": 6.0}),  # the limit is rest in half of the samples of a second
+        # The limit is a force that differs from 1 g by 0.12 g, for a sensor without six positions
+        ({"heavier": 0.115}, {"heavier": 0.125}),
         ({"heavier": -0.115}, {"heavier": -0.125}),
         # the force differs by 0.05 g from the force that was measured at a rest during the ride
         ({"heavier": 0.145, "rested": 1.1}, {"heavier": 0.155, "rested": 1.1}),
@@ -78,7 +80,7 @@ def test_each_condition_of_a_standstill_has_its_limit(stands, does_not):
 
 @pytest.mark.parametrize("ridden_s", [(0.0, 24.0), (8.0, 15.0)])
 def test_standstill_is_found_within_half_a_second(ridden_s):
-    """The standstill is found within this time even if most of the log is standstill."""
+    """The standstill is found within half a second even if most of the log is standstill."""
     ride = maybe()
     ride = ride.part((ride.t_s >= ridden_s[0]) & (ride.t_s < ridden_s[1]))
     times = ride.t_s[standing(ride)]
@@ -105,7 +107,7 @@ def test_rest_of_the_filter_is_extended_back():
     still = standing(ride)
     assert ride.t_s[still][0] == pytest.approx(12.3, abs=0.07)
     assert still[ride.t_s > 12.4].all()
-    ride.forward_g[(road.t_s >= 12.6) & (road.t_s < 12.9)] += 0.018  # below the limit of 0.02 g
+    ride.forward_g[(road.t_s >= 12.6) & (road.t_s < 12.9)] += 0.018  # 0.018 g is below the limit of 0.02 g
     assert ride.t_s[standing(ride)][0] == pytest.approx(12.3, abs=0.07)
     ride.forward_g[(road.t_s >= 12.6) & (road.t_s < 12.9)] += 0.006
     assert ride.t_s[standing(ride)][0] == pytest.approx(12.9, abs=0.07)

@@ -7,7 +7,7 @@ from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.analysis.stops.speed_fit import fitted_speed, speed_delay_s
 from roads import RATE_HZ, Road, braking
 
-BEGIN_S, STOP_S = 14.0, 18.0  # start and end of the braking
+BEGIN_S, STOP_S = 14.0, 18.0  # start and end of the braking, in s
 
 
 def part_of(road: Road, every: int, scale=1.0, off_mps=0.0, late_s=0.0):
@@ -30,7 +30,7 @@ def conditioned(part, speed, acceleration, delay_s):
     * the scale of the integrated speed: 1 %.
     * the delay of the log's speed: 0.05 s.
     * the error of the acceleration due to the road's slope: 0.05 m/s2 at the end of the part. Backwards from there this
-      error is a random walk of 0.1 m/s2 per root second. It is linear between points half a second apart.
+      error is a random walk of 0.1 m/s2 per root second. The error is linear between points half a second apart.
     * each measured speed: 0.05 m/s.
     """
     time = part.t_s
@@ -41,7 +41,7 @@ def conditioned(part, speed, acceleration, delay_s):
     knots = time[-1] - 0.5 * np.arange(count)
     back = np.arange(count)
     covariance = 0.05**2 + 0.1**2 * 0.5 * np.minimum(back[:, None], back[None, :])
-    slopes = []  # the effect of the acceleration error at each point on the speed of each sample
+    slopes = []  # how an acceleration error at each point changes the speed of each sample
     for k in range(count):
         hat = np.interp(-time, -knots, np.eye(count)[k])
         steps = np.append(np.diff(time) * (hat[1:] + hat[:-1]) / 2.0, 0.0)
@@ -124,7 +124,7 @@ def test_impossible_delay_of_the_speed_is_ignored(late_s):
     ("shows", "does_not"),
     [
         ({"seconds": 30.0}, {"seconds": 29.0}),  # thirty speeds are needed
-        ({"seconds": 30.0, "every_s": 0.5}, {"seconds": 29.0, "every_s": 0.5}),  # only one speed per second counts
+        ({"seconds": 30.0, "every_s": 0.5}, {"seconds": 29.0, "every_s": 0.5}),  # two speeds in a second count as one
         # the change of the speeds must be 0.5 m/s rms; it is 0.66 s times the amplitude of the acceleration
         ({"size_mps2": 0.80}, {"size_mps2": 0.70}),
     ],

@@ -46,7 +46,7 @@ def test_every_figure_of_a_stop_is_right(speed):
     assert stop.stop_s == pytest.approx(18.0, abs=near)
     assert stop.duration_s == stop.stop_s - stop.start_s
     assert stop.initial_speed_mps == pytest.approx(20.0, rel=near)
-    # the last term is the effect of the first sample, within which braking begins
+    # the last term is for the first sample, during which braking begins
     assert stop.distance_m == pytest.approx(40.0 + 20.0 * 0.12 - 5.0 * 0.02**2 / 4.0, rel=near)
     assert stop.mfdd_mps2 == pytest.approx(5.0, rel=near)
     assert stop.peak_mps2 == pytest.approx(5.0, rel=near)
@@ -62,7 +62,7 @@ def test_rebound_of_the_fork_does_not_change_the_end():
     road = braking(60.0, 5.0)
     ride = road.channels()
     end = int(np.argmax(road.rests & (road.t_s > 20.0)))
-    # the sum of this rebound is zero, so it does not change the speed
+    # the forces of the rebound add up to zero, so the rebound does not change the speed
     ride.forward_g[end - 6 : end] += 0.1 * np.array([1.0, -1.0, -1.0, 1.0, 1.0, -1.0])
     (stop,) = find_stops(ride)
     assert stop.stop_s == pytest.approx(REST_S + 15.0 + 4.0 + 12.0, abs=1e-6)
@@ -70,8 +70,8 @@ def test_rebound_of_the_fork_does_not_change_the_end():
 
 
 def test_jerk_is_the_steepest_change_of_the_force():
-    """The deceleration rises to 6 m/s2 at a rate of 10 m/s3, and stays constant. At the end it falls at a rate of
-    20 m/s3, which is the larger jerk."""
+    """The deceleration rises to 6 m/s2 at a rate of 10 m/s3, and stays constant. At the end the deceleration falls at a
+    rate of 20 m/s3, which is the larger jerk."""
     t = np.arange(0.0, 30.0, 1.0 / RATE_HZ)
     braked = np.interp(t, [15.0, 15.6, 17.6, 17.9, 19.0], [0.0, 6.0, 6.0, 0.0, 0.0])
     lost = np.concatenate(([0.0], np.cumsum((braked[1:] + braked[:-1]) / 2.0 / RATE_HZ)))[-1]
@@ -79,7 +79,7 @@ def test_jerk_is_the_steepest_change_of_the_force():
     road.mps2 = road.mps2 - braked[: len(road.t_s)]
     road.rests = (road.t_s < REST_S) | (road.t_s > 17.9)
     (stop,) = find_stops(road.channels())
-    # the jerk is smaller, because the force is smoothed twice over 0.2 s
+    # the force is smoothed twice over 0.2 s, which makes the jerk less than 20 m/s3
     assert stop.jerk_mps3 == pytest.approx(20.0, rel=0.15)
     assert stop.peak_mps2 == pytest.approx(6.0, rel=0.01)
     assert stop.initial_speed_mps == pytest.approx(lost, rel=0.01)
@@ -93,7 +93,7 @@ def test_jerk_is_the_steepest_change_of_the_force():
         (0.3, 6.0, 0.71),
         (0.8, 6.0, 0.71),
         (1.0, 6.0, 4.08),  # above 15 % of the full deceleration, all of it is braking
-        (0.24, 1.4, 0.71),  # below 0.25 m/s2 the cause is a slope or the wind, even above 15 %
+        (0.24, 1.4, 0.71),  # a deceleration below 0.25 m/s2 is a slope or the wind, even above 15 %
         (0.27, 1.4, 4.08),
     ],
 )
@@ -108,8 +108,8 @@ def test_start_of_braking_is_found(engine_mps2, mps2, earlier_s):
 
 @pytest.mark.parametrize(("pause_s", "counts"), [(0.26, True), (0.56, False)])
 def test_brief_pause_before_the_standstill_is_bridged(pause_s, counts):
-    """A stop continues after a short pause of braking. A longer pause ends it, and the remaining speed is too low to
-    count as a stop."""
+    """A stop continues after a short pause of braking. A longer pause ends the stop, and the braking after it begins
+    too slowly to count as a stop."""
     road = Road(*((REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (pause_s, 0.0), (0.1, -5.0), (REST_S, 0.0)))
     found = find_stops(road.channels())
     assert len(found) == counts
@@ -118,7 +118,7 @@ def test_brief_pause_before_the_standstill_is_bridged(pause_s, counts):
 
 
 def test_no_stop_is_longer_than_a_minute():
-    """A stop from 67.6 m/s at 1.04 m/s2 takes 65 s. Only its last 60 s are used."""
+    """A stop from 67.6 m/s at 1.04 m/s2 takes 65 s. Only the last 60 s of a stop are used."""
     (stop,) = find_stops(braking(67.6, 1.04).channels())
     assert stop.initial_speed_mps == pytest.approx(1.04 * 60.0, rel=0.005)
 
@@ -134,7 +134,7 @@ def test_missing_readings_are_bridged_for_half_a_second(missing_s, initial_mps):
 
 
 def test_only_readings_after_the_last_gap_are_integrated():
-    """The stop has two gaps of 0.9 s. It begins after the last gap."""
+    """The readings of the stop have two gaps of 0.9 s. The stop begins after the last gap."""
     road = braking(20.0, 2.0)
     there = ~((road.t_s > 14.5) & (road.t_s < 15.4)) & ~((road.t_s > 17.0) & (road.t_s < 17.9))
     (stop,) = find_stops(road.channels().part(there))
@@ -157,7 +157,7 @@ class TestStandstill:
         right = self.disturbed(9.0, 9.0)
         assert right == pytest.approx(5.0, rel=0.002)
         assert self.disturbed(2.56, 4.0) == pytest.approx(right, rel=1e-4)
-        # 0.1 g during 1 of these 2 s count as a slope of 0.49 m/s2
+        # 0.1 g during one of the 2 s before braking counts as a slope of 0.49 m/s2
         assert self.disturbed(0.5, 1.5) == pytest.approx(right + 0.49, rel=0.02)
         assert self.disturbed(1.5, 2.5) == pytest.approx(right + 0.49, rel=0.02)
 
@@ -190,12 +190,12 @@ def test_steep_road_does_not_change_the_figures(up):
 
 @pytest.mark.parametrize(("samples", "counts"), [(10, 0), (11, 1)])
 def test_brief_standstill_shows_no_slope(samples, counts):
-    """The road falls by 10 %. A brief standstill does not show this slope, so the stop does not count. A longer
-    standstill shows it."""
+    """The road falls by 10 %. A brief standstill does not show the road's slope, so the stop does not count. A longer
+    standstill shows the slope."""
     road = braking(20.0, 5.0)
     still = (road.t_s >= 18.0 - 1e-6) & (road.t_s < 18.0 + samples / RATE_HZ - 1e-6)
     found = stops_of(road.channels(forward_g=road.mps2 / STANDARD_GRAVITY - 0.1), still)
-    assert [stop.mfdd_mps2 for stop in found] == pytest.approx([5.0 - 2.5 / 11] * counts, rel=0.002)  # its first brakes
+    assert [stop.mfdd_mps2 for stop in found] == pytest.approx([5.0 - 2.5 / 11] * counts, rel=0.002)
 
 
 def test_dive_is_not_braking():
@@ -220,7 +220,7 @@ def test_bend_is_not_a_dive(side):
     road = braking(20.0, 5.0)
     turning = (road.t_s >= 14.5) & (road.t_s < 16.5)
     lean = np.where(turning, 30.0 * side, 0.0)
-    rate = np.where(turning, -8.0 * side, 0.0)  # a yaw rate is positive to the left
+    rate = np.where(turning, -8.0 * side, 0.0)  # the yaw rate is positive to the left
     ride = road.channels(
         lean_deg=lean, pitch_rate_dps=-rate * np.sin(np.radians(lean)), yaw_rate_dps=rate * np.cos(np.radians(lean))
     )
@@ -231,8 +231,8 @@ def test_bend_is_not_a_dive(side):
 
 
 def test_deviation_from_the_straight_line_is_right():
-    """The bike turns left at 0.5 deg/s for 4 s while it brakes from 20 m/s at 5 m/s2. Its deviation from the straight
-    line is the integral of (20 - 5 t) sin(0.5 deg/s t), where t is the time since the start of braking."""
+    """The bike turns left at 0.5 deg/s for 4 s while it brakes from 20 m/s at 5 m/s2. The bike's deviation from the
+    straight line is the integral of (20 - 5 t) sin(0.5 deg/s t), where t is the time since the start of braking."""
     road = braking(20.0, 5.0)
     ride = road.channels(yaw_rate_dps=np.where((road.t_s >= 14.0) & (road.t_s < 18.0), 0.5, 0.0))
     (stop,) = find_stops(ride)
@@ -264,9 +264,7 @@ def test_stop_with_an_open_speed_is_rejected(off_g, counts):
     ride = road.channels()
     ride.forward_g[(road.t_s > 5.0) & (road.t_s < 14.0)] -= off_g
     assert len(find_stops(ride)) == counts
-    assert closes(40.0, seconds=40.0) and not closes(
-        40.0, seconds=20.0
-    )  # after a long time the integral proves nothing
+    assert closes(40.0, seconds=40.0) and not closes(40.0, seconds=20.0)  # after 40 s the integral proves nothing
 
 
 def test_rolling_out_is_not_braking():
@@ -274,7 +272,7 @@ def test_rolling_out_is_not_braking():
 
 
 def test_speed_in_the_log_corrects_the_integral():
-    """The accelerometer's slope is 3 % too large. The log's speed corrects this error."""
+    """The accelerometer's slope is 3 % too large. The log's speed corrects the accelerometer's error."""
     road = braking(20.0, 5.0)
     ride = road.channels(forward_g=1.03 * road.mps2 / STANDARD_GRAVITY)
     (stop,) = find_stops(ride)
@@ -367,7 +365,8 @@ def test_full_deceleration_is_from_the_last_two_seconds(hard, easy, earlier_s):
 
 
 def test_rolling_out_after_braking_is_left_out():
-    """With released brakes the bike decelerates by 0.4 m/s2 at the end. The stop ends before this part."""
+    """With released brakes the bike decelerates by 0.4 m/s2 at the end. The stop ends before the brakes are
+    released."""
     legs = (REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (1.25, -0.4), (REST_S, 0.0)
     (stop,) = find_stops(Road(*legs).channels())
     assert stop.initial_speed_mps == pytest.approx(20.0, rel=1e-3)

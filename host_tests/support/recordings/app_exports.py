@@ -123,7 +123,7 @@ def phyphox(ride: Riding, separator: str = ",", comma: bool = False) -> dict[str
     def table(names: list[str], *columns: np.ndarray) -> str:
         text = [separator.join(f'"{name}"' for name in names)]
         text += [separator.join(map(number, row)) for row in np.column_stack(columns).tolist()]
-        return "\n".join(text)  # no line feed at the end
+        return "\n".join(text)  # the file has no line feed at its end
 
     gyro, fixes = ride.every(2, 1), ride.each_second()
     metres = ["Time (s)", *[f"{axis} (m/s^2)" for axis in "XYZ"]]

@@ -6,7 +6,7 @@ import gzip
 import random
 from collections.abc import Callable
 
-Rows = list[list[bytes]]  # the cells of each line
+Rows = list[list[bytes]]  # for each line a list of its cells
 
 WORDS = (
     *("nan", "NaN", "inf", "-inf", "1e308", "-1e308", "1e999", "1e-320", "5e15", "-0", "+-1", "1_0", "0x10", "1e", "."),
@@ -92,7 +92,7 @@ def lose_a_column(rows: Rows, chance: random.Random) -> None:
 def exchange_columns(rows: Rows, chance: random.Random) -> None:
     width = max(1, len(rows[0]))
     a, b = chance.randrange(width), chance.randrange(width)
-    header = chance.random() < 0.5  # exchange the names in the header, too
+    header = chance.random() < 0.5  # sometimes the names in the header are exchanged, too
     for row in rows[0 if header else 1 :]:
         if len(row) > max(a, b):
             row[a], row[b] = row[b], row[a]

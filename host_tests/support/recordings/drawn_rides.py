@@ -1,8 +1,8 @@
 """Rides whose road, bike, rider, mount and sensor are drawn at random from realistic values.
 
-The rides come from the second simulator (other_bike.py). It shares only one part with kickstand_tools.simulation, on
-request: the sensor with the data sheet's errors and its calibration by six positions. Parameters of the estimators are
-fitted with even seeds only, and figures are reported for odd seeds:
+The rides come from the second simulator (other_bike.py). On request, a ride uses one part of
+kickstand_tools.simulation: the sensor with the data sheet's errors and its calibration by six positions. Parameters of
+the estimators are fitted with even seeds only, and figures are reported for odd seeds:
 
     OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.drawn_rides odd 100
 """
@@ -258,7 +258,7 @@ def _of_the_sheet(chance, time, force, rates, mounting):
 def _road(chance, v, wheelbase, roughness):
     """Return the height of the chassis over the rear and over the front wheel, in m.
 
-    The bike rides at the speed v over a road with waves as in ISO 8608. Springs and tyres filter these waves.
+    The bike rides at the speed v over a road with waves as in ISO 8608. Springs and tyres filter the waves.
     """
     at = np.cumsum(v) / FINE_HZ
     edges = np.geomspace(WAVES_PER_M[0], WAVES_PER_M[1], 241)
@@ -281,8 +281,10 @@ def _road(chance, v, wheelbase, roughness):
 def _spring(hz, damping, by_its_foot=False):
     """Return (hz, a, b): the spring's natural frequency in Hz and the coefficients of its transfer function.
 
-    The function is (1 + b s) / (1 + a s + s^2). Here s is the complex frequency divided by the natural frequency.
-    by_its_foot: True if the foot of the spring moves. The damper then passes on this movement, so b equals a.
+    The function is (1 + b s) / (1 + a s + s^2). The variable s is the complex frequency divided by the natural
+    frequency.
+    by_its_foot: True if the foot of the spring moves. The damper then passes on the movement of the foot, so b equals
+        a.
     """
     return hz, 2.0 * damping, 2.0 * damping if by_its_foot else 0.0
 

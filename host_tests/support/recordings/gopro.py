@@ -38,7 +38,7 @@ def with_telemetry(video: Path, rate_dps: np.ndarray, rate_hz: float) -> Path:
     content = video.read_bytes()
     moov = _find(content, b"moov")
     head, inner, rest = content[: moov.start], content[moov.start + 8 : moov.stop], content[moov.stop :]
-    assert not rest  # the earlier parts of the file keep their offsets
+    assert not rest  # the track is added at the end, so the earlier parts of the file keep their offsets
     length = 8 + len(inner) + len(_track(packets, 0))
     grown = inner + _track(packets, len(head) + length + 8)
     video.write_bytes(head + _box(b"moov", grown) + _box(b"mdat", b"".join(packets)))

@@ -4,7 +4,7 @@ Each sensor has all errors of the data sheet and is calibrated by one log of the
 degrees off. The dive of each bike is random. Rides are judged with and without a measured speed. Parameters are fitted
 with even seeds only, and figures are reported for odd seeds.
 
-The program prints one line per simulator, profile and mount. It takes 20 s per ride on one processor:
+The program prints one line per simulator, profile and mount. The program takes 20 s per ride on one processor:
 
     OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.limit_rides odd 4
 """

@@ -1,10 +1,10 @@
-"""A second simulator of rides, which shares nothing with kickstand_tools.simulation. It checks parameters that were
-fitted with kickstand_tools.simulation.
+"""A second simulator of rides, which shares nothing with kickstand_tools.simulation. The second simulator checks
+parameters that were fitted with kickstand_tools.simulation.
 
-The path and the attitude of the bike are random curves. They determine the sensor's position. The force is the second
-derivative of this position plus gravity, and the rates are derivatives of the attitude's matrix. Both are computed
-numerically. The bike is in exact balance, except for the movements of its rider. The vibration is white noise. In the
-world's axes x and y are level and z is up. The vehicle's axes are left, up and forward.
+The path and the attitude of the bike are random curves. Path and attitude determine the sensor's position. The force is
+the second derivative of the sensor's position plus gravity, and the rates are derivatives of the attitude's matrix.
+Both are computed numerically. The bike is in exact balance, except for the movements of its rider. The vibration is
+white noise. In the world's axes x and y are level and z is up. The vehicle's axes are left, up and forward.
 """
 
 import numpy as np
@@ -168,7 +168,7 @@ def _about(axis, angle):
 
 
 def _smooth(values, seconds):
-    """Apply a moving mean three times. This gives movements as smooth as those of a rider."""
+    """Apply a moving mean three times. The result moves as smoothly as a rider."""
     width = max(1, round(seconds * FINE_HZ))
     window = np.full(width, 1.0 / width)
     for _ in range(3):

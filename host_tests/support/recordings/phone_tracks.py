@@ -99,7 +99,7 @@ def write_gpx(path: Path, track: Track, speed_as: str = "") -> Path:
 
 def write_fit(path: Path, track: Track) -> Path:
     """Write records with time in whole seconds, position and speed, in Garmin's FIT format."""
-    fields = ((253, 4, 0x86), (0, 4, 0x85), (1, 4, 0x85), (6, 2, 0x84))  # number, size, type
+    fields = ((253, 4, 0x86), (0, 4, 0x85), (1, 4, 0x85), (6, 2, 0x84))  # (number, size, type) of each field
     body = struct.pack("<BBBHB", 0x40, 0, 0, 20, len(fields)) + b"".join(struct.pack("BBB", *field) for field in fields)
     for utc_s, lat, lon, speed in zip(track.utc_s, track.lat_deg, track.lon_deg, track.speed_mps):
         record = int(utc_s) - FIT_EPOCH_S, round(lat * SEMICIRCLES), round(lon * SEMICIRCLES), round(1000.0 * speed)

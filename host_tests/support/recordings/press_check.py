@@ -1,8 +1,8 @@
 """Measures how often the gyro check of the two presses refuses a sound sensor, and how often it misses a faulty sensor.
 
 The simulated sensors have all errors of the data sheet and any mounting. Some are calibrated by the six positions.
-Hands raise the bike from its stand at once or after a while. They shake it and turn it about the vertical. The program
-prints the shares:
+Hands raise the bike from its stand at once or after a while. The hands shake the bike and turn it about the vertical.
+The program prints the shares:
 
     OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.press_check 1000
 """
@@ -49,7 +49,7 @@ def presses(chance, chip, mounting):
     hand = np.radians(0.05) * band_noise(chance, len(lean), 0.2, 0.6, RATE_HZ)
     lean[-still:] += hand[-still:]
     zero = np.zeros_like(lean)
-    # The axes are left, up, forward. In these axes, a lean to the right turns the direction up to the left.
+    # The axes are left, up, forward. In the bike's axes, a lean to the right turns the direction up to the left.
     body = (
         _rotations(np.column_stack((zero, yaw, zero)))
         @ _rotations(np.column_stack((-pitch, zero, zero)))

@@ -34,9 +34,10 @@ def calibration(trim_deg=0.0):
 
 
 def turns(count, seed=0):
-    """Yield the turns of the app's loop on a bike that leans from side to side on a rough road.
+    """Yield the passes of the app's loop on a bike that leans from side to side on a rough road.
 
-    Each turn is (sums of the seven readings, n, dt_us). n is the number of samples, and dt_us is the turn's duration.
+    Each pass is (sums of the seven readings, n, dt_us). n is the number of samples, and dt_us is the duration of the
+    pass.
     """
     random.seed(seed)
     for i in range(count):
@@ -61,10 +62,10 @@ def place(k):
 def blocks(
     count, ride=1, length=block_length, sequence=0, time_us=2_000_000, trim_deg=0.0, speed=False, places_every=0
 ):
-    """Return `count` full blocks, and the turns that they contain, each as (six sums, n, dt_us).
+    """Return `count` full blocks, and the passes of the loop that they contain, each as (six sums, n, dt_us).
 
-    speed: True for a speed in every hundredth turn.
-    places_every: number of turns between two positions, 0 for no positions.
+    speed: True for a speed in every hundredth pass. places_every: number of passes between two positions, 0 for no
+    positions.
     """
     block = RideBlock(5000)
     body = pack(CHIP.who_am_i, CHIP.accel_range_g, calibration(trim_deg))

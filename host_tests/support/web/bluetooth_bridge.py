@@ -1,5 +1,5 @@
-"""A simulated board on the virtual radio, for a page with a fake navigator.bluetooth. It runs in a thread, in real
-time."""
+"""A simulated board on the virtual radio, for a page with a fake navigator.bluetooth. The board runs in a thread, in
+real time."""
 
 import asyncio
 import base64
@@ -21,7 +21,7 @@ class Bridge:
     """Runs a simulated board in a thread.
 
     plan: see run_device() in device_runs.py.
-    begin_s: the board's time from which on it runs in real time. Before that it runs as fast as possible.
+    begin_s: the board's time from which on it runs in real time. Before begin_s it runs as fast as possible.
     """
 
     def __init__(self, plan, begin_s, directory):
@@ -90,7 +90,7 @@ class Bridge:
 
         await central.place(SERVICE, kind).subscribe(heard)
 
-    # The page calls this method.
+    # Called by the page.
 
     def do(self, name, kind, data):
         answer = Future()
@@ -101,7 +101,7 @@ class Bridge:
         packets, self._packets = self._packets, []
         return {"lost": self._lost, "packets": packets}
 
-    # A test calls these methods.
+    # The next methods are called by a test.
 
     def drop(self):
         """Cut the connection."""

@@ -10,7 +10,7 @@ _RAW_PASTE = b"\x05A\x01"
 class RawPrompt:
     """Replaces emulator.pico.Pico for a SerialLine.
 
-    The app does not really run. Each time it is started, it sends the next blocks and waits for Ctrl-C.
+    The app does not really run. At each start the app sends the next blocks and waits for Ctrl-C.
 
     board: the FakeBoard on which the code runs.
     streams: lists of blocks that the app sends.
@@ -43,7 +43,7 @@ class RawPrompt:
                     self.heard(b"\x04\x04>")
             elif byte == _CTRL_A and self._typed + b"\x01" == _RAW_PASTE:
                 self._typed = b""
-                self.heard(b"R\x00")  # MicroPython's answer: raw paste mode is known, but not supported
+                self.heard(b"R\x00")  # MicroPython's answer if it knows raw paste mode but does not support it
             elif byte == _CTRL_A:
                 self._typed = b""
                 self.heard(_PROMPT)

@@ -10,8 +10,8 @@ PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile":
 LAPTOP: dict[str, Any] = {"viewport": {"width": 1440, "height": 900}}
 READ_S = 120  # longest wait for the page to show something, long enough for a busy machine
 
-# This script keeps the messages of the board's worker, so that tests can check and repeat them. It also makes the page
-# draw less often.
+# This script keeps the messages of the board's worker, so that tests can check and repeat them. The script also makes
+# the page draw less often.
 KEEP = Path(__file__).with_name("keep.js").read_text()
 
 # This script replaces the page's fetch(). Files whose address has the passed ending get the passed status, until the
@@ -23,8 +23,8 @@ class Rider:
     """A rider with a page of the site.
 
     browser: playwright's browser.
-    policy: True to enforce the page's content security policy. Then playwright's wait_for_function() works only on the
-        page Rides.
+    policy: True to enforce the page's content security policy. With the policy, playwright's wait_for_function() works
+        only on the page Rides.
     script: code that runs before each page's own scripts.
 
     asked: the addresses that the page has requested.
@@ -70,7 +70,7 @@ class Rider:
         self.page.keyboard.down("Space")
         self.wait(seconds)
         self.page.keyboard.up("Space")
-        self.wait(0.3)  # like a finger, which does not press again at once
+        self.wait(0.3)  # wait as a finger does, which does not press again at once
 
     def click(self, selector):
         self.page.click(selector)
@@ -100,7 +100,7 @@ class Rider:
         self.guide_says("Press the button")
         self.click("#press")
         self.reads("Now upright")
-        self.click("#do")  # hold the bike upright
+        self.click("#do")  # the guide's button: hold the bike upright
         self.guide_says("Press the button once more")
         self.click("#press")
 

@@ -137,15 +137,15 @@ def _share(part: int, whole: int) -> str:
 def _quality(values: Sequence[float]) -> Markup:
     if not values:
         return Markup()
-    top = 1.6  # standard errors of aligned vehicles are under 1.5 degrees
+    top = 1.6  # right end of the scale in degrees; standard errors of aligned vehicles are under 1.5
     title = f"Standard error of forward, median {statistics.median(values):.2f}°"
     return _histogram(values, top, 26, title, 230, "degrees", "vehicles", _BLUE)
 
 
 def _braking(utc_s: Sequence[float], values: Sequence[float]) -> list[Markup]:
-    """Draw a histogram of the decelerations. If their times are known, also draw them over time.
+    """Draw a histogram of the decelerations. If the times are known, also draw the decelerations over time.
 
-    Returns the pictures. The list is empty without decelerations.
+    Returns the pictures. Without decelerations the list of drawings is empty.
     """
     if not values:
         return []

@@ -37,7 +37,7 @@ def draw(result: PeriodResult) -> str:
         element("text", said, x=20, y=45, fill="#555"),
         _agreement("forward: measured against dv/dt", "dv/dt, g", [(p[0], p[1]) for p in points], 20),
     ]
-    if row["kind"] == "motorcycle":  # a motorcycle leans into turns, so its force to the left is about zero
+    if row["kind"] == "motorcycle":  # a motorcycle leans into bends, so its force to the left is about zero
         side = [(p[0], p[3]) for p in points]
         parts.append(_agreement("left: measured against dv/dt, should be flat", "dv/dt, g", side, 335, flat=True))
     else:

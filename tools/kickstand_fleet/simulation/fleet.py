@@ -32,7 +32,7 @@ TROUBLES = {
     "cut": 0.02,  # the end of the first log is missing
     "missing": 0.02,  # the first log does not exist
 }
-# Faults that make an alignment impossible, each with the expected codes of the refusal. Any one of the codes is correct
+# Faults that make an alignment impossible, each with the codes of the refusals that are correct for this fault
 _REASONS = {
     "moved-between": "mount-moved",
     "moved-within": "mount-moved",
@@ -87,8 +87,8 @@ def make_fleet(
 ) -> list[MadeVehicle]:
     """Simulate a fleet, and write drives/*.csv.gz, MANIFEST.csv and TRUTH.csv to a directory.
 
-    One third of the vehicles are cars, one third buses, and one third motorcycles. Each has one to three drives. The
-    same seed always gives the same fleet.
+    One third of the vehicles are cars, one third buses, and one third motorcycles. Each vehicle has one to three
+    drives. The same seed always gives the same fleet.
 
     Args:
         out: The directory.

@@ -53,7 +53,7 @@ def random_route(
 ) -> Route:
     """Simulate a route with stops, bends and braking in straight lines.
 
-    straight: False for a drive in circles only, as in a car park. Such a drive never brakes in a straight line.
+    straight: False for a drive in circles only, as in a car park. A drive in circles never brakes in a straight line.
     """
     legs = _Legs(chance, handling)
     legs.stand(chance.uniform(7.0, 14.0))
@@ -68,7 +68,7 @@ def random_route(
     width = max(2, round(_SMOOTH_S * rate_hz))
     speed = moving_mean(np.interp(time, knots[:, 0], knots[:, 1]), width)
     place = np.searchsorted(knots[:, 0], time, side="right").clip(1, len(knots) - 1)
-    lateral = moving_mean(knots[place, 2], 2 * width)  # a leg's last knot has the leg's acceleration
+    lateral = moving_mean(knots[place, 2], 2 * width)  # the last knot of a leg has the leg's lateral acceleration
     yaw_rate = np.where(speed > 0.3, lateral / np.maximum(speed, 1.5), 0.0)
     distance = np.cumsum(speed) / rate_hz
     return Route(

@@ -21,7 +21,7 @@ from .evaluation import bands, integrity, integrity_report, picture, report, run
 from .evaluation.estimators import missing
 
 FAULTS_SECONDS = 120.0  # default riding time with each fault
-_WIDTH = 110  # columns of a table not printed to a terminal
+_WIDTH = 110  # width in columns of a table that is not printed to a terminal
 
 
 @click.command()

@@ -133,7 +133,8 @@ def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = Non
 def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
     """Run the app's loop on the emulated board.
 
-    seconds: emulated time. detail: True to measure the stages of a turn too. chosen: values of settings, by name.
+    seconds: emulated time. detail: True to measure the stages of a pass of the loop too. chosen: values of settings, by
+        name.
 
     Returns the figures and arrays of bench_guest.py, and the numbers of samples that were taken and lost.
     """
@@ -166,7 +167,8 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
             device.fit_wheel(lambda t_s: _SPEED_MPS)
         code = f"{device.SINK}import bench_guest\nbench_guest.run({detail}, {seconds}, Sink(), {chosen})\n"
         said = device.exec(code, limit_s=2.0 * seconds + 30.0)
-        result["figures"] = ast.literal_eval(said.rpartition("\x02")[2].strip())  # figures follow the output of a Sink
+        # The figures follow the output of a Sink
+        result["figures"] = ast.literal_eval(said.rpartition("\x02")[2].strip())
     turns = result["figures"]["turns"]
     result["took"] = arrays[0][:turns]
     asked_for = arrays[1][: result["figures"]["collections_by_app"]]
@@ -177,11 +179,12 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
 
 
 def _stages(run: dict[str, Any]) -> dict[str, np.ndarray]:
-    """Return the times of each stage in us, one for each turn in which the stage ran."""
+    """Return the times of each stage in us, one for each pass of the loop in which the stage ran."""
     columns = dict(zip(run["figures"]["stages"], run["stages"].T, strict=True))
     sampled = columns["decode and sum"] > 0
     watch = run["figures"]["stopwatch_us"]
-    fetch = columns["fetch"] - 3 * watch  # this stage contains three timed calls: two transfers and add_up()
+    # The stage of the sensor contains three timed calls: two transfers and add_up()
+    fetch = columns["fetch"] - 3 * watch
     meter = columns["meter"] - 2 * watch
     stages = {
         "read": columns["read"],

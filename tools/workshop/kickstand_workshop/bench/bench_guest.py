@@ -1,4 +1,5 @@
-"""Runs the app's own loop on the emulated board, and times its turns. bench.py starts it and reads its figures."""
+"""Runs the app's own loop on the emulated board, and times each pass. bench.py starts this program and reads its
+figures."""
 
 import gc
 import sys
@@ -11,8 +12,8 @@ from kickstand.settings import Settings
 from machine import mem16
 from uctypes import addressof, bytearray_at
 
-SETTLE_TURNS = 150  # number of turns before the first turn that is recorded
-# The heap use is recorded after this number of turns without garbage collection. The number is smaller on an ESP32,
+SETTLE_TURNS = 150  # number of passes of the loop before the first pass that is recorded
+# The heap use is recorded after this number of passes without garbage collection. The number is smaller on an ESP32,
 # because its heap is small and only grows during a collection.
 HEAP_TURNS = 3 if sys.platform == "esp32" else 10
 MAX_PAUSES = 2000
@@ -33,13 +34,15 @@ class Done(Exception):
 class Canary:
     """A piece of heap without a reference, to detect garbage collections.
 
-    A collection frees the piece, and it is soon overwritten. gc.mem_alloc() also shows collections, but takes 7 ms.
+    A collection frees the piece, and the piece is soon overwritten. gc.mem_alloc() also shows collections, but takes 7
+    ms.
     """
 
     MARK = 0x5AC3
 
     def arm(self):
-        self._address = addressof(array("H", [self.MARK] * 8))  # an address does not keep the array alive
+        # Only the address, because a reference would keep the array alive
+        self._address = addressof(array("H", [self.MARK] * 8))
 
     def died(self):
         return mem16[self._address] != self.MARK
@@ -57,7 +60,7 @@ class TimedGc:
             return
         start = ticks_us()
         gc.collect()
-        app_module.fill_gaps(app_module.SINGLE_GAPS)  # the app does the same after each collection
+        app_module.fill_gaps(app_module.SINGLE_GAPS)  # as the app does after each collection
         if app.n_pauses < MAX_PAUSES:
             app.pauses[app.n_pauses] = min(ticks_diff(ticks_us(), start), 65535)
             app.n_pauses += 1
@@ -68,14 +71,15 @@ class TimedGc:
 
 
 class MeasuredApp(app_module.App):
-    """The app, which records the costs of its turns and stops after a given time."""
+    """The app, which records the costs of the passes of its loop, and stops after a given time."""
 
     def prepare(self, seconds, out, spent):
         """Prepare the recording.
 
-        seconds: recording time. out: a Sink to the host. spent: array for the us of each stage in a turn, or None.
+        seconds: recording time. out: a Sink to the host. spent: array for the us of each stage in a pass, or None.
         """
-        gc.collect()  # without this, the arrays would be behind garbage in the heap, and lengthen each collection
+        # Without a collection here, the arrays would be behind garbage in the heap, and lengthen each later collection
+        gc.collect()
         turns = seconds * MAX_TURNS_HZ
         self._out, self._spent, self._turns = out, spent, turns
         self._until_us = seconds * 1_000_000
@@ -100,7 +104,7 @@ class MeasuredApp(app_module.App):
 
     def _begin(self):
         gc.collect()
-        app_module.fill_gaps(app_module.SINGLE_GAPS)  # the app does the same after each collection
+        app_module.fill_gaps(app_module.SINGLE_GAPS)  # as the app does after each collection
         self.free_before = gc.mem_free()
         gc.disable()
         self._allocated = gc.mem_alloc()
@@ -118,7 +122,7 @@ class MeasuredApp(app_module.App):
             raise Done
         self.took[turn] = took
         if self._spent:
-            self._out.write(self._spent_bytes)  # sent at once, because storing it would add to the measured heap use
+            self._out.write(self._spent_bytes)  # sent at once, because a stored time would add to the measured heap use
             self._clear()
         if self.count == HEAP_TURNS:
             self.heap_bytes = gc.mem_alloc() - self._allocated
@@ -153,10 +157,10 @@ def _attach(app):
 def run(detail, seconds, out, chosen):
     """Run the app, and print one line, a dictionary of figures.
 
-    detail: True to write the us of each stage to out after each turn, as 32-bit numbers.
+    detail: True to write the us of each stage to out after each pass, as 32-bit numbers.
     seconds: recording time.
-    out: a Sink to the host. It receives b"begin", then b"heap" after HEAP_TURNS, and b"end". Two arrays of 16-bit
-        numbers follow: us of each turn, and us of each collection that the app started.
+    out: a Sink to the host. out receives b"begin", then b"heap" after HEAP_TURNS, and b"end". Two arrays of 16-bit
+        numbers follow: us of each pass, and us of each collection that the app started.
     chosen: values of settings, by name.
     """
     for name in chosen:

@@ -1,6 +1,6 @@
 """Replaces the module bluetooth on the emulated board, and discards all data.
 
-A phone is always connected. It subscribes to everything at the highest rate.
+A phone is always connected. The phone subscribes to everything at the highest rate.
 """
 
 FASTEST_MS = 40

@@ -17,7 +17,8 @@ from rich.table import Table
 _LIMIT_S = 10.0
 _ROWS = 10  # number of modules in the table
 
-# Each module is imported after the modules that it imports. So the time of a module does not contain their times.
+# Each module is imported after the modules that it imports. So the time of a module does not contain the times of the
+# modules that it imports.
 _GUEST = """
 from time import ticks_diff, ticks_us
 took = []

@@ -34,7 +34,7 @@ class SampleCount:
 
     def lost(self) -> int:
         """Return the number of samples that are lost: overwritten, or removed from the FIFO before they were read."""
-        taken = self.taken()  # called first, because it updates the FIFO
+        taken = self.taken()  # taken() is called first, because it updates the FIFO
         frame = len(self._sensor._fifo_registers)
         if frame:
             kept = self._popped + self._sensor.fifo.count - self._waiting

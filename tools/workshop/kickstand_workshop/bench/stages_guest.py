@@ -17,8 +17,8 @@ WITHOUT_RESULT = ("apply_sum", "tick")  # methods that return nothing
 BUS = len(STAGES)  # index of an additional column for the sensor's transfers
 COLUMNS = BUS + 1
 
-# The wrapper has no *arguments and few local variables, because these would use heap. Then the allocations of the
-# measured code would take longer.
+# The wrapper has no *arguments and few local variables, because these would use heap, and lengthen the allocations of
+# the measured code.
 _TIMED = """
 def {name}({parameters}):
     begin({i})

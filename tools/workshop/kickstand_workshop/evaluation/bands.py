@@ -16,7 +16,7 @@ BANDS_HZ = ((0.03, 0.1), (0.1, 0.3), (0.3, 1.0), (1.0, 3.0), (3.0, 10.0))
 QUANTITIES = ("vertical, g", "sideways, g", "pitch rate, deg/s", "yaw rate, deg/s", "roll rate, deg/s")
 _GRID_HZ = 50.0
 _LEAST_S = 2.0 / BANDS_HZ[0][0]
-_RIDING_DPS = 5.0  # the rate of a standing bike is below this
+_RIDING_DPS = 5.0  # largest rate of a standing bike
 
 Figures = dict[str, NDArray[np.float64]]
 
@@ -65,7 +65,7 @@ def bands_of_log(log: Log, calibration: CalibrationFile) -> Figures:
 
 
 def of_recording(path: Path) -> Figures:
-    """Return the result of bands_of_log() for a recorded ride. The alignment is computed from this ride.
+    """Return the result of bands_of_log() for a recorded ride. The alignment is computed from the ride itself.
 
     Raises InputError if the log cannot be used.
     """

@@ -5,7 +5,7 @@ every sample in degrees, positive to the right.
 
 The filters of the packages `ahrs`, `vqf` and `imufusion` run twice: with the default gains of their authors, and with
 tuned gains under the name "... best". The tuned gains have the least error on one ride of each profile with the seed
-20, which is not used in the comparison. These filters start from the first reading.
+20, which is not used in the comparison. The filters of the packages start from the first reading.
 """
 
 from collections.abc import Callable

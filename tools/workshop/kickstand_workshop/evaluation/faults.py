@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 SEEN, ILL, HARMLESS = "seen", "ill", "harmless"
-ACCEL_RANGE_G, GYRO_RANGE_DPS = 16.0, 500.0  # the board's defaults
+ACCEL_RANGE_G, GYRO_RANGE_DPS = 16.0, 500.0  # ranges of the sensor, the defaults of a board
 
 
 @dataclass
@@ -113,7 +113,8 @@ def _gyro_bias_drifts(part: Part, dps: float) -> None:
 
 
 def _mount_slips(part: Part, degrees: float) -> None:
-    """Rotate the readings about one of the chip's axes. If the chip is mounted square, this is an axis of the bike."""
+    """Rotate the readings about one of the chip's axes. If the chip is mounted square, the chip's axes are the bike's
+    axes."""
     turned = rotation_matrix(np.radians(part.sign * degrees) * np.eye(3)[part.axis])
     part.force[:] = part.force @ turned
     part.rate[:] = part.rate @ turned
@@ -232,7 +233,8 @@ class Ill:
 
     @property
     def saturated(self) -> NDArray[np.bool_]:
-        """True for each reading with an axis at the end of its range. The driver treats these readings as lost."""
+        """True for each reading with an axis at the end of its range. The driver treats readings at the end of the
+        range as lost."""
         force, rate = np.abs(self.readings[:, :3]), np.abs(self.readings[:, 4:])
         return np.any(np.hstack((force >= ACCEL_RANGE_G, rate >= GYRO_RANGE_DPS)), axis=1)
 
@@ -256,7 +258,7 @@ def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: i
     first = 0 if fault.from_start else round(begin_s * rate_hz)
     end = len(made) if fault.seconds is None else min(len(made), first + round(fault.seconds * rate_hz))
     span = slice(first, end)
-    # Apply a fault of the kind SEEN along the chip's own axes. Otherwise the counts would not reveal the fault
+    # Apply a fault of the kind SEEN along the chip's own axes. A rotated fault would not show in the counts
     square = seed // 3 % 2 == 0 and fault.kind != SEEN
     turned = vehicle_from_sensor if square else np.eye(3)
     part = Part(

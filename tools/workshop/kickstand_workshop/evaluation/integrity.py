@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 WRONG_DEG = 8.0
 STANDS_S = 1.0
 RECOVERY_S = 10.0
-TURN = 2  # readings per turn of the app's loop
+TURN = 2  # number of readings per pass of the app's loop
 GPS_LATE_S = 0.4
 PROFILES = "street", "track", "hills", "city", "sweeper"
 SIGMA_EDGES = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0])  # limits of the classes of claimed sigma, in degrees
@@ -61,7 +61,7 @@ class FaultJob:
 
     @property
     def gps(self) -> bool:
-        """True for every fourth ride. These rides have a speed, late and once per second, as from a GPS receiver."""
+        """True for every fourth ride. A ride with a GPS has a late speed once per second."""
         return self.seed % 4 == 3
 
     @property
@@ -73,7 +73,7 @@ class FaultJob:
 
 @dataclass
 class Trace:
-    """The display during a ride, and the truth. The arrays have one entry per turn of the loop, shape (n).
+    """The display during a ride, and the truth. The arrays have one entry per pass of the loop, shape (n).
 
     time: Time in s.
     lean: Lean of the meter, in degrees.
@@ -172,7 +172,7 @@ def _made(
     made = ride(profile, seed, seconds, road=road, mount=mount)
     try:
         return made, calibrated_by_poses(made)
-    except InputError:  # the slanted pose refuses sensors with large cross-axis errors
+    except InputError:  # calibrate without the slanted pose, which refuses sensors with large cross-axis errors
         return made, calibrated_by_poses(replace(made, poses=made.poses[:6]))
 
 

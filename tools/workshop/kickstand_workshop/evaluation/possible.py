@@ -1,8 +1,8 @@
 """Computes leans for comparison, from data that a board does not have.
 
-oracle() runs the firmware's own filter with the true alignment and the true speed. Its readings have noise, but no
-other sensor errors, so the filter must only estimate the motion. gps_lean() computes the lean as phone apps do, from
-the speed and the change of course of a GPS receiver.
+oracle() runs the firmware's own filter with the true alignment and the true speed. The readings for oracle() have
+noise, but no other sensor errors, so the filter must only estimate the motion. gps_lean() computes the lean as phone
+apps do, from the speed and the change of course of a GPS receiver.
 """
 
 from collections.abc import Iterator

@@ -4,7 +4,7 @@ The calibration comes from `kickstand calibrate ride`. The reference lean is ata
 with the yaw rate about the bike's own up axis. Do not trust the values of the reference lean. The reference lean is too
 small for three reasons. The speed changes only once per second, tyres are wide, and the up axis leans with the bike.
 The reference also ignores slope and bank of the road. Use the reference to compare methods, and to reveal a lean that
-decays in a turn.
+decays in a bend.
 """
 
 from dataclasses import dataclass, field

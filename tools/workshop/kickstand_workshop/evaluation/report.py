@@ -121,7 +121,7 @@ def document(evaluation: Evaluation) -> dict[str, Any]:
     ]
     recorded = None if evaluation.recorded is None else _scores(evaluation.recorded.scores)
     found = {"profiles": by_profile(evaluation.results), "rides": rides, "recorded": recorded}
-    return json.loads(json.dumps(found), parse_constant=lambda _: None)  # JSON has no NaN and no infinity
+    return json.loads(json.dumps(found), parse_constant=lambda _: None)  # null, because JSON has no NaN and no infinity
 
 
 def write(evaluation: Evaluation, directory: Path) -> tuple[Path, Path]:

@@ -1,6 +1,6 @@
 """Simulates rides, calibrates them with the firmware's own code, and scores every estimator.
 
-`kickstand evaluate` uses this module. It runs on all processors.
+`kickstand evaluate` uses this module. The simulations run on all processors.
 """
 
 import multiprocessing

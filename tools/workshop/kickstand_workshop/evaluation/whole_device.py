@@ -20,8 +20,8 @@ from .faults import ACCEL_RANGE_G
 LOOK_S = 0.1
 # Texts that name a fault of the sensor. `Lean --` and texts about a speed source or a display do not match
 NAMES = re.compile("Sensor|Gyro|Accel|No sensor", re.IGNORECASE)
-STARTED_S = 2.0  # before this time, the display shows start-up texts
-WRITING = 2  # at most this many successive reads see a half-written line
+STARTED_S = 2.0  # time until the display no longer shows start-up texts
+WRITING = 2  # largest number of successive reads that see a half-written line
 
 
 def display_of(
@@ -68,7 +68,7 @@ def display_of(
 
     board.every(LOOK_S, look)
     config = {"SPEED": "gps"} if speed else {}
-    gc.freeze()  # the firmware often collects garbage. Scanning all earlier objects would take too long
+    gc.freeze()  # the firmware often collects garbage. Scanning the objects of earlier runs would take too long
     try:
         with tempfile.TemporaryDirectory() as flash, contextlib.chdir(flash):
             with board, contextlib.redirect_stdout(io.StringIO()):

@@ -4,7 +4,8 @@
     python3 tools/dev.py mutants imu --sample 50  50 random changes, always the same for the same --seed
     python3 tools/dev.py mutants imu --file sensor.py --lines 60 90
 
-It works on a copy of the project. It needs Linux or macOS, because each change is tested in a forked process.
+The command works on a copy of the project. The command needs Linux or macOS, because each change is tested in a forked
+process.
 """
 
 import argparse

@@ -25,7 +25,7 @@ OPERATORS = (
     *("ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ExceptionReplacer", "ZeroIterationForLoop"),
     "AddNot",  # replaces a condition by its opposite
 )
-SMALL = 16  # integers up to 16 (counts, indices) are changed by +1 and -1, larger integers are doubled and halved
+SMALL = 16  # larger integers are doubled and halved, smaller ones (counts, indices) are changed by +1 and -1
 
 
 class Change(NamedTuple):
@@ -55,7 +55,7 @@ class Change(NamedTuple):
 
 
 class Number(Operator):
-    """Changes numbers. This finds limits that no test checks."""
+    """Changes numbers. A changed number that no test notices is a limit that no test checks."""
 
     def mutation_positions(self, node):
         if is_number(node):

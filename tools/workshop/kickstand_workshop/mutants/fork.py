@@ -18,7 +18,8 @@ import pytest
 
 WARM = ("numpy", "hypothesis", "click", "rich.console", "matplotlib.pyplot", "pandas", "plotly.graph_objects")
 WARM += ("pyarrow.parquet",)
-# These arguments skip the variants of tests on MicroPython. These variants are slow, and the same tests run on CPython.
+# Arguments of pytest that skip the variants of tests on MicroPython. The variants on MicroPython are slow, and the same
+# tests run on CPython.
 ARGUMENTS = ("-x", "-q", "-k", "not micropython", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0")
 KILLED, SURVIVED, TIMED_OUT = "killed", "survived", "timed out"
 # The tests of a change may use TIMES the processor time of the tests of the unchanged code, plus EXTRA_S
@@ -46,7 +47,8 @@ class Tests:
         for name in WARM:
             with contextlib.suppress(ImportError):
                 importlib.import_module(name)
-        gc.freeze()  # pytest collects garbage at its end. Scanning the imported modules each time would take too long
+        # The end of pytest collects garbage. Scanning the imported modules for each change would take too long
+        gc.freeze()
 
     def pass_unchanged(self) -> bool:
         """Run the tests of the unchanged code. Returns True if they pass. The copy keeps the bytecode."""
@@ -67,7 +69,7 @@ class Tests:
         file = self.root / path
         original = file.read_text("utf-8")
         for bytecode in file.parent.glob(f"__pycache__/{file.stem}.*"):
-            # Python would use this bytecode for a changed file of the same length that is written in the same second
+            # Python would use the old bytecode for a changed file of the same length that is written in the same second
             bytecode.unlink()
         try:
             file.write_text(mutant, "utf-8")
@@ -97,7 +99,7 @@ class Tests:
                 os.killpg(child, signal.SIGKILL)
                 _, status = os.waitpid(child, 0)
         with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(child, signal.SIGKILL)  # also end the processes that the tests started
+            os.killpg(child, signal.SIGKILL)  # end the processes that the tests started, too
         if os.WIFSIGNALED(status):
             return TIMED_OUT
         return SURVIVED if os.WEXITSTATUS(status) == 0 else KILLED
@@ -107,7 +109,8 @@ class Tests:
         status = 3
         try:
             os.setpgid(0, 0)
-            for number in (signal.SIGTERM, signal.SIGHUP):  # as at the start of a program, which some tests rely on
+            # Default handlers, as at the start of a program, which some tests rely on
+            for number in (signal.SIGTERM, signal.SIGHUP):
                 signal.signal(number, signal.SIG_DFL)
             os.dup2(self._output.fileno(), 1)
             os.dup2(self._output.fileno(), 2)

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
-UNTESTABLE = ("_viper.py", "_guest.py")  # these files run only on a board or on MicroPython
+UNTESTABLE = ("_viper.py", "_guest.py")  # files that run only on a board or on MicroPython
 
 
 class Package(NamedTuple):
@@ -34,7 +34,8 @@ PACKAGES = {
     ),
     "lean": _package(
         "firmware/kickstand/lean/*.py",
-        "lean/test_known_ride lean/test_filter_states lean/test_[bkmru]* lean/test_formula",  # the others take longer
+        # All other tests of lean take longer
+        "lean/test_known_ride lean/test_filter_states lean/test_[bkmru]* lean/test_formula",
     ),
     "drive_alignment": _package(
         "firmware/kickstand/drive_alignment/*.py",
@@ -130,7 +131,7 @@ PACKAGES = {
     "web": _package(
         "tools/kickstand_tools/web/*.py",
         "web/test_web_parts web/test_rides_g* web/test_try_device web/test_sample_ride web/test_page_device"
-        " web/test_site",  # in a browser, runs only if the others noticed nothing
+        " web/test_site",  # tests in a browser, which run only if the other tests noticed nothing
     ),
     "fleet": _package(
         "tools/kickstand_fleet/**/*.py",

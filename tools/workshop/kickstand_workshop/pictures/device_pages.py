@@ -63,7 +63,7 @@ def _device_pages(display: str) -> dict[str, Any]:
 
 
 def _run(display: str) -> dict[str, Any]:
-    """Run the device. Afterwards, this process cannot run another device."""
+    """Run the device. After this function the process cannot run another device."""
     ride = Ride(SCRIPT)
     board = Board(Sensor(seed=PART_SEED, share=PART_SHARE).world(ride.motion), display=display)
     for at_s in PRESSES_S:
@@ -80,7 +80,7 @@ def _run(display: str) -> dict[str, Any]:
     for name, at_s in (MOMENTS_S if display == "lcd" else OLED_MOMENTS_S).items():
         board.at(at_s, lambda name=name: look(name))
     board.install()
-    from kickstand.start import main  # after install(), which replaces `machine` and `time`
+    from kickstand.start import main  # imported after install(), which replaces `machine` and `time`
 
     board.run(main, ride.seconds)
     return seen

@@ -67,7 +67,7 @@ def _arrow(page: Drawing, colour: str, tail: tuple[float, float], tip: tuple[flo
 def lean_compared() -> bytes:
     """Return a PNG of three leans during one minute of a simulated ride: true, by the formula, and shown.
 
-    This takes 5 s. This needs the packages of `pip install -e ".[rides]"`.
+    This takes 5 s. The function needs the packages of `pip install -e ".[rides]"`.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

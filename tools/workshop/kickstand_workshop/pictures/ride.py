@@ -10,7 +10,7 @@ from pathlib import Path
 from kickstand_tools.common import firmware_path
 from PIL import Image
 
-COLOURS = 64  # enough for a plot. The file is then a third of its size with all colours
+COLOURS = 64  # enough for a plot. With this number of colours the file has a third of its size with all colours
 _COMMANDS = (
     "simulate --profile track --seed 1 --seconds 200 --speed --out ride",
     "calibrate six {poses} --out ride/SIX.json",
@@ -20,7 +20,7 @@ _COMMANDS = (
 
 
 def draw() -> bytes:
-    """Return the plot as PNG. This takes 10 s, and needs the packages of `pip install -e ".[rides]"`."""
+    """Return the plot as PNG. The function takes 10 s, and needs the packages of `pip install -e ".[rides]"`."""
     with tempfile.TemporaryDirectory() as directory:
         for command in _COMMANDS:
             poses = " ".join(sorted(str(p.relative_to(directory)) for p in Path(directory).glob("ride/POSE_*.csv")))

@@ -30,8 +30,9 @@ TRIPS_WITH_A_BIKE = 8
 # before the first trip
 PART_SHARE = 0.5
 WHO_AM_I, RANGE_G = 0x68, 8
-WARM_TRIPS = 3  # memory may grow in the first trips, because modules are imported when they are first needed
-# Largest growth from a trip's second minute to its end, in memory blocks. Recording a ride uses a few hundred
+WARM_TRIPS = 3  # trips in which memory may grow, because modules are imported when they are first needed
+# Largest growth from a trip's second minute to its end, in memory blocks. The recording of a ride uses a few hundred
+# blocks
 MAX_GROWTH = 3000
 
 

@@ -72,8 +72,8 @@ def make_trip(chance: random.Random, speed: str | None, aligned: bool) -> Trip:
     """Make a trip of some minutes.
 
     speed: The speed source, "gps", "wheel" or None.
-    aligned: True if the bike is aligned. Then some trips repeat the alignment. Otherwise the trip begins with an
-        alignment.
+    aligned: True if the bike is aligned. With an aligned bike some trips repeat the alignment. A trip with an unaligned
+        bike begins with an alignment.
     """
     kind = chance.choice(list(RIDES))
     ride = script.Ride(_manoeuvres(chance, kind), vibration_g=chance.uniform(0.01, 0.08))
@@ -104,7 +104,8 @@ def make_trip(chance: random.Random, speed: str | None, aligned: bool) -> Trip:
         start_s = chance.uniform(0, ride.seconds)
         gps_faults.append([chance.choice(GPS_FAULTS), start_s, start_s + 20.0])
         faults.append(("GPS " + gps_faults[0][0], start_s, start_s + 20.0))
-    until_s = ride.seconds if chance.random() < 0.6 else chance.uniform(1.0, ride.seconds)  # switched off while riding
+    # Some trips end while the bike rides
+    until_s = ride.seconds if chance.random() < 0.6 else chance.uniform(1.0, ride.seconds)
     cut_save = chance.randint(0, 150) if aligned and chance.random() < 0.5 else None
     return Trip(kind, ride, until_s, presses, faults, calls, gps_faults, cut_save)
 

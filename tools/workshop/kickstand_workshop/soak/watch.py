@@ -9,8 +9,8 @@ from kickstand_tools.simulated_board.simulator import Board
 from .trip import QUIET_S, SENSOR, Trip
 
 LOOK_S = 0.1
-WRONG_DEG, WRONG_S = 10.0, 5.0  # longest time WRONG_S for which a lean with an error over WRONG_DEG may be shown
-LAG_S = 0.6  # a shown lean is right if it was the true lean at any moment in the last LAG_S seconds
+WRONG_DEG, WRONG_S = 10.0, 5.0  # a lean with an error over WRONG_DEG may be shown for at most WRONG_S
+LAG_S = 0.6  # a shown lean is right if it was the true lean at some moment of the last LAG_S seconds
 STILL_S = 2.0  # time without a transfer to the sensor after which the program counts as hanging
 # Longest time for which a lean may be shown without new readings: half a second, and the time for a page and a check
 STALE_S = 0.7
