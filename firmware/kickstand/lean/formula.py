@@ -21,8 +21,8 @@ def static_lean_deg(force):
 
 
 def centripetal_g(left_g, up_g, yaw_rate):
-    """Return s, the centripetal acceleration in g, by (26). The force gives the size of s. The yaw rate gives its sign,
-    which is > 0 in a left turn. Without a yaw rate s is 0."""
+    """Return s, the centripetal acceleration in g, by (26). The force gives the size of s. The yaw rate gives the sign
+    of s, which is > 0 in a left turn. Without a yaw rate s is 0."""
     excess = left_g * left_g + up_g * up_g - 1.0
     if excess <= 0.0 or yaw_rate == 0.0:
         return 0.0
