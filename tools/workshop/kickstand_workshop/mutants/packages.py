@@ -93,7 +93,14 @@ PACKAGES = {
         " analysis/test_drawn_values analysis/test_riding analysis/test_analysis_channels"
         " analysis/test_al* analysis/test_c* analysis/test_map",
     ),
-    "overlay": _package("tools/kickstand_tools/overlay/*.py", "overlay/test_[gosv]* overlay/test_c*"),
+    "overlay": _package(
+        "tools/kickstand_tools/overlay/[!gp]*.py tools/kickstand_tools/overlay/gpmf.py",
+        "overlay/test_[ov]* overlay/test_shown overlay/test_c*",
+    ),
+    "gauge": _package(  # mostly drawings
+        "tools/kickstand_tools/overlay/gauge.py tools/kickstand_tools/overlay/parts.py",
+        "overlay/test_gauge* overlay/test_overlay_choices",
+    ),
     "deploy": _package(
         "tools/kickstand_tools/deploy/*.py",
         "deploy/test_c*_limits deploy/test_check_order deploy/test_update_limits deploy/test_*_parts"
