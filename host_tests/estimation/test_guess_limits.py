@@ -77,6 +77,13 @@ def test_less_than_20_s_between_two_hands_count_as_a_hand(between, parts):
     assert len(limits(held((400, 500), (500 + between, 600 + between))[0])) == 2 * parts
 
 
+@pytest.mark.parametrize(("between", "parts"), [(106, 1), (107, 2)])
+def test_the_first_window_of_a_hand_counts_as_time_between(monkeypatch, between, parts):
+    """From the first hand's last window to the second hand's first window are n - 6 windows of 0.2 s."""
+    monkeypatch.setattr(first_guess, "BETWEEN_S", 20.1)
+    assert len(limits(held((400, 500), (500 + between, 600 + between))[0])) == 2 * parts
+
+
 @pytest.mark.parametrize(("begin", "first"), [(101, 0), (105, 111)])
 def test_less_than_20_s_before_the_first_hand_count_as_a_hand(begin, first):
     assert limits(held((begin, begin + 200))[0])[0] == first
