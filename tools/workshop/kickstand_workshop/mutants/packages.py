@@ -104,8 +104,8 @@ PACKAGES = {
     "deploy": _package(
         "tools/kickstand_tools/deploy/*.py",
         "deploy/test_c*_limits deploy/test_check_order deploy/test_update_limits deploy/test_*_parts"
-        " deploy/test_config_text"
-        # the others flash and check whole boards, and run only if these noticed nothing
+        " deploy/test_config_[ft]*"
+        # these flash and check whole boards, and run only if the others noticed nothing
         " deploy/test_others deploy/test_c[ho]* deploy/test_update deploy/test_[nm]* deploy/test_cli_flash",
     ),
     "simulation": _package(
