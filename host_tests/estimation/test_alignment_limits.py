@@ -109,7 +109,7 @@ def test_a_sensor_that_is_never_mounted_has_no_ride():
         alignment.mounted_windows(log)
 
 
-def checked(windows, lean=0.0, delay=0.4, expected=None):
+def checked(windows, lean: Any = 0.0, delay=0.4, expected=None):
     """Return _checked() of an estimate with this lean at all edges and this delay of the speed."""
     parameters, states = np.zeros((3, of.PARAMETERS)), np.zeros((len(windows) + 9, of.STATES))
     states[:, of.LEAN], parameters[:, of.DELAY] = lean, delay

@@ -7,16 +7,8 @@ import numpy as np
 import pytest
 from kickstand_tools.common.errors import RefusedInput
 from kickstand_tools.estimation import first_guess
-from kickstand_tools.estimation.windows import Windows
 from kickstand_tools.signals.leaning import Leaning
-
-
-def windows(n: int, rate=(0.0, 0.0, 0.0), force=(0.0, 1.0, 0.0)) -> Windows:
-    """Return n windows of 0.2 s each. rate, force: shape (3) or (n, 3)."""
-    rate, force = (np.array(np.broadcast_to(np.asarray(of, dtype=float), (n, 3))) for of in (rate, force))
-    none = np.zeros(n)
-    return Windows(np.arange(n + 1) * 0.2, rate, force, none, np.full(n, np.nan), none, none > 0.0, np.arange(n), none,
-                   none)  # fmt: skip
+from made_windows import windows
 
 
 def alternating(n: int, size: float) -> np.ndarray:

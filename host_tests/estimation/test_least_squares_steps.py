@@ -14,16 +14,9 @@ from kickstand_tools.estimation import (
     smooth,
     unknowns as of,
 )
-from kickstand_tools.estimation.windows import Windows
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_blocks
-
-
-def windows(n: int) -> Windows:
-    """Return n windows of 0.2 s each of an upright sensor."""
-    none = np.zeros(n)
-    return Windows(np.arange(n + 1) * 0.2, np.zeros((n, 3)), np.tile([0.0, 1.0, 0.0], (n, 1)), none,
-                   np.full(n, np.nan), none, none > 0.0, np.arange(n), none, none)  # fmt: skip
+from made_windows import windows
 
 
 def bare(**fields) -> Any:

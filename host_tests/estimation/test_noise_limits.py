@@ -5,14 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 from kickstand_tools.estimation import equations as eq, noise as noises, unknowns as of
-from kickstand_tools.estimation.windows import Windows, windows_of
-
-
-def windows(n: int) -> Windows:
-    """Return n windows of 0.2 s each of an upright sensor."""
-    none = np.zeros(n)
-    return Windows(np.arange(n + 1) * 0.2, np.zeros((n, 3)), np.tile([0.0, 1.0, 0.0], (n, 1)), none,
-                   np.full(n, np.nan), none, none > 0.0, np.arange(n), none, none)  # fmt: skip
+from kickstand_tools.estimation.windows import windows_of
+from made_windows import windows
 
 
 def misfit_of(climbing, speed=20.0, pitch=0.0, still=False, n=600):
