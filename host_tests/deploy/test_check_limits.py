@@ -89,6 +89,9 @@ def test_a_sound_sensor_at_rest_is_good():
         ({"rate": (0.0, 40.1, 0.0)}, "bias, gyro y", BAD),
         ({"force": (0.0, 0.0, 1.19)}, "bias, accelerometer", GOOD),
         ({"force": (0.0, 0.0, 0.79)}, "bias, accelerometer", LOOK),
+        ({"force": (0.0, 0.0, 1.21)}, "bias, accelerometer", LOOK),
+        ({"force": (0.0, 0.0, 0.51)}, "bias, accelerometer", LOOK),
+        ({"force": (0.0, 0.0, 0.49)}, "bias, accelerometer", BAD),
         ({"force": (0.9, 0.9, 0.9)}, "bias, accelerometer", BAD),
         ({"force": (0.0, -1.51, 0.0)}, "bias, accelerometer y", BAD),
         ({"temperature_c": 60.0}, "temperature", GOOD),
@@ -100,6 +103,9 @@ def test_a_sound_sensor_at_rest_is_good():
         ({"temperature_c": -40.1}, "temperature", BAD),
         ({"overflows": 1}, "readings", LOOK),
         ({"samples": 19}, "readings", BAD),
+        ({"samples": 20}, "temperature", GOOD),
+        ({"force": (0.0, 1.49, 0.0)}, "bias, accelerometer", LOOK),
+        ({"temperature_c": -10.0}, "temperature", GOOD),
     ],
 )
 def test_each_limit_of_a_sensor_at_rest(given, what, verdict):
@@ -158,7 +164,9 @@ def test_the_fifo_may_lose_a_tenth_and_two_frames(waiting, noticed, after, verdi
     ("given", "verdict"),
     [
         ({}, (GOOD, GOOD, GOOD)),
+        ({"longest_us": 99_900}, (GOOD, GOOD, GOOD)),
         ({"longest_us": 100_100}, (LOOK, GOOD, GOOD)),
+        ({"longest_us": 182_400}, (LOOK, GOOD, GOOD)),
         # The longest pass takes more than half of the time in which the FIFO fills
         ({"longest_us": 182_600}, (BAD, GOOD, GOOD)),
         ({"overflows": 1}, (BAD, GOOD, GOOD)),
@@ -200,3 +208,44 @@ def test_display_speed_and_sensor():
     assert one(limits.sensor("MPU6050", 0x68, 0x68, 0x68, "", 0), "sensor") == (GOOD, "MPU6050 (0x68) at 0x68")
     assert "SENSOR_ADDRESS is 0x68" in one(limits.sensor("MPU6050", 0x68, 0x69, 0x68, "", 0), "sensor")[1]
     assert one(limits.sensor("MPU6050", 0x68, 0x68, 0x68, "", 8), "sensor")[0] == BAD
+
+
+@pytest.mark.parametrize(
+    ("dlpf", "accel_mg", "gyro_dps"),
+    [(1, "6.8", "0.086"), (2, "4.9", "0.062"), (3, "3.3", "0.041"), (4, "2.3", "0.028"), (5, "1.6", "0.020"),
+     (6, "1.1", "0.015")],
+)  # fmt: skip
+def test_the_noise_by_the_data_sheet_at_each_bandwidth(dlpf, accel_mg, gyro_dps):
+    """The noise density times the root of 1.57 times the bandwidth, with the rounding to 0.3 counts."""
+    found = limits.noise(100, (0.0, 0.0, 4096.0) + (0.0,) * 4, (0.0,) * 7, (9,) * 7, 4096, 65.5, 25.0, 0, dlpf)
+    assert one(found, "noise, accelerometer y")[1].startswith(f"0.0 mg (data sheet {accel_mg},")
+    assert one(found, "noise, gyro x")[1].startswith(f"0.000 deg/s (data sheet {gyro_dps},")
+
+
+def test_words_of_a_board_and_its_chip():
+    assert one(limits.board("1", "Pico", "1.24", "defaults", ""), "machine code") == (GOOD, "used")
+    found = limits.board("1", "Pico", "1.24", "defaults", "x.py")
+    assert one(found, "board") == (GOOD, "Pico, MicroPython 1.24, Kickstand 1; defaults")
+    assert one(found, "machine code") == (LOOK, "not used for x.py: slower code runs instead")
+    assert one(limits.fifo("stays empty", 0, 0, 0, 0, True, 1), "FIFO")[0] == BAD
+    assert one(limits.display(0x3C, True, 9, 9, ""), "display")[1].startswith("OLED at 0x3c, acknowledged in 9")
+    assert one(limits.display(0, True, 0, 9, ""), "display")[1].endswith("check its wires and LCD_ADDRESSES")
+    assert "PWR_MGMT_2 reads 0x08" in one(limits.sensor("MPU6050", 0x68, 0x68, 0x68, "", 8), "sensor")[1]
+    high = rested(force=(0.0, 0.0, -1.6), rate=(0.0, 22.0, 0.0), temperature_c=70.0)
+    assert one(high, "bias, accelerometer z") == (BAD, "-1.60 g at rest")
+    assert one(high, "bias, accelerometer")[1] == "1.600 g at rest (limit 1 +- 0.2)"
+    assert one(high, "bias, gyro y")[1] == "+22.00 deg/s (data sheet 20, limit 40): beyond the data sheet"
+    assert one(high, "temperature")[1].startswith("70.0 C (limits -10 and 60): a chip at room temperature")
+    assert one(rested(force=(0.0, 0.0, 1.3)), "bias, accelerometer")[1].endswith(": do the six positions")
+    assert not [found for found in rested(force=(0.0, 0.0, 1.49)) if found.what == "bias, accelerometer z"]
+
+
+def test_the_factory_trim_by_hand():
+    """The accelerometer's code has three bits from its own register and two from register 0x10. Code 1 is 0.34 g, and
+    code 31 is 0.92 g. The gyro's code 2 is 4.6 % more than 25 deg/s."""
+    found = limits.factory_trims((0b000_00010, 0b111_00010, 0b000_00000, 0b01_11_00))
+    assert found == pytest.approx([4096 * 0.34, 4096 * 0.92, 0.0, 3275 * 1.046, -3275 * 1.046, 0.0])
+    found = limits.factory_trims((0b001_00000, 0, 0b000_00000, 0b00_00_10))
+    assert found[:3] == pytest.approx(
+        [4096 * 0.34 * (0.92 / 0.34) ** 0.1, 0.0, 4096 * 0.34 * (0.92 / 0.34) ** (1 / 30)]
+    )

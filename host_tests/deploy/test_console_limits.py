@@ -98,6 +98,7 @@ def test_a_computer_that_slept_hears_5_s_of_silence(answers):
     assert answers(b"a\n", (3.0,), 5.1, b"\x04\x04>")[0] == [b"a", awake]
     assert answers(b"a\n", (3.0,), 4.9, b"\x04\x04>")[0] == [b"a"]
     assert answers(b"a\n", (0.9,), 5.1, b"\x04\x04>")[0] == [b"a"]
+    assert answers(b"a\n", (1.1,), 5.1, b"\x04\x04>")[0] == [b"a", awake.replace("3", "1")]
     assert answers((3.0,), 2.1, b"\x04\x04>", silent_s=2.0)[0] == ["the board says nothing any more"]
 
 

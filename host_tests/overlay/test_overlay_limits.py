@@ -10,8 +10,7 @@ import pytest
 
 pytest.importorskip("PIL")
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.joining.motion import CellMotion
-from kickstand_tools.overlay import camera_match, gpmf, overlay, shown, video
+from kickstand_tools.overlay import overlay, shown, video
 from kickstand_tools.overlay.shown import Shown
 
 NAN = math.nan
@@ -97,6 +96,8 @@ def test_the_drawn_part_of_a_ride(given, found):
     [
         ({"offset": 100.0}, "they have nothing in common"),
         ({"offset": -60.0}, "they have nothing in common"),
+        ({"offset": -59.5}, r"with --from 0\.0 --to 0\.5"),
+        ({"offset": 99.5}, r"with --from 99\.5 --to 100\.0"),
         ({"offset": -1.1}, r"from -1\.1 to 58\.9 s of .* with --from 0\.0 --to 58\.9"),
         ({"offset": 41.1}, r"with --from 41\.1 --to 100\.0"),
         ({"film": False, "begin": 30.0, "end": 30.0}, "nothing from"),
@@ -174,30 +175,3 @@ def test_over_a_video_the_gauge_follows_its_smaller_side(monkeypatch, tmp_path):
     found, calls = overlaid(monkeypatch, film, out=tmp_path / "a.mp4", from_s=6.0, to_s=7.0)
     assert (found.offset_s, found.correlation, found.begin_s) == (5.0, 0.9, 6.0)
     assert calls[2][:4] == ["-ss", "1.0000", "-t", "1.0000"]
-
-
-# camera_match.py
-
-
-@pytest.fixture
-def offset(monkeypatch):
-    """Return a function that finds the offset from the result of each shift, {place: (correlation, evidence)}.
-
-    The video has 200 cells of 50 ms. The camera's readings begin 0.3 s after the video's first picture."""
-
-    def result(given, common=160):
-        monkeypatch.setattr(camera_match, "correlations", lambda *_: (found, np.full(799, common)))
-        monkeypatch.setattr(camera_match, "log_likelihood_ratio", lambda values, *_: likely * (values > 0.0))
-        monkeypatch.setattr(camera_match, "peaks", lambda *_: sorted(given, key=lambda at: -likely[at]))
-        found, likely = np.zeros(799), np.zeros(799)
-        for at, (correlation, evidence) in given.items():
-            found[at], likely[at] = correlation, evidence
-            found[[at - 1, at + 1]] = correlation - 0.1
-        camera = gpmf.Telemetry(np.linspace(0.3, 10.275, 400), np.random.default_rng(1).normal(size=(400, 3)))
-        ride = CellMotion(np.zeros((600, 3)), np.zeros((600, 3)), np.ones(600, dtype=bool), False, False)
-        try:
-            return camera_match.camera_offset_s(ride, camera)
-        except InputError as error:
-            return str(error)
-
-    return result

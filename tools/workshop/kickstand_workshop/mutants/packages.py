@@ -84,8 +84,9 @@ PACKAGES = {
     ),
     "estimation": _package(
         "tools/kickstand_tools/estimation/*.py",
-        "estimation/test_smooth_steps estimation/test_ride_limits estimation/test_estimation_parts"
-        " estimation/test_[esa]*",
+        "estimation/test_smooth_steps estimation/test_*_limits estimation/test_least_squares_steps"
+        " estimation/test_estimation_parts estimation/test_equations estimation/test_solver"
+        " estimation/test_known_alignment",  # the others take minutes
     ),
     "analysis": _package(
         "tools/kickstand_tools/analysis/*.py tools/kickstand_tools/analysis/plot/*.py",
@@ -93,12 +94,20 @@ PACKAGES = {
         " analysis/test_drawn_values analysis/test_riding analysis/test_analysis_channels"
         " analysis/test_al* analysis/test_c* analysis/test_map",
     ),
-    "overlay": _package("tools/kickstand_tools/overlay/*.py", "overlay/test_[gosv]* overlay/test_c*"),
+    "overlay": _package(
+        "tools/kickstand_tools/overlay/[!gp]*.py tools/kickstand_tools/overlay/gpmf.py",
+        "overlay/test_[ov]* overlay/test_shown overlay/test_c*",
+    ),
+    "gauge": _package(  # mostly drawings
+        "tools/kickstand_tools/overlay/gauge.py tools/kickstand_tools/overlay/parts.py",
+        "overlay/test_gauge* overlay/test_overlay_choices",
+    ),
     "deploy": _package(
         "tools/kickstand_tools/deploy/*.py",
-        "deploy/test_console_limits deploy/test_check_order deploy/test_check_limits"
-        " deploy/test_config_limits deploy/test_update_limits deploy/test_check* deploy/test_config*"
-        " deploy/test_[unmo]* deploy/test_cli_flash",
+        "deploy/test_c*_limits deploy/test_check_order deploy/test_update_limits deploy/test_*_parts"
+        " deploy/test_config_[ft]*"
+        # these flash and check whole boards, and run only if the others noticed nothing
+        " deploy/test_others deploy/test_c[ho]* deploy/test_update deploy/test_[nm]* deploy/test_cli_flash",
     ),
     "simulation": _package(
         "tools/kickstand_tools/simulation/**/*.py",
