@@ -28,7 +28,10 @@ def test_a_sentence_has_the_values_of_its_refusal(refusal, said):
 
 @pytest.fixture
 def printing(monkeypatch):
-    """Return a function that calls use(print times in ms) on a board and returns (its result, the printed texts)."""
+    """Return a function that calls use(takes_ms) on a board, and returns the result of use() and the printed texts.
+
+    use() sets takes_ms[0], the time in ms that one print takes.
+    """
 
     def run(use):
         printed, takes_ms, found = [], [0], []

@@ -46,8 +46,8 @@ def test_every_link_leads_somewhere(page):
 
 
 def test_a_link_out_of_the_checkout_has_its_depth():
-    """GitHub shows a file at OWNER/NAME/blob/BRANCH/, so a link to the issues must go up by that many folders. GitHub
-    also shows the first page at OWNER/NAME."""
+    """GitHub shows a file at OWNER/NAME/blob/BRANCH/PATH, and the issues at OWNER/NAME/issues. So a link to the issues
+    leaves the page's own folders, and then BRANCH and blob. GitHub also shows the first page at OWNER/NAME."""
     for page in PAGES:
         for link in filter(OF_THE_REPOSITORY.match, links(page)):
             assert link.count("../") == 1 + len(page.relative_to(ROOT).parts), link

@@ -26,7 +26,7 @@ RIDE = (kickstand(2.0, 0.0), accelerate(15.0, 4.0), turn(35.0, 6.0))
 
 
 def save_calibration(part, directory=""):
-    """Save the calibration of a device with this sensor, as after the six positions and the alignment."""
+    """Save the calibration that a device with this sensor has after the six positions and the alignment."""
     from kickstand.calibration.parameters import Calibration
     from kickstand.calibration.store import Store
 

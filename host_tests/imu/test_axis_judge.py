@@ -103,7 +103,7 @@ def test_a_stuck_high_byte_wraps_in_two_looks():
     judge, watch = AxisJudge(1, 3), Watch()
     for seen in (wrapped, {}, wrapped):
         watch.look(judge, seen=seen)
-    assert watch.fault is None  # a change of the high byte restarts the count
+    assert watch.fault is None  # the empty look between means that the high byte changed, which restarts the count
     watch.look(judge, seen=wrapped)
     assert watch.fault is not None
 

@@ -1,4 +1,5 @@
-"""The blocks of a ride at their limits: filling them, and the format."""
+"""Tests that everything fits into a ride's block even in the worst case, and that the format of the blocks stays the
+same."""
 
 import types
 from binascii import crc32

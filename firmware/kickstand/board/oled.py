@@ -33,8 +33,8 @@ _SHIFT_REFRESHES = const(6)
 # text.
 _SHIFTS_32 = (0, 63, 62, 63)
 # The first byte is a control byte, which starts a stream of commands. The commands are: clock; number of rows - 1; no
-# offset; columns and rows from the side opposite to the cable; COM pins alternate (64 rows) or in sequence (32);
-# pre-charge; VCOMH; show the RAM
+# offset; columns reversed; rows reversed; COM pins alternating (64 rows) or in sequence (32); pre-charge; VCOMH; show
+# the RAM. Columns and rows are reversed because modules are mounted with the panel's flexible cable at the top.
 _SET_UP = b"\x00\xd5\x80\xa8\x3f\xd3\x00\xa1\xc8\xda\x12\xd9\xf1\xdb\x40\xa4"
 _SET_UP_32 = b"\x00\xd5\x80\xa8\x1f\xd3\x00\xa1\xc8\xda\x02\xd9\xf1\xdb\x40\xa4"
 # Commands for the SH1106: DC-DC converter. Commands for the SSD1306: charge pump, page addressing, no scrolling.

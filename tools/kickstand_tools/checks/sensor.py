@@ -21,8 +21,8 @@ LEAST_SAMPLES = 10  # least number of samples in a stretch that is judged
 # An axis is judged only if the other axes change by OTHER_G or OTHER_DPS, and by OTHER_STEPS of their last digits.
 # Smaller changes do not prove noise, because a phone's rounding may hide it.
 OTHER_G, OTHER_DPS, OTHER_STEPS = 0.01, 0.3, 20.0
-# An axis has noise if at least this share of its samples changes direction. With white noise, two thirds of the samples
-# change direction. Without noise, less than the share NOISY does.
+# An axis has noise if its readings turn from rising to falling, or back, at least at this share of the samples. With
+# white noise they turn at two thirds of the samples. Without noise they turn at a smaller share than NOISY.
 NOISY = 0.15
 # If all axes of a sensor are constant, the sensor is judged only in a part of the log that is longer than this.
 DEAD_ALL_S = 20.0

@@ -236,8 +236,8 @@ class Smoother:
         """Estimate the values of the samples in these segments.
 
         own: the samples that need a lean. The other samples only improve the estimate, and remarks do not count them.
-        Returns the values, shape (samples, COLUMNS); NaN where the readings are not from riding. Returns None for under
-        SLOWEST_HZ samples per second.
+        Returns the values, shape (samples, COLUMNS); NaN where the readings are not from riding. Returns None
+        if there are fewer than SLOWEST_HZ samples per second.
         """
         t_s = np.concatenate([segment.t_s for segment in segments])
         readings = np.concatenate([segment.readings for segment in segments])
