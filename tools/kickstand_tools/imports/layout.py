@@ -153,8 +153,11 @@ def _rows(lines: Sequence[str], separator: str, comma: bool) -> tuple[int, int, 
     numbers = int(np.median([counts[k] for k in rows]))
     first = rows[0]
     names = next((k for k in range(first - 1, -1, -1) if lines[k].strip()), None)
-    if names is not None and not _is_names(split_row(lines[names].lstrip(_MARKS), separator), width):
-        names = _names_by_commas(lines, names, width)
+    # the names may be separated in another way than the rows
+    if names is not None and not any(
+        _is_names(split_row(lines[names].lstrip(_MARKS), mark), width) for mark in SEPARATORS
+    ):
+        names = None
     if names is not None and _all_units(split_row(lines[names].lstrip(_MARKS), separator)):
         above = names - 1
         if above >= 0 and _is_names(split_row(lines[above].lstrip(_MARKS), separator), width):
@@ -164,9 +167,9 @@ def _rows(lines: Sequence[str], separator: str, comma: bool) -> tuple[int, int, 
     return len(rows), numbers, Grid(names, first, separator, comma, width)
 
 
-def _names_by_commas(lines: Sequence[str], at: int, width: int) -> int | None:
-    """The line of names above the rows, if the names are separated by commas and the rows are not."""
-    return at if any(_is_names(split_row(lines[at].lstrip(_MARKS), mark), width) for mark in SEPARATORS) else None
+def _has_names(line: str, width: int) -> bool:
+    """True if the line can be the names of `width` columns. They may be separated in another way than the rows."""
+    return any(_is_names(split_row(line.lstrip(_MARKS), mark), width) for mark in SEPARATORS)
 
 
 def _is_names(cells: list[str], width: int) -> bool:

@@ -20,10 +20,7 @@ class ImportSpeedUnit(Message):
 
     code = "import-speed-unit"
     text = "{column} has no unit, and the positions do not show it, so the speed is left out"
-    todo = Remedy(
-        "add --units speed=km/h, mph or m/s",
-        "write it in brackets behind that name, as in Speed (km/h)",
-    )
+    todo = Remedy("add --units speed=km/h, mph or m/s", "write it in brackets behind that name, as in Speed (km/h)")
 
 
 def unit_by_positions(

@@ -129,13 +129,7 @@ def hills(plan: Plan) -> Conditions:
         else:
             _bends(plan, plan.uniform(12.0, 40.0), (9.0, 18.0), 0.4)
         if plan.likely(0.6):
-            plan.add(
-                "straight",
-                plan.uniform(2.0, 7.0),
-                plan.uniform(12.0, 20.0),
-                lean_deg=0.0,
-                slope_percent=before,
-            )
+            plan.add("straight", plan.uniform(2.0, 7.0), plan.uniform(12.0, 20.0), lean_deg=0.0, slope_percent=before)
     plan.finish(plan.uniform(11.0, 16.0), 3.0)
     return Conditions(CLASS_B * plan.uniform(0.6, 2.0), plan.uniform(0.05, 0.2))
 
