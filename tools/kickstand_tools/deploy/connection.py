@@ -190,7 +190,7 @@ def connected(port: Port) -> Iterator[tuple[ConnectedBoard, str]]:
 def _open_board(name: str) -> ConnectedBoard:
     kind = _EmulatedBoard if name.startswith(_EMULATED) else ConnectedBoard
     try:
-        return kind(name, timeout=ANSWER_S * (_SLOWER if kind is _EmulatedBoard else 1))
+        return kind(name, timeout=ANSWER_S * kind.slower)
     except (TransportError, ValueError):
         raise why_closed(name) from None
 
@@ -221,9 +221,8 @@ def why_closed(port: str) -> InputError:
         if error.errno in (errno.EACCES, errno.EPERM):
             return InputError(f"no permission for {port}: on Linux join the group dialout and log in again")
         if error.errno == errno.ENOENT or "FileNotFoundError" in text:
-            return InputError(
-                f"there is no port {port}", Remedy("plug the board in, or leave out --port to find it automatically")
-            )
+            remedy = Remedy("plug the board in, or leave out --port to find it automatically")
+            return InputError(f"there is no port {port}", remedy)
         if port.startswith("socket:") and "refused" in text:
             return InputError(f"nothing listens at {port}", Remedy("is kickstand emulate running?"))
         return InputError(f"{port} cannot be opened: {text}: check the name and the cable")
