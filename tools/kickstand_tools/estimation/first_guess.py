@@ -35,7 +35,6 @@ MAX_SPEED_FACTOR = 1.8  # largest factor between the log's speed and the speed f
 USUAL_MPS, USUAL_RADPS = 10.0, 0.14
 
 
-@dataclass(frozen=True)
 class RideShort(Message):
     """There is too little riding."""
 
@@ -47,7 +46,6 @@ class RideShort(Message):
     todo = Remedy("at least {least_s:.0f} s with bends are needed")
 
 
-@dataclass(frozen=True)
 class NoBends(Message):
     """The bike leans too little to show forward. lean_deg: rms of the lean."""
 
@@ -58,7 +56,6 @@ class NoBends(Message):
     todo = Remedy("a motorcycle's ride with bends to both sides is needed")
 
 
-@dataclass(frozen=True)
 class NotLeaning(Message):
     """The ride is a car's."""
 
@@ -69,7 +66,6 @@ class NotLeaning(Message):
     )
 
 
-@dataclass(frozen=True)
 class RideContradicts(Message):
     """No mounting explains the readings."""
 

@@ -64,7 +64,6 @@ class LeanTable(Table):
     notices: list[Message]
 
 
-@dataclass(frozen=True)
 class CarReplayed(Message):
     """The log is from a car. A car's display shows no lean."""
 
