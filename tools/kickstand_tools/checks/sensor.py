@@ -132,10 +132,8 @@ class SensorHealth:
         slope = np.diff(values, axis=0, append=values[-1:])
         turns = np.add.reduceat(slope * np.roll(slope, 1, axis=0) < 0.0, begins, dtype=float)
         noisy = turns >= NOISY * (ends - begins)[:, None]
-        if time_s[-1] - time_s[0] > DEAD_ALL_S:
-            constant = np.array([np.all(change[:, sensor] == 0.0) for sensor in _SENSORS])
-        else:
-            constant = np.zeros(2, dtype=bool)
+        long = time_s[-1] - time_s[0] > DEAD_ALL_S
+        constant = np.array([long and np.all(change[:, sensor] == 0.0) for sensor in _SENSORS], dtype=bool)
         before = 0  # begin of the previous stretch, because the first second of a dead axis is faulty too
         for begin, end, spreads, noise in zip(begins.tolist(), ends.tolist(), spread, noisy):
             if end - begin >= LEAST_SAMPLES:

@@ -266,16 +266,6 @@ def loop(
 
 # The function that judges each measurement, by the name of the function in check_guest.py that measures
 JUDGES: dict[str, Callable[..., Any]] = {
-    "board": board,
-    "button": button,
-    "sensor": sensor,
-    "self_test": self_test,
-    "noise": noise,
-    "clock": clock,
-    "fifo": fifo,
-    "i2c": i2c,
-    "display": display,
-    "flash": flash,
-    "speed": speed,
-    "loop": loop,
+    judge.__name__: judge
+    for judge in (board, button, sensor, self_test, noise, clock, fifo, i2c, display, flash, speed, loop)
 }

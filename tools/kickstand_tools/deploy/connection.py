@@ -185,7 +185,7 @@ def connected(port: Port) -> Iterator[tuple[ConnectedBoard, str]]:
 def _open_board(name: str) -> ConnectedBoard:
     kind = _EmulatedBoard if name.startswith(_EMULATED) else ConnectedBoard
     try:
-        return kind(name, timeout=ANSWER_S * kind.slower)
+        return kind(name, timeout=ANSWER_S * (_SLOWER if kind is _EmulatedBoard else 1))
     except (TransportError, ValueError):
         raise why_closed(name) from None
 

@@ -85,9 +85,8 @@ def standing(w: Windows) -> Bools:
 
 
 def _calm(w: Windows, over_s: float) -> Bools:
-    return ~w.gap & motionless(
-        w.rate, w.force, 2 * round(0.5 * over_s / WINDOW_S) + 1, STILL_RADPS, STILL_G, w.known_speed
-    )
+    count = 2 * round(0.5 * over_s / WINDOW_S) + 1
+    return ~w.gap & motionless(w.rate, w.force, count, STILL_RADPS, STILL_G, w.known_speed)
 
 
 def in_hand(w: Windows) -> tuple[Bools, Bools]:

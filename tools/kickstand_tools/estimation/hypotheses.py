@@ -57,9 +57,8 @@ class Hypotheses:
 
         index: indices of the hypotheses, shape (k). weight: their posterior weights, shape (k).
         """
-        return Hypotheses(
-            self.turning[index], self.rolling[index], self.pushed[index], self.minus_two_log_prior[index], weight
-        )
+        columns = self.turning, self.rolling, self.pushed, self.minus_two_log_prior
+        return Hypotheses(*(column[index] for column in columns), weight)
 
     def first(self) -> "Hypotheses":
         """Return only the first hypothesis, with weight 1."""
@@ -95,9 +94,8 @@ class Hypotheses:
         variance[:, ROLL] = self.rolling**2
         variance[:, BESIDE] = self.pushed**2 * 2.0 * BLOCK_S / PUSHED_S
         steps = np.repeat(variance[:, None, unknown], len(parameters) - 1, axis=1)
-        return RandomWalks(
-            np.concatenate((information, pull[..., None]), axis=2), steps, np.diff(parameters[:, unknown], axis=0)
-        )
+        equations = np.concatenate((information, pull[..., None]), axis=2)
+        return RandomWalks(equations, steps, np.diff(parameters[:, unknown], axis=0))
 
 
 def _all_hypotheses() -> Hypotheses:

@@ -328,9 +328,8 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
     threes = _find_triples(sheet)
     kinds = {kind: [three for three in threes if three.kind == kind] for kind in (*_KINDS, "")}
     unnamed = [*kinds["either"], *kinds[""]]
-    accel = _first_with_gravity(
-        [*kinds["accel"], *kinds["either"], *(kinds[""] if not kinds["accel"] else [])], seconds
-    )
+    possible = [*kinds["accel"], *kinds["either"], *([] if kinds["accel"] else kinds[""])]
+    accel = _first_with_gravity(possible, seconds)
     rates = next(iter(kinds["gyro"]), None) or next((three for three in unnamed if three is not accel), None)
     without = kinds["linear"] or kinds["accel"]
     if accel is None:
@@ -444,9 +443,8 @@ def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None
         return ColumnFinding([], by_fit, "in it the rates turn gravity as it turns")
     if "deg/s" not in candidates:
         usual = f"counts/{_usual_counts(accel):g}"
-        return ColumnFinding(
-            [], usual, "raw counts whose range nothing shows: the usual one with this accelerometer's", False
-        )
+        why = "raw counts whose range nothing shows: the usual one with this accelerometer's"
+        return ColumnFinding([], usual, why, False)
     return ColumnFinding([], *_by_size(rates, force), certain=False)
 
 

@@ -183,9 +183,8 @@ def unknown(files: list[RecordingFile], source: str, table: MappedTable | None =
             f"{source}: not a file of an app that is known{several}, and no time found in it: write the time of each "
             "row, such as millis(), or switch the time stamps of the serial monitor on"
         )
-    given = [
-        f"{key}={_column_as_typed(table, key)}" for key in (*REQUIRED, *OPTIONAL) if key in (*REQUIRED, *found.columns)
-    ]
+    keys = [key for key in (*REQUIRED, *OPTIONAL) if key in (*REQUIRED, *found.columns)]
+    given = [f"{key}={_column_as_typed(table, key)}" for key in keys]
     units = ",".join(f"{key}={name}" for key, name in found.units.items())
     where = source if len(files) == 1 or table.joined else f"{source}/{table.name}"
     ask = "Replace each ?" if table.missing else "Correct what is wrong"

@@ -213,10 +213,9 @@ def weight(plan: Plan) -> Conditions:
     conditions = street(plan)
     beside = plan.side() * plan.uniform(0.01, 0.02)
     for leg in plan.legs:
-        turning = leg.lean_deg is not None and abs(leg.lean_deg) > 12.0
-        leg.hang_m = beside + (
-            plan.uniform(0.02, 0.05) * (1.0 if (leg.lean_deg or 0.0) > 0 else -1.0) if turning else 0.0
-        )
+        leg.hang_m = beside
+        if leg.lean_deg is not None and abs(leg.lean_deg) > 12.0:
+            leg.hang_m += plan.uniform(0.02, 0.05) * (1.0 if leg.lean_deg > 0 else -1.0)
     conditions.sway_m = 0.004
     return conditions
 
