@@ -153,7 +153,7 @@ def _rows(lines: Sequence[str], separator: str, comma: bool) -> tuple[int, int, 
     numbers = int(np.median([counts[k] for k in rows]))
     first = rows[0]
     names = next((k for k in range(first - 1, -1, -1) if lines[k].strip()), None)
-    if names is not None and not _has_names(lines[names].lstrip(_MARKS), width):
+    if names is not None and not _has_names(lines[names], width):
         names = None
     if names is not None and _all_units(split_row(lines[names].lstrip(_MARKS), separator)):
         above = names - 1
@@ -167,11 +167,6 @@ def _rows(lines: Sequence[str], separator: str, comma: bool) -> tuple[int, int, 
 def _has_names(line: str, width: int) -> bool:
     """True if the line can be the names of `width` columns. They may be separated in another way than the rows."""
     return any(_is_names(split_row(line.lstrip(_MARKS), mark), width) for mark in SEPARATORS)
-
-
-def _has_names(line: str, width: int) -> bool:
-    """True if the line can be the names of `width` columns. They may be separated in another way than the rows."""
-    return any(_is_names(split_row(line, mark), width) for mark in SEPARATORS)
 
 
 def _is_names(cells: list[str], width: int) -> bool:
