@@ -57,8 +57,9 @@ class Hypotheses:
 
         index: indices of the hypotheses, shape (k). weight: their posterior weights, shape (k).
         """
-        columns = self.turning, self.rolling, self.pushed, self.minus_two_log_prior
-        return Hypotheses(*(column[index] for column in columns), weight)
+        return Hypotheses(
+            self.turning[index], self.rolling[index], self.pushed[index], self.minus_two_log_prior[index], weight
+        )
 
     def first(self) -> "Hypotheses":
         """Return only the first hypothesis, with weight 1."""
