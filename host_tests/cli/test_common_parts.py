@@ -5,7 +5,6 @@ import io
 import os
 import pickle
 import sys
-from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
@@ -144,7 +143,6 @@ def test_only_new_and_empty_directories_are_removed(tmp_path):
             make(tmp_path / "c" / "kept" / "x")
 
 
-@dataclass(frozen=True)
 class Late(Message):
     late_s: float
     name: str
@@ -154,7 +152,6 @@ class Late(Message):
     todo = Remedy("run it with --shift {late_s:.0f}", "shift it by {late_s:.0f} s")
 
 
-@dataclass(frozen=True)
 class Turned(WrongAxes):
     code = "turned"
     text = "the axes are turned"

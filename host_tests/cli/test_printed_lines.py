@@ -49,7 +49,6 @@ READING = LiveReading(
 )  # fmt: skip
 
 
-@dataclasses.dataclass(frozen=True)
 class MirroredAxes(WrongAxes):
     text = "the axes are mirrored"
 

@@ -131,10 +131,8 @@ def page(seen: Overview) -> "Group":
 
 def words(seen: Overview, on_page: bool = False) -> Words:
     """Describe the ride in words. on_page: remedies name the buttons of the page, not commands."""
-    alignment = _alignment(seen, on_page)
-    return Words(
-        Path(seen.ride.name).name, _too_little(seen), _ride(seen), alignment, _stops(seen.stops), _remark(seen)
-    )
+    name, alignment = Path(seen.ride.name).name, _alignment(seen, on_page)
+    return Words(name, _too_little(seen), _ride(seen), alignment, _stops(seen.stops), _remark(seen))
 
 
 def _too_little(seen: Overview) -> str:
@@ -241,12 +239,11 @@ def _cost_sentences(cost: LeanCost, speed: bool, on_page: bool) -> str:
         "Pitch": (cost.pitch_deg, _LESS_PITCH),
         "Yaw": (cost.yaw_deg, _LESS_YAW_BY_SPEED if speed else _LESS_YAW),
     }
-    said = [
+    return "".join(
         f" {name} usually costs about {value:.1f}° of lean; {remedy.words(on_page)}."
         for name, (value, remedy) in costs.items()
         if value is not None and value >= COSTS_DEG
-    ]
-    return "".join(said)
+    )
 
 
 def _stops(stops: list[Stop]) -> list[tuple[str, ...]]:

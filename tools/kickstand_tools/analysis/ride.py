@@ -23,7 +23,6 @@ from .channels import Channels, channels, joined
 _MAX_SIGMA_DEG = 3.0  # largest standard deviation of a smoothed lean that is trusted
 
 
-@dataclass(frozen=True)
 class SmoothSlow(Message):
     """There are too few samples per second to smooth the lean."""
 
@@ -34,7 +33,6 @@ class SmoothSlow(Message):
     )
 
 
-@dataclass(frozen=True)
 class AbsurdReadings(Message):
     """The log has implausible readings.
 

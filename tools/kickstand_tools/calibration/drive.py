@@ -125,9 +125,8 @@ def fit_drive(
     (True, True, (3, 3))
     """
     refuse_same_file(logs)
-    found = fit_logs(
-        [usable(read_log(source), len(logs) > 1) for source in logs], calibration, vehicle, method, progress, on_event
-    )
+    given = [usable(read_log(source), len(logs) > 1) for source in logs]
+    found = fit_logs(given, calibration, vehicle, method, progress, on_event)
     if found.refusal:
         raise found.refusal
     return found

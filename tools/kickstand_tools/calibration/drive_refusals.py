@@ -3,12 +3,10 @@
 Each code of kickstand.drive_alignment has a class. of_firmware() converts a refusal to its message.
 """
 
-from dataclasses import dataclass
-
 from kickstand.errors import Refusal
 
 from ..checks.units import SpeedStuck, SpeedUnit
-from ..common.messages import Message, Remedy, by_code
+from ..common.messages import Message, Remedy, by_code, defined_in
 
 _MOVED = {
     "between-stops": "two stops differ by over {angle_deg:.0f} degrees; those of a motorcycle on its kickstand do: is "
@@ -22,7 +20,6 @@ _MOVED = {
 }
 
 
-@dataclass(frozen=True)
 class MountMoved(Message):
     """The mount has moved.
 
@@ -40,7 +37,6 @@ class MountMoved(Message):
         return "the mount has moved: " + _MOVED[self.how].format(angle_deg=self.angle_deg)
 
 
-@dataclass(frozen=True)
 class SpeedNegative(Message):
     """The speed is below 0."""
 
@@ -50,7 +46,6 @@ class SpeedNegative(Message):
     text = "the speed is {speed_mps:.1f} m/s: it must not be negative"
 
 
-@dataclass(frozen=True)
 class SpeedLate(Message):
     """The speed is delayed too much relative to the force."""
 
@@ -61,7 +56,6 @@ class SpeedLate(Message):
     todo = Remedy("under 2 s are needed")
 
 
-@dataclass(frozen=True)
 class NoSpeed(Message):
     """There is no speed."""
 
@@ -70,7 +64,6 @@ class NoSpeed(Message):
     todo = Remedy("it needs a speed, from a GPS or a wheel")
 
 
-@dataclass(frozen=True)
 class NotDriven(Message):
     """The vehicle did not move. needed: number of braking events that are needed."""
 
@@ -81,7 +74,6 @@ class NotDriven(Message):
     todo = Remedy("drive, and brake in a straight line {needed} times")
 
 
-@dataclass(frozen=True)
 class NotStopped(Message):
     """The vehicle did not stop."""
 
@@ -92,7 +84,6 @@ class NotStopped(Message):
     todo = Remedy("a stop of {stop_s:.0f} s is needed for the vertical")
 
 
-@dataclass(frozen=True)
 class FewEvents(Message):
     """There are too few braking events.
 
@@ -112,7 +103,6 @@ class FewEvents(Message):
     )
 
 
-@dataclass(frozen=True)
 class PartsDiffer(Message):
     """Two parts of the drive give two directions of forward."""
 
@@ -123,7 +113,6 @@ class PartsDiffer(Message):
     todo = Remedy("did the mount move? Else drive on")
 
 
-@dataclass(frozen=True)
 class Uncertain(Message):
     """The standard error of forward is too large."""
 
@@ -135,19 +124,7 @@ class Uncertain(Message):
     todo = Remedy("drive on")
 
 
-CODES = by_code(
-    MountMoved,
-    SpeedStuck,
-    SpeedUnit,
-    SpeedNegative,
-    SpeedLate,
-    NoSpeed,
-    NotDriven,
-    NotStopped,
-    FewEvents,
-    PartsDiffer,
-    Uncertain,
-)
+CODES = by_code(*defined_in(__name__), SpeedStuck, SpeedUnit)
 
 
 def of_firmware(refusal: Refusal) -> Message:

@@ -301,12 +301,11 @@ def _check_ranges(name: str, calibration: CalibrationFile) -> None:
             wrong = f"gyro bias of {axis} is {bias:g} deg/s, a sensor's is under {MAX_BIAS_DPS:g}"
         if wrong:
             raise InputError(f"{name}: {wrong}: calibrate again")
-    for entry, most in (("accel_matrix", MAX_MATRIX_ERROR), ("gyro_matrix", MAX_MATRIX_ERROR)):
+    for entry in ("accel_matrix", "gyro_matrix"):
         worst = float(np.max(np.abs(getattr(calibration, entry) - np.eye(3))))
-        if not worst <= most:
-            raise InputError(
-                f"{name}: {entry} is {worst:g} from the identity, a sensor's is within {most:g}: calibrate again"
-            )
+        if not worst <= MAX_MATRIX_ERROR:
+            what = f"{entry} is {worst:g} from the identity, a sensor's is within {MAX_MATRIX_ERROR:g}"
+            raise InputError(f"{name}: {what}: calibrate again")
     if not (np.all(calibration.gyro_sigma >= 0.0) and np.all(calibration.gyro_sigma <= MAX_GYRO_SIGMA)):
         raise InputError(f"{name}: gyro_sigma must be 0 to {MAX_GYRO_SIGMA:g}: calibrate again")
     if not is_rotation(calibration.vehicle_from_sensor.ravel().tolist(), ROTATION_TOLERANCE):

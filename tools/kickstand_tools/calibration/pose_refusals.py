@@ -4,14 +4,11 @@ of_firmware() converts a refusal to its message. In kickstand.calibration, still
 six_position and sensor_fit refuse six poses, and two_position refuses two poses.
 """
 
-from dataclasses import dataclass
-
 from kickstand.errors import Refusal
 
-from ..common.messages import Message, Remedy, by_code
+from ..common.messages import Message, Remedy, by_code, defined_in
 
 
-@dataclass(frozen=True)
 class Moved(Message):
     """The sensor moved in a pose."""
 
@@ -19,7 +16,6 @@ class Moved(Message):
     text = "moved or knocked"
 
 
-@dataclass(frozen=True)
 class Vibration(Message):
     """The readings are noisy."""
 
@@ -27,7 +23,6 @@ class Vibration(Message):
     text = "not still: vibration"
 
 
-@dataclass(frozen=True)
 class Tilting(Message):
     """The mean of the readings drifts."""
 
@@ -35,7 +30,6 @@ class Tilting(Message):
     text = "not still: slowly tilting"
 
 
-@dataclass(frozen=True)
 class Saturated(Message):
     """The accelerometer is at the end of its range."""
 
@@ -43,7 +37,6 @@ class Saturated(Message):
     text = "saturated: the accelerometer is at the end of its range"
 
 
-@dataclass(frozen=True)
 class TooFew(Message):
     """The pose is too short."""
 
@@ -54,7 +47,6 @@ class TooFew(Message):
     text = "too short: {samples} samples, at least {least} needed"
 
 
-@dataclass(frozen=True)
 class FrozenPose(Message):
     """Every reading of the pose is the same."""
 
@@ -63,7 +55,6 @@ class FrozenPose(Message):
     todo = Remedy("check the sensor and its wires")
 
 
-@dataclass(frozen=True)
 class StuckAccel(Message):
     """One axis of the accelerometer has no noise."""
 
@@ -74,7 +65,6 @@ class StuckAccel(Message):
     todo = Remedy("check the sensor")
 
 
-@dataclass(frozen=True)
 class DeadGyro(Message):
     """One axis of the gyro has no noise."""
 
@@ -85,7 +75,6 @@ class DeadGyro(Message):
     todo = Remedy("check the sensor")
 
 
-@dataclass(frozen=True)
 class NoisyGyro(Message):
     """One axis of the gyro is too noisy."""
 
@@ -96,7 +85,6 @@ class NoisyGyro(Message):
     todo = Remedy("engine off, or check the sensor")
 
 
-@dataclass(frozen=True)
 class GyroOffset(Message):
     """The rates at rest are too large."""
 
@@ -106,7 +94,6 @@ class GyroOffset(Message):
     text = "turning, or a gyro offset of over {most_dps:.0f} deg/s"
 
 
-@dataclass(frozen=True)
 class GyroScale(Message):
     """The gyro reads wrong rates about an axis."""
 
@@ -118,7 +105,6 @@ class GyroScale(Message):
     todo = Remedy("check the sensor, and the unit of the rates")
 
 
-@dataclass(frozen=True)
 class GyroReversed(Message):
     """The gyro reads rates of the wrong sign about an axis."""
 
@@ -129,7 +115,6 @@ class GyroReversed(Message):
     todo = Remedy("check the sensor, and the axes of the log")
 
 
-@dataclass(frozen=True)
 class GyroMisfit(Message):
     """The gyro's rates do not add up to the turn between two poses."""
 
@@ -140,7 +125,6 @@ class GyroMisfit(Message):
     todo = Remedy("repeat the six positions; if it happens again, an axis of the gyro is late, clipped or dead")
 
 
-@dataclass(frozen=True)
 class UnprovedGyro(Message):
     """The sensor was not turned about an axis."""
 
@@ -151,7 +135,6 @@ class UnprovedGyro(Message):
     todo = Remedy("turn the sensor about it too")
 
 
-@dataclass(frozen=True)
 class GyroTilt(Message):
     """The gyro does not agree with the tilt between two poses."""
 
@@ -163,7 +146,6 @@ class GyroTilt(Message):
     todo = Remedy("repeat the poses, or check the sensor")
 
 
-@dataclass(frozen=True)
 class DeadAxis(Message):
     """An axis of the accelerometer hardly changes between its two sides."""
 
@@ -174,7 +156,6 @@ class DeadAxis(Message):
     text = "axis {axis} barely changes when turned over: {change_g:.2f} g"
 
 
-@dataclass(frozen=True)
 class Unclear(Message):
     """The equations of the six poses have no solution."""
 
@@ -183,7 +164,6 @@ class Unclear(Message):
     todo = Remedy("repeat them, each side once")
 
 
-@dataclass(frozen=True)
 class OddAxis(Message):
     """The offset or the slope is impossible for a sensor."""
 
@@ -196,7 +176,6 @@ class OddAxis(Message):
     todo = Remedy("repeat the six poses")
 
 
-@dataclass(frozen=True)
 class SideTilted(Message):
     """A side did not point up."""
 
@@ -208,7 +187,6 @@ class SideTilted(Message):
     text = "side {side} was {tilt_deg:.0f} degrees off: within {most_deg:.0f} is needed"
 
 
-@dataclass(frozen=True)
 class FreePoseOff(Message):
     """The seventh (free) pose contradicts the calibration."""
 
@@ -219,7 +197,6 @@ class FreePoseOff(Message):
     todo = Remedy("repeat the six poses, held still")
 
 
-@dataclass(frozen=True)
 class NotOneG(Message):
     """One of the two poses does not read 1 g. pose: "kickstand" or "upright"."""
 
@@ -231,7 +208,6 @@ class NotOneG(Message):
     todo = Remedy("calibrate six positions first, or check the sensor")
 
 
-@dataclass(frozen=True)
 class SamePose(Message):
     """The bike did not move between the poses."""
 
@@ -242,7 +218,6 @@ class SamePose(Message):
     todo = Remedy("take one on the kickstand and one upright")
 
 
-@dataclass(frozen=True)
 class TiltSmall(Message):
     """There is too little lean between the poses."""
 
@@ -254,7 +229,6 @@ class TiltSmall(Message):
     todo = Remedy("at least {least_deg:.0f} are needed, lean the bike further")
 
 
-@dataclass(frozen=True)
 class TiltLarge(Message):
     """There is too much lean between the poses."""
 
@@ -266,32 +240,7 @@ class TiltLarge(Message):
     todo = Remedy("no kickstand leans over {most_deg:.0f}, repeat both poses")
 
 
-CODES = by_code(
-    Moved,
-    Vibration,
-    Tilting,
-    Saturated,
-    TooFew,
-    FrozenPose,
-    StuckAccel,
-    DeadGyro,
-    NoisyGyro,
-    GyroOffset,
-    GyroScale,
-    GyroReversed,
-    GyroMisfit,
-    UnprovedGyro,
-    GyroTilt,
-    DeadAxis,
-    Unclear,
-    OddAxis,
-    SideTilted,
-    FreePoseOff,
-    NotOneG,
-    SamePose,
-    TiltSmall,
-    TiltLarge,
-)
+CODES = by_code(*defined_in(__name__))
 
 
 def of_firmware(refusal: Refusal) -> Message:

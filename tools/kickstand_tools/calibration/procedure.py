@@ -3,7 +3,7 @@
 It finds the still poses in the log, and calibrates the gyro by the turns between the poses.
 """
 
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from kickstand.calibration import six_position
@@ -73,11 +73,8 @@ def fit_procedure(source: Source) -> SixPositions:
         side = isinstance(reason, SideTilted)
         raise RefusedInput(reason, poses[sides[SIDES.index(reason.side)]].name if side else log.name) from error
     bias = np.median([pose.gyro_dps for pose in poses], axis=0)
-    matrices = fit.accel_matrix, fit.gyro_matrix, np.array(fit.gyro_sigma)
-    calibration = replace(
-        CalibrationFile(np.array(fit.offset), np.array(fit.slope), bias, six_done=True),
-        **dict(zip(("accel_matrix", "gyro_matrix", "gyro_sigma"), matrices, strict=True)),
-    )
+    matrices: dict[str, Any] = {name: getattr(fit, name) for name in ("accel_matrix", "gyro_matrix", "gyro_sigma")}
+    calibration = CalibrationFile(np.array(fit.offset), np.array(fit.slope), bias, six_done=True, **matrices)
     return SixPositions(
         calibration,
         [poses[k] for k in sides],
@@ -163,9 +160,8 @@ def _turns(log: Log, stretches: list[tuple[int, int]], poses: list[Pose]) -> lis
     steps_us = np.diff(times_us, prepend=times_us[0])
     rates = np.round(log.gyro_dps * _MICRO).astype(int).tolist()
     most = float(np.max(np.abs(log.gyro_dps)))
-    limit = next(
-        (_QUICK * end for end in _RANGES_DPS if _AT_RANGE[0] * end <= most <= _AT_RANGE[1] * end), 2 * most + 1
-    )
+    low, high = _AT_RANGE
+    limit = next((_QUICK * end for end in _RANGES_DPS if low * end <= most <= high * end), 2 * most + 1)
     turn = Turn(_MICRO, int(np.median(steps_us[1:])), int(limit * _MICRO))
     found: list[tuple[list[float], float] | None] = []
     for (_, begin), (end, _), before, after in zip(stretches, stretches[1:], poses, poses[1:]):

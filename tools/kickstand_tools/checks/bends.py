@@ -11,8 +11,6 @@ rates give the rate about left, the yaw rate and the lean. This shows two mistak
 Logs of a parked vehicle are never judged. Logs of a car are never judged either, because a car does not lean.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..common.messages import AT_REST, Message, Remedy, WrongAxes
@@ -34,7 +32,6 @@ CALMEST, LEAST, CALM_G = 0.2, 3, 0.02
 AGREE, FEW, KNOWN_DPS = 0.8, 5, 3.0
 
 
-@dataclass(frozen=True)
 class RatesInRadians(WrongAxes):
     """The rates seem to be in rad/s.
 
@@ -48,7 +45,6 @@ class RatesInRadians(WrongAxes):
     todo = Remedy("are they in rad/s? deg/s are needed")
 
 
-@dataclass(frozen=True)
 class LeftHanded(WrongAxes):
     """The rates have the opposite sign, or the axes are left-handed."""
 

@@ -15,7 +15,6 @@ own axes.
 """
 
 import itertools
-from dataclasses import dataclass
 
 import numpy as np
 from kickstand.units import AXES
@@ -57,7 +56,6 @@ def _exchanges() -> Array:
 EXCHANGES = _exchanges()  # true rate = exchange @ reading of the gyro
 
 
-@dataclass(frozen=True)
 class RatesMisfit(WrongAxes):
     """The gyro's axes are not those of the accelerometer.
 

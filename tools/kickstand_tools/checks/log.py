@@ -1,7 +1,5 @@
 """Runs all checks on one table of cells, and collects the remarks."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..calibration.file import CalibrationFile
@@ -20,7 +18,6 @@ _LIMITS = np.array(3 * [MOST_G] + [np.inf] + 3 * [MOST_DPS])  # limits of readin
 _AGAIN_S = 20.0  # the unit of the speed is checked again each time this much of the log was read
 
 
-@dataclass(frozen=True)
 class Mirrored(WrongAxes):
     """The track shows that left and right are exchanged."""
 

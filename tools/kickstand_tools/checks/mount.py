@@ -13,8 +13,6 @@ exchanged, and so are left and right. The force alone does not show this, becaus
 In simulated and recorded rides with a correct calibration, up is found within 8 degrees and forward within 5.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from kickstand.units import AXES, STANDARD_GRAVITY
 
@@ -57,7 +55,6 @@ AGAIN_CAR = Remedy(
 )
 
 
-@dataclass(frozen=True)
 class UpOff(WrongMount):
     """Up differs between the calibration and the ride."""
 
@@ -73,7 +70,6 @@ class UpOff(WrongMount):
         return again.followed(f". Or {OPPOSITE_SIGN}") if self.angle_deg > UPSIDE_DOWN_DEG else again
 
 
-@dataclass(frozen=True)
 class ForwardOff(WrongMount):
     """Forward differs between the calibration and the ride.
 
@@ -102,7 +98,6 @@ class ForwardOff(WrongMount):
         return AGAIN_CAR if self.car else AGAIN
 
 
-@dataclass(frozen=True)
 class ForwardExchanged(WrongMount):
     """Forward and backward are exchanged.
 
@@ -135,7 +130,6 @@ class ForwardExchanged(WrongMount):
         return found.followed(f" Or, if no board wrote this log, {OPPOSITE_SIGN}")
 
 
-@dataclass(frozen=True)
 class UpsideDown(WrongMount):
     """The sensor is upside down, or its accelerations have the opposite sign.
 
@@ -152,7 +146,6 @@ class UpsideDown(WrongMount):
     )
 
 
-@dataclass(frozen=True)
 class AnotherMount(WrongMount):
     """The earlier calibration belongs to another mount. The new calibration uses only its offset and slope."""
 

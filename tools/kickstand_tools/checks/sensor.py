@@ -8,8 +8,6 @@
   remark.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from kickstand.units import AXES
 
@@ -39,7 +37,6 @@ _MOTION = [0, 1, 2, 4, 5, 6]  # columns of forces and rates, in the chip's order
 _LEAST = np.repeat([OTHER_G, OTHER_DPS], 3)
 
 
-@dataclass(frozen=True)
 class AxisDead(Message):
     """An axis repeats its reading while other axes of the same sensor change.
 
@@ -60,7 +57,6 @@ class AxisDead(Message):
     todo = Remedy("check the sensor and its solder joints, or replace it")
 
 
-@dataclass(frozen=True)
 class GyroSaturated(Message):
     """The gyro was at the end of its range.
 
@@ -82,7 +78,6 @@ class GyroSaturated(Message):
     todo = Remedy("fix the sensor firmly, or set a larger GYRO_RANGE_DPS")
 
 
-@dataclass(frozen=True)
 class AccelClipped(Message):
     """Vibration clipped the accelerometer.
 
@@ -137,10 +132,8 @@ class SensorHealth:
         slope = np.diff(values, axis=0, append=values[-1:])
         turns = np.add.reduceat(slope * np.roll(slope, 1, axis=0) < 0.0, begins, dtype=float)
         noisy = turns >= NOISY * (ends - begins)[:, None]
-        if time_s[-1] - time_s[0] > DEAD_ALL_S:
-            constant = np.array([np.all(change[:, sensor] == 0.0) for sensor in _SENSORS])
-        else:
-            constant = np.zeros(2, dtype=bool)
+        long = time_s[-1] - time_s[0] > DEAD_ALL_S
+        constant = np.array([long and np.all(change[:, sensor] == 0.0) for sensor in _SENSORS], dtype=bool)
         before = 0  # begin of the previous stretch, because the first second of a dead axis is faulty too
         for begin, end, spreads, noise in zip(begins.tolist(), ends.tolist(), spread, noisy):
             if end - begin >= LEAST_SAMPLES:

@@ -6,8 +6,6 @@ does not matter: forward is the direction in which force and change of speed cor
 rider add to the force only. These effects can make the change of speed seem too small, but never too large.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from kickstand.drive_alignment.speed_check import speed_unit_problem
 from kickstand.units import STANDARD_GRAVITY
@@ -30,7 +28,6 @@ LAGS_S = np.arange(0.0, 2.1, 0.25)  # possible delays of a satellite receiver's 
 SHORTEST_S, LONGEST_S = 0.5, 2.2  # least and largest time between two speeds
 
 
-@dataclass(frozen=True)
 class SpeedUnit(Message):
     """The speed is not in m/s. factor: the changes of the speed divided by the changes that the force explains."""
 
@@ -48,7 +45,6 @@ class SpeedUnit(Message):
         return Remedy("is it in m/s, and the right vehicle's?")
 
 
-@dataclass(frozen=True)
 class SpeedStuck(Message):
     """The speed in the log is constant, but the vehicle speeds up and brakes."""
 

@@ -2,7 +2,7 @@
 
 import contextlib
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -11,7 +11,7 @@ from ..common import firmware_path
 from ..common.errors import InputError
 from ..common.progress import Bar
 from ..deploy.check import check, verdict
-from ..deploy.connection import Progress, status
+from ..deploy.connection import status
 from ..deploy.flash import flash
 from ..rides.pull import PulledRide, pull
 from ..rides.record import live_line, record
@@ -27,8 +27,8 @@ _NAMED_ONE_BY_ONE = 5
 @click.option("--yes", is_flag=True, help="Rename files of another project on the board without asking.")
 def flash_command(port: str | None, config: bool, yes: bool) -> None:
     """Copy the firmware to a board that runs MicroPython, check it, and start it."""
-    with _bar() as progress:
-        result = flash(port, config, progress, agree=None if yes else _agree)
+    with Bar("") as bar:
+        result = flash(port, config, bar.reach_in, agree=None if yes else _agree)
     echo(f"{result.board} on {result.port}")
     for line in result.others:
         echo(f"kept: {line}")
@@ -105,8 +105,8 @@ def pull_command(port: str | None, out: Path, delete: bool) -> None:
         elif delete:
             warning(f"ride {ride.number}: not deleted from the board, because it was not fetched completely")
 
-    with _bar() as progress:
-        result = pull(port, out, delete, progress, say)
+    with Bar("") as bar:
+        result = pull(port, out, delete, bar.reach_in, say)
     if not result.rides:
         echo(f"no rides on the board at {result.port}: start one with Record ride in its menu")
 
@@ -144,15 +144,3 @@ def _live_text(reading: LiveReading) -> str:
     bar = "#" * min(20, round(abs(lean) / 3))
     picture = f"{bar if lean < 0 else '':>20}|{bar if lean > 0 else '':<20}"
     return f"{picture} lean {lean:+5.1f} deg  forward {forward_g:+.2f} g  {how_long}"
-
-
-@contextlib.contextmanager
-def _bar() -> Iterator[Progress]:
-    """A progress bar whose text changes."""
-    with Bar("") as bar:
-
-        def show(what: str, done: int, total: int) -> None:
-            bar.describe(what)
-            bar.reach(done, total)
-
-        yield show

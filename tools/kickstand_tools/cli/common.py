@@ -75,16 +75,13 @@ def from_to(start: str, end: str) -> Command:
     The command's function gets their values as from_s and to_s.
     """
 
-    def add(command: Command) -> Command:
-        first = click.option("--from", "from_s", type=TIME, metavar="TIME", help=start)
-        return first(click.option("--to", "to_s", type=TIME, metavar="TIME", help=end)(command))
-
-    return add
+    first = click.option("--from", "from_s", type=TIME, metavar="TIME", help=start)
+    last = click.option("--to", "to_s", type=TIME, metavar="TIME", help=end)
+    return lambda command: first(last(command))
 
 
 STRETCH = from_to(
-    "Where to begin: seconds from the beginning, or 1:30.",
-    "Where to end. A negative time counts from the end.",
+    "Where to begin: seconds from the beginning, or 1:30.", "Where to end. A negative time counts from the end."
 )
 
 
@@ -112,11 +109,9 @@ RIGHT_HANDED = help_adds(
 
 def live(command: Command) -> Command:
     """Add the option --live to a command: it uses the lean that the display showed instead of the smoothed lean."""
-    smoothed = (
-        "The lean is smoothed: computed from the whole ride, and more exact than the lean that the display showed."
-    )
+    words = "The lean is smoothed: computed from the whole ride, and more exact than the lean that the display showed."
     option = click.option("--live", is_flag=True, help="Use the lean that the display showed, not the smoothed lean.")
-    return option(help_adds(smoothed)(command))
+    return option(help_adds(words)(command))
 
 
 def known_to(found: "RideFit") -> str:

@@ -24,18 +24,11 @@ def seconds_option(least: float, words: str) -> Command:
 
 def pose_options(pitch_change_deg: float | None, words: str) -> Command:
     """Return a decorator that adds the options for the errors of the two poses. words: help text of --pitch-change."""
-
-    def add(command: Command) -> Command:
-        upright, pitch = click.FloatRange(-30.0, 30.0), click.FloatRange(-10.0, 10.0)
-        return click.option(
-            "--upright-error",
-            "upright_error_deg",
-            type=upright,
-            default=0.0,
-            help="Error of the upright pose, degrees.",
-        )(click.option("--pitch-change", "pitch_change_deg", type=pitch, default=pitch_change_deg, help=words)(command))
-
-    return add
+    error, change = click.FloatRange(-30.0, 30.0), click.FloatRange(-10.0, 10.0)
+    about = "Error of the upright pose, degrees."
+    upright = click.option("--upright-error", "upright_error_deg", type=error, default=0.0, help=about)
+    pitch = click.option("--pitch-change", "pitch_change_deg", type=change, default=pitch_change_deg, help=words)
+    return lambda command: upright(pitch(command))
 
 
 @click.command()

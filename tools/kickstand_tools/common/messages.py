@@ -2,7 +2,6 @@
 
 Define a class in the module of the check that returns it:
 
-    @dataclass(frozen=True)
     class SpeedLate(Message):
         late_s: float
 
@@ -10,13 +9,14 @@ Define a class in the module of the check that returns it:
         text = "the speed is {late_s:.1f} s late"
         todo = Remedy("under 2 s are needed")
 
-Override sentence() or remedy() if a template is not enough.
+Each subclass of Message is a frozen dataclass, so it needs no decorator. Override sentence() or remedy() if a template
+is not enough.
 """
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from math import isfinite
-from typing import Any, ClassVar
+from typing import Any, ClassVar, dataclass_transform
 
 AT_REST = "at rest up reads +1 g"
 OPPOSITE_SIGN = f"do all accelerations have the opposite sign? {AT_REST.capitalize()}"
@@ -49,6 +49,7 @@ class Remedy:
 NOTHING_TO_DO = Remedy()
 
 
+@dataclass_transform(frozen_default=True)
 @dataclass(frozen=True)
 class Message:
     """A notice, or the reason for a refusal.
@@ -61,6 +62,9 @@ class Message:
     code: ClassVar[str] = ""
     text: ClassVar[str] = ""
     todo: ClassVar[Remedy] = NOTHING_TO_DO
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True)(cls)
 
     def sentence(self) -> str:
         """Return one line that says what happened, without a full stop."""
@@ -84,7 +88,6 @@ class Message:
         return tuple(getattr(self, field.name) for field in fields(self))
 
 
-@dataclass(frozen=True)
 class Plain(Message):
     """A message without a code of its own. Its text is written where it is raised."""
 
@@ -100,12 +103,10 @@ class Plain(Message):
         return self.what_to_do
 
 
-@dataclass(frozen=True)
 class WrongAxes(Message):
     """The log's axes, their signs or the unit of the rates are wrong. The log must be corrected before it is used."""
 
 
-@dataclass(frozen=True)
 class WrongMount(Message):
     """The calibration belongs to another mount.
 
@@ -130,6 +131,11 @@ def sentence(message: Message, page: bool = False) -> str:
 def by_code(*classes: type[Message]) -> dict[str, type[Message]]:
     """Return a dictionary from each code to its class."""
     return {one.code: one for one in classes}
+
+
+def defined_in(module: str) -> list[type[Message]]:
+    """Return the messages that a module defines. module: its __name__."""
+    return [one for one in Message.__subclasses__() if one.__module__ == module]
 
 
 def is_explained(messages: Iterable[Message]) -> bool:

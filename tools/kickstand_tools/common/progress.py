@@ -65,6 +65,11 @@ class Bar:
         """Change the text in front of the bar."""
         self._progress.update(self._task, description=what)
 
+    def reach_in(self, what: str, done: int, total: int) -> None:
+        """Set the text, the work done and the total. total: 0 if unknown."""
+        self.describe(what)
+        self.reach(done, total)
+
     def __exit__(self, *_: object) -> None:
         if self._shown:
             self._progress.stop()

@@ -21,5 +21,4 @@ def command(script: str, *arguments: str) -> list[str]:
 
 def environment() -> dict[str, str]:
     """Return the environment for command(). It puts firmware and tools on MicroPython's path."""
-    path = f"{firmware_path.search_path()}:.frozen"
-    return os.environ | {"MICROPYPATH": path}
+    return os.environ | {"MICROPYPATH": f"{firmware_path.search_path()}:.frozen"}

@@ -56,11 +56,9 @@ def _print(device: DeviceProcess, score: Score, console: bool) -> None:
             print(device.console.pop(0), flush=True)
         for state in ticks:
             score.add(state)
-            live_page = state["lcd"][0][:4] == said[0][:4]
-            if state["lcd"] == said or (live_page and state["t_s"] - said_s < FRAME_S):
-                continue
+            same_page = state["lcd"][0][:4] == said[0][:4]
             between = state["lcd"][0].startswith("?")  # the new picture of an OLED may be incomplete
-            if between and state["t_s"] - said_s < FRAME_S:
+            if state["lcd"] == said or ((same_page or between) and state["t_s"] - said_s < FRAME_S):
                 continue
             said, said_s = state["lcd"], state["t_s"]
             print(f"{said_s:6.2f} s  {state['phase']}, true lean {lean_text(state['lean_deg'])}")

@@ -7,15 +7,7 @@ from math import degrees, pi, radians, sin
 
 from kickstand.units import STANDARD_GRAVITY
 
-from ..simulation.scripted.script import (
-    KICKSTAND_DEG,
-    RIDING_MPS,
-    RIDING_SWAY_DEG,
-    STANDING_SWAY_DEG,
-    body_motion,
-    shaken,
-    yaw_rate_in_balance,
-)
+from ..simulation.scripted import script
 
 CRUISE_MPS = 15.0
 LEAN_STEP_DEG = 5.0
@@ -41,7 +33,7 @@ class HandBike:
         self._pose = "kickstand"  # "kickstand", "upright" or "riding"
         self._lean_wish = 0.0
         self._cruise = CRUISE_MPS
-        self._lean, self._lean_rate = radians(KICKSTAND_DEG), 0.0
+        self._lean, self._lean_rate = radians(script.KICKSTAND_DEG), 0.0
         self._speed, self._acceleration, self._distance = 0.0, 0.0, 0.0
         self._sway = 0.0  # amplitude, rad
 
@@ -88,14 +80,14 @@ class HandBike:
             self._distance += self._speed * step
             self._speed += self._acceleration * step
             target = 0.0
-            if self._speed > RIDING_MPS:
+            if self._speed > script.RIDING_MPS:
                 target = radians(self._lean_wish)
             elif self._speed == 0.0 and self._pose == "kickstand":
-                target = radians(KICKSTAND_DEG)
+                target = radians(script.KICKSTAND_DEG)
             pull = _ROLL_RATE * _ROLL_RATE * (target - self._lean) - 2.0 * _ROLL_RATE * self._lean_rate
             self._lean_rate += pull * step
             self._lean += self._lean_rate * step
-            sway = {"kickstand": 0.0, "upright": STANDING_SWAY_DEG, "riding": RIDING_SWAY_DEG}[self._pose]
+            sway = {"kickstand": 0.0, "upright": script.STANDING_SWAY_DEG, "riding": script.RIDING_SWAY_DEG}[self._pose]
             self._sway += (radians(sway) - self._sway) * step
 
     def _attitude(self, t_s):
@@ -103,7 +95,7 @@ class HandBike:
         self._advance(t_s)
         lean = self._lean + self._sway * sin(_SWAY_RADPS * t_s)
         lean_rate = self._lean_rate + self._sway * _SWAY_RADPS * sin(_SWAY_RADPS * t_s + pi / 2.0)
-        return lean, lean_rate, yaw_rate_in_balance(lean, STANDARD_GRAVITY, self._speed)
+        return lean, lean_rate, script.yaw_rate_in_balance(lean, STANDARD_GRAVITY, self._speed)
 
     def motion(self, t_s):
         """Return the six readings of a perfect sensor, including vibration.
@@ -111,9 +103,9 @@ class HandBike:
         They are the specific force along left, up, forward in g, then the rates about these axes in deg/s.
         """
         lean, lean_rate, yaw_rate = self._attitude(t_s)
-        clean = body_motion(lean, lean_rate, self._speed, self._acceleration, yaw_rate)
+        clean = script.body_motion(lean, lean_rate, self._speed, self._acceleration, yaw_rate)
         engine = min(1.0, self._speed / 2.0)
-        return shaken(clean, t_s, self._vibration_g, self._speed, self._distance, engine)
+        return script.shaken(clean, t_s, self._vibration_g, self._speed, self._distance, engine)
 
     def truth(self, t_s):
         """Return (lean_deg, speed_mps, yaw_rate_dps, phase)."""
@@ -123,7 +115,7 @@ class HandBike:
     def _phase(self):
         settled = abs(self._lean_rate) < 0.02
         if self._speed == 0.0:
-            pose = radians(KICKSTAND_DEG) if self._pose == "kickstand" else 0.0
+            pose = radians(script.KICKSTAND_DEG) if self._pose == "kickstand" else 0.0
             return self._pose if settled and abs(self._lean - pose) < 0.01 else "moving"
         if self._pose != "riding":
             return "brake"

@@ -1,6 +1,7 @@
 """Runs `kickstand check`, which measures a board and everything wired to it, and judges the results."""
 
 import ast
+import functools
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -97,8 +98,7 @@ def measured(ask: Ask, say: Callable[[str], None], name: str = "the board") -> l
         if "SettingsError" in str(failed):
             raise InputError(f"{name}: config.py cannot be used", _SAYS_WHY) from failed
         raise InputError(f"the board at {name} cannot be checked ({failed})", UPDATE) from None
-    found: list[Finding] = []
-    check = _Check(ask, say, found)
+    check = _Check(ask, say)
     check.step("board")
     say(f"Press the push button once, within {PRESS_S} s, and release it. Then leave sensor and board at rest.")
     check.step("button", 1000 * PRESS_S)
@@ -112,7 +112,7 @@ def measured(ask: Ask, say: Callable[[str], None], name: str = "the board") -> l
     check.step("display", TEXTS)
     check.step("speed")
     check.step("loop", LOOP_S, judged_with=(check.lasts_ms,))
-    return found
+    return check.found
 
 
 def _sensor(check: "_Check", who_am_i: int, writes: bool) -> None:
@@ -134,16 +134,14 @@ def _sensor(check: "_Check", who_am_i: int, writes: bool) -> None:
 class _Check:
     """Runs the measurements. dlpf: the board's setting DLPF. lasts_ms: time in which the FIFO fills."""
 
-    def __init__(self, ask: Ask, say: Callable[[str], None], found: list[Finding]) -> None:
-        self._ask, self._say, self._found = ask, say, found
+    def __init__(self, ask: Ask, say: Callable[[str], None]) -> None:
+        self._ask, self._say = ask, say
+        self.found: list[Finding] = []
         self.lasts_ms = _FIFO_MS
-        self._dlpf: int | None = None
 
-    @property
+    @functools.cached_property
     def dlpf(self) -> int:
-        if self._dlpf is None:
-            self._dlpf = int(self._ask("print(parts.settings.DLPF)"))
-        return self._dlpf
+        return int(self._ask("print(parts.settings.DLPF)"))
 
     def step(self, name: str, *arguments: int, judged_with: tuple[int, ...] = ()) -> tuple[Any, ...] | None:
         """Run a measurement on the board and judge its result.
@@ -173,7 +171,7 @@ class _Check:
     def add(self, findings: list[Finding]) -> None:
         for finding in findings:
             self._say(line(finding))
-        self._found.extend(findings)
+        self.found.extend(findings)
 
 
 _NAMES = {

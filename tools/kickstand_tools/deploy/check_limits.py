@@ -45,13 +45,17 @@ class Finding:
     words: str
 
 
+def _advised(what: str, verdict: str, words: str, advice: str) -> Finding:
+    """Return a Finding. If it is not good, the advice follows its words."""
+    return Finding(what, verdict, words if verdict == GOOD else words + advice)
+
+
 def board(version: str, name: str, release: str, settings: str, slow: str) -> list[Finding]:
-    found = [Finding("board", GOOD, f"{name}, MicroPython {release}, Kickstand {version}; {settings}")]
-    if slow:
-        found.append(Finding("machine code", LOOK, f"not used for {slow}: slower code runs instead"))
-    else:
-        found.append(Finding("machine code", GOOD, "used"))
-    return found
+    used = f"not used for {slow}: slower code runs instead" if slow else "used"
+    return [
+        Finding("board", GOOD, f"{name}, MicroPython {release}, Kickstand {version}; {settings}"),
+        Finding("machine code", LOOK if slow else GOOD, used),
+    ]
 
 
 def button(at_first: bool, pressed: bool, released: bool, took_ms: int, edges: int, pin: int) -> list[Finding]:
@@ -63,11 +67,8 @@ def button(at_first: bool, pressed: bool, released: bool, took_ms: int, edges: i
     elif not released:
         words = f"pressed on {where}, but not released"
     elif edges > BOUNCE_EDGES:
-        return [
-            Finding(
-                "button", LOOK, f"pressed and released on {where}; it bounces: {edges} edges (limit {BOUNCE_EDGES})"
-            )
-        ]
+        words = f"pressed and released on {where}; it bounces: {edges} edges (limit {BOUNCE_EDGES})"
+        return [Finding("button", LOOK, words)]
     else:
         return [Finding("button", GOOD, f"pressed for {took_ms} ms and released, on {where}, {edges} edges")]
     return [Finding("button", BAD, words)]
@@ -106,8 +107,8 @@ def self_test(registers: tuple[int, ...], off: tuple[float, ...], on: tuple[floa
             continue
         percent = 100 * ((with_it - without) / trim - 1)
         words = f"{percent:+.1f} % off its factory trim (limit {SELF_TEST_PERCENT:.0f} %)"
-        bad = not abs(percent) <= SELF_TEST_PERCENT
-        found.append(Finding(what, BAD if bad else GOOD, words + ": the axis is damaged, or the chip is a clone" * bad))
+        verdict = GOOD if abs(percent) <= SELF_TEST_PERCENT else BAD  # BAD for NaN
+        found.append(_advised(what, verdict, words, ": the axis is damaged, or the chip is a clone"))
     return found
 
 
@@ -131,6 +132,7 @@ def noise(
     dead = [changes[c] < DEAD_SHARE * samples for c in channels]
     found = []
     moved = sum(one > MOVED_DPS for one in noises[3:]) >= 2
+    why = "it was moved, repeat with the sensor at rest" if moved else "this axis is faulty, or it vibrates"
     bands = BANDWIDTH_HZ[dlpf]
     for k, axis in enumerate(AXES):
         unit, digits = ("mg", 1) if k < 3 else ("deg/s", 3)
@@ -142,19 +144,14 @@ def noise(
         if dead[k]:
             found.append(Finding(f"noise, {axis}", BAD, "its count does not change: this axis is dead or in standby"))
         elif noises[k] > NOISE_TIMES * sheet:
-            advice = (
-                ": it was moved, repeat with the sensor at rest" if moved else ": this axis is faulty, or it vibrates"
-            )
-            found.append(Finding(f"noise, {axis}", LOOK if moved else BAD, words + advice))
+            found.append(Finding(f"noise, {axis}", LOOK if moved else BAD, f"{words}: {why}"))
         else:
             found.append(Finding(f"noise, {axis}", GOOD, words))
     for k in range(3, 6):
         words = f"{values[k]:+.2f} deg/s (data sheet 20, limit {MOST_GYRO_BIAS_DPS:.0f})"
         size = abs(values[k])
         verdict = BAD if size > MOST_GYRO_BIAS_DPS else LOOK if size > GYRO_BIAS_DPS else GOOD
-        found.append(
-            Finding(f"bias, {AXES[k]}", verdict, words + (": beyond the data sheet" if verdict != GOOD else ""))
-        )
+        found.append(_advised(f"bias, {AXES[k]}", verdict, words, ": beyond the data sheet"))
     force = math.hypot(*values[:3])
     words = f"{force:.3f} g at rest (limit 1 +- {FORCE_OFF_G})"
     off = abs(force - 1.0)
@@ -167,8 +164,7 @@ def noise(
     least, most = MOST_TEMPERATURE_C
     words = f"{temperature_c:.1f} C (limits {low:.0f} and {high:.0f})"
     verdict = GOOD if low <= temperature_c <= high else LOOK if least <= temperature_c <= most else BAD
-    advice = "" if verdict == GOOD else ": a chip at room temperature should not say that"
-    found.append(Finding("temperature", verdict, words + advice))
+    found.append(_advised("temperature", verdict, words, ": a chip at room temperature should not say that"))
     if overflows:
         found.append(Finding("readings", LOOK, f"{overflows} overflows of the FIFO while they were read"))
     return found
@@ -182,7 +178,7 @@ def clock(samples: int, us: int, rate_hz: int, overflows: int, errors: int) -> l
     words = f"{samples / (us / 1e6):.2f} samples per second, {percent:+.2f} % off {rate_hz} (limit {CLOCK_PERCENT} %)"
     size = abs(percent)
     verdict = BAD if size > MOST_CLOCK_PERCENT else LOOK if size > CLOCK_PERCENT else GOOD
-    return [Finding("sample clock", verdict, words + (": a clone, or a faulty chip" if verdict != GOOD else ""))]
+    return [_advised("sample clock", verdict, words, ": a clone, or a faulty chip")]
 
 
 def fifo(fault: str, size: int, lasts_ms: int, waiting: int, expected: int, noticed: bool, after: int) -> list[Finding]:
@@ -201,12 +197,11 @@ def fifo(fault: str, size: int, lasts_ms: int, waiting: int, expected: int, noti
 
 
 def i2c(transfers: int, errors: int, wrong: int, us: int) -> list[Finding]:
-    words = (
-        f"{errors} errors and {wrong} wrong answers in {transfers} transfers (limit 0), {us / transfers:.0f} us each"
-    )
+    count = f"{errors} errors and {wrong} wrong answers in {transfers} transfers"
+    words = f"{count} (limit 0), {us / transfers:.0f} us each"
     verdict = GOOD if not errors and not wrong else LOOK if errors <= ERRORS and not wrong else BAD
-    advice = ": shorter wires, SENSOR_BUS_HZ = 100_000, away from ignition and motor" if verdict != GOOD else ""
-    return [Finding("I2C errors", verdict, words + advice)]
+    advice = ": shorter wires, SENSOR_BUS_HZ = 100_000, away from ignition and motor"
+    return [_advised("I2C errors", verdict, words, advice)]
 
 
 def display(address: int, draws: bool, there: int, rounds: int, fault: str) -> list[Finding]:
@@ -225,12 +220,11 @@ def flash(times_ms: tuple[int, ...], wrong: int, free_kb: int, error: str, lasts
         return [Finding("flash", BAD, f"{wrong} of {len(times_ms)} blocks read back differently: it is worn out")]
     longest = max(times_ms)
     words = f"writing a block of 4 KB takes at most {longest} ms (limit {lasts_ms}, when the FIFO is full)"
-    slow = longest > lasts_ms
-    found = [Finding("flash", BAD if slow else GOOD, words + (": readings get lost" if slow else ""))]
     room = f"{free_kb} KB free (limit {LITTLE_FLASH_KB})"
-    little = free_kb < LITTLE_FLASH_KB
-    advice = ": pull and remove rides" if little else ""
-    return [*found, Finding("room in flash", LOOK if little else GOOD, room + advice)]
+    return [
+        _advised("flash", BAD if longest > lasts_ms else GOOD, words, ": readings get lost"),
+        _advised("room in flash", LOOK if free_kb < LITTLE_FLASH_KB else GOOD, room, ": pull and remove rides"),
+    ]
 
 
 def speed(source: str, fault: str, mps: float) -> list[Finding]:
@@ -256,8 +250,7 @@ def loop(
     most = MOST_TURN_SHARE * lasts_ms
     words = f"{longest:.1f} ms in {turns} turns (limit {TURN_MS:.0f}); places left in the FIFO: {places}"
     verdict = BAD if longest > most or overflows else LOOK if longest > TURN_MS else GOOD
-    advice = f"; {lost} samples lost: something takes the board's time" if verdict != GOOD else ""
-    found = [Finding("longest turn", verdict, words + advice)]
+    found = [_advised("longest turn", verdict, words, f"; {lost} samples lost: something takes the board's time")]
     if faults or restarts > 1:
         words = f"faults while the lean meter ran: {faults or 'none'}; set up {restarts} times (limit 1): a loose wire"
         found.append(Finding("sensor while running", BAD, words))
@@ -268,22 +261,11 @@ def loop(
     free_kb = free // 1024
     words = f"{free_kb} KB free while the lean meter runs (limit {LITTLE_HEAP_KB})"
     verdict = BAD if free_kb < LEAST_HEAP_KB else LOOK if free_kb < LITTLE_HEAP_KB else GOOD
-    advice = ": do less in user.py, or switch LIVE or SPEED off" if verdict != GOOD else ""
-    return [*found, Finding("memory", verdict, words + advice)]
+    return [*found, _advised("memory", verdict, words, ": do less in user.py, or switch LIVE or SPEED off")]
 
 
 # The function that judges each measurement, by the name of the function in check_guest.py that measures
 JUDGES: dict[str, Callable[..., Any]] = {
-    "board": board,
-    "button": button,
-    "sensor": sensor,
-    "self_test": self_test,
-    "noise": noise,
-    "clock": clock,
-    "fifo": fifo,
-    "i2c": i2c,
-    "display": display,
-    "flash": flash,
-    "speed": speed,
-    "loop": loop,
+    judge.__name__: judge
+    for judge in (board, button, sensor, self_test, noise, clock, fifo, i2c, display, flash, speed, loop)
 }

@@ -7,7 +7,6 @@ import io
 import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Any, cast
 
 import serial
@@ -46,7 +45,6 @@ _DEBUG_PROBE = (0x2E8A, 0x000C)  # Raspberry Pi's Debug Probe is not a board
 UPDATE = Remedy("kickstand flash brings it up to date", "the page Install brings it up to date")
 
 
-@dataclass(frozen=True)
 class ConnectionLost(Message):
     """The connection to a port was lost.
 
@@ -64,7 +62,6 @@ class ConnectionLost(Message):
         return f"connection lost: {self.todo.words(page)}" if page else super().line()
 
 
-@dataclass(frozen=True)
 class NotInstalled(Message):
     """Kickstand is not on the board. name: name of the board's port."""
 
@@ -74,7 +71,6 @@ class NotInstalled(Message):
     todo = Remedy("install it with kickstand flash", "install it with the page Install")
 
 
-@dataclass(frozen=True)
 class UnfitFirmware(Message):
     """The firmware on the board lacks a module. The board has another version of the firmware, or an update was
     interrupted.
@@ -90,7 +86,6 @@ class UnfitFirmware(Message):
     todo = UPDATE
 
 
-@dataclass(frozen=True)
 class NoAnswer(Message):
     """A program that uses the firmware failed on the board.
 
@@ -221,9 +216,8 @@ def why_closed(port: str) -> InputError:
         if error.errno in (errno.EACCES, errno.EPERM):
             return InputError(f"no permission for {port}: on Linux join the group dialout and log in again")
         if error.errno == errno.ENOENT or "FileNotFoundError" in text:
-            return InputError(
-                f"there is no port {port}", Remedy("plug the board in, or leave out --port to find it automatically")
-            )
+            remedy = Remedy("plug the board in, or leave out --port to find it automatically")
+            return InputError(f"there is no port {port}", remedy)
         if port.startswith("socket:") and "refused" in text:
             return InputError(f"nothing listens at {port}", Remedy("is kickstand emulate running?"))
         return InputError(f"{port} cannot be opened: {text}: check the name and the cable")

@@ -61,7 +61,6 @@ PHONE_SIGMA_DEG = 20.0  # standard deviation of the mounting, because a holder m
 PHONE_MAX_DEG = 45.0  # largest accepted difference: half of the 90 degrees between two mountings
 
 
-@dataclass(frozen=True)
 class RideHalves(Message):
     """The two halves of the ride give different alignments."""
 
@@ -72,7 +71,6 @@ class RideHalves(Message):
     todo = Remedy("did the mount move? Give a part in which it did not")
 
 
-@dataclass(frozen=True)
 class RideUncertain(Message):
     """The alignment's standard errors are too large."""
 
@@ -88,7 +86,6 @@ class RideUncertain(Message):
     todo = Remedy("a longer ride is needed, with bends to both sides")
 
 
-@dataclass(frozen=True)
 class PhoneOtherwise(Message):
     """The phone is not mounted as the user says."""
 
@@ -100,7 +97,6 @@ class PhoneOtherwise(Message):
     todo = Remedy("mounted another way? Then leave out --phone", "mounted another way?")
 
 
-@dataclass(frozen=True)
 class PhoneUpsideDown(Message):
     """The phone is mounted as the user says only if all accelerations have the opposite sign."""
 

@@ -35,7 +35,6 @@ MAX_SPEED_FACTOR = 1.8  # largest factor between the log's speed and the speed f
 USUAL_MPS, USUAL_RADPS = 10.0, 0.14
 
 
-@dataclass(frozen=True)
 class RideShort(Message):
     """There is too little riding."""
 
@@ -47,7 +46,6 @@ class RideShort(Message):
     todo = Remedy("at least {least_s:.0f} s with bends are needed")
 
 
-@dataclass(frozen=True)
 class NoBends(Message):
     """The bike leans too little to show forward. lean_deg: rms of the lean."""
 
@@ -58,7 +56,6 @@ class NoBends(Message):
     todo = Remedy("a motorcycle's ride with bends to both sides is needed")
 
 
-@dataclass(frozen=True)
 class NotLeaning(Message):
     """The ride is a car's."""
 
@@ -69,7 +66,6 @@ class NotLeaning(Message):
     )
 
 
-@dataclass(frozen=True)
 class RideContradicts(Message):
     """No mounting explains the readings."""
 
@@ -89,9 +85,8 @@ def standing(w: Windows) -> Bools:
 
 
 def _calm(w: Windows, over_s: float) -> Bools:
-    return ~w.gap & motionless(
-        w.rate, w.force, 2 * round(0.5 * over_s / WINDOW_S) + 1, STILL_RADPS, STILL_G, w.known_speed
-    )
+    count = 2 * round(0.5 * over_s / WINDOW_S) + 1
+    return ~w.gap & motionless(w.rate, w.force, count, STILL_RADPS, STILL_G, w.known_speed)
 
 
 def in_hand(w: Windows) -> tuple[Bools, Bools]:

@@ -95,9 +95,8 @@ class Hypotheses:
         variance[:, ROLL] = self.rolling**2
         variance[:, BESIDE] = self.pushed**2 * 2.0 * BLOCK_S / PUSHED_S
         steps = np.repeat(variance[:, None, unknown], len(parameters) - 1, axis=1)
-        return RandomWalks(
-            np.concatenate((information, pull[..., None]), axis=2), steps, np.diff(parameters[:, unknown], axis=0)
-        )
+        equations = np.concatenate((information, pull[..., None]), axis=2)
+        return RandomWalks(equations, steps, np.diff(parameters[:, unknown], axis=0))
 
 
 def _all_hypotheses() -> Hypotheses:

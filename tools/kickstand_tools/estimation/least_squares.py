@@ -75,9 +75,8 @@ class Estimate:
         """Return the standard deviations of the states, shape (n + 1, STATES)."""
         blocks = self._reduced(robust=True)
         s = STATES
-        found = np.diagonal(
-            covariances(blocks, posterior_covariance(*self._problem(blocks)))[..., : 2 * s], axis1=2, axis2=3
-        )
+        joint = covariances(blocks, posterior_covariance(*self._problem(blocks)))
+        found = np.diagonal(joint[..., : 2 * s], axis1=2, axis2=3)
         edges = np.concatenate((found[:, :, :s].reshape(-1, s), found[-1, -1:, s:]))
         return np.sqrt(np.maximum(edges, 0.0))
 

@@ -42,7 +42,6 @@ POSE_DEG = 1.8
 ODD_SIGMAS = 4.0
 
 
-@dataclass(frozen=True)
 class SensorOdd(Message):
     """The gyro's errors are larger than those of any working gyro."""
 
@@ -56,7 +55,6 @@ class SensorOdd(Message):
     todo = Remedy("is an axis of the gyro faulty?")
 
 
-@dataclass(frozen=True)
 class NotTheBikes(Message):
     """The accelerations are not a bike's. percent: the share of the riding time with such accelerations."""
 
@@ -70,7 +68,6 @@ class NotTheBikes(Message):
     todo = Remedy("is the sensor in a soft mount or in a pocket? Fix it firmly")
 
 
-@dataclass(frozen=True)
 class PoseOff(Message):
     """The upright pose was not upright.
 

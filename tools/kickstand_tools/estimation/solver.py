@@ -84,9 +84,8 @@ def _reduced(links: Array, common: Array) -> Reduced:
         log_determinant += np.sum(np.linalg.slogdet(inner)[1], axis=1)
         links = np.concatenate((merged, links[:, even:]), axis=1) if links.shape[1] > even else merged
     below = np.concatenate((links[:, 0, :, 2 * s : -1].transpose(0, 2, 1), common[:, :-1]), axis=2)
-    return Reduced(
-        s, gains, covariances, np.concatenate((links[:, 0], below), axis=1), log_determinant, common[:, -1, -1]
-    )
+    left = np.concatenate((links[:, 0], below), axis=1)
+    return Reduced(s, gains, covariances, left, log_determinant, common[:, -1, -1])
 
 
 def _in_rows(values: Array) -> Array:

@@ -97,10 +97,8 @@ class Prior:
         """
         found = np.diag(np.divide(1.0, sigma**2, out=np.zeros(PARAMETERS), where=sigma > 0.0))
         if self.posed:
-            for angle, offset, sign in (
-                (ROTATION.start, OFFSET.stop - 1, 1.0),
-                (ROTATION.stop - 1, OFFSET.start, -1.0),
-            ):
+            ties = (ROTATION.start, OFFSET.stop - 1, 1.0), (ROTATION.stop - 1, OFFSET.start, -1.0)
+            for angle, offset, sign in ties:
                 found[offset, offset] += found[angle, angle]
                 found[angle, offset] = found[offset, angle] = sign * found[angle, angle]
         return found[np.ix_(self.unknown, self.unknown)]

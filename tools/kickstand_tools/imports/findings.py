@@ -30,6 +30,7 @@ from .units import (
     RATES,
     SPEEDS,
     counts_per,
+    since_first_s,
     time_unit,
     unit,
     unwrapped,
@@ -128,16 +129,12 @@ def find(sheet: Sheet) -> Findings:
     for key, kind in (("a", "accel"), ("g", "gyro")):
         if key not in findings.found:
             findings.single |= _single(sheet, key, kind)
-    for key, places in (
-        ("speed", _speed(sheet)),
-        ("lat", _find_by_name(sheet, "^lat|latitude")),
-        ("lon", _find_by_name(sheet, "^lon|^lng|longitude")),
-    ):
-        if places is not None:
-            findings.found[key] = places
-    if ("lat" in findings.found) != ("lon" in findings.found):
-        findings.found.pop("lat", None)
-        findings.found.pop("lon", None)
+    speed = _speed(sheet)
+    if speed is not None:
+        findings.found["speed"] = speed
+    lat, lon = _find_by_name(sheet, "^lat|latitude"), _find_by_name(sheet, "^lon|^lng|longitude")
+    if lat is not None and lon is not None:
+        findings.found |= {"lat": lat, "lon": lon}
     return findings
 
 
@@ -172,7 +169,7 @@ def _time(sheet: Sheet) -> ColumnFinding | None:
     stated = stated_unit(name)
     numbers = sheet.numbers(place)
     found = time_unit(sheet.cells[place])
-    if stated in ("s", "ms", "us", "ns") and _step_fits(numbers, stated):
+    if stated in _SECONDS and _step_fits(numbers, stated):
         return ColumnFinding([name], stated, f"{name} says {stated}")
     if found == DATES:
         return ColumnFinding([name], "", "dates or times of day")
@@ -197,9 +194,7 @@ def _seconds(sheet: Sheet, time: ColumnFinding | None) -> Array | None:
     """Return the seconds since the first time, shape (n), or None without a time column."""
     if time is None:
         return None
-    ns = sheet.times(sheet.columns.index(time.columns[0]), time.unit)
-    good = ns != NO_TIME
-    return np.where(good, (ns - ns[good][0]) * 1e-9, np.nan)
+    return since_first_s(sheet.times(sheet.columns.index(time.columns[0]), time.unit))
 
 
 # Groups of three
@@ -311,8 +306,8 @@ def stated_unit(name: str) -> str:
     for word, known in (("milli", "ms"), ("micro", "us"), ("nano", "ns")):
         if word in bare:
             return known
-    if bare.endswith("ms") or bare in _SECONDS:
-        return "ms" if bare.endswith("ms") else bare
+    if bare.endswith("ms"):
+        return "ms"
     return unit(bare) if unit(bare) in _SECONDS else ""
 
 
@@ -333,9 +328,8 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
     threes = _find_triples(sheet)
     kinds = {kind: [three for three in threes if three.kind == kind] for kind in (*_KINDS, "")}
     unnamed = [*kinds["either"], *kinds[""]]
-    accel = _first_with_gravity(
-        [*kinds["accel"], *kinds["either"], *(kinds[""] if not kinds["accel"] else [])], seconds
-    )
+    possible = [*kinds["accel"], *kinds["either"], *([] if kinds["accel"] else kinds[""])]
+    accel = _first_with_gravity(possible, seconds)
     rates = next(iter(kinds["gyro"]), None) or next((three for three in unnamed if three is not accel), None)
     without = kinds["linear"] or kinds["accel"]
     if accel is None:
@@ -449,9 +443,8 @@ def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None
         return ColumnFinding([], by_fit, "in it the rates turn gravity as it turns")
     if "deg/s" not in candidates:
         usual = f"counts/{_usual_counts(accel):g}"
-        return ColumnFinding(
-            [], usual, "raw counts whose range nothing shows: the usual one with this accelerometer's", False
-        )
+        why = "raw counts whose range nothing shows: the usual one with this accelerometer's"
+        return ColumnFinding([], usual, why, False)
     return ColumnFinding([], *_by_size(rates, force), certain=False)
 
 

@@ -34,7 +34,6 @@ LEAST_HZ = 19.5  # a lean needs this many samples per second: 20, minus the erro
 NAMES = [app.NAME for app in reversed(_APPS)]
 
 
-@dataclass(frozen=True)
 class ImportSlow(Message):
     """The recording has too few samples per second."""
 
@@ -45,7 +44,6 @@ class ImportSlow(Message):
     todo = Remedy("record it faster")
 
 
-@dataclass(frozen=True)
 class ImportShort(Message):
     """The recording is too short for an alignment."""
 
@@ -56,7 +54,6 @@ class ImportShort(Message):
     text = "it lasts {lasts_s:.0f} s: to find the alignment from it, at least {least_s:.0f} s of riding are needed"
 
 
-@dataclass(frozen=True)
 class ImportDamaged(Message):
     """Damaged rows are left out."""
 
@@ -69,7 +66,6 @@ class ImportDamaged(Message):
     )
 
 
-@dataclass(frozen=True)
 class ImportSign(Message):
     """In this app's files, the sign of accelerations is uncertain: up may read +1 g or -1 g."""
 

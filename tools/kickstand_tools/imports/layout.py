@@ -153,8 +153,8 @@ def _rows(lines: Sequence[str], separator: str, comma: bool) -> tuple[int, int, 
     numbers = int(np.median([counts[k] for k in rows]))
     first = rows[0]
     names = next((k for k in range(first - 1, -1, -1) if lines[k].strip()), None)
-    if names is not None and not _is_names(split_row(lines[names].lstrip(_MARKS), separator), width):
-        names = _names_by_commas(lines, names, width)
+    if names is not None and not _has_names(lines[names], width):
+        names = None
     if names is not None and _all_units(split_row(lines[names].lstrip(_MARKS), separator)):
         above = names - 1
         if above >= 0 and _is_names(split_row(lines[above].lstrip(_MARKS), separator), width):
@@ -164,9 +164,9 @@ def _rows(lines: Sequence[str], separator: str, comma: bool) -> tuple[int, int, 
     return len(rows), numbers, Grid(names, first, separator, comma, width)
 
 
-def _names_by_commas(lines: Sequence[str], at: int, width: int) -> int | None:
-    """The line of names above the rows, if the names are separated by commas and the rows are not."""
-    return at if any(_is_names(split_row(lines[at].lstrip(_MARKS), mark), width) for mark in SEPARATORS) else None
+def _has_names(line: str, width: int) -> bool:
+    """True if the line can be the names of `width` columns. They may be separated in another way than the rows."""
+    return any(_is_names(split_row(line.lstrip(_MARKS), mark), width) for mark in SEPARATORS)
 
 
 def _is_names(cells: list[str], width: int) -> bool:
@@ -223,9 +223,8 @@ def _names(lines: Sequence[str], grid: Grid) -> list[str]:
     if grid.first > grid.names + 1:
         units = split_row(lines[grid.first - 1].lstrip("#%/ "), grid.separator)
         if _all_units(units) and len(units) <= len(names):
-            names = [f"{name} ({mark.strip('[]()')})" if mark else name for name, mark in zip(names, units)] + names[
-                len(units) :
-            ]
+            rest = names[len(units) :]
+            names = [f"{name} ({mark.strip('[]()')})" if mark else name for name, mark in zip(names, units)] + rest
     return [*names, *[""] * (grid.width - len(names))]
 
 
@@ -298,9 +297,8 @@ def _labelled(name: str, text: str) -> Sheet | None:
                 stamp = value
             row.setdefault(label, value)
     rows.append(row)
-    labels = [
-        label for label, count in Counter(label for row in rows for label in row).items() if count > len(rows) / 2
-    ]
+    counts = Counter(label for row in rows for label in row)
+    labels = [label for label, count in counts.items() if count > len(rows) / 2]
     if len(labels) < FEWEST_CELLS:
         return None
     cells = columns_of(([row.get(label, "") for label in labels] for row in rows), len(labels))

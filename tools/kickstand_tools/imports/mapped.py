@@ -24,12 +24,12 @@ from .units import (
     COUNTS_PER_G,
     EPOCH_NS,
     RATES,
-    REPEATED,
     SPEEDS,
     TIMES,
     Nanoseconds,
     counts_per,
     factor,
+    since_first_s,
     time_unit,
     unit,
 )
@@ -54,23 +54,9 @@ class MappedTable:
     joined: bool = False
 
     @property
-    def columns(self) -> list[str]:
-        return self.sheet.columns
-
-    @property
-    def found(self) -> dict[str, str]:
-        """The columns by the keys of REQUIRED and OPTIONAL."""
-        return self.findings.columns
-
-    @property
-    def units(self) -> dict[str, str]:
-        """The probable units by UNIT_KEYS."""
-        return self.findings.units
-
-    @property
     def missing(self) -> list[str]:
         """The columns of REQUIRED that are not found."""
-        return [key for key in REQUIRED if key not in self.found]
+        return [key for key in REQUIRED if key not in self.findings.columns]
 
     def first_seconds(self, seconds: float = 10.0, points: int = 300) -> dict[str, list[float] | list[list[float]]]:
         """The first seconds of the found time (t, s), accelerometer (a) and gyro (g), reduced to `points` points, in
@@ -78,14 +64,14 @@ class MappedTable:
         found = self.findings.found
         if "t" not in found:
             return {}
-        place = self.columns.index(found["t"].columns[0])
-        since = _seconds(self.sheet.times(place, found["t"].unit))
+        columns = self.sheet.columns
+        since = since_first_s(self.sheet.times(columns.index(found["t"].columns[0]), found["t"].unit))
         shown = np.flatnonzero(since <= seconds)
         shown = shown[:: max(1, len(shown) // points)]
         picture: dict[str, list[float] | list[list[float]]] = {"t": since[shown].round(3).tolist()}
         for key in ("a", "g"):
             if key in found:
-                values = self.sheet.table([self.columns.index(name) for name in found[key].columns])[shown]
+                values = self.sheet.table([columns.index(name) for name in found[key].columns])[shown]
                 picture[key] = np.nan_to_num(values).round(5).T.tolist()
         return picture
 
@@ -117,7 +103,7 @@ def read_mapped(
     time_ns = sheet.times(places["t"], t_unit)
     units = _with_counts(sheet, time_ns, places, dict(units))
     force, rates = (_scaled(sheet, places, units, axes) for axes in (ACCEL, GYRO))
-    _check_rates(sheet.name, _seconds(time_ns), force, rates)
+    _check_rates(sheet.name, since_first_s(time_ns), force, rates)
     accel = _sensor(sheet, time_ns, places, units, "accelerometer", force)
     accel.taken.insert(0, Taken("time", sheet.named([places["t"]]), t_unit))
     gyro = _sensor(sheet, time_ns, places, units, "gyro", rates)
@@ -183,8 +169,8 @@ def unknown(files: list[RecordingFile], source: str, table: MappedTable | None =
             "folder or the zip that an app has exported as CSV"
         )
     several = f" (of {len(files)} files, the largest is {table.name})" if len(files) > 1 else ""
-    shown = ", ".join(table.columns[:40]) + (", ..." if len(table.columns) > 40 else "")
-    found = table.findings
+    columns, found = table.sheet.columns, table.findings
+    shown = ", ".join(columns[:40]) + (", ..." if len(columns) > 40 else "")
     if "gyro" in found.lacking and ("a" in found.found or found.remarks):
         return InputError(
             f"{source}: not a file of an app that is known{several}, and no gyro found in it: without one there is no "
@@ -197,10 +183,9 @@ def unknown(files: list[RecordingFile], source: str, table: MappedTable | None =
             f"{source}: not a file of an app that is known{several}, and no time found in it: write the time of each "
             "row, such as millis(), or switch the time stamps of the serial monitor on"
         )
-    given = [
-        f"{key}={_column_as_typed(table, key)}" for key in (*REQUIRED, *OPTIONAL) if key in (*REQUIRED, *table.found)
-    ]
-    units = ",".join(f"{key}={name}" for key, name in table.units.items())
+    keys = [key for key in (*REQUIRED, *OPTIONAL) if key in (*REQUIRED, *found.columns)]
+    given = [f"{key}={_column_as_typed(table, key)}" for key in keys]
+    units = ",".join(f"{key}={name}" for key, name in found.units.items())
     where = source if len(files) == 1 or table.joined else f"{source}/{table.name}"
     ask = "Replace each ?" if table.missing else "Correct what is wrong"
     reasons = f" ({found.reasons})" if found.reasons else ""
@@ -217,9 +202,9 @@ def unknown(files: list[RecordingFile], source: str, table: MappedTable | None =
 def _column_as_typed(table: MappedTable, key: str) -> str:
     """Return the column of a key as the user types it: its name, or its number if the name would be misread. Return ?
     if the column is unknown."""
-    name = table.found.get(key, "?")
-    if name != "?" and (any(mark in name for mark in ",=") or table.columns.count(name) > 1):
-        return f"#{table.columns.index(name) + 1}"
+    name, columns = table.findings.columns.get(key, "?"), table.sheet.columns
+    if name != "?" and (any(mark in name for mark in ",=") or columns.count(name) > 1):
+        return f"#{columns.index(name) + 1}"
     return name
 
 
@@ -263,8 +248,9 @@ def _with_counts(
     if not any(map(_is_counts, units.values())):
         return units
     force, rates = (sheet.table([places[axis] for axis in axes]) for axes in (ACCEL, GYRO))
-    accel = findings.accelerometer(force, _seconds(time_ns))
-    found = {"a": accel.unit, "g": findings.gyro(force, rates, accel, _seconds(time_ns)).unit}
+    seconds = since_first_s(time_ns)
+    accel = findings.accelerometer(force, seconds)
+    found = {"a": accel.unit, "g": findings.gyro(force, rates, accel, seconds).unit}
     for key, text in units.items():
         if _is_counts(text):
             if not counts_per(found[key[0]]):
@@ -275,12 +261,6 @@ def _with_counts(
                 )
             units[key] = ("-" if text.strip().startswith("-") else "") + found[key[0]]
     return units
-
-
-def _seconds(time_ns: Nanoseconds) -> Array:
-    """Return the seconds since the first time, shape (n), NaN for a missing time."""
-    good = time_ns > REPEATED
-    return np.where(good, (time_ns - (time_ns[good][0] if np.any(good) else 0)) * 1e-9, np.nan)
 
 
 def _check_rates(name: str, seconds: Array, force: Array, rates: Array) -> None:

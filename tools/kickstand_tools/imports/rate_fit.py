@@ -75,8 +75,8 @@ def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
     u = u / np.maximum(length, 1e-9)[:, None]
     span = round(WINDOW_S / CELL_S)
     begins = np.arange(0, len(u) - span, span // 2)
-    whole = np.array([bool(np.all(good[begin : begin + span + 1])) for begin in begins])
-    begins = begins[whole] if len(begins) else begins
+    whole = np.array([np.all(good[begin : begin + span + 1]) for begin in begins], dtype=bool)
+    begins = begins[whole]
     if len(begins) < FEWEST:
         return RateFit()
     change = u[begins + span] - u[begins]
@@ -122,8 +122,6 @@ def turns_too_far(seconds: Array, force: Array, rates: Array) -> bool:
     u = u / np.maximum(np.linalg.norm(u, axis=1), 1e-9)[:, None]
     span = round(TURNED_S / CELL_S)
     begins = np.arange(0, len(u) - span + 1, span)
-    if not len(begins):
-        return False
     kept, much = [], []
     for begin in begins:
         part = u[begin : begin + span]

@@ -1,7 +1,5 @@
 """Finds the unit of a speed from the positions in the same recording."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..common.messages import Message, Remedy
@@ -12,7 +10,6 @@ from .units import SPEEDS, Nanoseconds, factor
 _NEAR = 1.25  # largest factor between the speed and the speed from positions; units differ by 1.6 or more
 
 
-@dataclass(frozen=True)
 class ImportSpeedUnit(Message):
     """The speed is left out because its unit is unknown."""
 
@@ -20,10 +17,7 @@ class ImportSpeedUnit(Message):
 
     code = "import-speed-unit"
     text = "{column} has no unit, and the positions do not show it, so the speed is left out"
-    todo = Remedy(
-        "add --units speed=km/h, mph or m/s",
-        "write it in brackets behind that name, as in Speed (km/h)",
-    )
+    todo = Remedy("add --units speed=km/h, mph or m/s", "write it in brackets behind that name, as in Speed (km/h)")
 
 
 def unit_by_positions(

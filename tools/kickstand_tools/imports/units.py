@@ -139,6 +139,12 @@ def of_seconds(seconds: Array) -> Nanoseconds:
     return _scaled(seconds, TIMES["s"])
 
 
+def since_first_s(time_ns: Nanoseconds) -> Array:
+    """Return the seconds since the first time, shape (n), NaN for a missing time."""
+    good = time_ns > REPEATED
+    return np.where(good, (time_ns - (time_ns[good][0] if np.any(good) else 0)) * 1e-9, np.nan)
+
+
 def of_day(clock: Array) -> Nanoseconds:
     """Return times of day in ns. clock: numbers of the form HHMMSS.SS, shape (n). After midnight a day is added."""
     whole = np.floor(clock)

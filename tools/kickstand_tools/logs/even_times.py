@@ -7,7 +7,7 @@ about half a tick of the recorder's clock.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,7 +38,6 @@ CONTEXT = 2000  # number of samples before and after a block that are used to co
 REPORTED_S = 0.002  # smallest change of a time, in s, that is reported in a notice
 
 
-@dataclass(frozen=True)
 class TimesSpread(Message):
     """The recorder rounded the times.
 

@@ -9,8 +9,6 @@ with the readings before and after them. The equal readings are kept if the valu
 are left out if the values jump on both sides.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..common.messages import Message
@@ -26,7 +24,6 @@ NEAR_G, NEAR_DPS = 0.02, 0.5
 _MOTION = [0, 1, 2, 4, 5, 6]  # columns in the chip's order, without the temperature
 
 
-@dataclass(frozen=True)
 class FrozenReadings(Message):
     """The readings froze.
 

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,6 @@ _READINGS = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")  # 
 Source = File | Log | Stretch  # everything that can be read as a log
 
 
-@dataclass(frozen=True)
 class CutLine(Message):
     """The last line is incomplete, as after an interrupted recording."""
 

@@ -7,7 +7,6 @@ import stat
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, cast
 
@@ -21,7 +20,6 @@ File = Path | str | IO[bytes] | IO[str]
 Progress = Callable[[int, int], None]  # called with (done, total) in the same unit; total is 0 if unknown
 
 
-@dataclass(frozen=True)
 class NulEnd(Message):
     """The file ends in NUL bytes. count: number of NUL bytes."""
 
@@ -31,7 +29,6 @@ class NulEnd(Message):
     text = "its end is {count} NUL bytes, as after a loss of power: they are left out"
 
 
-@dataclass(frozen=True)
 class CutGzip(Message):
     """The end of a gzip file is missing."""
 

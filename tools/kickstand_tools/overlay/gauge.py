@@ -85,12 +85,12 @@ class Gauge:
     def _still_picture(self) -> Image.Image:
         """Draw the part of the gauge that never changes."""
         picture = Image.new("RGBA", (self.width, self.height), parts.CLEAR)
-        panel = parts.smooth_mask(
-            picture.size,
-            lambda pen, finer: pen.rounded_rectangle(
-                [0, 0, self.width * finer - 1, self.height * finer - 1], radius=9.0 * self._unit * finer, fill=PANEL[3]
-            ),
-        )
+
+        def draw(pen: ImageDraw.ImageDraw, finer: int) -> None:
+            box = [0, 0, self.width * finer - 1, self.height * finer - 1]
+            pen.rounded_rectangle(box, radius=9.0 * self._unit * finer, fill=PANEL[3])
+
+        panel = parts.smooth_mask(picture.size, draw)
         picture.paste(PANEL[:3] + (255,), mask=panel)
         picture.putalpha(panel)
         edge = max(1, round(self._unit * 0.8))
@@ -132,9 +132,8 @@ class Gauge:
             pen.line([(x * finer, (y - radius) * finer), (x * finer, (y + radius) * finer)], fill=120, width=finer)
             pen.line([((x - radius) * finer, y * finer), ((x + radius) * finer, y * finer)], fill=120, width=finer)
 
-        picture.alpha_composite(
-            parts.outlined(parts.smooth_mask(picture.size, draw), DIM, max(1, round(self._unit * 0.4)))
-        )
+        mask = parts.smooth_mask(picture.size, draw)
+        picture.alpha_composite(parts.outlined(mask, DIM, max(1, round(self._unit * 0.4))))
 
     def _fill(self, picture: Image.Image, lean_deg: float) -> None:
         """Fill the band from upright to the lean."""

@@ -46,9 +46,8 @@ def text(words: str, height: float, colour: Colour) -> Image.Image:
     ascent = font.getbbox("0", stroke_width=stroke)  # gives all texts the same baseline
     top, bottom = min(top, ascent[1]), max(bottom, ascent[3])
     picture = Image.new("RGBA", (int(right - left) + 2, int(bottom - top) + 2), DARK[:3] + (0,))
-    ImageDraw.Draw(picture).text(
-        (1 - left, 1 - top), words, font=font, fill=colour, stroke_width=stroke, stroke_fill=DARK
-    )
+    place = 1 - left, 1 - top
+    ImageDraw.Draw(picture).text(place, words, font=font, fill=colour, stroke_width=stroke, stroke_fill=DARK)
     return picture
 
 
@@ -105,9 +104,8 @@ def bike(height: float) -> Image.Image:
     picture = outlined(smooth_mask((side, side), draw), WHITE, max(1, round(unit * 0.9)))
     lamp = max(1, round(unit * 1.1))
     middle, up = side // 2, round(16.2 * unit)
-    ImageDraw.Draw(picture).rounded_rectangle(
-        [middle - 3 * lamp, middle - up - lamp, middle + 3 * lamp, middle - up + lamp], radius=lamp, fill=_LAMP
-    )
+    box = [middle - 3 * lamp, middle - up - lamp, middle + 3 * lamp, middle - up + lamp]
+    ImageDraw.Draw(picture).rounded_rectangle(box, radius=lamp, fill=_LAMP)
     return picture
 
 

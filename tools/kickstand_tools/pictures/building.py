@@ -113,12 +113,11 @@ def six_positions(columns: int = 7) -> str:
     columns: number of poses side by side.
     """
     poses = [*_POSITIONS.items(), ("", _SLANTED)]
+    table = [(-47, -50, -47), (47, -50, -47), (47, -50, 47), (-47, -50, 47)]
     page = Drawing(140 * columns, 215 * -(-len(poses) // columns))
     for k, (name, axes) in enumerate(poses):
         middle, top = 70 + 140 * (k % columns), 215 * (k // columns)
-        page.shape(
-            "#e4dfd0", *(_seen(middle, top + 128, (x, -50, z)) for x, z in ((-47, -47), (47, -47), (47, 47), (-47, 47)))
-        )
+        page.shape("#e4dfd0", *(_seen(middle, top + 128, corner) for corner in table))
         _lay(page, middle, top + 128, axes)
         page.text(middle, top + 20, name or "then slanted", 17 if name else 14, "middle", bold=True)
         page.text(middle, top + 42, _SAYS.get(name, "the proof"), 15, "middle", _QUIET)
@@ -139,11 +138,8 @@ def _lay(page: Drawing, x: float, y: float, axes: tuple[Vector, Vector, Vector])
         corners = []
         for one, other in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
             corner = [0.0, 0.0, 0.0]
-            corner[which], corner[along], corner[across] = (
-                side * _HALF[which],
-                one * _HALF[along],
-                other * _HALF[across],
-            )
+            corner[which] = side * _HALF[which]
+            corner[along], corner[across] = one * _HALF[along], other * _HALF[across]
             corners.append(at(*corner))
         page.shape(_MODULE if which == 2 else "#1d3872", *corners)
         if which == 2 and side > 0:
@@ -196,14 +192,8 @@ def on_the_bike() -> str:
     page.box(440, 204, 34, 22, "#3a3f4a", 4)
     page.wire(RED, (474, 214), (500, 214), (528, 211), width=3)
     page.wire(BLUE, (528, 204), (430, 176), (352, 128), (340, 106), width=3)
-    _label(
-        page,
-        (556, 198),
-        (610, 56),
-        "Board and sensor, in a dry box",
-        "firm on frame or tail, at any angle,",
-        "away from the exhaust's heat",
-    )
+    where = "firm on frame or tail, at any angle,", "away from the exhaust's heat"
+    _label(page, (556, 198), (610, 56), "Board and sensor, in a dry box", *where)
     _label(page, (334, 82), (40, 40), "Display and button", "where you see and reach them")
     _label(page, (457, 204), (420, 30), "12 V through a fuse", "that the ignition switches")
     _label(page, (280, 246), (20, 190), "Not the sensor:", "fork and handlebar steer")

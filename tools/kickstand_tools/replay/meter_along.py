@@ -60,7 +60,6 @@ class MeterAlong(Replay):
         )
 
 
-@dataclass(frozen=True)
 class ReadingsMisfit(Message):
     """The meter repeatedly reported readings that contradict each other.
 

@@ -64,7 +64,6 @@ class LeanTable(Table):
     notices: list[Message]
 
 
-@dataclass(frozen=True)
 class CarReplayed(Message):
     """The log is from a car. A car's display shows no lean."""
 
@@ -201,9 +200,8 @@ def _last_words(traceback: bytes) -> str:
 
 def _records(blocks: Iterable[Block], calibration: CalibrationFile) -> Iterator[bytes]:
     """Yield the bytes that replay_engine.run() reads."""
-    yield struct.pack(
-        replay_engine.CALIBRATION, *calibration.parameters(), *calibration.matrices(), calibration.delay_s()
-    )
+    numbers = *calibration.parameters(), *calibration.matrices(), calibration.delay_s()
+    yield struct.pack(replay_engine.CALIBRATION, *numbers)
     for block in blocks:
         for time_us, reading, speed in block.measured.rows():
             given = speed if speed >= 0.0 else replay_engine.NO_SPEED  # NaN is not >= 0 either

@@ -270,9 +270,8 @@ def _try_to_copy(transport: ConnectedBoard, part: _Part, title: str, came: _Came
     came(f"pulling {title}", 0)
     try:
         # base64 needs four characters per three bytes, and two per line end. The file of a running recording may grow.
-        for line in lines(
-            transport, _READ.replace("PATH", repr(part.path)), _SILENT_S, most_bytes=2 * part.size + 9999
-        ):
+        code = _READ.replace("PATH", repr(part.path))
+        for line in lines(transport, code, _SILENT_S, most_bytes=2 * part.size + 9999):
             if line.startswith(b"("):
                 there = literal(line, (int, int))
                 continue

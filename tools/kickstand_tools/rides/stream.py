@@ -129,14 +129,10 @@ class StreamLog:
                 speed = NO_SPEED if turn.speed_mps is None else turn.speed_mps
                 meter = replay.take(turn.time_us, (*force, 0.0, *rate), speed)
                 trusted = meter.trusted and not meter.fallen and abs(meter.lean_deg) <= FALLEN_DEG
-                moments.append(
-                    (
-                        (turn.time_us - self.first.time_us) / 1e6,
-                        meter.lean_deg if aligned and trusted and not car else None,
-                        meter.smooth_force[2] if aligned else None,
-                        meter.smooth_force[0] if aligned and car else None,
-                    )
-                )
+                lean_deg = meter.lean_deg if aligned and trusted and not car else None
+                forward_g = meter.smooth_force[2] if aligned else None
+                left_g = meter.smooth_force[0] if aligned and car else None
+                moments.append(((turn.time_us - self.first.time_us) / 1e6, lean_deg, forward_g, left_g))
             self.count += len(block.turns)
             last_us = block.turns[-1].time_us if block.turns else block.time_us
             self.seconds = (last_us - self.first.time_us) / 1e6

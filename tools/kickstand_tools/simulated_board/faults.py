@@ -188,9 +188,8 @@ class Faults:
             bus.faults.append(TransferFault(kind, address, 0, _FOREVER, to_us(at_s), to_us(at_s + for_s)))
 
     def _override(self, at_s, for_s, value):
-        self._between(
-            at_s, for_s, lambda: self._board.sensor.override(value), lambda: self._board.sensor.override(None)
-        )
+        sensor = self._board.sensor
+        self._between(at_s, for_s, lambda: sensor.override(value), lambda: sensor.override(None))
 
     def _between(self, at_s, for_s, begin, end):
         """Call begin() at at_s, and end() for_s later. for_s: None to never call end()."""

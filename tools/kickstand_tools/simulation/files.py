@@ -23,13 +23,7 @@ _TRACK_S = 1  # time between two fixes, as from a GPS receiver
 
 
 def simulate(
-    profile: str,
-    seed: int,
-    out_dir: Path | str,
-    seconds: float = 640.0,
-    *,
-    speed: bool = False,
-    **conditions: Any,
+    profile: str, seed: int, out_dir: Path | str, seconds: float = 640.0, *, speed: bool = False, **conditions: Any
 ) -> SimulatedRide:
     """Simulate a ride and write it to a directory.
 

@@ -99,16 +99,13 @@ def _rotations(vectors: NDArray) -> NDArray:
 
 def _rotation_vector(m: NDArray) -> NDArray:
     """Convert a rotation matrix to a rotation vector in rad, by the quaternion of the rotation."""
-    _, vectors = np.linalg.eigh(
-        np.array(
-            [
-                [m[0, 0] - m[1, 1] - m[2, 2], m[1, 0] + m[0, 1], m[2, 0] + m[0, 2], m[2, 1] - m[1, 2]],
-                [m[1, 0] + m[0, 1], m[1, 1] - m[0, 0] - m[2, 2], m[2, 1] + m[1, 2], m[0, 2] - m[2, 0]],
-                [m[2, 0] + m[0, 2], m[2, 1] + m[1, 2], m[2, 2] - m[0, 0] - m[1, 1], m[1, 0] - m[0, 1]],
-                [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], np.trace(m)],
-            ]
-        )
-    )
+    symmetric = [
+        [m[0, 0] - m[1, 1] - m[2, 2], m[1, 0] + m[0, 1], m[2, 0] + m[0, 2], m[2, 1] - m[1, 2]],
+        [m[1, 0] + m[0, 1], m[1, 1] - m[0, 0] - m[2, 2], m[2, 1] + m[1, 2], m[0, 2] - m[2, 0]],
+        [m[2, 0] + m[0, 2], m[2, 1] + m[1, 2], m[2, 2] - m[0, 0] - m[1, 1], m[1, 0] - m[0, 1]],
+        [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], np.trace(m)],
+    ]
+    _, vectors = np.linalg.eigh(np.array(symmetric))
     q = vectors[:, -1] * (1.0 if vectors[3, -1] >= 0.0 else -1.0)
     size = np.linalg.norm(q[:3])
     return q[:3] * (2.0 * np.arctan2(size, q[3]) / size if size > 1e-12 else 2.0)

@@ -129,13 +129,7 @@ def hills(plan: Plan) -> Conditions:
         else:
             _bends(plan, plan.uniform(12.0, 40.0), (9.0, 18.0), 0.4)
         if plan.likely(0.6):
-            plan.add(
-                "straight",
-                plan.uniform(2.0, 7.0),
-                plan.uniform(12.0, 20.0),
-                lean_deg=0.0,
-                slope_percent=before,
-            )
+            plan.add("straight", plan.uniform(2.0, 7.0), plan.uniform(12.0, 20.0), lean_deg=0.0, slope_percent=before)
     plan.finish(plan.uniform(11.0, 16.0), 3.0)
     return Conditions(CLASS_B * plan.uniform(0.6, 2.0), plan.uniform(0.05, 0.2))
 
@@ -219,10 +213,9 @@ def weight(plan: Plan) -> Conditions:
     conditions = street(plan)
     beside = plan.side() * plan.uniform(0.01, 0.02)
     for leg in plan.legs:
-        turning = leg.lean_deg is not None and abs(leg.lean_deg) > 12.0
-        leg.hang_m = beside + (
-            plan.uniform(0.02, 0.05) * (1.0 if (leg.lean_deg or 0.0) > 0 else -1.0) if turning else 0.0
-        )
+        leg.hang_m = beside
+        if leg.lean_deg is not None and abs(leg.lean_deg) > 12.0:
+            leg.hang_m += plan.uniform(0.02, 0.05) * (1.0 if leg.lean_deg > 0 else -1.0)
     conditions.sway_m = 0.004
     return conditions
 

@@ -61,9 +61,8 @@ class Installation:
         except InputError as error:
             self._by_hand = str(error)
         with config_check.posed(*self._pose):
-            usual = {
-                name: _written(value) for name, value in vars(config_check.default_settings()).items() if name.isupper()
-            }
+            defaults = vars(config_check.default_settings())
+            usual = {name: _written(value) for name, value in defaults.items() if name.isupper()}
         said = {"board": board, "settings": settings, "usual": usual, "by_hand": self._by_hand}
         return json.dumps(said | {"others": found.words()})
 

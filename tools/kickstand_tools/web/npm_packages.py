@@ -17,10 +17,7 @@ NPM = Path(__file__).resolve().parent / "npm"
 LISTS = ("package.json", "package-lock.json")
 # {folder in the site: (name of the package, files that the site takes from it)}
 PACKAGES = {
-    "micropython": (
-        "@micropython/micropython-webassembly-pyscript",
-        ("micropython.mjs", "micropython.wasm"),
-    ),
+    "micropython": ("@micropython/micropython-webassembly-pyscript", ("micropython.mjs", "micropython.wasm")),
     "esptool": ("esptool-js", ("bundle.js", "LICENSE")),
     "numpy": ("@emscripten-forge/numpy", ("pkg/numpy-2.0.1-py312h4e66579_0.tar.gz",)),
     "plotly": ("plotly.js-dist-min", ("plotly.min.js",)),

@@ -123,7 +123,7 @@ def _add(found: Given, log: str, names: list[str], files: list[RecordingFile]) -
     """Add a ride, or the reason why the files are not a ride."""
     known = recordings(files)
     table = None if known else mapped.table_in(files)
-    if not known and (table is None or len(table.columns) < len(mapped.REQUIRED)):
+    if not known and (table is None or len(table.sheet.columns) < len(mapped.REQUIRED)):
         found.refused |= dict.fromkeys(names, mapped.unknown(files, log))
         return
     found.rides.append(GivenRide(log, names, table=table))

@@ -91,18 +91,18 @@ def asked_for(table: mapped.MappedTable) -> dict[str, Any]:
         certain: true if all required columns are certain.
         picture: result of MappedTable.first_seconds().
     """
-    keys = [[key, words, key in mapped.REQUIRED, table.found.get(key, "")] for key, words in mapped.WORDS.items()]
     found = table.findings
+    keys = [[key, words, key in mapped.REQUIRED, found.columns.get(key, "")] for key, words in mapped.WORDS.items()]
     units = []
     for key, words in (("t", "time"), ("a", "acceleration"), ("g", "rates"), ("speed", "speed")):
-        likely, why = table.units.get(key, ""), found.found[key].why if key in found.found else ""
+        likely, why = found.units.get(key, ""), found.found[key].why if key in found.found else ""
         choices = [*mapped.UNIT_KEYS[key], *([mapped.COUNTS] if key in "ag" else [])]
         if likely and likely not in choices:
             choices.insert(0, likely)
         units.append([key, f"unit of the {words}", [[unit, unit] for unit in choices], likely, why])
     units[1][2] += [[f"-{unit}", f"{unit}, all of the opposite sign"] for unit, _ in list(units[1][2])]
     words = {"lacking": table.lacking, "certain": found.decided, "picture": table.first_seconds()}
-    return {"columns": table.columns, "keys": keys, "units": units} | words
+    return {"columns": table.sheet.columns, "keys": keys, "units": units} | words
 
 
 @in_json

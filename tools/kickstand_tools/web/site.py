@@ -60,9 +60,8 @@ def site_files() -> dict[str, bytes]:
     (package,) = (name for name in files if name.startswith("numpy/"))
     files["numpy/numpy.zip"], files["numpy/licence.txt"] = archives.numpy_archive(files.pop(package))
     files["font.json"] = json.dumps({code: list(rows) for code, rows in ROM.items()}).encode()
-    files["sizes.json"] = json.dumps(
-        {name: len(data) for name, data in files.items() if name.startswith(LATER)}
-    ).encode()
+    sizes = {name: len(data) for name, data in files.items() if name.startswith(LATER)}
+    files["sizes.json"] = json.dumps(sizes).encode()
     version = hashlib.sha256(b"".join(name.encode() + data for name, data in sorted(files.items()))).hexdigest()[:12]
     kept = sorted(["./", *(name for name in files if name not in _NOT_KEPT and not name.startswith(_WHEN_READ))])
     files["service_worker.js"] = _filled("service_worker.js", files=kept, version=version)

@@ -33,7 +33,6 @@ _DATED = ("gpx", "racechrono", "vbo")  # formats that need date and time
 _CLOCK_S = 1e8  # a time in a log is Unix time if it is larger than this (March 1973)
 
 
-@dataclass(frozen=True)
 class RowsShare(Message):
     """Several samples have the same time in the format."""
 

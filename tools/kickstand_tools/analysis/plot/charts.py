@@ -219,9 +219,8 @@ def _over_time(seen: Overview, words: str, traces: list[Trace], height: float, y
 
 def _lean(seen: Overview) -> Chart:
     limit = lean_limit(seen)
-    lean = Sides(seen.course.t_s, shown_lean_deg(seen), GAP_S)
     words = "Lean, degrees (right up, left down)"
-    traces: list[Trace] = [lean]
+    traces: list[Trace] = [Sides(seen.course.t_s, shown_lean_deg(seen), GAP_S)]
     doubtful = seen.course.doubtful >= 0.5
     if np.any(doubtful):
         words = "Lean, degrees (right up; yellow: less exact)"  # a phone has no room for more words
@@ -282,9 +281,8 @@ def _shares(seen: Overview) -> Chart:
         at = sign * peak.value
         made.traces.append(Line(np.array([at, at]), np.array([0.0, _MARKED * top]), "#555555", dotted=True))
         beside = "left" if sign < 0 else "right"  # labels of small leans go to the side, to avoid overlap
-        made.notes.append(
-            Note(at, _MARKED * top, f"{peak.value:.0f}°", "above" if peak.value > 0.3 * limit else beside)
-        )
+        side = "above" if peak.value > 0.3 * limit else beside
+        made.notes.append(Note(at, _MARKED * top, f"{peak.value:.0f}°", side))
     made.x_title = "left  ·  degrees  ·  right"
     made.ticks = {tick: f"{abs(tick):.0f}" for tick in np.arange(-180.0, 181.0, 20.0).tolist() if abs(tick) <= limit}
     return made

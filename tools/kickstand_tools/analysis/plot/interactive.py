@@ -79,11 +79,9 @@ def _traces(trace: Trace) -> list[dict[str, Any]]:
     if isinstance(trace, Line):
         x, y = envelope(trace.x, trace.y, POINTS, trace.gap_s)
         line = {"color": trace.colour, "width": 1.2 * trace.width, "dash": "dot" if trace.dotted else "solid"}
-        named = (
-            {"type": "scattergl", "name": trace.name, **_OWN_WORDS}
-            if trace.name
-            else {"type": "scatter", "hoverinfo": "skip"}
-        )
+        named = {"type": "scatter", "hoverinfo": "skip"}
+        if trace.name:
+            named = {"type": "scattergl", "name": trace.name, **_OWN_WORDS}
         return [{"mode": "lines", "line": line, "x": plain(x), "y": plain(y)} | named]
     if isinstance(trace, Sides):
         x, y = envelope(trace.x, trace.y, POINTS, trace.gap_s)
@@ -103,11 +101,7 @@ def _traces(trace: Trace) -> list[dict[str, Any]]:
     centres = plain((trace.edges[1:] + trace.edges[:-1]) / 2.0, 4)
     there = trace.values > 0.0
     logs = np.log10(np.where(there, trace.values, np.nan))
-    drawn: dict[str, Any] = _OWN_WORDS | {
-        "type": "heatmap",
-        "colorscale": _OFTEN,
-        "showscale": False,
-    }
+    drawn: dict[str, Any] = _OWN_WORDS | {"type": "heatmap", "colorscale": _OFTEN, "showscale": False}
     if np.any(there):
         drawn |= {"zmin": float(np.nanmin(logs)), "zmax": float(np.nanmax(logs))}
     return [drawn | {"name": f"{trace.name}, log10", "x": centres, "y": centres, "z": [plain(row) for row in logs]}]
@@ -120,8 +114,7 @@ def _filled(name: str, x: Array, y: Array, colour: str) -> dict[str, Any]:
     kept[1:] |= leans[:-1]
     kept[:-1] |= leans[1:]
     drawn = _OWN_WORDS | {"type": "scattergl", "mode": "lines", "line": {"color": colour, "width": 1.2}}
-    drawn |= {"fill": "tozeroy"}
-    return drawn | {"name": name, "x": plain(x[kept]), "y": plain(y[kept])}
+    return drawn | {"fill": "tozeroy", "name": name, "x": plain(x[kept]), "y": plain(y[kept])}
 
 
 def _layout(charts: Charts, narrow: bool, linked: bool) -> dict[str, Any]:

@@ -31,9 +31,8 @@ def draw(path: Path, seen: Overview, tiles: bool = False) -> None:
     tiles: show streets in the map. The page loads them from a server.
     """
     library = files("plotly").joinpath("package_data/plotly.min.js").read_text(encoding="utf-8")
-    path.write_text(
-        page(seen, f"<script>{library}</script>", source_hash(library), tiles, warnings=True), encoding="utf-8"
-    )
+    text = page(seen, f"<script>{library}</script>", source_hash(library), tiles, warnings=True)
+    path.write_text(text, encoding="utf-8")
 
 
 def page(seen: Overview, library: str, allowed: str, tiles: bool = False, warnings: bool = False) -> str:

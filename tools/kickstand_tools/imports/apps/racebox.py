@@ -46,9 +46,8 @@ def read(files: list[RecordingFile], name: str, units: Mapping[str, str] = {}) -
     lat, lon, speed = sheet.place("Latitude"), sheet.place("Longitude"), sheet.place("Speed", "KPH")
     notices: list[Message] = []
     if speed is not None:
-        speed_unit = (
-            speed_unit or _unit_in_name(sheet.columns[speed]) or unit_by_positions(sheet, time_ns, speed, lat, lon)
-        )
+        speed_unit = speed_unit or _unit_in_name(sheet.columns[speed])
+        speed_unit = speed_unit or unit_by_positions(sheet, time_ns, speed, lat, lon)
         if not speed_unit:
             notices.append(ImportSpeedUnit(sheet.columns[speed]))
             speed = None

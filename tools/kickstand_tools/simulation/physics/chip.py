@@ -78,14 +78,14 @@ class Chip:
         has a third of the accelerometer's drift and a fifth of the gyro's drift.
         """
 
-        def near_one(scale: float, cross: float) -> NDArray[np.float64]:
+        def near_one() -> NDArray[np.float64]:
             spread = chance.standard_normal((3, 3)).clip(-2.0, 2.0) / 2.0
-            return np.eye(3) + share * spread * np.where(np.eye(3) > 0.0, scale, cross)
+            return np.eye(3) + share * spread * np.where(np.eye(3) > 0.0, MAX_SCALE_ERROR, _CROSS_AXIS)
 
         return Chip(
-            near_one(MAX_SCALE_ERROR, _CROSS_AXIS),
+            near_one(),
             share * chance.uniform(-1.0, 1.0, 3) * MAX_OFFSET_G,
-            near_one(MAX_SCALE_ERROR, _CROSS_AXIS),
+            near_one(),
             share * chance.uniform(-MAX_GYRO_BIAS_DPS, MAX_GYRO_BIAS_DPS, 3),
             share * drift * chance.uniform(-0.0003, 0.0003, 3),
             share * drift * chance.uniform(-0.06, 0.06, 3),

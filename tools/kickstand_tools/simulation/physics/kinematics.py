@@ -65,10 +65,7 @@ def specific_force(motion: Motion, bike: Bike) -> NDArray[np.float64]:
     up = STANDARD_GRAVITY * np.cos(slope) + v * derivative(slope, rate) + motion.heave
     forward = STANDARD_GRAVITY * np.sin(slope) + derivative(v, rate)
     nose = motion.pitch - slope
-    up, forward = (
-        up * np.cos(nose) - forward * np.sin(nose),
-        forward * np.cos(nose) + up * np.sin(nose),
-    )
+    up, forward = up * np.cos(nose) - forward * np.sin(nose), forward * np.cos(nose) + up * np.sin(nose)
     c, s = np.cos(motion.lean), np.sin(motion.lean)
     force = np.column_stack((left * c + up * s, up * c - left * s, forward))
     arm = np.array([bike.sensor_left, bike.sensor_height - bike.tyre_radius, bike.sensor_forward])

@@ -54,10 +54,8 @@ class Holder:
         turned[:, 0] = (self.sag[0] * held[:, 2]).clip(-_SAG_LIMIT, _SAG_LIMIT)
         turned[:, 2] = (-self.sag[2] * held[:, 0]).clip(-_SAG_LIMIT, _SAG_LIMIT)
         turning = np.column_stack([derivative(column, rate_hz) for column in turned.T])
-        turning = np.column_stack(
-            [self._by_spring(column, k, rate_hz) for k, column in enumerate(rates.T)]
-        ) + np.degrees(turning)
-        return held - np.cross(turned, held), turning
+        held_rates = np.column_stack([self._by_spring(column, k, rate_hz) for k, column in enumerate(rates.T)])
+        return held - np.cross(turned, held), held_rates + np.degrees(turning)
 
     def _by_spring(self, x: Signal, axis: int, rate_hz: float) -> Signal:
         """Return the motion of a mass on a spring whose base moves by x."""

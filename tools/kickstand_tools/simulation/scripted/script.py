@@ -50,18 +50,12 @@ def kickstand(seconds, lean_deg=KICKSTAND_DEG, slope_deg=None):
 
     lean_deg: lean on the kickstand, positive if the kickstand is on the right.
     """
-    return (
-        Segment("moving", MOVE_S, lean_deg, 0.0, slope_deg, 0.0, 0.0),
-        Segment("kickstand", seconds),
-    )
+    return Segment("moving", MOVE_S, lean_deg, 0.0, slope_deg, 0.0, 0.0), Segment("kickstand", seconds)
 
 
 def upright(seconds, lean_deg=0.0, slope_deg=None):
     """Bring the bike upright, where the rider holds it, with the engine off. lean_deg: error of the upright pose."""
-    return (
-        Segment("moving", MOVE_S, lean_deg, 0.0, slope_deg, STANDING_SWAY_DEG, 0.0),
-        Segment("upright", seconds),
-    )
+    return Segment("moving", MOVE_S, lean_deg, 0.0, slope_deg, STANDING_SWAY_DEG, 0.0), Segment("upright", seconds)
 
 
 def wait(seconds):
@@ -76,11 +70,7 @@ def straight(seconds, slope_deg=None):
 
 def turn(lean_deg, seconds, roll_s=1.5):
     """Roll to lean_deg within roll_s, hold this lean for `seconds`, and roll back within roll_s."""
-    return (
-        Segment("roll in", roll_s, lean_deg),
-        Segment("held turn", seconds),
-        Segment("roll out", roll_s, 0.0),
-    )
+    return Segment("roll in", roll_s, lean_deg), Segment("held turn", seconds), Segment("roll out", roll_s, 0.0)
 
 
 def accelerate(speed_mps, seconds):

@@ -4,7 +4,6 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape
-from typing import Any
 
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
@@ -118,7 +117,7 @@ def _linked(children: list[Token], link: Link, picture: Callable[[str], str]) ->
                 continue
             token.attrSet("href", address)
             if address.startswith(("https:", "http:")):
-                _set(token, target="_blank", rel="noopener")
+                token.attrs |= {"target": "_blank", "rel": "noopener"}
         elif token.type == "link_close" and not open_links.pop():
             continue
         elif token.type == "image":
@@ -132,8 +131,3 @@ def _linked(children: list[Token], link: Link, picture: Callable[[str], str]) ->
 
 def _with_pictures(html: str, picture: Callable[[str], str]) -> str:
     return _IMAGE.sub(lambda found: found[1] + picture(found[2]) + found[3], html)
-
-
-def _set(token: Token, **attributes: Any) -> None:
-    for name, value in attributes.items():
-        token.attrSet(name, value)
