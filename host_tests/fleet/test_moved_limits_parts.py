@@ -5,7 +5,7 @@ In most tests a function replaces compare(), so that each limit has exact number
 import numpy as np
 import pytest
 from kickstand_fleet import moved
-from test_moved_parts import LEFT, hill, log_of, part
+from test_moved_parts import LEFT, MOUNT, compared, hill, log_of, part, swaying
 
 
 def decided(monkeypatch, turn_deg, sigma_deg=1.0, between=False, moment: "float | None" = 50.0, **how):
@@ -126,3 +126,18 @@ def test_a_jump_is_not_seen_in_a_part_without_driving():
         log = log_of(60.0, 9.0, LEFT, 30.0)
         log.weight[:] = (np.arange(60) >= 30 - used // 2) & (np.arange(60) < 30 - used // 2 + used)
         assert (jump(log, move) is not None) is known
+
+
+@pytest.mark.parametrize(("apart_deg", "used"), [(6.4, True), (9.5, False)])
+def test_the_direction_of_sway_has_a_standard_deviation_under_five_degrees(apart_deg, used):
+    """Half of the blocks sway to one side of forward, the others to the other side. Without one of eight blocks, the
+    mean direction is `off`."""
+    parts = part(), part()
+    for one in parts:
+        for k in range(8):
+            one.sway[k] = MOUNT.T @ swaying(apart_deg * (-1) ** k) @ MOUNT
+    _, sigma = compared(*parts)
+    off = np.degrees(0.5 * np.arctan(np.tan(np.radians(2.0 * apart_deg)) / 7.0))
+    swayed, braking = 2.0 * 7.0 * off**2 + 2.0 * 0.7**2, 2.0 * 0.16 + 2.0 * 0.25**2
+    assert bool(swayed < 25.0) is used
+    assert sigma[1] ** 2 == pytest.approx(braking * swayed / (braking + swayed) if used else braking, rel=0.003)
