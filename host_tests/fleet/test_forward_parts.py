@@ -71,11 +71,24 @@ def test_the_beginnings_of_bends_are_not_fitted():
     assert found(log_of(64.0, arm=0.1)).frame == pytest.approx(MOUNT, abs=0.02)
 
 
+def device_of(frame, quality_deg, halves_deg=None):
+    """Return an alignment by the firmware."""
+    calibration = SimpleNamespace(vehicle_from_sensor=frame)
+    return SimpleNamespace(calibration=calibration, quality_deg=quality_deg, halves_deg=halves_deg)
+
+
+@pytest.mark.parametrize("halves_deg", [None, 2.5])
+def test_a_short_drive_has_the_firmwares_alignment(halves_deg):
+    """Its standard error includes the error of the sensor."""
+    made = found(log_of(24.0), device=device_of(MOUNT, 0.4, halves_deg))
+    assert made.frame is MOUNT and (made.sigma_deg, made.halves_deg) == (pytest.approx(0.5), halves_deg or 0.0)
+    assert made.attitude_deg == pytest.approx(np.hypot(0.5, UP_DEG))
+
+
 def test_the_firmwares_alignment_gives_up_and_a_part_of_forward():
     """Both have the same standard error, so forward is in the middle. The attitude has the error of this mean."""
     theirs = turn_of(1.0, UP) @ turn_of(2.0, (0.0, 0.0, 1.0)) @ MOUNT
-    device = SimpleNamespace(calibration=SimpleNamespace(vehicle_from_sensor=theirs), quality_deg=0.0)
-    made = found(log_of(64.0), device=device)
+    made = found(log_of(64.0), device=device_of(theirs, 0.0))
     assert made.frame[1] == pytest.approx(theirs[1])
     assert np.degrees(np.arcsin(made.frame[2] @ theirs[0])) == pytest.approx(0.5, abs=0.03)
     assert made.sigma_deg == pytest.approx(np.sqrt(0.75) * 0.3 * max(1.0, 1.0 / 0.3 / 2.0), rel=0.02)
