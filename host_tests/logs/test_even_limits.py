@@ -1,5 +1,7 @@
 """The limits of the repair of times, each with a value on either side of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from kickstand_tools.common.errors import InputError
@@ -143,3 +145,54 @@ def test_times_that_become_rounded_continue_after_even_ones():
     assert found[0].own_times and not found[-1].own_times
     assert time_us[:3000].tolist() == np.rint(even[:3000] * 1e6).astype(int).tolist()
     assert np.abs(time_us[6000:] * 1e-6 - rounded).max() <= 0.0061
+
+
+@pytest.mark.parametrize(("at", "counts"), [(6, True), (7, False)])
+def test_a_line_through_the_first_samples_continues_before_them(at, counts):
+    """The line is fitted to seven samples, if a mean has three on each side. The first mean has three of its points."""
+    values = np.where(np.arange(20) == at, 1.0, 0.0)
+    for found in (module._mean(values, 3)[0], module._mean(values[::-1], 3)[-1]):
+        assert bool(found) is counts
+        if counts:  # the line has the mean 1/7 and the slope 3/28 per sample, and its points are 4, 5 and 6 away
+            assert found == pytest.approx((3.0 / 7.0 - 15.0 * 3.0 / 28.0) / 7.0)
+
+
+@pytest.mark.parametrize("size", [5000, 6001, 12000])
+def test_blocks_of_a_log_have_the_times_of_the_whole_log(size):
+    """The first new time is not 0. It is added to the start of the log."""
+    times = np.floor(np.arange(12000) * 0.7 + 1e-9) / 100.0
+    whole = even_times(times)
+    found = list(even_blocks(blocks_of(times, size), "a", []))
+    assert abs(whole[0]) > 0.001 and found[0].time_us[0] == 0
+    assert [block.start_s for block in found] == pytest.approx([whole[0]] * len(found), abs=1e-6)
+    assert np.concatenate([block.start_s + block.t_s for block in found]) == pytest.approx(whole, abs=3e-6)
+
+
+def test_a_time_is_after_the_last_time_of_the_previous_block():
+    """The second block has two samples for each time, so the mean around its first sample is before the sample."""
+    even = np.arange(3000) * 0.01
+    found = list(even_blocks(blocks_of(np.concatenate((even, np.repeat(29.99 + even, 2))), 3000), "a", []))
+    time_us = np.concatenate([block.time_us for block in found])
+    assert time_us[2999] == 29_990_000 and time_us[3000] == 29_990_001 and np.all(np.diff(time_us) >= 1)
+
+
+def test_a_first_block_with_a_single_time_waits_for_the_next():
+    times = [0.0, 0.0, *(0.01 + np.arange(20) * 0.01)]
+    assert sum(len(block.time_us) for block in even_blocks(blocks_of(times, 2), "a", [])) == 22
+
+
+def test_new_times_count_from_the_first_of_them():
+    """The second block begins before the end of the first, so its first time is 1 us after that end."""
+    blocks = list(blocks_of([0.0, 0.1, 0.15, 0.3], 2))
+    spread = module._Spread("a")
+    first = spread._ready(replace(blocks[0], start_s=5.0), np.array([0.05, 0.1]))
+    second = spread._ready(replace(blocks[1], start_s=5.0), np.array([0.09, 0.3]))
+    third = spread._ready(replace(blocks[1], start_s=5.0), np.array([0.2, 0.4]))
+    assert [block.time_us.tolist() for block in (first, second, third)] == [
+        [0, 50_000],
+        [50_001, 250_000],
+        [250_001, 350_000],
+    ]
+    assert {block.start_s for block in (first, second, third)} == {5.05}
+    (remark,) = spread.notices()
+    assert remark.shift_s == pytest.approx(0.1) and remark.samples == 6 and remark.repeated == 0  # type: ignore[attr-defined]
