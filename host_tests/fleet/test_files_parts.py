@@ -103,7 +103,7 @@ def test_a_packed_log_may_have_300_million_bytes(monkeypatch):
     asked = []
 
     class File(io.BytesIO):
-        def read(self, size=-1):
+        def read(self, size: int | None = -1):
             asked.append(size)
             return b"x"
 

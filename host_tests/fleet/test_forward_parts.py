@@ -19,7 +19,7 @@ def log_of(seconds, turn_deg=0.0, axis=UP, from_s=0.0, arm=0.0):
     arm: force to the left in g if the yaw rate changes by 1 rad/s2.
     """
     count = int(seconds)
-    t_s = np.arange(count) + 0.5
+    t_s = np.linspace(0.5, count - 0.5, count)
     a = np.where(np.arange(count) % 4 < 2, -0.2, 0.2)
     c = np.where(np.arange(count) % 8 < 4, -0.1, 0.1)
     w = np.where(np.arange(count) % 2 < 1, -0.3, 0.3)

@@ -186,7 +186,7 @@ def test_a_gzip_file_with_a_wrong_check_sum_is_damaged(tmp_path):
 
 
 def test_a_log_may_begin_at_any_time(monkeypatch):
-    log = Log([1.0, 2.0], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2)
+    log = Log(np.array([1.0, 2.0]), np.tile([0.0, 1.0, 0.0], (2, 1)), np.zeros((2, 3)))
     assert log.t_s.tolist() == [0.0, 1.0] and log.start_s == 1.0
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(InputError, match=r"^data frames need pandas: .*\[rides\]"):
