@@ -2,6 +2,7 @@
 
 import gzip
 import io
+import os
 
 import fsspec
 import pytest
@@ -152,3 +153,21 @@ def test_a_vehicle_of_a_pattern_has_a_printable_name(monkeypatch):
     monkeypatch.setattr(files, "matches", lambda pattern: ["a\udcff.csv"])
     assert by_pattern("*.csv", "motorcycle") == [Period("a\\udcff.csv", "", "motorcycle", ("a\udcff.csv",))]
     assert by_pattern("*.csv")[0].kind == "car"
+
+
+def test_paths_are_relative_to_the_manifest():
+    joined = [files.join("/data/", path) for path in ("a.csv", "/b.csv", "s3://c/d.csv")]
+    assert joined == ["/data/a.csv", "/b.csv", "s3://c/d.csv"]
+    assert files.join("", "a.csv") == "a.csv" and files.join("s3://x", "a.csv") == "s3://x/a.csv"
+    assert files.is_remote("memory://a") and not files.is_remote("/a/b:c")
+    assert files.folder_value("a/b=ä") == "a%2Fb%3D%C3%A4"
+
+
+def test_a_changed_file_has_another_mark(tmp_path):
+    path, other = tmp_path / "a.csv", tmp_path / "none.csv"
+    path.write_text("one")
+    os.utime(path, ns=(5, 5))
+    marks = files.identities([str(path), str(other)])
+    assert marks == {str(path): "3-5", str(other): ""}
+    os.utime(path, ns=(6, 6))
+    assert files.identities([str(path)]) != {str(path): marks[str(path)]}
