@@ -1,7 +1,6 @@
 """Single steps of the fleet with known results: alignments from forces, means of two alignments, tables, files, axes of
 a picture, and the signals of a day."""
 
-import os
 from math import cos, radians, sin
 from pathlib import Path
 from types import SimpleNamespace
@@ -174,7 +173,9 @@ def test_tables_are_written_in_groups_with_their_units(tmp_path, monkeypatch):
     assert whole.column("vehicle").to_pylist() == [f"v{k}" for k in range(10)]
     assert whole.schema.field("quality_deg").metadata[b"unit"] == b"deg"
     assert whole.schema.field("stops").type == "int32"
-    assert parquet.ParquetFile(tmp_path / "alignments.parquet").num_row_groups in (3, 4)
+    with parquet.ParquetFile(tmp_path / "alignments.parquet") as file:
+        groups = [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)]
+    assert groups == [4, 4, 2]
 
 
 @pytest.mark.parametrize(
@@ -193,24 +194,6 @@ def test_ticks_are_round_and_within_the_axis(first, last, count, values):
 
 def test_a_day_is_that_of_universal_time():
     assert [panel.date_text(utc_s) for utc_s in (0.0, 86_399.0, 1.79e9)] == ["1970-01-01", "1970-01-01", "2026-09-21"]
-
-
-def test_paths_are_relative_to_the_manifest():
-    joined = [files.join("/data/", path) for path in ("a.csv", "/b.csv", "s3://c/d.csv")]
-    assert joined == ["/data/a.csv", "/b.csv", "s3://c/d.csv"]
-    assert files.join("", "a.csv") == "a.csv" and files.join("s3://x", "a.csv") == "s3://x/a.csv"
-    assert files.is_remote("memory://a") and not files.is_remote("/a/b:c")
-    assert files.folder_value("a/b=ä") == "a%2Fb%3D%C3%A4"
-
-
-def test_a_changed_file_has_another_mark(tmp_path):
-    path, other = tmp_path / "a.csv", tmp_path / "none.csv"
-    path.write_text("one")
-    os.utime(path, ns=(5, 5))
-    marks = files.identities([str(path), str(other)])
-    assert marks == {str(path): "3-5", str(other): ""}
-    os.utime(path, ns=(6, 6))
-    assert files.identities([str(path)]) != {str(path): marks[str(path)]}
 
 
 def test_a_file_is_read_up_to_its_limit(tmp_path):

@@ -4,7 +4,8 @@ import json
 import os
 
 import pytest
-from kickstand_fleet.journal import Journal
+from kickstand_fleet import files, journal as module
+from kickstand_fleet.journal import Journal, StoreJournal
 from kickstand_fleet.manifest import Period
 from kickstand_fleet.period import failed
 from kickstand_tools.common.errors import InputError
@@ -117,3 +118,112 @@ def test_damaged_line_is_dropped_and_counted_once(tmp_path):
             journal.add("d", result("d"))
         with Journal(path) as journal:
             assert "d" in journal and journal.damaged == 0
+
+
+@pytest.mark.parametrize(("system", "closed"), [("posix", False), ("nt", True)])
+def test_an_empty_journal_is_removed_while_it_is_locked(tmp_path, monkeypatch, system, closed):
+    """Windows cannot remove an open file. There the journal is removed after it is closed."""
+    seen = []
+
+    class Removed:
+        def unlink(self):
+            seen.append(journal._file.closed)
+
+    with Journal(tmp_path / "journal.jsonl") as journal, monkeypatch.context() as patched:
+        patched.setattr(os, "name", system)
+        patched.setattr(journal, "_path", Removed())
+        journal.__exit__()
+    assert seen == [closed]
+    with Journal(tmp_path / "other.jsonl") as journal, monkeypatch.context() as patched:
+        journal.add("a", result())
+        patched.setattr(os, "name", system)
+        patched.setattr(journal, "_path", Removed())
+        journal.__exit__()
+    assert seen == [closed]
+
+
+def test_others_may_read_and_write_the_journal(tmp_path):
+    before = os.umask(0o002)
+    try:
+        with Journal(tmp_path / "journal.jsonl") as journal:
+            journal.add("a", result(message=20_000 * "x"))
+    finally:
+        os.umask(before)
+    if os.name != "nt":
+        assert (tmp_path / "journal.jsonl").stat().st_mode & 0o777 == 0o664
+    with Journal(tmp_path / "journal.jsonl") as journal:
+        assert "a" in journal and journal.damaged == 0  # long lines are read, too
+
+
+def test_a_line_without_end_is_damaged(tmp_path, monkeypatch):
+    """It is read in parts, so that a damaged file cannot fill the memory."""
+    path = tmp_path / "journal.jsonl"
+    with Journal(path) as journal:
+        journal.add("a", result())
+    longest = len(path.read_bytes())
+    path.write_bytes(path.read_bytes() + (2 * longest - 1) * b"x" + b"\n")
+    monkeypatch.setattr(module, "_LONGEST", longest)
+    with Journal(path) as journal:
+        assert "a" in journal and journal.damaged == 2
+    assert path.read_bytes()[longest:] == 2 * ((longest - 1) * b" " + b"\n")
+
+
+def test_a_part_of_a_line_is_removed_if_the_disk_is_full(tmp_path, monkeypatch):
+    path = tmp_path / "journal.jsonl"
+    with Journal(path) as journal:
+        journal.add("a", result())
+        length = path.stat().st_size
+        file = journal._file
+
+        class Full:
+            def __getattr__(self, name):
+                return getattr(file, name)
+
+            def write(self, line):
+                file.write(line[:10])
+                file.flush()
+                raise OSError(28, "No space left on device")
+
+        with monkeypatch.context() as patched, pytest.raises(InputError, match="cannot be written: No space"):
+            patched.setattr(journal, "_file", Full())
+            journal.add("b", result())
+        assert path.stat().st_size == length and "b" not in journal
+        journal.add("c", result())
+    with Journal(path) as journal:
+        assert ("a" in journal, "c" in journal, journal.damaged) == (True, True, 0)
+
+
+def test_results_of_a_store_are_fetched_200_at_a_time(monkeypatch):
+    place = "memory://fleet-many/journal"
+    keys = [f"k{k}" for k in range(401)]
+    sizes = []
+    line = module._line("k", result(), False)
+
+    def read_all(paths):
+        sizes.append(len(paths))
+        return [line] * len(paths)
+
+    monkeypatch.setattr(files, "read_all", read_all)
+    journal = StoreJournal(place)
+    journal._kept |= set(keys)
+    assert len(list(journal.results([*keys, "none"]))) == 401 and sizes == [200, 200, 1]
+
+
+def test_a_final_result_of_a_store_replaces_an_earlier_one():
+    place = "memory://fleet-again/journal"
+    with StoreJournal(place) as journal:
+        journal.add("a", result(message="early"), again=True)
+        assert "a" not in journal
+        assert [found.alignment["message"] for found in journal.results(["a"])] == ["early"]
+        journal.add("a", result(message="final"))
+    with StoreJournal(place) as journal:
+        assert "a" in journal and journal.damaged == 0
+        assert [found.alignment["message"] for found in journal.results(["a", "b"])] == ["final"]
+
+
+def test_a_picture_is_not_kept_in_the_journal(tmp_path):
+    with Journal(tmp_path / "journal.jsonl") as journal:
+        one = result()
+        one.picture = [[1.0, 2.0, 3.0, 4.0]]
+        journal.add("a", one)
+        assert [found.picture for found in journal.results(["a"])] == [[]]

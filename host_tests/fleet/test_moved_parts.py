@@ -95,7 +95,7 @@ def test_the_sway_measures_yaw_too():
     assert turn[1] == pytest.approx(2.0 - 2.0 * braking / (braking + road), abs=0.01)
 
 
-@pytest.mark.parametrize(("apart_deg", "used"), [(3.5, True), (3.65, False), (-3.5, True), (-3.65, False)])
+@pytest.mark.parametrize(("apart_deg", "used"), [(3.55, True), (3.62, False), (-3.55, True), (-3.62, False)])
 def test_sway_that_contradicts_by_three_standard_deviations_is_not_used(apart_deg, used):
     """Three standard deviations of the difference are 3.58 degrees."""
     _, sigma = compared(part(sway=swaying(40.0)), part(sway=swaying(40.0 + apart_deg)))

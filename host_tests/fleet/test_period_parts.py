@@ -1,8 +1,10 @@
 """Parts of the result of a period: rows, messages, and the points of the picture."""
 
 import errno
+import importlib
 import sys
 
+import kickstand_fleet
 import numpy as np
 import pytest
 from kickstand_fleet import files, period, tables
@@ -145,9 +147,14 @@ def test_names_that_are_not_utf8_are_printable():
 
 
 def test_a_missing_library_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    """The module of the tables is imported without the library, too."""
+    monkeypatch.setattr(kickstand_fleet, "tables", tables)  # restored at the end, as sys.modules is
+    monkeypatch.delitem(sys.modules, "kickstand_fleet.tables")
+    for name in ("pyarrow", "pyarrow.parquet"):
+        monkeypatch.setitem(sys.modules, name, None)
+    without = importlib.import_module("kickstand_fleet.tables")
     with pytest.raises(InputError, match=r"a fleet needs pyarrow: .*fleet\]"):
-        tables.check()
+        without.check()
 
 
 def test_a_long_name_is_cut_and_unique():

@@ -2,11 +2,13 @@
 
 import csv
 import gzip
+import sys
 from collections import Counter
 from copy import copy
 
 import numpy as np
 import pytest
+from fixed_chance import Fixed
 from kickstand_fleet.simulation import fleet
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs.log import Log
@@ -173,6 +175,63 @@ def test_the_truth_says_if_the_vehicle_can_be_aligned(trouble):
     vehicle = fleet.MadeVehicle("a", "car", trouble, [], [np.eye(3)])
     refused = trouble in ("moved-between", "moved-within", "late", "dead", "km/h", "circles")
     assert bool(vehicle.reasons) is refused
+
+
+def test_a_fault_draws_its_vehicles_by_its_share():
+    """In a small fleet a share is rounded to whole vehicles."""
+    counts = [Counter(fleet._shares(np.random.default_rng(1), count)) for count in (10, 25, 200)]
+    assert counts[0] == {"moved-between": 1, "moved-within": 1, "": 8}
+    assert counts[1]["late"] == counts[1]["km/h"] == 1 and "cut" not in counts[1]
+    names = ["dies", "circles", "garbage", "empty", "cut", "missing"]
+    assert [counts[2][name] for name in names] == [4] * 6 and counts[2]["moved-within"] == 12
+    assert [counts[2][name] for name in ("late", "dead", "km/h")] == [6] * 3
+
+
+@pytest.mark.parametrize(("share", "apart_days", "lasts"), [(0.0, 0.1, 0.85), (1.0, 1.5, 1.2)])
+def test_drives_are_a_tenth_to_one_and_a_half_days_apart(drives, tmp_path, share, apart_days, lasts):
+    """The mount moves from 40 to 60 % of a drive."""
+    for trouble in ("moved-between", "moved-within"):
+        (tmp_path / trouble).mkdir()
+        made = fleet._vehicle(Fixed(share), tmp_path / trouble, 0, trouble, 100.0, 25.0)
+        assert made.moved_deg == pytest.approx(40.0 if share else 5.0)
+    first, second, *_ = (start_s for *_, start_s, _ in drives)
+    assert second - first == pytest.approx(apart_days * 86_400.0)
+    assert made.moved_log == 0 and made.moved_s == pytest.approx((0.4 + 0.2 * share) * drives[-1][1].time[-1], abs=0.06)
+    assert 100.0 * lasts - 12.0 < drives[-1][1].time[-1] < 100.0 * lasts + 60.0
+    assert drives[-1][3].late_s == pytest.approx(1.2 * share)
+
+
+def test_a_receiver_has_one_two_or_five_values_per_second(drives, tmp_path):
+    fleet.make_fleet(tmp_path, 24, 1, 20.0, troubles=["circles"] * 24)
+    assert {receiver.every_s for *_, receiver, _, _ in drives} == {0.2, 0.5, 1.0}
+
+
+def test_a_missing_log_does_not_stay_from_an_earlier_fleet(drives, tmp_path):
+    (there,) = fleet.make_fleet(tmp_path, 1, 1, 20.0, troubles=["circles"])
+    assert there.paths[0].exists()
+    (missing,) = fleet.make_fleet(tmp_path, 1, 1, 20.0, troubles=["missing"])
+    assert missing.paths[0] == there.paths[0] and not missing.paths[0].exists()
+
+
+def test_times_have_three_decimals():
+    one = np.ones((2, 3))
+    content = fleet.log_bytes(Log(np.array([0.0, 0.0123]), one, one, name="x"))
+    assert content.splitlines()[2] == b"0.012,1,1,1,1,1,1,,"
+
+
+def test_a_missing_library_of_a_fleet_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(InputError, match=r"a fleet needs pyarrow: .*\[fleet\]"):
+        fleet.log_bytes(Log(np.array([0.0, 1.0]), np.ones((2, 3)), np.ones((2, 3))))
+
+
+def test_a_full_disk_is_reported(drives, tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(fleet, "_write", full)
+    with pytest.raises(InputError, match="cannot be written: No space left on device"):
+        fleet.make_fleet(tmp_path, 1, 1, 20.0, troubles=[""])
 
 
 def test_a_folder_that_cannot_be_written_is_named(drives, tmp_path):

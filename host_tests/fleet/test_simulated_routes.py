@@ -96,6 +96,24 @@ def test_circles_are_tight_and_slow(share, choice, expected):
         assert at(route, route.yaw_rate, time) == pytest.approx(lateral / speed, rel=0.01)
 
 
+def test_a_bend_of_the_road_is_followed_by_a_straight_second():
+    """A bend at 8 m/s with 1 m/s2 takes 1.4 s, and the next one begins 1 s later."""
+    route = random_route(Fixed(0.0, 0.75), HANDLING, 40.0, RATE_HZ)
+    bends = np.flatnonzero(np.diff((route.yaw_rate < -0.06).astype(int)) > 0) / RATE_HZ
+    assert np.diff(bends)[:3] == pytest.approx(radians(10.0) * 8.0 / 1.0 + 1.0, abs=0.03)
+
+
+def test_the_lateral_acceleration_takes_1_2_seconds_to_change():
+    """It is a mean over twice the 0.6 s of the pedal. The yaw rate is a mean over 0.6 s once more, so it changes for
+    1.8 s. At the beginning and at the end of a bend the vehicle goes straight."""
+    route = random_route(Fixed(1.0, 0.75), HANDLING, 36.0, RATE_HZ)
+    begin_s, bend_s = 14.0 + 19.0 / 2.4, radians(40.0) * 19.0 / 3.0
+    lateral = -route.yaw_rate * 19.0
+    for time, expected in ((-0.92, 0.0), (-0.3, 3.0 * 2.0 / 9.0), (0.0, 1.5), (0.3, 3.0 * 7.0 / 9.0), (0.92, 3.0)):
+        assert at(route, lateral, begin_s + time) == pytest.approx(expected, abs=0.15)
+        assert at(route, lateral, begin_s + bend_s - time) == pytest.approx(expected, abs=0.15)
+
+
 def test_the_route_ends_some_seconds_after_the_wanted_time():
     """New legs begin until 12 s before the wanted time. After the last leg the vehicle brakes, and stands for 4.5 s."""
     assert random_route(Fixed(0.0, 0.75), HANDLING, 18.9, RATE_HZ).time[-1] == pytest.approx(7.0 + 4.5, abs=0.03)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from fixed_chance import Fixed
 from kickstand.units import STANDARD_GRAVITY
-from kickstand_fleet.simulation.route import Route
-from kickstand_fleet.simulation.vehicle import Receiver, VehicleSensor, drive_log, random_sensor
+from kickstand_fleet.simulation.route import Route, random_route
+from kickstand_fleet.simulation.vehicle import HANDLING, Receiver, VehicleSensor, drive_log, random_sensor
 from made_fleet import turn_of
 
 G = STANDARD_GRAVITY
@@ -116,7 +116,10 @@ def test_a_receiver_is_late_and_has_a_rate():
     assert [speed for speed, _ in seen.values()] == pytest.approx([10.0, 10.5, 11.5, 12.5])
     assert [utc_s for _, utc_s in seen.values()] == pytest.approx([1000.0, 1001.0, 1002.0, 1003.0])
     assert list(received(Receiver(0.5))) == [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5]
-    assert received(Receiver())[1.0][0] == pytest.approx(10.7)  # by default a speed is 0.3 s late
+    usual = received(Receiver())
+    assert list(usual) == [0.0, 1.0, 2.0, 3.0]
+    assert usual[1.0][0] == pytest.approx(10.7)  # by default a speed is 0.3 s late
+    assert received(Receiver(late_s=0.0), speed=10.1271)[0.0][0] == 10.13  # a speed has two decimals
     assert len(received(Receiver(0.001))) == 200  # a sample never has more than one speed
 
 
@@ -143,3 +146,20 @@ def test_a_moving_mount_turns_within_a_third_of_a_second():
     assert log.t_s[turning][[0, -1]] == pytest.approx([1.86, 2.14], abs=0.011)
     assert np.sum(log.gyro_dps, axis=0) * 0.02 == pytest.approx([0.0, 30.0, 0.0], abs=2.1)
     assert log.gyro_dps[turning][:, 1] == pytest.approx(100.0, abs=0.51 * COUNT_DPS)
+
+
+@pytest.mark.parametrize(
+    ("kind", "gentle", "hard"),
+    [
+        # cruising speed, acceleration and deceleration forward, acceleration in bends
+        ("car", (8.0, 1.0, 1.3, 1.0), (19.0, 2.4, 3.4, 3.0)),
+        ("bus", (7.0, 0.7, 1.0, 0.7), (14.0, 1.3, 2.0, 1.6)),
+        ("motorcycle", (9.0, 1.5, 1.6, 1.5), (22.0, 3.2, 4.5, 4.0)),
+    ],
+)
+def test_a_bus_is_driven_gently_and_a_motorcycle_hard(kind, gentle, hard):
+    for share, expected in ((0.0, gentle), (1.0, hard)):
+        route = random_route(Fixed(share, 0.6), HANDLING[kind], 45.0, 50.0)  # with a junction
+        lateral = np.abs(route.speed * route.yaw_rate).max()
+        found = route.speed.max(), route.acceleration.max(), -route.acceleration.min(), lateral
+        assert found == pytest.approx(expected, rel=0.07)

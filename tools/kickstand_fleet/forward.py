@@ -54,13 +54,15 @@ class Forward:
 def find_forward(logs: list[Intervals], device: DriveFit | None = None) -> Forward | None:
     """Compute the alignment from all logs. Returns None if the logs do not determine it.
 
+    A short drive has too few blocks for this module's alignment. The result is then the firmware's alignment.
+
     logs: The intervals of each log.
     device: The firmware's alignment from the same logs, or None if the firmware refuses them.
     """
     whole = evidence.blocks(logs)
     count = len(whole.log)
     if count < _LEAST_BLOCKS:
-        return None
+        return _alone(device) if device else None
     square, product = whole.square[:, :_TERMS, :_TERMS], whole.product[:, :_TERMS]
 
     def frame_of(part: slice) -> Array:
@@ -78,6 +80,13 @@ def find_forward(logs: list[Intervals], device: DriveFit | None = None) -> Forwa
         frame, variance = _mean(frame, variance, device.calibration.vehicle_from_sensor, device.quality_deg)
     attitude = variance + float(pitch + roll) + UP_DEG**2
     return Forward(frame, float(np.sqrt(variance)), float(np.sqrt(attitude)), abs(apart))
+
+
+def _alone(device: DriveFit) -> Forward:
+    """Return the firmware's alignment with its standard errors."""
+    sigma = float(np.hypot(device.quality_deg, SENSOR_DEG))
+    attitude = float(np.hypot(sigma, UP_DEG))
+    return Forward(device.calibration.vehicle_from_sensor, sigma, attitude, device.halves_deg or 0.0)
 
 
 def _mean(frame: Array, variance: float, device: Array, quality_deg: float) -> tuple[Array, float]:

@@ -68,7 +68,7 @@ def numbers_in(text: bytes, count: int) -> Array | None:
     for empty in (b",,", b",,", b",\n", b"\n,"):  # b",,": replaced twice, because adjacent empty cells share a comma
         filled_up = filled_up.replace(empty, empty[:1] + b"nan" + empty[1:])
     try:
-        found = np.loadtxt(io.BytesIO(filled_up[1:]), delimiter=",", comments=None, ndmin=2)
+        found = np.loadtxt(io.BytesIO(filled_up), delimiter=",", comments=None, ndmin=2)
     except ValueError:
         return None
     return found if found.shape == (text.count(b"\n"), count) else None  # loadtxt skips empty lines

@@ -98,7 +98,7 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
     tick_us = float(np.gcd.reduce(between_us))
     if repeated > OFTEN * len(recorded):
         tick_us = max(tick_us, usual_us)
-    if np.any((counts > CROWD) & (counts > CROWDED * max(1.0, tick_us / period_us))):
+    if np.any((counts > CROWD) & (counts > CROWDED * tick_us / period_us)):
         at = recorded[starts[int(np.argmax(counts))]]
         raise InputError(f"{name}: time stands still at {at:g} s, in {np.max(counts)} samples: it must increase")
     if not repeated and (tick_us < COARSE * period_us or _one_step(between_us)):
