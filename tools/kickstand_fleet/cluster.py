@@ -33,7 +33,8 @@ Outcome = tuple[int, Any | None, str, str]
 _LOCAL_PATIENCE_S, _REMOTE_PATIENCE_S = 60.0, 20.0  # longest time to wait for the first worker
 # Longest wait for the restart of a worker. A restart after this time would end the worker's next task, too
 _RESTART_S = 120.0
-_LOST_S = 60.0  # longest time without a worker. Dask replaces a dead worker sooner, if it can
+# Longest time without a worker. Dask replaces a dead worker sooner: on a very busy computer after a minute or more.
+_LOST_S = 180.0
 
 
 def run_tasks(
