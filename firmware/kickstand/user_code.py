@@ -22,7 +22,7 @@ from time import ticks_diff, ticks_ms
 from .errors import Notice, report
 from .units import const
 
-_SLOW_MS = const(50)  # longest call that is not reported; a slow function is reported once
+_SLOW_MS = const(50)  # a longer call is reported, once for each function
 _TOO_SLOW_MS = const(300)  # longest time of a call, because the sensor does not keep its samples for longer
 # Number of successive calls longer than _SLOW_MS that disable a function. After more slow calls the loop could not
 # catch up with the samples.

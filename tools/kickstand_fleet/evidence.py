@@ -37,7 +37,7 @@ from kickstand.units import GAP_US, STANDARD_GRAVITY
 from kickstand_tools.logs.log import Log, Table
 from kickstand_tools.signals import STANDING_MPS, Array, moving_mean, runs
 
-INTERVAL_S = 0.9  # shortest time between two speeds that are used
+INTERVAL_S = 0.9  # of speeds that are closer together, only the first is used
 MOVING_MPS = 2.0
 # Weight of a second at a standstill, compared with a second of driving. The weight is small, because even a long stop
 # shows the slope of the road at one place only

@@ -11,7 +11,7 @@ from ..units import const
 SHORT = 1
 LONG = 2
 
-_DEBOUNCE_MS = const(20)  # shortest duration of a change of the contact that counts
+_DEBOUNCE_MS = const(20)  # a change of the contact counts if it lasts this long
 _LONG_MS = const(800)  # shortest duration of a long press
 
 

@@ -43,7 +43,7 @@ _MAX_MISFIT = const(0.012)  # largest misfit of a turn after the fit, in rad
 _GROSS_MISFIT = const(0.25)
 # Factors by which the readings of a faulty gyro axis may differ from the true rate. Each factor is tried on each axis.
 _READS = const((-1.0, 0.25, 0.5, 0.75, 1.3, 2.0, 4.0))
-_DEAD_RAD = const(0.2)  # largest angle of a dead axis in any turn
+_DEAD_RAD = const(0.2)  # an axis that measures no larger angle in any turn is dead
 # Largest standard error of a gyro axis' scale. With a larger standard error, no turn about this axis has measured the
 # scale.
 _PROOF_SIGMA = const(0.025)

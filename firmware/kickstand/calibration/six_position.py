@@ -17,7 +17,7 @@ from .parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE
 
 SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")  # the axis that points up, in the order of the six poses
 _MAX_TILT_DEG = const(20.0)  # largest angle between a side's axis and the vertical
-FREE_TILT_DEG = 20.0  # smallest tilt of the free pose; a pose nearer to a side adds little information
+FREE_TILT_DEG = 20.0  # the free pose must be tilted by more, because a pose near a side adds little information
 # Largest error of the free pose. A good sensor can have this error, because six numbers cannot describe its cross-axis
 # sensitivity of 2 %.
 _FREE_MAX_G = const(0.028)

@@ -16,9 +16,9 @@ from .verdict import MOVED, REFINED, REVERSED, SAME, compare, turn_round
 
 # Number of passes of the loop whose counts are added up before they are converted to floats, to save time
 _FEED_TURNS = const(2)
-_GAP_MS = const(300)  # longest time between two readings without a loss of readings
+_GAP_MS = const(300)  # a longer time between two readings means that readings were lost
 _LOOK_MS = const(1000)  # time between two calls of _look()
-_FRESH_MS = const(3000)  # largest age of a speed that proves a standstill
+_FRESH_MS = const(3000)  # an older speed proves no standstill
 _AWAY_MPS = const(2.0)  # speed above which the vehicle has driven off
 
 # The gyro's bias that remains in the rates of an aligned sensor: 0, because the bias measured in the poses is already

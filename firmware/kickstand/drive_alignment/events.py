@@ -14,7 +14,7 @@ from .regression import LAG_STEP_US, LAGS, Fit, ForwardRegression
 # must change the speed by at least _CHANGE_MPS.
 BEGIN_MPS2, END_MPS2 = 0.8, 0.4
 _CHANGE_MPS = const(1.5)
-_MAX_ACCELERATION_EVENTS = const(2)  # most acceleration events that count, because braking shows forward better
+_MAX_ACCELERATION_EVENTS = const(2)  # further acceleration events do not count, because braking shows forward better
 # Shortest interval between two speeds. In a shorter interval the change of speed is noisier, and speeds at 10 Hz do not
 # carry more information than at 2 Hz.
 MIN_INTERVAL_US = 400_000

@@ -18,9 +18,9 @@ PRIOR_FREEDOM = 4
 # Standard deviation of forward that camber and wind cause on one stretch of road. This part does not depend on the
 # weight.
 STRETCH_DEG = 1.5
-_MIN_WEIGHT = const(0.1)  # smallest weight of a part whose forward is compared, in g^2 s
-_MIN_S = const(20.0)  # shortest straight driving in a part whose vertical is compared
-_MIN_BLOCKS = const(4)  # smallest number of blocks in a drive whose forward is compared
+_MIN_WEIGHT = const(0.1)  # the forward of a part with a smaller weight (g^2 s) is not compared
+_MIN_S = const(20.0)  # the vertical of a part with less straight driving is not compared
+_MIN_BLOCKS = const(4)  # with fewer blocks in the drive, forward is not compared
 
 
 def angle_between(a, b):

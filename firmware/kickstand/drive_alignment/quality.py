@@ -37,7 +37,7 @@ ROLL_DEG = 7.0
 # judged only if its weight and the length of its forward exceed _MIN_EVENT_WEIGHT and _MIN_EVENT_FORWARD. On recorded
 # drives no such event differed by more than 40 degrees.
 _EVENT_OFF_DEG = const(80.0)
-_MIN_EVENT_WEIGHT = const(0.012)  # smallest weight of an event that is judged, in g^2 s
+_MIN_EVENT_WEIGHT = const(0.012)  # an event with a smaller weight (g^2 s) is not judged
 _MIN_EVENT_FORWARD = const(0.5)  # smallest length of an event's forward, in g per g
 
 

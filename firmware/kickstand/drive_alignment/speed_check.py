@@ -5,11 +5,12 @@ from math import sqrt
 from ..errors import AlignmentError
 from ..units import const
 
-_NEGATIVE_MPS = const(-0.5)  # lowest speed that may be noise of a standing vehicle
-# A second is lively if its mean force differs by at least _LIVELY_G from the mean force of the previous second. At
+_NEGATIVE_MPS = const(-0.5)  # a speed of 0 to this may be noise of a standing vehicle
+# A second is lively if its mean force differs by more than _LIVELY_G from the mean force of the previous second. At
 # standstill no second is lively. While driving, most seconds are lively.
 _LIVELY_G = const(0.03)
-_TURNING_DPS = const(5.0)  # largest yaw rate of a second that counts, because a bend is lively at constant speed too
+# A second with a larger yaw rate and the second after it do not count, because the force changes in a bend too.
+_TURNING_DPS = const(5.0)
 # The speed is stuck if it has not changed for at least _STUCK_S lively seconds, and at least _STUCK_SHARE of all
 # seconds since its last change are lively. Four braking events together have 8 lively seconds.
 _STUCK_S = const(8)

@@ -14,7 +14,7 @@ from micropython import const
 from ..errors import NO_MACHINE_CODE, Notice, checked, tried
 
 FRAME = const(14)  # bytes
-SATURATED = const(32700)  # smallest absolute value of a reading at the end of its range
+SATURATED = const(32700)  # a reading of this absolute value or more is at the end of its range
 LOOK_MS = const(400)  # time between two looks
 
 # Indices in the notes of add_up(), an array('i', 33). The machine code repeats these numbers.

@@ -10,7 +10,7 @@ from .mpu6050 import UnknownChip
 
 _RETRY_MS = const(50)  # time between two attempts to set the chip up
 _FAILURES = const(3)  # number of successive failed transfers that are a fault; one or two are tolerated
-_SILENT_MS = const(100)  # longest time without a sample before a fault is reported
+_SILENT_MS = const(100)  # after a longer time without a sample a fault is reported
 # Longest time without a sample while the FIFO overflows, because the board has no time to read the FIFO
 _STALE_MS = const(500)
 _SETTLED_MS = const(1000)  # a set-up did not help if a fault comes within this time after it

@@ -8,7 +8,7 @@ With lean t > 0 to the right, s the centripetal acceleration in g (> 0 in a left
 
 from math import asin, atan2, degrees, sqrt
 
-_TOO_SMALL = 0.01  # smallest squared force with a direction, (0.1 g)^2. In free fall the force is smaller than 0.1 g
+_TOO_SMALL = 0.01  # (0.1 g)^2. A smaller squared force has no direction, because it is nearly free fall
 
 
 def static_lean_deg(force):

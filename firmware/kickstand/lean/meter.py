@@ -11,9 +11,9 @@ from .measurements import SIGMA_SHARE, gyro_variances
 _SMOOTH_US = const(300_000)  # time constant of smooth_force
 # Largest variance of a lean that is shown. The standard deviation is 1.4 degrees: SIGMA_SHARE times 3 degrees.
 MAX_VARIANCE = (SIGMA_SHARE * radians(3.0)) ** 2
-DOUBTED_VARIANCE = (SIGMA_SHARE * radians(2.0)) ** 2  # largest variance of a lean that is shown after repeated misfits
-TRIM_MAX_VARIANCE = radians(0.5) ** 2  # largest variance of a trim that is kept
-_TRIM_STEP_DEG = const(0.3)  # smallest change of the trim that is saved; saving smaller changes would wear the flash
+DOUBTED_VARIANCE = (SIGMA_SHARE * radians(2.0)) ** 2  # after repeated misfits, a lean of larger variance is not shown
+TRIM_MAX_VARIANCE = radians(0.5) ** 2  # a trim of larger variance is not kept
+_TRIM_STEP_DEG = const(0.3)  # smaller changes of the trim are not saved, because saving wears the flash
 FALLEN_DEG = 65.0  # smallest lean of a fallen bike; the bike has fallen if the lean lasts for _FALLEN_US
 _FALLEN_US = const(1_000_000)
 # Half of the time for which a lean must last to count as a maximum. The jerk of a pothole is shorter than the whole

@@ -11,7 +11,7 @@ from ..units import const
 VERSION = 1  # version of Kickstand's own packets
 # Kinds of packets, which are also the indices in `intervals`. RaceChrono's packet ids are higher by 1
 LEAN, MOTION, SPEED, OWN = range(4)
-_FASTEST_MS = const(40)  # shortest interval between two packets of the same kind
+_FASTEST_MS = const(40)  # packets of the same kind are at least this far apart
 UNKNOWN, UNKNOWN_SPEED, UNKNOWN_SIGMA = -0x8000, 0xFFFF, 0xFF
 
 ALIGNED, TRUSTED, AT_REST, FALLEN, RECORDING, CAR, NO_READINGS = (1 << bit for bit in range(7))  # bits of the state

@@ -24,11 +24,11 @@ _MAX_SENTENCE = const(100)
 # Most bytes read per pass of the loop. With a pass every 10 ms, this is twice the need of 10 fixes per second.
 _MAX_CHUNK = const(64)
 _SILENT_MS = const(3000)  # time without a byte, a sentence or a fix after which fault() reports it
-_LATE_MS = const(2000)  # longest time for which a fix may wait in the receiver
+_LATE_MS = const(2000)  # a fix that is older when it arrives gives no speed
 _LOOK_MS = const(1500)  # time without a sentence with a speed after which other kinds of sentences are examined
 # Age to which older times are limited, because after 6 days ticks_diff() is negative
 _CARRY_MS = const(60_000)
-_TIME_JUMP_MS = const(5000)  # smallest apparent delay of a fix that shows a correction of the receiver's clock
+_TIME_JUMP_MS = const(5000)  # a fix that seems delayed by more shows that the receiver's clock was corrected
 # The delay of a fix is measured against a reference, which is a fix without a delay. If all fixes are late for longer
 # than _TIME_JUMP_MS, the receiver has set its clock back. The new reference is then the fix with the smallest delay of
 # at least this number of fixes.

@@ -24,9 +24,9 @@ YAW_COSTS_DEG, PITCH_COSTS_DEG = 3.0, 5.0  # rms error of the lean, divided by t
 
 SMOOTH_S = 0.5
 STRAIGHT_DPS, STRAIGHT_DEG = 2.0, 8.0  # largest yaw rate and largest lean on a straight
-ENOUGH_S = 10.0  # shortest total time of straight riding that shows roll and yaw
-LEVEL_S = 60.0  # shortest time of riding in which uphill and downhill roughly cancel out
-ENOUGH_G = 0.05  # smallest standard deviation of the forward force on straights that shows yaw
+ENOUGH_S = 10.0  # a shorter time of straight riding does not show roll and yaw
+LEVEL_S = 60.0  # in a longer time of riding, uphill and downhill roughly cancel out
+ENOUGH_G = 0.05  # a smaller standard deviation of the forward force on straights does not show yaw
 
 
 @dataclass

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 COSTS_DEG = 0.25  # the report names a remedy for larger errors of the lean only; the display cannot show smaller errors
 GRAVITY_G = 0.02  # largest accepted difference of the force at rest from 1 g, as in the check of the six positions
-RIDDEN_S = 10.0  # shortest riding time for a report; a shorter time means that the bike was only pushed around
+RIDDEN_S = 10.0  # a shorter riding time gets no report, because the bike was only pushed around
 STOPS_TITLE = "Stops"
 STOPS_UNITS = {"at": "", "from": "km/h", "time": "s", "distance": "m", "MFDD": "m/s²", "peak": "m/s²", "jerk": "m/s³"}
 STOPS_UNITS |= {"pulls": "m"}  # a stop must fit one line of 80 columns, without room for units

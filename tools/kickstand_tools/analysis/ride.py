@@ -20,7 +20,7 @@ from ..replay.meter_along import MeterAlong, Misfit
 from ..signals import Array, Bools
 from .channels import Channels, channels, joined
 
-_MAX_SIGMA_DEG = 3.0  # largest standard deviation of a smoothed lean that is trusted
+_MAX_SIGMA_DEG = 3.0  # a smoothed lean with a larger standard deviation is not trusted
 
 
 class SmoothSlow(Message):

@@ -11,7 +11,7 @@ from .channels import Channels
 
 LEANS_DEG = (30.0, 40.0)
 BIN_DEG = 1.0
-HELD_S = 2e-6 * HELD_US  # least duration of a maximum of the lean, as on the display
+HELD_S = 2e-6 * HELD_US  # a maximum of the lean must last this long, as on the display
 BINS_DEG = np.arange(-70.0, 70.0 + BIN_DEG, BIN_DEG)
 
 

@@ -20,7 +20,7 @@ from .pose_refusals import SideTilted, UnprovedGyro, of_firmware
 from .poses import Pose, SixPositions, beyond_sheet, take_pose, wrong_number
 
 _WINDOW_S = 0.5  # length of the windows in which the sensor must be still
-_LEAST_S = 1.0  # least length of a pose
+_LEAST_S = 1.0  # a shorter pose is not used
 _MARGIN_S = 0.1  # time that is left out at both ends of a pose
 _STILL_G, _STILL_DPS = 0.1, 6.0  # largest change of an axis in a still window
 _STILL_SPREAD_G = 0.02  # largest standard deviation in a still window

@@ -21,7 +21,7 @@ from kickstand.units import GAP_US
 from ..signals import Array, cross_matrix
 
 MAX_DISPERSION = 0.02  # largest circular dispersion of a braking event: a spread of 8 degrees
-MIN_LEVEL_G = 0.03  # least levelled force; a smaller force has a random direction
+MIN_LEVEL_G = 0.03  # a smaller levelled force has a random direction, so it is not used
 BRAKING_MPS2 = -1.0  # an interval with more deceleration than this belongs to a braking event
 MEAN_US = 100_000  # forces are averaged over this time
 LOSS_MPS = 1.5  # least reduction of the speed in a braking event; a smaller reduction is noise

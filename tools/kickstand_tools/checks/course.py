@@ -13,7 +13,7 @@ from .cells import CellTable, LogCells
 SLOWEST_MPS = 3.0  # least speed at which positions show the course
 TURNING_DPS = 4.0  # a second counts if the course changes faster than this
 FASTEST_DPS = 90.0  # if the course changes faster than this, the positions have jumped
-ENOUGH = 8  # least number of seconds that count
+ENOUGH = 8  # fewer usable seconds give no result
 CLEAR = 0.6  # least correlation of course and gyro, of either sign
 LAGS_S = np.arange(0.0, 2.1, 0.25)  # delays of the positions that are tried
 LONGEST_S = 2.5  # longest time between two positions

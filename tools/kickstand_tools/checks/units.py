@@ -21,7 +21,7 @@ MILLISECONDS_US = 4e6  # samples this far apart have times in ms that were read 
 # Largest ratio of the logged change of speed to the change that the force explains. Speeds in knots give 1.94, and
 # speeds in m/s at most 1.1.
 MOST_RATIO = 1.5
-PUSH_G = 0.15  # least force that is used; an ordinary road's slope causes less
+PUSH_G = 0.15  # a smaller force is not used, because an ordinary road's slope causes such forces
 ENOUGH = 10  # least number of seconds with this force: two or three braking events
 SIGMAS = 5.0  # the correlation of force and change of speed must exceed chance by this many standard deviations
 LAGS_S = np.arange(0.0, 2.1, 0.25)  # possible delays of a satellite receiver's speed

@@ -31,7 +31,7 @@ from .least_squares import Estimate
 from .unknowns import ACCEL, BESIDE, BIAS, BIAS_PER_C, DELAY, LEAN, MEAN, OFFSET, OFFSET_PER_C, ROTATION, SENSOR, Prior
 from .windows import WINDOW_S, Windows, windows_of
 
-SLOWEST_HZ = 20.0  # least sample rate
+SLOWEST_HZ = 20.0  # a log with a lower sample rate is refused
 LONGEST_S = 1800.0  # the longest part of a ride that is used; a longer part does not improve the result
 # Standard deviations of the prior
 ROTATION_SIGMA = 10.0  # misalignment, in rad; large, because nothing is known about it

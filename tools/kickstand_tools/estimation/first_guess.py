@@ -24,7 +24,7 @@ SLOW_S = 4.0  # changes of lean slower than this are computed from the yaw rate,
 TURNS_S = 40.0  # the speed is computed from the bends within this time
 CALM_S = 1.0  # length of the calm stretches that show the gyro's bias if the ride has no standstill
 MIN_RIDING_S = 30.0
-MIN_LEAN = np.radians(3.0)  # least rms of the lean; a ride with less lean does not show forward
+MIN_LEAN = np.radians(3.0)  # a ride whose lean has a smaller rms does not show forward
 MIN_LIKENESS = 0.5  # least correlation between leaning and turning; bikes have over 0.75
 # Largest force to the side in bends, divided by the lean. Bikes have 0.1 to 0.2, due to the width of the tyres.
 MAX_PUSHED = 0.5

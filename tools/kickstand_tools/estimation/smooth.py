@@ -22,7 +22,7 @@ from .noise import jolted
 from .unknowns import FORWARD, GYRO, LEAN, PITCH, Prior
 from .windows import Windows, windows_of
 
-SLOWEST_HZ = 10.0  # least sample rate
+SLOWEST_HZ = 10.0  # a log with a lower sample rate is not smoothed
 SEGMENT_S = 120.0  # longest part of a log between two cuts
 TOGETHER = 8  # number of segments estimated together, with one more before and one after
 # LEANED_SHARE times the lean is added to the standard deviation of the lean, to cover errors that the model lacks,
@@ -33,7 +33,7 @@ LEANED_SHARE = 0.001
 TIMING_S = 0.002
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps", "doubtful")
 DIGITS = 3, 3, 3, 3, 0
-DOUBTFUL = 0.2  # largest share of doubtful riding without a remark
+DOUBTFUL = 0.2  # a larger share of doubtful riding gets a remark
 # Largest lean at which a bike balances on straights, if the upright pose was right and no luggage is on one side
 POSE_DEG = 1.8
 # A gyro is faulty if an estimated error is over this many standard deviations of its prior. Good gyros stayed under

@@ -52,7 +52,7 @@ _CLOCK = re.compile(r"\s*(\d{4}-\d\d-\d\d.)?\d{1,2}:\d\d")
 _COUNTER = re.compile(r"^(no|nr|n|i|index|count|counter|record|sample|frame|id|row)$")
 CALM_S = 0.5  # length of the moving window in which the motion is measured to find calm samples
 CALMEST = 0.2  # share of the samples that count as calm
-NEAR = 1.3  # largest factor between a calm acceleration and gravity, reached by clones of the chip and on rough rides
+NEAR = 1.3  # a calm acceleration is within this factor of gravity, also with clones of the chip and on rough rides
 NOISE_DPS = 0.1  # standard deviation of a gyro at rest
 # Length of the mean acceleration, divided by the mean length of the accelerations. Without gravity the ratio is smaller
 # than this.

@@ -21,7 +21,7 @@ MANY = 0.02  # a larger share of readings over MOST_G or MOST_DPS means another 
 SHUFFLED_NS = 500_000_000  # samples in the wrong order are sorted if they are less late than this
 # samples are sorted only if at most the share MOST_LATE is late by over LATE_STEPS median steps
 LATE_STEPS, MOST_LATE = 4.0, 0.02
-MOST_HZ = 10_000.0  # highest rate of an inertial sensor; the fastest have 8,000 Hz
+MOST_HZ = 10_000.0  # a sensor with a higher rate is refused; the fastest have 8,000 Hz
 
 
 def join(recording: AppRecording, name: str) -> tuple[Log, int]:

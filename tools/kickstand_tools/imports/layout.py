@@ -23,7 +23,7 @@ from .units import ACCELERATIONS, RATES, SPEEDS, TIMES, unit
 
 LOOKED_AT = 400  # lines used to find the layout
 SEPARATORS = "\t;, "  # if two separators split the same lines into the same number of cells, the first is used
-FEWEST_CELLS = 4  # least count of numbers in a row of a table of sensors: a time and three axes
+FEWEST_CELLS = 4  # a row of a table of sensors has at least this many numbers: a time and three axes
 MOST_KINDS = 20  # largest number of names of sensors or events in one column
 EVENT = ":"  # separates a sensor's name from a column's name
 _UNITS = {**ACCELERATIONS, **RATES, **SPEEDS, **TIMES}

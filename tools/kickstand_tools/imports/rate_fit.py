@@ -18,7 +18,7 @@ from ..signals import Array
 CELL_S = 0.05  # readings are averaged over cells of this length
 MOST_CELLS = 12_000  # ten minutes are enough to find a unit
 WINDOW_S = 0.4
-LEAST_TURN = 0.03  # smallest turn of gravity in the windows from which a unit is found, in rad rms
+LEAST_TURN = 0.03  # a unit is found only if gravity's turn in the windows has this rms, in rad
 STRAIGHT = 0.25  # the force in a cell counts as gravity if its length is this close to the median
 EXPLAINED = 0.5  # the rates must explain at least this share of the variance of gravity's turns
 # with this share, units that differ by a factor of 2 can be distinguished, as the ranges of raw counts do

@@ -37,7 +37,7 @@ class Sheet:
     left_out: int = 0
 
     def place(self, *names: str) -> int | None:
-        """Number of the first column with one of these names, compared by plain()."""
+        """Find the first of these names that a column has, compared by plain(). Return the column's number, or None."""
         wanted = [plain(name) for name in names]
         found = [plain(column) for column in self.columns]
         return next((found.index(name) for name in wanted if name in found), None)

@@ -22,7 +22,8 @@ _USUAL_TILT = 0.05  # standard deviation of the tilt of up by an accelerometer's
 _PRIOR = 1.0 / np.array([np.inf, USUAL_DRIFT, _USUAL_TILT, _USUAL_TILT, np.inf, np.inf, np.inf]) ** 2
 _SAME_TRACK_S = 0.05  # least standard deviation of the shift; receivers smooth more in bends than on straights
 _FREEDOM = 4.0  # degrees of freedom of Student's distribution, which down-weights errors over two sigma
-# least error divided by its sigma. With a better receiver the error is no smaller, because of the gyro's scale factor
+# A smaller error, divided by its sigma, counts as this. A better receiver does not make the error smaller, because of
+# the gyro's scale factor.
 _LEAST_ERROR = 0.5
 _LEAST_COST = 0.5 * (_FREEDOM + 1.0) * np.log1p(_LEAST_ERROR**2 / _FREEDOM)  # least cost of a step
 _ROUNDS = 8

@@ -14,7 +14,7 @@ from . import Array, Bools, moving_mean, moving_spread
 
 WINDOW_S = 0.2  # length of the windows over which rates and forces are averaged
 SMOOTH_S = 0.6  # length of the moving mean that smooths rates before their changes are compared
-SLOW_S = 12.0  # longest change of lean that can be distinguished from the gyro's drift
+SLOW_S = 12.0  # a slower change of lean cannot be distinguished from the gyro's drift
 # If share, sigmas and likeness of a Leaning exceed these limits, its rates are in rad/s. In simulated and recorded
 # rides, the share was 1.0 to 1.6 for rates in deg/s. It was 57 to 92 for rates in rad/s, at over 5 sigmas. Cars had a
 # likeness under 0.6.

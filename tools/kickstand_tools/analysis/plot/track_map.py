@@ -73,8 +73,9 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
     """Return the map for plotly.js: {"data": traces, "layout": ...}, in plain numbers and lists, with None for NaN.
 
     The first trace is the track as a line. Its customdata are time (s), lean (degrees) and speed (km/h), None if
-    missing. The second trace has the coloured points. Its customdata are their times. The first shape marks a place,
-    the second shape is the scale bar, and the first annotation names the length of the bar. map.js moves all three.
+    missing. The second trace has the coloured points, with their times (s) as customdata. The first shape marks a
+    place, the second shape is the scale bar, and the first annotation names the length of the bar. map.js moves all
+    three.
     """
     x, y = plain(points.east_m, 1), plain(points.north_m, 1)
     rows = [plain(row, 1) for row in np.column_stack((points.t_s, points.lean_deg, points.speed_kmh))]

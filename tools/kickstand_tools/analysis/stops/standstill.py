@@ -11,7 +11,7 @@ import numpy as np
 from ...signals import STANDING_MPS, Array, Bools, smoothed, stretches, window_means, window_spreads
 from ..channels import Channels, spacing_s
 
-STALE_S = 3.0  # largest age in s of a speed that is used
+STALE_S = 3.0  # an older speed is not used
 
 # Without a speed, standstills are found by the shaking. At a standstill, the shaking over QUIET_S is less than a share
 # of the shaking while moving.

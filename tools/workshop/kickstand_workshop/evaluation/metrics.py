@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 LEANED_DEG = 10.0  # smallest true lean for the fit of the slope, because most of a ride is nearly upright
 _LAG_RANGE_S = (-0.2, 0.8)  # smallest and largest lag to try
 _LAG_SMOOTHING_S = 0.05
-_STILL_DPS = 1.0  # smallest rms of the true roll rate for which a lag is computed
+_STILL_DPS = 1.0  # no lag is computed if the true roll rate has a smaller rms
 # On a straight, yaw rate and lean stay below the first two limits and the speed above the third. A straight lasts
 # _STRAIGHT_S or longer
 _STRAIGHT_DPS, _STRAIGHT_DEG, _STRAIGHT_MPS, _STRAIGHT_S = 2.0, 6.0, 5.0, 1.0
