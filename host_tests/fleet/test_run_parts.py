@@ -1,4 +1,4 @@
-"""A run with its tasks, its clock and its writer replaced: when the tables are written, and what is kept."""
+"""A run with its tasks, its clock and its writer replaced: when the tables are written, and which results are kept."""
 
 from types import SimpleNamespace
 

@@ -109,7 +109,7 @@ def test_a_new_chip_is_at_fault_until_its_first_sample(board):
 
 def test_a_chip_that_is_prepared_starts_with_the_first_fetch(board):
     """The chip was prepared earlier, but its FIFO starts only with the first fetch. So the FIFO never contains samples
-    from before the first fetch."""
+    that are older than the first fetch."""
     sensor, chip = made(board)
     for now_ms in range(0, 1000, 15):
         sensor.prepare(now_ms)

@@ -79,7 +79,7 @@ class Turning:
         """
         left = np.empty((len(exchanges), len(self._force)))
         for sign in 1.0, -1.0:
-            # Exchanges of one sign have the same rates until each corrects the bias
+            # All exchanges of one sign start with the same rates. Each corrects the bias by itself
             first = self._models(sign, self._bias, self._velocities)
             for k in np.flatnonzero(np.linalg.det(exchanges) * sign > 0.0):
                 # permute the force instead of the rates. Only the sign of the permutation is applied to the rates
@@ -102,6 +102,7 @@ class Turning:
         return sign * np.radians(self._rate - bias)
 
     def _models(self, sign: float, bias: Array, velocities: list[tuple[Array, Array]]) -> list["_Model"]:
+        """Return a model for each velocity. The rotations are integrated once for all of them."""
         rate = self._signed(sign, bias)
         turn = _turn(rate)
         moving = turn @ cross_matrix(rate)
@@ -144,6 +145,7 @@ class _Model:
         self._inverse = np.linalg.inv(square + prior**2 * np.eye(square.shape[-1]))
 
     def fit(self, force: Array) -> _Fit:
+        """Fit the coefficients. force: along the exchanged axes, shape (w, n, 3), in g."""
         turned = np.einsum("wnij,wnj->wni", self._turn, force)
         moved = _evened(turned)
         seen = np.einsum("wnij,wni->wj", self._along, moved)
