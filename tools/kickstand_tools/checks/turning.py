@@ -27,6 +27,7 @@ FORCE_G = 0.1  # standard deviation of the noise of these means
 # Standard deviations of the prior: of the velocity along the vehicle's direction and across it, and of the gyro's bias.
 ALONG_MPS, ACROSS_MPS, BIAS_DPS = 30.0, 2.0, 10.0
 UP_G = 0.07  # standard deviation of the length of `up`, because of the accelerometer's errors
+STEP_DPS = 0.2  # step for the derivatives by the bias
 MOST_DPS = 8.0  # largest change of the bias in one step
 SETTLED = 0.02  # the bias is found if a step reduces the cost by a smaller share
 SMALLER, LEAST_STEP = 0.3, 0.1  # a step that increases the cost is tried again, smaller
@@ -77,7 +78,7 @@ class Turning:
         model = _Model(sign, self._rate, bias, self._cell_s)
         fit, share = model.along_fit(force), 1.0
         for _ in range(steps):
-            change = share * np.clip(model.bias_change(fit), -MOST_DPS, MOST_DPS)
+            change = share * np.clip(model.bias_change(force, fit), -MOST_DPS, MOST_DPS)
             other = _Model(sign, self._rate, model.bias + change, self._cell_s)
             better = other.along_fit(force)
             if better.cost < fit.cost:
@@ -99,8 +100,6 @@ _WEIGHT = (FORCE_G / UP_G) ** 2
 class _Fit:
     """The least squares in w windows for one bias. The velocity has k coefficients.
 
-    turned: the force, rotated to the axes at the beginning of the window, shape (w, n, 3).
-    moved: the averaged force without its mean, shape (w, m * 3).
     along_up: the direction of `up` before this fit, shape (w, 3), or 0 if its length was not used.
     found: the coefficients of the velocity, shape (w, k).
     inverse: the inverse of the normal equations, shape (w, k, k).
@@ -108,8 +107,6 @@ class _Fit:
     left, cost: see TurningFit.
     """
 
-    turned: Array
-    moved: Array
     along_up: Array
     found: Array
     inverse: Array
@@ -125,7 +122,7 @@ class _Model:
     """
 
     def __init__(self, sign: float, readings: Array, bias: Array, cell_s: float) -> None:
-        self.bias, self._sign, self._cell_s = bias, sign, cell_s
+        self.bias, self._sign, self._readings, self._cell_s = bias, sign, readings, cell_s
         rate = sign * np.radians(readings - bias)
         self._evened = round(EVENED_S / cell_s)
         self.means = rate.shape[1] // self._evened  # number of averaged forces in a window
@@ -149,8 +146,7 @@ class _Model:
         before: an earlier fit, for the direction of the velocity, which is the same in all windows, and of `up`. None
             if unknown: then the velocity has any direction, and `up` any length.
         """
-        turned = np.einsum("wnij,wnj->wni", self._turn, force)
-        means = self._means(turned)
+        means = self._means(np.einsum("wnij,wnj->wni", self._turn, force))
         mean = np.mean(means, axis=1)
         moved = (means - mean[:, None]).reshape(len(force), -1)
         seen = np.einsum("wij,wi->wj", self._along, moved)
@@ -169,34 +165,43 @@ class _Model:
         squares -= np.sum(found * seen, axis=1)
         up = mean - np.einsum("wij,wj->wi", self._mean, found)
         cost = float(np.sum(squares) + (FORCE_G / BIAS_DPS) ** 2 * (self.bias @ self.bias))
-        return _Fit(turned, moved, along_up, found, inverse, up, squares / self.means, cost)
+        return _Fit(along_up, found, inverse, up, squares / self.means, cost)
 
     def along_fit(self, force: Array) -> _Fit:
         """Fit the velocity along one direction."""
         return self.fit(force, self.fit(force))
 
-    def bias_change(self, fit: _Fit) -> Array:
+    def bias_change(self, force: Array, fit: _Fit) -> Array:
         """Return the correction of the bias by one step of linear least squares, shape (3), in deg/s.
 
-        A change of the bias rotates the force by the integral of this change from the middle of the window.
+        The velocity is eliminated from the normal equations (Schur complement).
         """
-        angle = np.cumsum(self._turn, axis=1) * self._cell_s
-        angle -= angle[:, angle.shape[1] // 2, None]
-        by_bias = self._means(-self._sign * np.radians(1.0) * cross_matrix(fit.turned) @ angle)
-        mean = np.mean(by_bias, axis=1)
-        by_bias = (by_bias - mean[:, None]).reshape(len(angle), -1, 3)
-        mixed = self._along.swapaxes(1, 2) @ by_bias
-        # The equation of the length of `up`
-        row, by = (np.einsum("wi,wij->wj", fit.along_up, matrix) for matrix in (self._mean, mean))
-        long = np.sum(fit.along_up * fit.up, axis=1) - np.any(fit.along_up, axis=1)
-        mixed = mixed + _WEIGHT * row[:, :, None] * by[:, None]
-        # Eliminate the velocities of the windows from the normal equations (Schur complement).
+        left = self._unexplained(self.bias, force, fit)
+        by = np.stack(
+            [self._unexplained(self.bias + step, force, fit) - left for step in np.eye(3) * STEP_DPS], axis=-1
+        )
+        by /= STEP_DPS
+        row = np.einsum("wi,wij->wj", fit.along_up, self._mean)
+        up, by_up = np.mean(left, axis=1), np.mean(by, axis=1)
+        long = np.sum(fit.along_up * up, axis=1) - 1.0
+        long_by = np.einsum("wi,wij->wj", fit.along_up, by_up)
+        left = (left - up[:, None]).reshape(len(left), -1)
+        by = (by - by_up[:, None]).reshape(len(left), -1, 3)
+        mixed = self._along.swapaxes(1, 2) @ by + _WEIGHT * row[:, :, None] * long_by[:, None]
+        square = np.sum(by.swapaxes(1, 2) @ by - mixed.swapaxes(1, 2) @ fit.inverse @ mixed, axis=0)
+        square += _WEIGHT * long_by.T @ long_by
+        vector = -np.einsum("wni,wn->i", by, left) - _WEIGHT * long @ long_by
         prior = (FORCE_G / BIAS_DPS) ** 2
-        square = np.sum(by_bias.swapaxes(1, 2) @ by_bias - mixed.swapaxes(1, 2) @ fit.inverse @ mixed, axis=0)
-        square += _WEIGHT * by.T @ by
-        left = fit.moved - np.einsum("wij,wj->wi", self._along, fit.found)
-        vector = np.einsum("wni,wn->i", by_bias, left) + _WEIGHT * long @ by
         return np.linalg.solve(square + prior * np.eye(3), vector - prior * self.bias)
+
+    def _unexplained(self, bias: Array, force: Array, fit: _Fit) -> Array:
+        """Return the forces that the velocity of a fit does not explain with this bias, shape (w, m, 3)."""
+        found = fit.found.reshape(len(force), self._knots, 3)
+        values, changes = _knots(force.shape[1], self._cell_s)
+        speed, change = (np.einsum("kn,wkj->wnj", functions, found) for functions in (values, changes))
+        rate = self._sign * np.radians(self._readings - bias)
+        force = force - (change + np.cross(rate, speed)) / STANDARD_GRAVITY
+        return self._means(np.einsum("wnij,wnj->wni", _turn(rate, self._cell_s), force))
 
     def _means(self, values: Array) -> Array:
         return np.mean(values.reshape(len(values), self.means, self._evened, *values.shape[2:]), axis=2)
