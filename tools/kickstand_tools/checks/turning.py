@@ -19,7 +19,10 @@ from functools import cached_property
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ..signals import Array, cross_matrix, rotation_matrix
+from ..signals import Array, Bools, Ints, cross_matrix, rotation_matrix, stretches
+
+WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # short windows are used if the log has no long window without a gap
+MOST_WINDOWS = 10  # number of windows that are fitted: the windows with the largest rates
 
 KNOT_S = 2.5  # time between the knots of the velocity
 EVENED_S = 1.0  # time over which the rotated forces are averaged, to remove vibration
@@ -27,6 +30,7 @@ FORCE_G = 0.1  # standard deviation of the noise of these means
 # Standard deviations of the prior: of the velocity along the vehicle's direction and across it, and of the gyro's bias.
 ALONG_MPS, ACROSS_MPS, BIAS_DPS = 30.0, 2.0, 10.0
 UP_G = 0.07  # standard deviation of the length of `up`, because of the accelerometer's errors
+STEPS = 5  # most steps that correct the bias
 STEP_DPS = 0.2  # step for the derivatives by the bias
 MOST_DPS = 8.0  # largest change of the bias in one step
 SETTLED = 0.02  # the bias is found if a step reduces the cost by a smaller share
@@ -45,6 +49,47 @@ class TurningFit:
     left: Array
     bias: Array
     cost: float
+
+
+def liveliest(force: Array, rate: Array, known: Bools, cell_s: float) -> tuple["Turning", list[Array]] | None:
+    """Return the windows of a log with the largest rates, and guesses of the gyro's bias; None without a window.
+
+    A phone has no bias. In other logs, the median rate is a guess: most of a ride is nearly straight.
+
+    force: mean force of each cell, shape (n, 3), in g.
+    rate: mean rate of each cell, shape (n, 3), in deg/s.
+    known: False for the cells in gaps, shape (n).
+    cell_s: duration of a cell.
+    """
+    places = windows(known, round(WINDOW_S / cell_s))
+    places = places if len(places) else windows(known, round(SHORT_WINDOW_S / cell_s))
+    if not len(places):
+        return None
+    usual = np.median(rate[known], axis=0)
+    turned = np.sum((rate[places] - usual) ** 2, axis=(1, 2))
+    places = places[np.sort(np.argsort(-turned)[:MOST_WINDOWS])]
+    return Turning(force[places], rate[places], cell_s), [np.zeros(3), usual]
+
+
+def bias_dps(force: Array, rate: Array, known: Bools, cell_s: float) -> Array | None:
+    """Find the gyro's bias in a log without a standstill, shape (3), in deg/s; None if the log is too short.
+
+    For the parameters see liveliest().
+    """
+    found = liveliest(force, rate, known, cell_s)
+    if found is None:
+        return None
+    turning, guesses = found
+    return min((turning.fit(np.eye(3), guess) for guess in guesses), key=lambda fit: fit.cost).bias
+
+
+def windows(known: Bools, length: int) -> Ints:
+    """Find the windows of `length` cells without an unknown cell.
+
+    Returns the indices of the cells of each window, shape (windows, length).
+    """
+    starts = [k for begin, end in stretches(known) for k in range(begin, end - length + 1, length)]
+    return np.array(starts, dtype=int).reshape(-1, 1) + np.arange(length)
 
 
 class Turning:
@@ -71,13 +116,13 @@ class Turning:
                 left[k] = np.mean(fit.left + _WEIGHT * (np.linalg.norm(fit.up, axis=1) - 1.0) ** 2 / model.means)
         return left
 
-    def fit(self, exchange: Array, bias: Array, steps: int) -> TurningFit:
-        """Fit velocity, direction and bias for one exchange. bias: the first guess. steps: most steps of the bias."""
+    def fit(self, exchange: Array, bias: Array) -> TurningFit:
+        """Fit velocity, direction and bias for one exchange. bias: the first guess."""
         sign = float(np.sign(np.linalg.det(exchange)))
         force = _permuted(self._force, sign, exchange)
         model = _Model(sign, self._rate, bias, self._cell_s)
         fit, share = model.along_fit(force), 1.0
-        for _ in range(steps):
+        for _ in range(STEPS):
             change = share * np.clip(model.bias_change(force, fit), -MOST_DPS, MOST_DPS)
             other = _Model(sign, self._rate, model.bias + change, self._cell_s)
             better = other.along_fit(force)
