@@ -24,6 +24,7 @@ from ..signals import Array, Bools, Ints, cross_matrix, rotation_matrix, stretch
 WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # short windows are used if the log has no long window without a gap
 MOST_WINDOWS = 10  # number of windows that are fitted: the windows with the largest rates
 
+MERGED_S = 0.2  # cells are merged to this length
 KNOT_S = 2.5  # time between the knots of the velocity
 EVENED_S = 1.0  # time over which the rotated forces are averaged, to remove vibration
 FORCE_G = 0.1  # standard deviation of the noise of these means
@@ -31,7 +32,6 @@ FORCE_G = 0.1  # standard deviation of the noise of these means
 ALONG_MPS, ACROSS_MPS, BIAS_DPS = 30.0, 2.0, 10.0
 UP_G = 0.07  # standard deviation of the length of `up`, because of the accelerometer's errors
 STEPS = 5  # most steps that correct the bias
-STEP_DPS = 0.2  # step for the derivatives by the bias
 MOST_DPS = 8.0  # largest change of the bias in one step
 SETTLED = 0.02  # the bias is found if a step reduces the cost by a smaller share
 SMALLER, LEAST_STEP = 0.3, 0.1  # a step that increases the cost is tried again, smaller
@@ -68,7 +68,9 @@ def liveliest(force: Array, rate: Array, known: Bools, cell_s: float) -> tuple["
     usual = np.median(rate[known], axis=0)
     turned = np.sum((rate[places] - usual) ** 2, axis=(1, 2))
     places = places[np.sort(np.argsort(-turned)[:MOST_WINDOWS])]
-    return Turning(force[places], rate[places], cell_s), [np.zeros(3), usual]
+    merged = (len(places), -1, round(MERGED_S / cell_s), 3)
+    force, rate = (np.mean(values[places].reshape(merged), axis=2) for values in (force, rate))
+    return Turning(force, rate, MERGED_S), [np.zeros(3), usual]
 
 
 def bias_dps(force: Array, rate: Array, known: Bools, cell_s: float) -> Array | None:
@@ -167,12 +169,12 @@ class _Model:
     """
 
     def __init__(self, sign: float, readings: Array, bias: Array, cell_s: float) -> None:
-        self.bias, self._sign, self._readings, self._cell_s = bias, sign, readings, cell_s
-        rate = sign * np.radians(readings - bias)
+        self.bias, self._sign, self._cell_s = bias, sign, cell_s
+        self._rate = rate = sign * np.radians(readings - bias)
         self._evened = round(EVENED_S / cell_s)
         self.means = rate.shape[1] // self._evened  # number of averaged forces in a window
         self._turn = _turn(rate, cell_s)
-        values, changes = _knots(rate.shape[1], cell_s)
+        self._functions = values, changes = _knots(rate.shape[1], cell_s)
         moving = self._turn @ cross_matrix(rate)
         # Derivatives of the averaged force by the coefficients, shape (w, m, 3, knots, 3)
         shape = len(rate), -1, self._evened, 3, 3
@@ -221,11 +223,16 @@ class _Model:
 
         The velocity is eliminated from the normal equations (Schur complement).
         """
-        left = self._unexplained(self.bias, force, fit)
-        by = np.stack(
-            [self._unexplained(self.bias + step, force, fit) - left for step in np.eye(3) * STEP_DPS], axis=-1
-        )
-        by /= STEP_DPS
+        found = fit.found.reshape(len(force), self._knots, 3)
+        speed, change = (np.einsum("kn,wkj->wnj", functions, found) for functions in self._functions)
+        force = force - (change + np.einsum("wnij,wnj->wni", cross_matrix(self._rate), speed)) / STANDARD_GRAVITY
+        force = np.einsum("wnij,wnj->wni", self._turn, force)
+        left = self._means(force)
+        # Derivatives by the bias. A change of the bias rotates the force by the integral of this change. It also
+        # changes the force that the bend needs.
+        angle = np.cumsum(self._turn, axis=1) * self._cell_s
+        by = cross_matrix(force) @ angle - self._turn @ cross_matrix(speed / STANDARD_GRAVITY)
+        by = self._means(self._sign * np.radians(1.0) * by)
         row = np.einsum("wi,wij->wj", fit.along_up, self._mean)
         up, by_up = np.mean(left, axis=1), np.mean(by, axis=1)
         long = np.sum(fit.along_up * up, axis=1) - 1.0
@@ -238,15 +245,6 @@ class _Model:
         vector = -np.einsum("wni,wn->i", by, left) - _WEIGHT * long @ long_by
         prior = (FORCE_G / BIAS_DPS) ** 2
         return np.linalg.solve(square + prior * np.eye(3), vector - prior * self.bias)
-
-    def _unexplained(self, bias: Array, force: Array, fit: _Fit) -> Array:
-        """Return the forces that the velocity of a fit does not explain with this bias, shape (w, m, 3)."""
-        found = fit.found.reshape(len(force), self._knots, 3)
-        values, changes = _knots(force.shape[1], self._cell_s)
-        speed, change = (np.einsum("kn,wkj->wnj", functions, found) for functions in (values, changes))
-        rate = self._sign * np.radians(self._readings - bias)
-        force = force - (change + np.cross(rate, speed)) / STANDARD_GRAVITY
-        return self._means(np.einsum("wnij,wnj->wni", _turn(rate, self._cell_s), force))
 
     def _means(self, values: Array) -> Array:
         return np.mean(values.reshape(len(values), self.means, self._evened, *values.shape[2:]), axis=2)
