@@ -139,6 +139,18 @@ def find(sheet: Sheet) -> Findings:
     return findings
 
 
+def with_sums(sheet: Sheet) -> Sheet:
+    """Add columns of the total acceleration to a table that has an acceleration without gravity, and gravity alone."""
+    first = {three.kind: three for three in reversed(_find_triples(sheet))}
+    if "accel" in first or not {"linear", "gravity"} <= set(first):
+        return sheet
+    linear, gravity = first["linear"], first["gravity"]
+    stated = stated_unit(sheet.columns[linear.places[0]])
+    names = [f"total acceleration {axis}" + (f" ({stated})" if stated else "") for axis in "xyz"]
+    total = linear.values + gravity.values
+    return Sheet(sheet.name, [*sheet.columns, *names], [*sheet.cells, *total.T], sheet.left_out)
+
+
 # Time
 
 
