@@ -28,7 +28,11 @@ MIN_LEAN = np.radians(3.0)  # a ride whose lean has a smaller rms does not show 
 MIN_LIKENESS = 0.5  # least correlation between leaning and turning; bikes have over 0.75
 # Largest force to the side in bends, divided by the lean. Bikes have 0.1 to 0.2, due to the width of the tyres.
 MAX_PUSHED = 0.5
-CAR_G, CAR_LEAN = 0.045, np.radians(5.0)  # a car has a larger rms of the force to the side, and a smaller rms of lean
+# A car has a larger rms of the force to the side, also divided by the lean, and a smaller rms of lean. Its rates are
+# about the force: in recorded drives the angle was at most 16 degrees. A leaning bike's rates are not, even in a bend
+# that is so long that the lean hardly changes.
+CAR_G, CAR_PUSHED, CAR_LEAN, CAR_TILT = 0.045, 2.0, np.radians(5.0), np.radians(20.0)
+CONTRADICTS_S = 120.0  # less riding that no mounting explains is only not enough
 # A log's speed is stuck if it changes by less than STUCK_MPS, although the force along the vehicle changes the speed by
 # an rms of PUSHED_MPS.
 STUCK_MPS, PUSHED_MPS = 0.5, 1.5
@@ -176,7 +180,7 @@ def axes(w: Windows) -> Axes:
     if seconds < MIN_RIDING_S:
         raise RefusedInput(RideShort(seconds, MIN_RIDING_S))
     found = leaning_of(w.rate, w.force, riding)
-    _refuse_no_motorcycle(found, without_drift(w.force @ found.matrix[0]), riding)
+    _refuse_no_motorcycle(found, without_drift(w.force @ found.matrix[0]), _tilt(w, riding), riding)
     pushed = without_drift(np.cumsum(w.force @ found.matrix[2]) * WINDOW_S * STANDARD_GRAVITY)
     _refuse_wrong_speed(w.known_speed[riding], found.rolled[riding], found.turned[riding], pushed[riding])
     return Axes(found.matrix, bias)
@@ -195,10 +199,17 @@ def _bias(w: Windows) -> Array:
     return np.median(w.rate[~w.gap], axis=0) if found is None else np.radians(found)
 
 
-def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: Bools) -> None:
+def _tilt(w: Windows, riding: Bools) -> float:
+    """Return the usual angle between force and rate while riding, in rad."""
+    force, rate = averaged(w.force, 2.0)[riding], averaged(w.rate, 2.0)[riding]
+    return float(np.arctan2(np.linalg.norm(np.cross(force, rate)), np.linalg.norm(np.sum(force * rate, axis=1))))
+
+
+def _refuse_no_motorcycle(found: Leaning, sideways: Array, tilt: float, riding: Bools) -> None:
     """Raise RefusedInput if the ride is not a motorcycle's, or does not show lean and side.
 
     sideways: the force to the left without its slow changes, shape (n), in g.
+    tilt: see _tilt().
     """
     in_radians_mps = speed_in_radians(found)
     if in_radians_mps is not None:
@@ -206,12 +217,13 @@ def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: Bools) -> Non
     rolled, turned, sideways = found.rolled[riding], found.turned[riding], sideways[riding]
     lean, side = float(np.sqrt(np.mean(rolled**2))), float(np.sqrt(np.mean(sideways**2)))
     pushed = abs(float(sideways @ turned)) / max(abs(float(rolled @ turned)), 1e-30)
-    if pushed > MAX_PUSHED and side > CAR_G and lean < CAR_LEAN:
+    if pushed > CAR_PUSHED and side > CAR_G and lean < CAR_LEAN and tilt < CAR_TILT:
         raise RefusedInput(NotLeaning())
     if lean < MIN_LEAN:
         raise RefusedInput(NoBends(float(np.degrees(lean))))
     if pushed > MAX_PUSHED or found.likeness < MIN_LIKENESS:
-        raise RefusedInput(RideContradicts())
+        enough = np.count_nonzero(riding) * WINDOW_S > CONTRADICTS_S
+        raise RefusedInput(RideContradicts() if enough else SideUnsure())
     # A leaning bike that turns also rotates about its own left. The opposite sign of this rotation contradicts the side
     # of the lean. The handedness itself is judged when the log is read.
     if found.share < 0.0:
