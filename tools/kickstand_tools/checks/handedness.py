@@ -26,6 +26,7 @@ from .bends import LeftHanded
 from .cells import CELL_S, LogCells
 from .turning import Turning, TurningFit, liveliest
 
+FAR_DPS = 10.0 * np.array(list(itertools.product((1.0, -1.0), repeat=3)))  # guesses of a large bias of the gyro
 TRIED = 4  # number of exchanges that are fitted with their bias, besides none and all axes reversed
 
 # Another exchange must reduce the mean square of the residual force (g2) by this factor, or by FEW_CLEARLY in at most
@@ -120,24 +121,31 @@ def handedness(cells: LogCells) -> Message | None:
     return LeftHanded() if reversed_all else RatesMisfit(*map(tuple, EXCHANGES[best].astype(int).tolist()))
 
 
-def fit_exchanges(turning: Turning, biases: list[Array]) -> dict[int, TurningFit]:
+def fit_exchanges(turning: Turning, guesses: list[Array]) -> dict[int, TurningFit]:
     """Fit the log's own axes, all axes reversed, and the exchanges that explain the forces best.
 
-    biases: first guesses of the gyro's bias. The gyro's bias is the same for each exchange, so the bias of the best fit
-        is tried for all.
+    If the log's own axes seem wrong, all exchanges are fitted, from more guesses: else the right one may be missed.
+
+    guesses: guesses of the gyro's bias, each of shape (3), in deg/s. The bias is the same for each exchange, so the
+        bias of the best fit is tried for all.
     Returns the fits by their index in EXCHANGES.
     """
     fits: dict[int, TurningFit] = {}
 
-    def fit(rough: Array, guesses: list[Array]) -> None:
-        """rough: residual of each exchange for each guess, shape (48, guesses)."""
-        for k in {0, 1, *fits, *np.argsort(np.min(rough, axis=1))[:TRIED].tolist()}:
-            found = turning.fit(EXCHANGES[k], guesses[int(np.argmin(rough[k]))])
+    def fit(biases: list[Array], tried: int) -> None:
+        rough = np.column_stack([turning.rough(EXCHANGES, bias) for bias in biases])
+        for k in {0, 1, *fits, *np.argsort(np.min(rough, axis=1))[:tried].tolist()}:
+            found = turning.fit(EXCHANGES[k], biases[int(np.argmin(rough[k]))])
             fits[k] = min(fits.get(k, found), found, key=lambda each: each.cost)
 
-    fit(np.column_stack([turning.rough(EXCHANGES, bias) for bias in biases]), biases)
-    bias = min(fits.values(), key=lambda each: each.cost).bias
-    fit(turning.rough(EXCHANGES, bias)[:, None], [bias])
+    def best() -> Array:
+        return min(fits.values(), key=lambda each: each.cost).bias
+
+    fit(guesses, TRIED)
+    fit([best()], TRIED)
+    if is_wrong(fits):
+        fit([best(), *guesses, *FAR_DPS], len(EXCHANGES))
+        fit([best()], TRIED)
     return fits
 
 
