@@ -26,17 +26,19 @@ from .bends import LeftHanded
 from .cells import CELL_S, LogCells
 from .turning import Turning, TurningFit, liveliest
 
-FAR_DPS = 10.0 * np.array(list(itertools.product((1.0, -1.0), repeat=3)))  # guesses of a large bias of the gyro
-TRIED = 4  # number of exchanges that are fitted with their bias, besides none and all axes reversed
+FAR_DPS = 10.0 * np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)])  # guesses of a large bias of the gyro
+# Numbers of exchanges that are fitted with their bias, besides none and all axes reversed
+TRIED, TRIED_IF_WRONG = 4, 12
 
 # Another exchange must reduce the mean square of the residual force (g2) by this factor, or by FEW_CLEARLY in at most
 # FEW_WINDOWS windows. In correct logs the factor was at most 1.6 in windows of simulated and recorded rides.
 CLEARLY, FEW_WINDOWS, FEW_CLEARLY = 2.0, 3, 3.0
 # Least reduction of the mean square, for any factor. In a parked vehicle, drift reduces it by under 0.0002.
 LEAST_G2 = 0.001
-# An exchange is named if the residual of each other one is larger by this factor. Before, the residuals are multiplied
-# by PENALTY: all axes reversed (or none) are the likeliest mistake, then some axes reversed or two exchanged.
-NAMED = 1.3
+# An exchange is named if the residual of each other one is larger by this factor, or by FEW_NAMED in few windows.
+# Before, the residuals are multiplied by PENALTY: all axes reversed (or none) are the likeliest mistake, then some axes
+# reversed or two exchanged.
+NAMED, FEW_NAMED = 1.3, 1.8
 PENALTY = 1.0, 1.15, 1.3
 
 
@@ -124,7 +126,7 @@ def handedness(cells: LogCells) -> Message | None:
 def fit_exchanges(turning: Turning, guesses: list[Array]) -> dict[int, TurningFit]:
     """Fit the log's own axes, all axes reversed, and the exchanges that explain the forces best.
 
-    If the log's own axes seem wrong, all exchanges are fitted, from more guesses: else the right one may be missed.
+    If the log's own axes seem wrong, more exchanges are fitted, from more guesses: else the right one may be missed.
 
     guesses: guesses of the gyro's bias, each of shape (3), in deg/s. The bias is the same for each exchange, so the
         bias of the best fit is tried for all.
@@ -144,7 +146,7 @@ def fit_exchanges(turning: Turning, guesses: list[Array]) -> dict[int, TurningFi
     fit(guesses, TRIED)
     fit([best()], TRIED)
     if is_wrong(fits):
-        fit([best(), *guesses, *FAR_DPS], len(EXCHANGES))
+        fit([best(), *guesses, *FAR_DPS], TRIED_IF_WRONG)
         fit([best()], TRIED)
     return fits
 
@@ -160,7 +162,8 @@ def likeliest(fits: dict[int, TurningFit]) -> int | None:
     """Return the index in EXCHANGES of the exchange that is right; None if several may be right."""
     scores = {k: float(np.mean(fit.left)) * _penalty(EXCHANGES[k]) for k, fit in fits.items()}
     best, second = sorted(scores, key=lambda k: scores[k])[:2]
-    return best if scores[second] > NAMED * scores[best] else None
+    named = NAMED if len(fits[0].left) > FEW_WINDOWS else FEW_NAMED
+    return best if scores[second] > named * scores[best] else None
 
 
 def _penalty(exchange: Array) -> float:
