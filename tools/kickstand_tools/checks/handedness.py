@@ -24,9 +24,8 @@ from ..common.messages import Message, Remedy, WrongAxes
 from ..signals import Array
 from .bends import LeftHanded
 from .cells import CELL_S, LogCells
-from .turning import Turning, TurningFit, liveliest
+from .turning import FAR_DPS, Turning, TurningFit, liveliest
 
-FAR_DPS = 10.0 * np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)])  # guesses of a large bias of the gyro
 # Numbers of exchanges that are fitted with their bias, besides none and all axes reversed
 TRIED, TRIED_IF_WRONG = 4, 12
 
@@ -126,7 +125,8 @@ def handedness(cells: LogCells) -> Message | None:
 def fit_exchanges(turning: Turning, guesses: list[Array]) -> dict[int, TurningFit]:
     """Fit the log's own axes, all axes reversed, and the exchanges that explain the forces best.
 
-    If the log's own axes seem wrong, more exchanges are fitted, from more guesses: else the right one may be missed.
+    If the log's own axes seem wrong, they are fitted again from more guesses, because the fit may have ended at the
+    rate of a long bend instead of the bias. If they still seem wrong, more exchanges are fitted, to name the right one.
 
     guesses: guesses of the gyro's bias, each of shape (3), in deg/s. The bias is the same for each exchange, so the
         bias of the best fit is tried for all.
@@ -134,20 +134,26 @@ def fit_exchanges(turning: Turning, guesses: list[Array]) -> dict[int, TurningFi
     """
     fits: dict[int, TurningFit] = {}
 
-    def fit(biases: list[Array], tried: int) -> None:
+    def fit(k: int, bias: Array) -> None:
+        found = turning.fit(EXCHANGES[k], bias)
+        fits[k] = min(fits.get(k, found), found, key=lambda each: each.cost)
+
+    def fit_best(biases: list[Array], tried: int) -> None:
         rough = np.column_stack([turning.rough(EXCHANGES, bias) for bias in biases])
         for k in {0, 1, *fits, *np.argsort(np.min(rough, axis=1))[:tried].tolist()}:
-            found = turning.fit(EXCHANGES[k], biases[int(np.argmin(rough[k]))])
-            fits[k] = min(fits.get(k, found), found, key=lambda each: each.cost)
+            fit(k, biases[int(np.argmin(rough[k]))])
 
     def best() -> Array:
         return min(fits.values(), key=lambda each: each.cost).bias
 
-    fit(guesses, TRIED)
-    fit([best()], TRIED)
+    fit_best(guesses, TRIED)
+    fit_best([best()], TRIED)
     if is_wrong(fits):
-        fit([best(), *guesses, *FAR_DPS], TRIED_IF_WRONG)
-        fit([best()], TRIED)
+        for bias in [*guesses, *FAR_DPS]:
+            fit(0, bias)
+    if is_wrong(fits):
+        fit_best([best(), *guesses, *FAR_DPS], TRIED_IF_WRONG)
+        fit_best([best()], TRIED)
     return fits
 
 
