@@ -1,4 +1,4 @@
-"""Which logs `calibrate drive` uses, and which vehicle it assumes. The alignment itself is in host_tests/drive_alignment."""
+"""Which logs `calibrate drive` uses, and which vehicle it assumes."""
 
 import numpy as np
 import pytest
