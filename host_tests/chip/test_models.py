@@ -1,13 +1,16 @@
-"""Corrections to rp2040py: the bus and the flash take time, I2C errors are those of the chip, and the console is
-quiet."""
+"""The emulated Pico as a program sees it: the bus and the flash take time, I2C errors are those of the chip, and the
+console is quiet. Also its pins as speed sources, and the machine code that it accepts."""
 
+import json
 import os
 import subprocess
 import sys
+from typing import Any
 
 import pytest
+from kickstand_tools.deploy import bytecode
 from support import emulated
-from support.emulated import pico
+from support.emulated import CHIPS, modules, pico
 
 pytestmark = pytest.mark.chip
 
@@ -43,15 +46,15 @@ def test_fast_division_gives_the_results_of_rp2040py():
     results = []
     for chip in (quick, own):
         chip.sio.reset()
-        began = chip.core.cycles
-        seen = []
+        begin = chip.core.cycles
+        values = []
         for signed in (0, 8):  # the two registers of signed division follow those of unsigned division
             for dividend in (0, 1, 7, 1000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF):
                 for divisor in (1, 3, 0, 0x7FFFFFFF, 0xFFFFFFF9, 0xFFFFFFFF):
                     for register, value in ((0x60 + signed, dividend), (0x64 + signed, divisor)):
                         chip.write_uint32(0xD0000000 + register, value)
-                        seen += [chip.read_uint32(0xD0000000 + r) for r in (0x60, 0x64, 0x78, 0x74, 0x70, 0x78, 0)]
-        results.append((seen, chip.core.cycles - began))
+                        values += [chip.read_uint32(0xD0000000 + r) for r in (0x60, 0x64, 0x78, 0x74, 0x70, 0x78, 0)]
+        results.append((values, chip.core.cycles - begin))
     assert results[0] == results[1]
 
 
@@ -64,6 +67,7 @@ print(emulated.begun(0.003))
 """
 
 
+@pytest.mark.long
 def test_chip_runs_the_same_on_every_host():
     """Cycles and memory are the same with modules compiled for this Python, with the wheel's modules, and on a slow
     host."""
@@ -135,3 +139,48 @@ def test_idle_console_takes_no_processor_time(board):
     first, second = int(board.exec(code)), int(board.exec(code))
     assert first < 3500
     assert abs(first - second) < 10
+
+
+def test_image_accepts_the_compiled_files(at_prompt):
+    assert at_prompt.exec("import sys\nprint(sys.implementation._mpy)") == f"{bytecode.PICO}\n"
+
+
+_LISTEN = """
+from time import sleep_ms, ticks_add, ticks_diff, ticks_ms
+from kickstand.settings import Settings
+from kickstand.speed.source import open_speed
+def opened(source):
+    class Config:
+        SPEED = source
+    return open_speed(Settings(Config))
+speeds = [opened(source) for source in %r]
+received, end = [[] for _ in speeds], ticks_add(ticks_ms(), 1800)
+while ticks_diff(end, ticks_ms()) > 0:
+    for i in range(len(speeds)):
+        new = speeds[i].poll(ticks_ms())
+        if new is not None:
+            received[i].append(new)
+    sleep_ms(10)
+print(received)
+"""
+
+
+@pytest.mark.parametrize(
+    ("chip", "sources"),
+    [
+        ("pico", ["wheel"]),
+        pytest.param("esp32", ["wheel", "gps"], marks=[pytest.mark.esp32, pytest.mark.long]),
+    ],
+)
+def test_wheel_and_gps_measure_the_speed(chip, sources):
+    """The contact of the wheel sensor bounces."""
+    board: Any = CHIPS[chip](files=modules(chip))
+    with board as device:
+        device.fit_wheel(lambda t_s: 15.0, bounce_us=1000)
+        if "gps" in sources:
+            device.fit_gps(lambda t_s: 15.0)
+        speeds_of_sources = json.loads(device.exec(_LISTEN % sources, 20.0).splitlines()[-1])
+    assert len(speeds_of_sources) == len(sources)
+    for speeds in speeds_of_sources:
+        assert len(speeds) >= 2
+        assert speeds == pytest.approx([15.0] * len(speeds), abs=0.3)

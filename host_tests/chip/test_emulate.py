@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 from kickstand_emulator import esp32_library, image
-from kickstand_tools.deploy import bytecode, connection
+from kickstand_tools.deploy import connection
 from mpremote import transport_serial
 from support import command
 from support.emulated import CHIPS, calibrated, firmware, need
@@ -26,28 +26,30 @@ pytestmark = pytest.mark.chip
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 @pytest.mark.parametrize(
     ("chip", "name"),
-    [("rp2040", "Pico"), pytest.param("esp32", "ESP32", marks=pytest.mark.esp32)],
+    [("rp2040", "Pico"), pytest.param("esp32", "ESP32", marks=[pytest.mark.esp32, pytest.mark.long])],
 )
 def test_emulate_in_a_terminal(chip, name):
     """The picture shows the bike. One key presses the button, and another key ends the program."""
     need("esp32" if chip == "esp32" else "pico")
-    with socket.create_server(("127.0.0.1", 0)) as found:
-        free = found.getsockname()[1]
-    with Terminal([sys.executable, "-m", "kickstand_tools.cli", "emulate", "--chip", chip, "--port", str(free)]) as at:
-        at.wait_for(f"Kickstand on an emulated {name}, socket://")
-        at.wait_for("No firmware on it yet, so the display is blank. In another terminal:")
-        at.wait_for(f"kickstand flash --port socket://127.0.0.1:{free}")
-        at.press("B")
-        at.wait_for("pressed")
-        at.press("q")
-        assert at.end() == 0
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        free = server.getsockname()[1]
+    with Terminal(
+        [sys.executable, "-m", "kickstand_tools.cli", "emulate", "--chip", chip, "--port", str(free)]
+    ) as terminal:
+        terminal.wait_for(f"Kickstand on an emulated {name}, socket://")
+        terminal.wait_for("No firmware on it yet, so the display is blank. In another terminal:")
+        terminal.wait_for(f"kickstand flash --port socket://127.0.0.1:{free}")
+        terminal.press("B")
+        terminal.wait_for("pressed")
+        terminal.press("q")
+        assert terminal.end() == 0
 
 
 @pytest.mark.parametrize("words", [("emulate", "--chip", "esp32"), ("bench", "--chip", "esp32")])
 def test_without_its_library_an_esp32_is_refused(words, tmp_path, monkeypatch):
     monkeypatch.setenv(esp32_library.VARIABLE, str(tmp_path))
-    said = command.refused(tmp_path, *words, words="no emulated ESP32: libqemu-xtensa.so is missing")
-    assert str(tmp_path) in said
+    refusal = command.refused(tmp_path, *words, words="no emulated ESP32: libqemu-xtensa.so is missing")
+    assert str(tmp_path) in refusal
 
 
 @pytest.mark.parametrize("chip", ["rp2040", "esp32"])
@@ -56,19 +58,19 @@ def test_emulate_reports_its_start_at_once(tmp_path, monkeypatch, chip):
     monkeypatch.setattr(Path, "home", lambda: tmp_path)
     monkeypatch.setattr(image, "URL", "http://127.0.0.1:9/" + image.NAME)
     monkeypatch.setenv(esp32_library.VARIABLE, str(tmp_path))
-    done = command.run("emulate", "--chip", chip)
-    assert done.status == 2
-    assert done.out.startswith("starting: ")
+    process = command.run("emulate", "--chip", chip)
+    assert process.status == 2
+    assert process.out.startswith("starting: ")
     source = {"rp2040": f"http://127.0.0.1:9/{image.NAME}", "esp32": "micropython.org"}[chip]
-    assert source in done.err and str(tmp_path) in done.err
+    assert source in process.err and str(tmp_path) in process.err
 
 
 def test_an_esp32_needs_no_emulator_of_the_pico():
     """The modules for an ESP32 are imported without rp2040py."""
     script = "import sys; sys.modules['rp2040py'] = None\nfrom kickstand_emulator.emulate import device_class\n"
     script += "import kickstand_workshop.bench.bench\nprint(device_class('esp32').NAME)"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
-    assert (done.stdout, done.stderr) == ("ESP32\n", "")
+    process = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (process.stdout, process.stderr) == ("ESP32\n", "")
 
 
 class Emulating(threading.Thread):
@@ -94,15 +96,15 @@ class Emulating(threading.Thread):
 
         self.device: Any = None
         self.end_s = math.inf
-        self.said = queue.Queue()
+        self.lines = queue.Queue()
         patch.setattr(emulate, "device_class", lambda _chip: Limited)
         self._emulate, self._chip = emulate.emulate, chip
 
     def run(self):
         try:
-            self._emulate(0, self.said.put, self._chip)
+            self._emulate(0, self.lines.put, self._chip)
         finally:
-            self.said.put(None)
+            self.lines.put(None)
 
     def time_s(self):
         """Return the time of the emulated board in seconds."""
@@ -115,20 +117,20 @@ class Emulating(threading.Thread):
             time.sleep(0.001)
 
 
-@pytest.mark.nightly  # the page Install has a similar test, and host_tests/deploy has tests with a fake board
+@pytest.mark.long
 @pytest.mark.parametrize("chip", ["rp2040", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_flash_and_status_on_the_emulated_board(monkeypatch, chip):
     """The board has an older version and an edited config.py. After `flash` the display shows the rider's next step."""
     name = "esp32" if chip == "esp32" else "pico"
     names = {"rp2040": "Raspberry Pi Pico with RP2040", "esp32": "Generic ESP32 module with ESP32"}
     CHIPS[name]()  # skips the test without the emulator
-    kept = calibrated() | {"config.py": b'SIDE = "right"\n'}
+    owners_files = calibrated() | {"config.py": b'SIDE = "right"\n'}
     ours = firmware(name)
     older = {"/kickstand/lean/formula.mpy": b"old", "/kickstand/lean/old_idea.py": b"pass"}
-    emulating = Emulating(monkeypatch, ours | kept | older, chip)
+    emulating = Emulating(monkeypatch, ours | owners_files | older, chip)
     emulating.start()
     try:
-        address = re.search(r"socket://\S+?:\d+", emulating.said.get())
+        address = re.search(r"socket://\S+?:\d+", emulating.lines.get())
         assert address
         clock = types.SimpleNamespace(monotonic=emulating.time_s, sleep=emulating.sleep)
         for module in (transport_serial, connection):
@@ -142,18 +144,14 @@ def test_flash_and_status_on_the_emulated_board(monkeypatch, chip):
         assert "and verified them" in flashed
         assert "right" in command.works("status", "--port", address[0]).out
         emulating.end_s = emulating.time_s() + 30.0
-        shown = ""
-        while "Lean" not in shown:
-            text = emulating.said.get()
-            assert text is not None, f"the display never showed a lean: {shown}"
-            shown += text
+        screen = ""
+        while "Lean" not in screen:
+            text = emulating.lines.get()
+            assert text is not None, f"the display never showed a lean: {screen}"
+            screen += text
     finally:
         emulating.end_s = 0.0
         emulating.join()
     assert emulating.device
-    wanted = {path.lstrip("/"): content for path, content in (ours | kept).items()}
+    wanted = {path.lstrip("/"): content for path, content in (ours | owners_files).items()}
     assert emulating.device.files() == wanted
-
-
-def test_image_accepts_the_compiled_files(at_prompt):
-    assert at_prompt.exec("import sys\nprint(sys.implementation._mpy)") == f"{bytecode.PICO}\n"

@@ -1,13 +1,16 @@
-"""Test `kickstand check` on the emulated boards: a good board passes, and each planted defect is named."""
+"""`kickstand check` and `kickstand bench` on the emulated boards: each planted defect is named, and the loop, the start
+and the heap stay within their limits."""
+
+import json
 
 import pytest
 from kickstand_tools.deploy import check
 from kickstand_tools.simulated_board.mpu6050 import Fifo
 from kickstand_tools.simulated_board.other_devices import Ds3231
 from support.checked_board import part
-from support.emulated import CHIPS, modules
+from support.emulated import CHIPS, modules, pico
 
-pytestmark = [pytest.mark.chip, pytest.mark.nightly, pytest.mark.long]
+pytestmark = [pytest.mark.chip, pytest.mark.long]
 REST = part(4, share=0.3)
 ESP32 = pytest.param("esp32", marks=pytest.mark.esp32)
 
@@ -28,8 +31,8 @@ def checked(chip, world=REST, plant=None, press=True, files=None, **fitted):
             except Exception as error:
                 raise check.GuestFailed(str(error).strip().rpartition("\n")[2]) from error
 
-        found = check.measured(ask, say)
-    return {one.what: check.line(one) for one in found if one.verdict != check.GOOD}
+        findings = check.measured(ask, say)
+    return {finding.what: check.line(finding) for finding in findings if finding.verdict != check.GOOD}
 
 
 @pytest.mark.parametrize("chip", ["pico", ESP32])
@@ -55,12 +58,12 @@ def many(board):
 
 @pytest.mark.parametrize("chip", ["pico", ESP32])
 def test_defects_of_many_parts_are_found_at_once(chip):
-    found = checked(chip, spoilt, many, press=False)
+    bad = checked(chip, spoilt, many, press=False)
     wanted = {"noise, accelerometer x", "noise, accelerometer y", "noise, gyro y", "noise, gyro z", "bias, gyro x"}
     wanted |= {"temperature", "self-test, accelerometer z", "self-test, gyro x", "sample clock", "display", "button"}
-    assert wanted <= set(found), found
+    assert wanted <= set(bad), bad
     beside = {"self-test, accelerometer x", "self-test, gyro z", "sensor while running", "bias, accelerometer"}
-    assert set(found) - wanted <= beside | {"noise, gyro x"}, found
+    assert set(bad) - wanted <= beside | {"noise, gyro x"}, bad
 
 
 def always_full(board):
@@ -120,5 +123,43 @@ def test_a_defect_that_hides_others_is_found_by_its_name(name):
     """Each board has one defect. The line of the defect comes first, before the lines of its consequences. Together
     with the eleven defects above, the tests plant twenty defects."""
     what, planted = PLANTED[name]
-    found = checked("pico", **planted)
-    assert next(iter(found), None) == what, found
+    bad = checked("pico", **planted)
+    assert next(iter(bad), None) == what, bad
+
+
+def test_the_loop_and_the_start_stay_within_their_limits():
+    """No sample is lost, the heap does not shrink, and the first lean appears within 1.12 s."""
+    pico()  # skips the test without the emulator
+    from kickstand_workshop.bench import bench
+
+    result = bench.loop(2)  # within only one second the number of garbage collections varies
+    for spread in result["turn_us"], result["collection_pause_us"]:
+        assert 0 < spread["median"] <= spread["p99"] <= spread["max"]
+    assert result["samples_taken"] == pytest.approx(result["seconds"] * bench.SAMPLE_HZ, abs=2)
+    assert result["samples_lost"] == 0
+    assert 0.1 < result["cpu_share"] < 0.50
+    assert result["free_heap_bytes"] > 120_000
+    assert result["free_heap_at_end_bytes"] > result["free_heap_bytes"] - 4000
+    start = bench.start("rp2040")
+    assert 0 < start.micropython_s < 0.1
+    assert 0.2 < start.starting_s < start.sampling_s < start.lean_s < 1.12
+    assert 0.4 < sum(start.import_s.values()) < start.sampling_s
+    assert "kickstand.lean.lean_filter" in start.import_s
+
+
+def test_bench(monkeypatch):
+    """In a short run of all parts, the times of the stages add up, and each figure is in the tables."""
+    pico()  # skips the test without the emulator
+    from kickstand_workshop.bench import bench
+
+    monkeypatch.setattr(bench, "_MODES", {"recording": {"RECORD": True}})
+    result = json.loads(json.dumps(bench.bench(1)))
+    stages = {name: spread["median"] for name, spread in result["stage_us"].items()}
+    parts = ("read", "decode and sum", "check", "calibrate and rotate", "filter", "rest of the meter")
+    assert all(stages[name] > 0 for name in parts)
+    assert sum(stages[name] for name in parts) == pytest.approx(stages["sample path"], rel=0.1)
+    assert 390 < stages["read"]
+    assert all(0 < us["median"] <= us["p99"] <= us["max"] for us in result["stage_us"].values())
+    assert result["boot"]["mpy"]["lean_s"] < result["boot"]["py"]["lean_s"] < 5.0
+    assert result["flash_bytes"]["mpy"] < result["flash_bytes"]["py"] / 2
+    assert bench.tables(result)
