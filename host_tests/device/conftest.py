@@ -47,7 +47,11 @@ def status(tmp_path):
     def lines(config=None, fit=None, world=rough, arguments=(), ride_s=0, **fitted):
         imported = device_runs.take_firmware()  # so that an earlier run of the app is forgotten
         try:
-            with device_plans.on_flash(tmp_path), Board(world, **fitted) as board, redirect_stdout(io.StringIO()) as out:
+            with (
+                device_plans.on_flash(tmp_path),
+                Board(world, **fitted) as board,
+                redirect_stdout(io.StringIO()) as out,
+            ):
                 import kickstand
                 from kickstand import start
 

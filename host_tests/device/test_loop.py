@@ -2,6 +2,7 @@
 
 import contextlib
 import gc
+import itertools
 import json
 
 import pytest
@@ -75,7 +76,7 @@ def test_garbage_is_collected_after_so_many_turns(config, fitted, turns, with_ap
         return collections
 
     collections = with_app(use, config, **fitted)
-    gaps = [later - earlier for earlier, later in zip(collections, collections[1:], strict=False)]
+    gaps = [later - earlier for earlier, later in itertools.pairwise(collections)]
     assert collections[0] in (turns - 1, 39) and gaps and set(gaps) == {turns}
 
 

@@ -12,7 +12,13 @@ SHORT, LONG = 0.15, 1.2
 POSES = [[0, -12], [8, 0]]
 ONE_BUS = {"LCD_SDA": 4, "LCD_SCL": 5}
 # A ride of an aligned bike: a left bend until 12 s, a right bend until 18 s, then straight ahead
-SHORT_RIDE = [["upright", 2.0], ["accelerate", 15.0, 4.0], ["turn", -30.0, 3.0], ["turn", 40.0, 3.0], ["straight", 60.0]]
+SHORT_RIDE = [
+    ["upright", 2.0],
+    ["accelerate", 15.0, 4.0],
+    ["turn", -30.0, 3.0],
+    ["turn", 40.0, 3.0],
+    ["straight", 60.0],
+]
 
 
 @pytest.mark.parametrize(

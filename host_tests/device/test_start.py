@@ -96,7 +96,11 @@ def test_too_little_memory_for_the_settings_is_shown_before_a_restart(without, r
 
 @pytest.mark.parametrize(
     ("module", "entry", "error"),
-    [("ui.align_wizard", 0, ImportError), ("calibration.pose_taker", 1, MemoryError), ("rides.recorder", 4, ImportError)],
+    [
+        ("ui.align_wizard", 0, ImportError),
+        ("calibration.pose_taker", 1, MemoryError),
+        ("rides.recorder", 4, ImportError),
+    ],
 )
 def test_failed_import_of_a_menu_entry_is_shown_each_time(module, entry, error, without, run):
     """entry: its position in the menu."""

@@ -60,7 +60,7 @@ def test_each_function_is_called(engine, run_user):
 
 
 def test_own_pages_are_in_the_menu_without_an_alignment(run, tmp_path):
-    """"Own pages" is the sixth entry of the menu."""
+    """The menu's sixth entry is "Own pages"."""
     (tmp_path / "user.py").write_text(COMPLETE)
     presses = [[2, 1.2]] + [[4 + 0.5 * k, 0.15] for k in range(5)] + [[8, 1.2], [10, 0.15], [11, 0.15]]
     record = run({"lean": [[0, 0]], "presses": presses, "until": 13})
@@ -140,7 +140,8 @@ def test_pages_are_text_or_numbers_with_a_picture(with_user):
     source = (
         "pages = 3\npage_size = 'no function'\ndef page_b(app):\n    return 1.5, b'two'\n"
         "def draw(canvas, a, b):\n    canvas.append((a, b))\n"
-        "def page(app):\n    return app.settings.SIDE, '', (draw, 4, 5)\ndef page_a(app):\n    return ['a', 'b', None]\n"
+        "def page(app):\n    return app.settings.SIDE, '', (draw, 4, 5)\n"
+        "def page_a(app):\n    return ['a', 'b', None]\n"
         "def other(app):\n    1 / 0\n"
     )
 

@@ -10,6 +10,7 @@ import re
 import shutil
 import sys
 import tempfile
+import warnings
 from pathlib import Path
 
 from support import device_runs
@@ -118,8 +119,10 @@ def run(engine, flash, plan, capsys=None, fit=None):
         # Exclude the objects of earlier tests, because the app collects garbage often and scanning them takes minutes
         gc.freeze()
         try:
-            with on_flash(flash):
+            with on_flash(flash), warnings.catch_warnings():
+                warnings.simplefilter("ignore", ResourceWarning)  # a board that loses its power closes no file
                 answer = json.loads(json.dumps(device_runs.run_device(plan, fit, world_of(plan))))
+                gc.collect()
         finally:
             gc.unfreeze()
         return Record(answer, capsys.readouterr().out if capsys else "")

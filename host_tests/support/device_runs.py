@@ -253,7 +253,7 @@ def world_of(plan):
 def run_device(plan, fit=None, made=None):
     """Run a plan and return Device.record(). A plan is data, which can be sent to another process.
 
-    fit: fit(board) changes the board before power-on, or None. made: the result of world_of(plan), if it exists already.
+    fit: fit(board) changes the board before power-on, or None. made: the result of world_of(plan), if it exists.
 
     A plan has the time "until" (s) and one of three motions. All other entries are optional.
         "lean": as for standing().
