@@ -3,12 +3,14 @@ off in a line. The display never shows a lean that is more than half a second ol
 
 import pytest
 from kickstand_tools.simulation.scripted import script
-from support import device_plans, engines
+from support import engines
 
-FROM_S = 32.0
+FROM_S = 15.0
+UNTIL_S = FROM_S + 8.0
 # From FROM_S on the bike rolls quickly from side to side. So the value of a displayed lean shows how old it is.
 RIDE = [
-    *device_plans.RIDE[:3],
+    ["upright", 2.0],
+    ["accelerate", 15.0, 5.0],
     ["turn", -30.0, 2.0],
     ["turn", 40.0, 0.0],
     *[["turn", 40.0 * (-1) ** k, 0.3] for k in range(8)],
@@ -29,9 +31,8 @@ STARVED = {
 }
 
 
-def run(engine, flash, faults, config, **more):
-    plan = {"ride": RIDE, "presses": device_plans.PRESSES, "until": FROM_S + 8.0, "faults": faults, "config": config}
-    return device_plans.run(engine, flash, {**plan, **more})
+def riding(faults, config, **more):
+    return {"ride": RIDE, "until": UNTIL_S, "faults": faults, "config": {"SAMPLE_HZ": 200, **config}, **more}
 
 
 def too_old(record, from_s=FROM_S - 5.0):
@@ -40,35 +41,35 @@ def too_old(record, from_s=FROM_S - 5.0):
     Returns a list of (t_s, line, smallest lean, largest lean). The smallest and the largest lean are the bike's within
     the last OLDEST_S.
     """
-    found = []
-    for k in range(int(10 * (FROM_S + 8.0 - from_s))):
+    old = []
+    for k in range(int(10 * (UNTIL_S - from_s))):
         t_s = from_s + k / 10
         shown = record.lean_at(t_s)
         recent = [TRUE.truth(t_s - OLDEST_S * i / 20)[0] for i in range(21)]
         if shown is not None and not min(recent) - NEAR_DEG <= shown <= max(recent) + NEAR_DEG:
-            found.append((t_s, record.at(t_s)[0], min(recent), max(recent)))
-    return found
+            old.append((t_s, record.at(t_s)[0], min(recent), max(recent)))
+    return old
 
 
-@pytest.mark.parametrize("engine, name", [("cpython", n) for n in STARVED] + [("micropython", "a hang")])
-def test_no_lean_on_the_display_is_too_old(engine, name, tmp_path):
-    faults, config = STARVED[name]
-    record = run(engine, tmp_path, faults, config)
+@pytest.mark.parametrize(("engine", "name"), [("cpython", n) for n in STARVED] + [("micropython", "a hang")])
+@pytest.mark.usefixtures("aligned")
+def test_no_lean_on_the_display_is_too_old(engine, name, run):
+    record = run(riding(*STARVED[name]), engine)
     assert record.ends == ["off"]
     # While the program hangs, it cannot change the display.
     hang_s = (FROM_S + 0.3, FROM_S + 0.3 + HANG_S + 0.05) if name == "a hang" else (0, 0)
-    assert [found for found in too_old(record) if not hang_s[0] < found[0] < hang_s[1]] == []
+    assert [old for old in too_old(record) if not hang_s[0] < old[0] < hang_s[1]] == []
     if name == "a hang":
         assert record.first("Readings lost", FROM_S) < hang_s[1] + 0.1
     assert record.lean_at(FROM_S - 0.5) is not None
-    assert len(record.leans(FROM_S + 7.0, FROM_S + 8.0)) > 3
+    assert len(record.leans(FROM_S + 7.0, UNTIL_S)) > 3
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
-def test_a_storm_of_wheel_pulses_is_reported_and_leaves_the_lean(engine, tmp_path):
+@pytest.mark.usefixtures("aligned")
+def test_storm_of_wheel_pulses_is_reported_and_leaves_the_lean(engine, run):
     """At 50,000 pulses per second the loop gets no time, until the interrupt's handler disables the interrupt."""
-    storm = [["wheel_storm", [FROM_S, 3.0, 50_000]]]
-    record = run(engine, tmp_path, storm, {"SPEED": "wheel"}, wheel={})
+    record = run(riding([["wheel_storm", [FROM_S, 3.0, 50_000]]], {"SPEED": "wheel"}, wheel={}), engine)
     assert record.ends == ["off"]
     assert record.first("Wheel: noise") < FROM_S + 0.3
     assert too_old(record, FROM_S + 2.5) == []
