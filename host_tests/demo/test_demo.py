@@ -145,7 +145,12 @@ def test_a_changed_page_is_printed_at_once_and_its_values_every_250_ms(device):
     ]
     lines = device(*({**STATE, "t_s": t_s, "lcd": lcd} for t_s, *lcd in shown), OFF)
     assert [line.split()[0] for line in lines if " s  " in line] == ["1.00", "1.25", "1.30", "1.40"]
-    frame = ["  1.00 s  held turn, true lean 30.0° left", "+----------------+", "|Lean  27° left  |", "|" + 16 * " " + "|"]
+    frame = [
+        "  1.00 s  held turn, true lean 30.0° left",
+        "+----------------+",
+        "|Lean  27° left  |",
+        "|" + 16 * " " + "|",
+    ]
     assert lines[:4] == frame
 
 
