@@ -46,9 +46,12 @@ def value(lines, name):
     [
         ({}, ["30.0° left", "27° left", "+3.0°", "54 km/h", "held turn", "○"]),
         ({"lcd": ["Max left", ""], "lean_deg": 2.0, "speed_mps": 1.0}, ["2.0° right", "-", "-", "4 km/h"]),
-        ({"pressed": True, "pixels": "ff" * 1024}, ["30.0° left", "27° left", "+3.0°", "54 km/h", "held turn", "● pressed"]),
+        (
+            {"pressed": True, "pixels": "ff" * 1024},
+            ["30.0° left", "27° left", "+3.0°", "54 km/h", "held turn", "● pressed"],
+        ),
     ],
-)  # fmt: skip
+)
 def test_the_picture_has_true_and_shown_lean(changed, values):
     lines = drawn(**changed)
     names = "true lean", "shown lean", "error", "speed", "bike", "button"
@@ -71,7 +74,7 @@ def test_the_picture_fits_eighty_columns_with_title_and_time(paused, of_s, end):
 def columns(lean_deg, shown_deg, style):
     """Return the columns of a style in the upper half of the bike's picture, from its middle."""
     text, found = bike(lean_deg, shown_deg), []
-    for row, line in enumerate(text.split("\n")[:6]):
+    for line in text.split("\n")[:6]:
         for column, character in enumerate(line.plain):
             styles = {str(span.style) for span in line.spans if span.start <= column < span.end}
             if character != " " and style in styles:
