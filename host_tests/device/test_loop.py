@@ -6,6 +6,8 @@ import itertools
 import json
 
 import pytest
+from kickstand_tools.simulated_board.fakes import fake_time
+from support import device_runs
 from support.mpy import run_mpy
 
 
@@ -95,9 +97,11 @@ class Esp32:
         return [(90000, 70000, self.could_grow, 1000), (9000, 5000, 4000, 1000)]
 
 sys.modules["esp32"] = Esp32()
+from kickstand.board import port
+
+port.begin()
 from kickstand import devices
 from kickstand.app import App
-from kickstand.board import port
 from kickstand.settings import Settings
 
 port.IS_ESP32 = True
@@ -166,3 +170,14 @@ def test_small_heap_is_collected_between_turns_only(plan):
     assert 3 <= result["plan"] <= 10
     assert result["turns"] > 500
     assert (result["within"] == 0) is plan, result
+
+
+@pytest.mark.parametrize(("chip", "processor_hz"), [("esp32", 240_000_000), ("pico", 160_000_000)])
+def test_an_esp32_runs_at_240_mhz_and_yields(chip, processor_hz, monkeypatch):
+    """Only sleep_ms() gives time to an ESP32's idle task and its radio. A Pico keeps its clock."""
+    waits_ms, sleep_ms = [], fake_time.sleep_ms
+    monkeypatch.setattr(fake_time, "sleep_ms", lambda ms: waits_ms.append(ms) or sleep_ms(ms))
+    device = device_runs.Device(lambda t_s: (0.0, 1.0, 0.0, 0.0, 0.0, 0.0), machine=chip)
+    device.run({}, [3.0])
+    assert device.board.processor_hz == processor_hz
+    assert sum(ms >= 5 for ms in waits_ms) > 100
