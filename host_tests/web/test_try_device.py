@@ -63,7 +63,7 @@ def test_a_first_visit_is_recorded_every_20_ms(board):
     assert [any(words in text for text in shown) for words in ("On stand: press", "Aligned!")] == [True, True]
     assert len(shown) < 0.2 * len(records)
     states = [tick["state"] for tick in records if "state" in tick]
-    assert states[0]["code"] == "starting" and states[-1]["view"] == "lean" and set(states[-1]) == set(STATE)
+    assert states[0]["code"] == "starting" and states[-1]["view"] == "align" and set(states[-1]) == set(STATE)
     assert all(one != other for one, other in itertools.pairwise(states)) and len(states) < 30
     board.order("pose", 15.0)
     records += ticks(board, 20.0)
