@@ -1,6 +1,6 @@
 """The page Try in Chromium. The main job is to align the simulated meter, to ride, and to compare the lean.
 
-The clock of the page and of its board is eight times as fast as usual, if the test does not need the usual clock.
+The board's clock is eight times as fast as usual, if the test does not need the usual clock.
 """
 
 import json
@@ -18,12 +18,12 @@ LEAN_DEG = 30
 
 
 @pytest.fixture
-def visit(chromium, address):
+def visit(chromium, address, faster_address):
     """Return a function that opens the page. At the end, the page had no error and asked no other server."""
     riders = []
 
-    def visit(name="", **kind):
-        riders.append(Rider(chromium, address + name, **kind))
+    def visit(name="", faster=False, **kind):
+        riders.append(Rider(chromium, (faster_address if faster else address) + name, **kind))
         return riders[-1]
 
     yield visit
@@ -41,7 +41,7 @@ def ride_off(rider):
 
 
 def test_two_presses_a_ride_and_a_bend_show_the_lean(visit):
-    rider = visit(viewport=WINDOW, speed=8)
+    rider = visit(viewport=WINDOW, faster=True)
     ride_off(rider)
     rider.keys("ArrowRight", LEAN_DEG // 5)
     rider.guide_says("That is all")
@@ -63,8 +63,8 @@ def loop_s():
 
 @pytest.mark.long
 def test_faults_are_shown_as_the_firmware_does_and_without_a_network(visit, address, tmp_path):
-    """At the usual speed. The firmware's own loop, with the same orders at the same times, fills the display's memory in
-    the same way. The board needs a quarter of a slow phone's processor."""
+    """At the usual speed. The firmware's own loop, with the same orders at the same times, fills the display's memory
+    in the same way. The board needs less than a slow phone's processor has."""
     rider = visit(viewport=WINDOW)
     rider.align()
     rider.reads("Aligned!")
@@ -109,7 +109,7 @@ LOOK = """(seconds) => new Promise((done) => {
 
 @pytest.mark.long
 def test_the_page_flashes_nothing_in_a_bend(visit):
-    rider = visit(speed=4, **LAPTOP)
+    rider = visit(faster=True, **LAPTOP)
     ride_off(rider)
     rider.keys("ArrowRight", 5)
     rider.wait(3)
@@ -126,7 +126,7 @@ ACTIVE = "document.activeElement.id || document.activeElement.value"
 def test_by_the_keyboard_alone(visit):
     """The arrow keys change the lean, and the space bar is the board's button. Controls that the rider cannot move
     show what the motorcycle does. The focus stays when the guide shows its next step."""
-    rider = visit(speed=8, **LAPTOP)
+    rider = visit(faster=True, **LAPTOP)
     page = rider.page
 
     def tab_to(name):
@@ -253,7 +253,8 @@ def test_motorcycle_is_seen_in_the_dark(visit):
     rider.page.wait_for_selector(".mirror")
     road, *parts = rider.page.evaluate(
         """() => {
-          const colour = (one, name) => getComputedStyle(document.querySelector(one))[name].match(/[0-9]+/g).map(Number);
+          const style = (one) => getComputedStyle(document.querySelector(one));
+          const colour = (one, name) => style(one)[name].match(/[0-9]+/g).map(Number);
           const road = document.createElement("p");
           road.style.color = "var(--road)";
           road.id = "paint";

@@ -19,19 +19,6 @@ KEEP = Path(__file__).with_name("keep.js").read_text()
 MISSING = Path(__file__).with_name("missing.js").read_text()
 
 
-# This script makes the clock of a page or a worker faster.
-FASTER = """{
-  const [now, later] = [performance.now.bind(performance), setTimeout];
-  performance.now = () => SPEED * now();
-  globalThis.setTimeout = (done, ms, ...rest) => later(done, ms / SPEED, ...rest);
-}"""
-
-
-def _with_clock(route, clock):
-    response = route.fetch()
-    route.fulfill(response=response, body=clock + response.text())
-
-
 class Rider:
     """A rider with a page of the site.
 
@@ -39,22 +26,16 @@ class Rider:
     policy: True to enforce the page's content security policy. With the policy, playwright's wait_for_function() works
         only on the page Rides.
     script: code that runs before each page's own scripts.
-    speed: the page's clock, and the clock of the board of the page Try, are faster by this factor.
 
     asked: the addresses that the page has requested.
     errors: the errors on the page.
     """
 
-    def __init__(self, browser, address, policy=False, script="", speed=1, **kind):
+    def __init__(self, browser, address, policy=False, script="", **kind):
         self._browser = browser
-        workers = "block" if speed > 1 else "allow"  # the service worker would bypass the route of the faster worker
-        self.context = browser.new_context(**({"bypass_csp": not policy, "service_workers": workers} | kind))
+        self.context = browser.new_context(bypass_csp=not policy, **kind)
         self.context.set_default_timeout(1000 * READ_S)
         self.context.add_init_script(KEEP)
-        if speed > 1:
-            clock = FASTER.replace("SPEED", str(speed))
-            self.context.add_init_script(clock)
-            self.context.route("**/worker.mjs", lambda route: _with_clock(route, clock))
         self.context.add_init_script(script)
         self.asked, self.errors = [], []
         self.context.on("request", lambda request: self.asked.append(request.url))
