@@ -7,7 +7,7 @@ import functools
 
 import pytest
 from support import device_plans
-from support.device_runs import Device, _world
+from support.device_runs import Device, world_of
 from support.radio_decoder import SERVICE, channels
 
 virtual_radio = pytest.importorskip("support.virtual_radio", reason="no bumble", exc_type=ImportError)
@@ -25,7 +25,7 @@ def on_air(tmp_path, monkeypatch, capsys):
     asyncio._set_running_loop(None)
 
     def run(until_s, visits, machine="pico w", **config):
-        world, _ = _world(device_plans.ALIGNED)
+        world, _ = world_of(device_plans.ALIGNED)
         device = Device(world, machine=machine)
         for press in device_plans.PRESSES:
             device.board.press(*press)

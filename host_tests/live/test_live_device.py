@@ -6,7 +6,7 @@ import sys
 
 import pytest
 from support import device_plans
-from support.device_runs import Device, _world
+from support.device_runs import Device, world_of
 from support.engines import ENGINES
 from support.radio_decoder import channels, own
 
@@ -202,7 +202,7 @@ def test_the_pin_is_required_once_per_phone(run):
 
 def test_with_live_off_nothing_more_is_imported(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    device = Device(_world(device_plans.ALIGNED)[0], machine="pico w")
+    device = Device(world_of(device_plans.ALIGNED)[0], machine="pico w")
     seen = set()
     device.board.at(8.0, lambda: seen.update(sys.modules))
     device.run({}, [9.0])

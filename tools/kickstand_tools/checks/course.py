@@ -14,7 +14,9 @@ SLOWEST_MPS = 3.0  # least speed at which positions show the course
 TURNING_DPS = 4.0  # a second counts if the course changes faster than this
 FASTEST_DPS = 90.0  # if the course changes faster than this, the positions have jumped
 ENOUGH = 8  # fewer usable seconds give no result
-CLEAR = 0.6  # least correlation of course and gyro, of either sign
+# Least correlation of course and gyro, of either sign, and by how many standard errors it must differ from 0. The
+# errors of the positions turn the course too: in few seconds with small turns, they correlate with the gyro by chance.
+CLEAR, SIGMAS = 0.6, 5.0
 LAGS_S = np.arange(0.0, 2.1, 0.25)  # delays of the positions that are tried
 LONGEST_S = 2.5  # longest time between two positions
 
@@ -44,7 +46,10 @@ def course_agrees(cells: LogCells) -> bool | None:
         return course_dps, ((after - before) @ up / span_s)[:, None]
 
     best = best_lag(LAGS_S, earlier)
-    return None if best is None or best.value < CLEAR else bool(best.direction[0] > 0.0)
+    if best is None or best.value < CLEAR:
+        return None
+    sigmas = best.value * np.sqrt((len(course_dps) - 2) / max(1.0 - best.value**2, 1e-9))
+    return bool(best.direction[0] > 0.0) if sigmas > SIGMAS else None
 
 
 def log_agrees(time_s: Array, accel_g: Array, gyro_dps: Array, lat_deg: Array, lon_deg: Array) -> bool | None:
