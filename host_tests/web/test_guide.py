@@ -5,6 +5,7 @@ that the rider could see.
 """
 
 import json
+from pathlib import Path
 
 import pytest
 from kickstand_tools.web.device import PageDevice
@@ -12,22 +13,7 @@ from support.page_turner import PageTurner
 
 # This script does the same as tell() in main.mjs. It returns [stage, words beside the true lean, number of the step,
 # text, action] after each tick.
-STEPS = """async (ticks) => {
-  const { Guide } = await import(PAGE + "/guide.mjs");
-  const { shows } = await import(PAGE + "/shows.mjs");
-  const guide = new Guide();
-  let shown = null, view = { view: "starting" }, words = null, step = null, dark = false;
-  return ticks.map((tick) => {
-    shown = tick.display ? tick.display.shown_deg : shown;
-    view = tick.state ?? view;
-    words = shows(view)?.words ?? words;
-    if (!tick.powered && !dark) guide.dark(tick.cut);
-    dark = !tick.powered;
-    const standing = tick.phase === tick.pose;
-    step = guide.next(view, shown, tick.pose, standing, { ...tick, time: tick.t_s }) ?? step;
-    return [tick.stage, words, step.number, step.text, step.action?.[1] ?? ""];
-  });
-}"""
+STEPS = Path(__file__).with_name("guide_steps.js").read_text()
 
 SHORT, LONG = ("press", 0.15), ("press", 1.2)
 STAND, UPRIGHT, RIDE = ("pose", "kickstand"), ("pose", "upright"), ("pose", 15.0)

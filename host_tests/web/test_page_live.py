@@ -7,6 +7,7 @@ Bluetooth, a simulated board is on a virtual radio.
 import functools
 import gzip
 import json
+from pathlib import Path
 
 import pytest
 from kickstand_tools.deploy import connection
@@ -217,7 +218,7 @@ def test_simulated_board_is_watched_without_a_real_one(chromium, address):
             [
                 *("open", "closed"),
                 "The port cannot be opened: Failed to open serial port. Does another program have it? "
-                "Then close it, and press the button again.",
+                "On Linux: are you in the group dialout?",
             ],
             id="a port without signals is closed again",
         ),
@@ -327,26 +328,7 @@ def test_browser_with_bluetooth_alone_offers_no_cable(chromium, address):
     rider.context.close()
 
 
-LOGGED = """async (packets) => {
-  const { BluetoothLog } = await import(PAGE + "/live/bluetooth/log.mjs");
-  const { BoardTime } = await import(PAGE + "/live/bluetooth/board_time.mjs");
-  const { Stops } = await import(PAGE + "/live/bluetooth/stops.mjs");
-  const { AT_REST, decodeNow, decodeRide } = await import(PAGE + "/live/bluetooth/packets.mjs");
-  const [log, time, stops] = [new BluetoothLog(), new BoardTime(), new Stops()];
-  for (const [atS, kind, bytes] of packets) {
-    const view = new DataView(Uint8Array.from(bytes).buffer);
-    if (kind === "ride") {
-      log.takeRide(decodeRide(view));
-      continue;
-    }
-    const now = decodeNow(view);
-    const { s } = time.take(now.ms, 1000 * atS);
-    log.take(now, s);
-    stops.take(s, now.force[2], (now.state & AT_REST) !== 0);
-  }
-  const text = ({ name, data }) => [name, new TextDecoder().decode(data)];
-  return { files: log.files(new Date(0)).map(text), stop: stops.last };
-}"""
+LOGGED = Path(__file__).with_name("bluetooth_log.js").read_text()
 
 
 def test_saved_bluetooth_log_can_be_reported_and_smoothed(node, tmp_path):

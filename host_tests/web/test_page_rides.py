@@ -9,6 +9,7 @@ import gzip
 import itertools
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -139,15 +140,7 @@ def test_long_work_can_be_stopped_and_repeated(page, ride, calibration):
     assert page.said() == "Stopped." and page.page.is_hidden("#report")
 
 
-DROP = """([selector, files]) => {
-  const data = new DataTransfer();
-  for (const [name, bytes] of files) {
-    data.items.add(new File([Uint8Array.from(atob(bytes), (letter) => letter.charCodeAt(0))], name));
-  }
-  for (const kind of ["dragover", "drop"]) {
-    document.querySelector(selector).dispatchEvent(new DragEvent(kind, { dataTransfer: data, bubbles: true }));
-  }
-}"""
+DROP = Path(__file__).with_name("drop.js").read_text()
 
 
 def test_dropped_file_that_is_cut_off_is_shown_with_a_warning(page, ride, calibration, tmp_path):
@@ -290,16 +283,7 @@ def test_browser_without_a_store_is_told_so(chromium, address):
     rider.context.close()
 
 
-PULLED = """(files) => new Promise((done) => {
-  const opening = indexedDB.open("kickstand", 1);
-  opening.onupgradeneeded = () => opening.result.createObjectStore("files");
-  opening.onsuccess = () => {
-    const work = opening.result.transaction("files", "readwrite");
-    const all = files.map(([name, text]) => ({ name, data: new TextEncoder().encode(text).buffer }));
-    work.objectStore("files").put(all, "pulled");
-    work.oncomplete = () => { opening.result.close(); done(); };
-  };
-})"""
+PULLED = Path(__file__).with_name("keep_pulled.js").read_text()
 
 
 def test_pulled_rides_are_opened_once(page, address, ride, calibration):

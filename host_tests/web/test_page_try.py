@@ -15,6 +15,9 @@ from support.web.rider import LAPTOP, PHONE, Rider
 
 WINDOW = {"width": 1000, "height": 700}
 LEAN_DEG = 30
+LOOK, ROOM, COLOURS, FOREIGN = (
+    Path(__file__).with_name(f"{name}.js").read_text() for name in ("look", "room", "colours", "foreign")
+)
 
 
 @pytest.fixture
@@ -95,16 +98,6 @@ def test_faults_are_shown_as_the_firmware_does_and_without_a_network(visit, addr
     for name in "", "index.html":
         rider.page.goto(address + name)
         rider.reads("Raw")
-
-
-LOOK = """(seconds) => new Promise((done) => {
-  const seen = [], until = Date.now() + 1000 * seconds;
-  const text = (id) => document.querySelector(id).textContent;
-  const timer = setInterval(() => {
-    seen.push([document.querySelector("#display").ariaLabel, text("#shown-lean"), text("#todo")]);
-    if (Date.now() > until) { clearInterval(timer); done(seen); }
-  }, 20);
-})"""
 
 
 @pytest.mark.long
@@ -223,21 +216,7 @@ def test_every_step_of_the_guide_has_its_room(visit, files):
         rider.page.set_viewport_size({"width": width, "height": height})
         assert rider.fits(), width
         long, words = rider.page.evaluate(
-            """(steps) => {
-              const [todo, button, guide] = ["#todo", "#do", ".guide"].map((one) => document.querySelector(one));
-              button.hidden = false;
-              button.textContent = "Put it on its stand";
-              todo.textContent = "";
-              const bottom = guide.getBoundingClientRect().bottom;
-              const long = steps.filter((text) => {
-                todo.textContent = text;
-                const moved = guide.getBoundingClientRect().bottom !== bottom;
-                return moved || button.getBoundingClientRect().bottom > bottom - 8;
-              });
-              const all = document.createRange();
-              all.selectNodeContents(document.querySelector('#press-help'));
-              return [long, all.getBoundingClientRect().right];
-            }""",
+            ROOM,
             steps,
         )
         assert long == [], width
@@ -251,26 +230,8 @@ def test_motorcycle_is_seen_in_the_dark(visit):
     """Mirrors, frame and tyre differ in colour from the road behind them."""
     rider = visit(color_scheme="dark", **LAPTOP)
     rider.page.wait_for_selector(".mirror")
-    road, *parts = rider.page.evaluate(
-        """() => {
-          const style = (one) => getComputedStyle(document.querySelector(one));
-          const colour = (one, name) => style(one)[name].match(/[0-9]+/g).map(Number);
-          const road = document.createElement("p");
-          road.style.color = "var(--road)";
-          road.id = "paint";
-          document.body.append(road);
-          return [colour("#paint", "color"), colour(".mirror", "fill"), colour(".frame", "stroke"),
-            colour(".tyre", "stroke")];
-        }"""
-    )
+    road, *parts = rider.page.evaluate(COLOURS)
     assert all(sum(part) - sum(road) > 130 for part in parts), (road, parts)
-
-
-FOREIGN = """() => {
-  const script = document.createElement("script");
-  script.textContent = "window.ours = 1";
-  document.body.append(script);
-}"""
 
 
 @pytest.mark.long
