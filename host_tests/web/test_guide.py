@@ -4,63 +4,14 @@ The page's device runs at full speed and gets the orders of a rider. The page's 
 that the rider could see.
 """
 
-import json
 from pathlib import Path
 
 import pytest
-from kickstand_tools.web.device import PageDevice
-from support.page_turner import PageTurner
+from page_drive import ALIGN, LONG, PLUG, PULL, RIDE, RIDING, SHORT, STAND, UPRIGHT, Drive
 
 # This script does the same as tell() in main.mjs. It returns [stage, words beside the true lean, number of the step,
 # text, action] after each tick.
 STEPS = Path(__file__).with_name("guide_steps.js").read_text()
-
-SHORT, LONG = ("press", 0.15), ("press", 1.2)
-STAND, UPRIGHT, RIDE = ("pose", "kickstand"), ("pose", "upright"), ("pose", 15.0)
-PULL, PLUG = ("sensor", False), ("sensor", True)
-ALIGN = [("wait", 1.5), SHORT, ("wait", 4), UPRIGHT, ("wait", 3), SHORT, ("wait", 4)]
-RIDING = [*ALIGN, RIDE, ("wait", 12), ("lean", 30), ("wait", 6)]
-
-
-class Drive:
-    """A rider at the page's device. The records of each tick get the stage of the drive and the rider's own doings."""
-
-    def __init__(self):
-        self.device = PageDevice()
-        self.now_s = 0.0
-        self.state = {"powered": True, "plugged": True, "armed": False, "pose": "kickstand", "stage": 0}
-        self.records = []
-
-    def run(self, seconds):
-        self.now_s += seconds
-        self.device.run_to(self.now_s)
-        for tick in json.loads(self.device.take()):
-            cut = self.state["armed"] and not tick["powered"]
-            self.state["armed"] = self.state["armed"] and tick["powered"]
-            self.records.append({**self.state, **tick, "cut": cut})
-
-    def press(self, seconds):
-        self.device.order("button", True)
-        self.run(seconds)
-        self.device.order("button", False)
-        self.run(0.4)
-
-    def do(self, name, value):
-        """Carry out an order of Device.act(), or one of: wait or press for some seconds, turn to a view by presses."""
-        if name in ("wait", "press"):
-            return self.run(value) if name == "wait" else self.press(value)
-        if name == "turn_to":
-            turner = PageTurner()
-            turner.turn_to(value)
-            while turner.presses(self.device.state()["view"]):
-                self.press(0.15)
-            return turner.check()
-        self.device.order(name, value)
-        if name == "pose":
-            self.state["pose"] = value if isinstance(value, str) else "ride"
-        elif name not in ("lean", "button"):
-            self.state[{"sensor": "plugged", "power": "powered", "cut_save": "armed"}[name]] = value
-        return None
 
 
 @pytest.fixture
@@ -70,20 +21,19 @@ def stages(node, tmp_path, monkeypatch):
     Each stage is (orders, words beside the true lean, number of the step, a part of its text, action).
     """
     monkeypatch.chdir(tmp_path)  # the board's flash
-    drive = Drive()
+    with Drive() as drive:
 
-    def check(*table):
-        for drive.state["stage"], (orders, *_) in enumerate(table):
-            for order in orders:
-                drive.do(*order)
-        last = {stage: step for stage, *step in node(STEPS, drive.records)}
-        for stage, (_, words, number, text, action) in enumerate(table):
-            shown_words, shown_number, shown_text, shown_action = last[stage]
-            assert text in shown_text, stage
-            assert (shown_words, shown_number, shown_action) == (words, number, action), (stage, shown_text)
+        def check(*table):
+            for drive.state["stage"], (orders, *_) in enumerate(table):
+                for order in orders:
+                    drive.do(*order)
+            last = {stage: step for stage, *step in node(STEPS, drive.records)}
+            for stage, (_, words, number, text, action) in enumerate(table):
+                shown_words, shown_number, shown_text, shown_action = last[stage]
+                assert text in shown_text, stage
+                assert (shown_words, shown_number, shown_action) == (words, number, action), (stage, shown_text)
 
-    yield check
-    drive.device.board.uninstall()
+        yield check
 
 
 def test_a_press_while_riding_is_taken_for_the_stand(stages):

@@ -9,6 +9,7 @@ import pytest
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.lcd import Lcd
 from kickstand_tools.web.device import STATE, WHOLE_TICKS, PageDevice, display
+from page_drive import ALIGN, RIDE, SHORT, Drive
 from support.mpy import run_mpy
 from support.web import page_repeated
 
@@ -200,42 +201,6 @@ def test_the_page_turns_the_loop_as_the_firmware_does(tmp_path):
     assert page["displays"] == loop["displays"]
 
 
-# This script simulates a ride as fast as possible, beginning with the first press. Each tick is 20 ms.
-RIDE = """
-import json
-from kickstand_tools.web.device import PageDevice
-
-device, now, seen = PageDevice(), 0.0, []
-
-def run(seconds):
-    global now
-    now += seconds
-    device.run_to(now)
-    for tick in json.loads(device.take()):
-        if "display" in tick:
-            seen.append([tick["t_s"], tick["display"]["text"][0]])
-
-def press(seconds):
-    device.order("button", True)
-    run(seconds)
-    device.order("button", False)
-    run(0.4)
-
-run(2)
-press(0.15)
-run(5)
-device.order("pose", "upright")
-run(4)
-press(0.15)
-run(5)
-device.order("pose", 15.0)
-run(20)
-for i, lean in enumerate((30, -25, 10, -40, 0, 5, 45, -3)):
-    device.order("lean", lean)
-    run(3)
-    press(0.15)
-print("\\n" + json.dumps(seen))
-"""
 # Every complete first line that the display can show in this ride
 WHOLE = re.compile(
     r" {16}$|Kickstand {7}$|Raw +-?\d+° [+-]\d\.\d\dg *$|Stand: hold {5}$|Now upright: {4}$|Upright: hold {3}$"
@@ -246,8 +211,16 @@ LASTING_S = 0.08  # the firmware writes a page every 0.1 s, so a text that disap
 
 
 @pytest.mark.long
-def test_no_display_is_shown_half_written(tmp_path):
-    shown = json.loads(run_mpy(RIDE, directory=tmp_path).splitlines()[-1])
+def test_no_display_is_shown_half_written(tmp_path, monkeypatch):
+    """The display of a ride with bends is sampled every 20 ms. The rider turns through the pages."""
+    monkeypatch.chdir(tmp_path)
+    with Drive() as drive:
+        for order in [*ALIGN, RIDE, ("wait", 20)]:
+            drive.do(*order)
+        for lean_deg in (30, -25, 10, -40, 0, 5, 45, -3):
+            for order in [("lean", lean_deg), ("wait", 3), SHORT]:
+                drive.do(*order)
+    shown = [(tick["t_s"], tick["display"]["text"][0]) for tick in drive.records if "display" in tick]
     assert len(shown) > 100 and [line for _, line in shown if not WHOLE.match(line)] == []
     pages = [(t_s, re.sub(r"[-+\d.°]+|left|right|Brake|Accel", "", line).strip()) for t_s, line in shown if t_s > 1.0]
     changes = [pages[0], *(other for one, other in itertools.pairwise(pages) if one[1] != other[1])]
