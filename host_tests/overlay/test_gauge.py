@@ -160,3 +160,15 @@ def test_gauge_scales_with_the_video_and_has_clear_corners(video_height, height)
     assert (gauge.height, *picture.shape) == (height, height, gauge.width, 4) and gauge.width % 2 == height % 2 == 0
     assert picture[0, 0, 3] == picture[-1, -1, 3] == 0 and picture[..., 3].max() == 255
     assert 50 < picture[gauge.height // 2, 2, 3] < 200  # the panel is partly transparent
+
+
+def test_parts_are_drawn_completely_and_symmetrically():
+    for words in ("31", "km/h", "max 45°", "BRAKE 0.90 g"):
+        alpha = np.asarray(parts.text(words, 20.0, WHITE))[..., 3]
+        edges = alpha[0].max(), alpha[-1].max(), alpha[:, 0].max(), alpha[:, -1].max()
+        assert max(edges) < 255 and alpha.max() == 255, words  # no letter is cut off
+    spot, bike = np.asarray(parts.spot(20, ACCENT)), np.asarray(parts.bike(100.0))
+    assert np.array_equal(spot, spot[::-1]) and np.array_equal(spot, spot[:, ::-1])
+    assert np.abs(bike.astype(int) - bike[:, ::-1]).mean() < 3.0
+    rows = np.flatnonzero(bike[..., 3].max(axis=1) == 255)
+    assert rows[-1] == pytest.approx(len(bike) / 2, abs=3)  # the tyre touches the ground in the middle
