@@ -1,6 +1,7 @@
 """Rides of a few numbers, whose figures, words and charts can be computed by hand."""
 
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 from kickstand_tools import api
@@ -33,10 +34,10 @@ def overview_of(course, quality=None, stops=(), riding_s=60.0, notices=(), smoot
     return Overview(ride, summary(course), course, list(stops), quality, riding_s, list(notices))
 
 
-def standing_log(seconds=4.0, shake_g=0.002, shake_dps=0.002, hz=100.0, bias_dps=0.0, **columns):
+def standing_log(seconds=4.0, shake_g=0.002, shake_dps=0.002, hz=100.0, bias_dps=0.0, **values: Any):
     """A log of a bike that stands upright. shake_g, shake_dps: rms of the vibration."""
     random, count = np.random.default_rng(2), round(seconds * hz)
     force = random.normal(0.0, shake_g, (count, 3)) + [0.0, 1.0, 0.0]
     rates = random.normal(bias_dps, shake_dps, (count, 3))
-    columns = {name: np.full(count, value) for name, value in columns.items()}
+    columns: Any = {name: np.full(count, value) for name, value in values.items()}
     return api.Log(np.arange(count) / hz, force, rates, **columns, name="trip/RIDE.csv")

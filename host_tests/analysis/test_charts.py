@@ -3,6 +3,7 @@
 import itertools
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,13 +28,13 @@ NAN = np.nan
 HELD = np.where(np.arange(6000) > 3000, 40.0, 0.0)  # a lean to the right in the second half
 
 
-def chart_of(seen, title):
+def chart_of(seen, title) -> Any:
     drawn = charts.charts(seen)
     (chart,) = (chart for chart in (*drawn.over_time, *drawn.below) if chart.title.startswith(title))
     return chart
 
 
-def chart(title, **columns):
+def chart(title, **columns) -> Any:
     return chart_of(overview_of(samples(6000, **columns)), title)
 
 

@@ -97,7 +97,7 @@ SQUARE = CalibrationFile(aligned=True, vehicle="car")  # the sensor's axes are l
 def braking_left(n=200, step_s=0.01, start_s=0.0, speed_mps=()):
     """Simulate braking in a left turn, with a different reading on each axis."""
     force, rate = np.tile([0.2, 1.0, -0.4], (n, 1)), np.tile([5.0, 7.0, 9.0], (n, 1))
-    return Log(start_s + np.arange(n) * step_s, force, rate, np.asarray(speed_mps, dtype=float))
+    return Log(start_s + np.linspace(0.0, (n - 1) * step_s, n), force, rate, np.asarray(speed_mps, dtype=float))
 
 
 def table_of(path, form):
@@ -183,8 +183,9 @@ def test_no_time_is_written_twice(tmp_path, form, step_s, columns, start_s):
 def test_progress_and_notices_are_passed_on(tmp_path):
     """The readings of the ride are frozen, which gives a notice."""
     progress, notices = [], []
-    ride = open_ride(braking_left(3000), SQUARE)
-    ride.log.gyro_dps[200::2] += 1e-4
+    log = braking_left(3000)
+    log.gyro_dps[200::2] += 1e-4
+    ride = open_ride(log, SQUARE)
     export(ride, "csv", tmp_path / "out", lambda *counts: progress.append(counts), notices)
     assert progress == [(3000, 3000)] and [notice.code for notice in notices] == ["frozen-readings"]
 

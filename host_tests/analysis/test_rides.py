@@ -1,6 +1,7 @@
 """The blocks of a ride: parts that are left out, warnings, the riding time, and refusals of unusable files."""
 
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -111,11 +112,12 @@ def test_a_ride_needs_its_calibration_beside_it(tmp_path, content, calibration, 
 
 
 def test_a_calibration_is_given_or_refused(tmp_path):
-    for arguments, words in (
+    refused: Any = (
         ((standing_log(),), "an open file has no calibration beside it: give one"),
         ((standing_log(), api.CalibrationFile()), "^the calibration is not aligned"),
         ((tmp_path,), "is a directory: give the name of a ride in it"),
-    ):
+    )
+    for arguments, words in refused:
         with pytest.raises(InputError, match=words):
             api.open_ride(*arguments)
     (tmp_path / "RIDE.csv").write_text(LOG)

@@ -35,8 +35,10 @@ def block_group(turn_deg=0.0, axis=UP, count=8, varied=1.0, sway=NO_SWAY, log=0)
     terms = np.array([[1.0, sign * a, other * a, 0.0] for sign in (-1.0, 1.0) for other in (-1e-3, 1e-3)])
     force = terms[:, :3] @ np.array([mount[1], mount[2], mount[0]])
     begin_s = np.linspace(0.0, 8.0 * (count - 1), count)
-    sums = (np.tile(matrix, (count, 1, 1)) for matrix in (terms.T @ terms, terms.T @ force, mount.T @ sway @ mount))
-    return Blocks(*sums, np.full(count, log), begin_s, begin_s + 7.0)
+    square, product, swayed = (
+        np.tile(sums, (count, 1, 1)) for sums in (terms.T @ terms, terms.T @ force, mount.T @ sway @ mount)
+    )
+    return Blocks(square, product, swayed, np.full(count, log), begin_s, begin_s + 7.0)
 
 
 def horizontal_sway(direction_deg):

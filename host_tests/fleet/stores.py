@@ -54,7 +54,8 @@ class FailingStore(MemoryFileSystem):
 
     def ls(self, path, detail=True, **options):
         self._check(path)
-        return [entry | self.marks for entry in super().ls(path, detail=True, **options)]
+        entries: Any = super().ls(path, detail=True, **options)
+        return [entry | self.marks for entry in entries]
 
 
 fsspec.register_implementation("failing", FailingStore, clobber=True)

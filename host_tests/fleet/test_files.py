@@ -41,14 +41,6 @@ def test_a_store_works_as_a_directory_does(base):
         assert (log.name, log.gyro_dps[:, 2].tolist()) == (f"{base}/{name}", [0, 1, 2, 3, 4])
 
 
-def test_files_of_a_store_are_fetched_together(store):
-    files.write_bytes("failing:///all/a", b"1")
-    files.write_bytes("failing:///all/b", b"2")
-    assert files.read_all(["failing:///all/b", "failing:///all/a"]) == [b"2", b"1"]
-    assert set(files.listed("failing:///all")) == {"failing:///all/a", "failing:///all/b"}
-    assert files.listed("failing:///none") == {}
-
-
 @pytest.mark.parametrize(
     ("info", "mark"),
     [
@@ -102,14 +94,6 @@ def test_a_store_without_its_library_is_named(path, words):
         files.read_bytes(path)
 
 
-def test_a_directory_that_cannot_be_made_is_named(tmp_path):
-    (tmp_path / "a").write_text("")
-    with pytest.raises(InputError, match="a/below cannot be made: Not a directory"):
-        files.write_bytes(str(tmp_path / "a" / "below" / "b"), b"x")
-    with pytest.raises(InputError, match="cannot be read"):
-        files.read_bytes(str(tmp_path))
-
-
 NAMES = ["x" * 256, "x" * 257, 100 * "\u4e2d", "hid", ".hid", "..", "a/b", "con", "a%2Fb", "\x00", " ", "\u202e", "HID"]
 
 
@@ -133,17 +117,3 @@ def test_a_long_name_is_cut_and_keeps_whole_characters():
     assert len(set(stems)) == 3 and stems[0].startswith("a-")
     assert plot.file_name(".hid", "")[0] != "." and plot.file_name("bus 12", "front").startswith("bus%2012%20front-")
     assert len({plot.file_name(*names) for names in (("bus 12", ""), ("bus", "12"), ("bus 12", "front"))}) == 3
-
-
-@pytest.mark.parametrize(
-    ("directory", "path", "joined"),
-    [
-        ("/data/", "a.csv", "/data/a.csv"),
-        ("/data/", "/b.csv", "/b.csv"),
-        ("/data", "s3://c/d.csv", "s3://c/d.csv"),
-        ("", "a.csv", "a.csv"),
-        ("s3://x", "a.csv", "s3://x/a.csv"),
-    ],
-)
-def test_paths_are_relative_to_a_directory(directory, path, joined):
-    assert files.join(directory, path) == joined

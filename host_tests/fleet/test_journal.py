@@ -160,14 +160,3 @@ def test_a_line_that_does_not_fit_is_removed(tmp_path):
         journal.add("c", result())
     with Journal(path) as journal:
         assert ["a" in journal, "c" in journal, journal.damaged] == [True, True, 0]
-
-
-@pytest.mark.skipif(os.name == "nt", reason="permissions of POSIX")
-def test_others_may_read_and_write_the_journal(tmp_path):
-    mask = os.umask(0o002)
-    try:
-        with Journal(tmp_path / "journal.jsonl") as journal:
-            journal.add("a", result())
-    finally:
-        os.umask(mask)
-    assert (tmp_path / "journal.jsonl").stat().st_mode & 0o777 == 0o664

@@ -7,11 +7,9 @@ from pathlib import Path
 
 import pytest
 from kickstand_fleet import run
-from kickstand_fleet.journal import Journal
 from kickstand_fleet.manifest import Period, by_pattern
-from kickstand_fleet.period import failed
 from kickstand_fleet.run import run_fleet
-from kickstand_fleet.tables import TABLES, schema, write_tables
+from kickstand_fleet.tables import TABLES, schema
 from kickstand_tools.common.errors import InputError
 from support import command
 
@@ -56,15 +54,6 @@ def test_the_tables_have_all_results_with_types_and_units(periods, results, work
     assert run_fleet(periods, tmp_path).new == 0 and table(tmp_path) == rows
 
 
-def test_tables_are_written_in_groups(tmp_path):
-    from pyarrow import parquet
-
-    result = failed(absent(1)[0], *CRASHED)
-    write_tables(str(tmp_path), (result for _ in range(20_001)))
-    with parquet.ParquetFile(tmp_path / "errors.parquet") as file:
-        assert [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)] == [20_000, 1]
-
-
 def test_only_changed_vehicles_are_computed_again(workers, tmp_path):
     log = tmp_path / "a.csv"
     log.write_text("1")
@@ -80,12 +69,6 @@ def test_only_changed_vehicles_are_computed_again(workers, tmp_path):
     assert run_fleet([usual], tmp_path / "out", with_signals=True).new == 1
     log.write_text("12")
     assert run_fleet([usual], tmp_path / "out").new == 1
-
-
-def test_another_version_computes_all_results_again(workers, tmp_path, monkeypatch):
-    run_fleet(absent(2), tmp_path)
-    monkeypatch.setattr(run, "RESULTS_VERSION", 99)
-    assert run_fleet(absent(2), tmp_path).new == 2
 
 
 def test_a_crashed_vehicle_is_retried_and_a_bad_log_is_not(workers, tmp_path):
@@ -105,13 +88,6 @@ def test_a_run_that_ends_early_keeps_its_results(workers, tmp_path, error):
     assert "3 of 5 mounted sensors so far" in (tmp_path / "index.html").read_text()
     workers.outcomes = {}
     assert run_fleet(absent(5), tmp_path).new == 2
-
-
-def test_a_run_that_ends_before_any_result_writes_nothing(workers, tmp_path):
-    workers.outcomes = {"v0": InputError("lost")}
-    with pytest.raises(InputError, match="lost"):
-        run_fleet(absent(3), tmp_path / "out")
-    assert not (tmp_path / "out").exists() or not list((tmp_path / "out").iterdir())
 
 
 class Clock:
@@ -193,18 +169,6 @@ def test_a_full_store_keeps_the_row_and_ends_the_run(periods, workers, results, 
     assert run_fleet(periods[:1], OUT, with_signals=signals).new == 0
 
 
-def test_a_disk_that_fails_at_a_flush_is_reported(tmp_path, monkeypatch):
-    def full(_):
-        raise FULL
-
-    monkeypatch.setattr(os, "fsync", full)
-    with (
-        Journal(tmp_path / "journal.jsonl") as journal,
-        pytest.raises(InputError, match="No space left on device; finished work is kept: run the same command"),
-    ):
-        journal.sync()
-
-
 def test_signals_of_equally_named_logs_have_separate_files(periods, workers, tmp_path):
     from pyarrow import parquet
 
@@ -255,16 +219,3 @@ def test_the_command_says_that_finished_work_is_kept(workers, tmp_path):
     workers.outcomes = {"v": KeyboardInterrupt()}
     stopped = command.run("fleet", tmp_path / "MANIFEST.csv", "--out", tmp_path / "out")
     assert stopped.status == 130 and "finished work is kept: run the same command again to resume\n" in stopped.err
-
-
-def test_a_move_at_an_unknown_time_is_counted(workers, tmp_path):
-    for name in "a.csv", "b.csv":
-        (tmp_path / name).touch()
-        result = failed(Period(f"{tmp_path}/{name}", "", "motorcycle", (name,)), "mount-moved", "a reason")
-        result.alignment["status"] = "refused"
-        workers.outcomes[f"{tmp_path}/{name}"] = result
-    done = command.works("fleet", tmp_path / "*.csv", "--vehicle", "motorcycle", "--out", tmp_path / "out")
-    assert "mounted sensors: 2\n" in done.out and "mounts that seem to have moved: 2;" in done.out
-    page = (tmp_path / "out" / "index.html").read_text()
-    assert "The time of a move could not be found." in page and "<b>2</b><span>whose mount seems to have moved" in page
-    assert "<td>a.csv</td><td>motorcycle</td>" in page and f"Names are those below {tmp_path}/" in page

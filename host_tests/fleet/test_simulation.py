@@ -7,12 +7,12 @@ from math import atan, cos, degrees, radians, sin, sqrt
 
 import numpy as np
 import pytest
-from fleet_drives import TROUBLES, drive, simulate, turn_of
+from fleet_drives import TROUBLES, simulate, turn_of
 from kickstand.units import STANDARD_GRAVITY as G
 from kickstand_fleet import files
-from kickstand_fleet.simulation.fleet import MadeVehicle, make_fleet
-from kickstand_fleet.simulation.route import Route, balance_lean, random_route
-from kickstand_fleet.simulation.vehicle import HANDLING, Receiver, VehicleSensor, drive_log, random_sensor
+from kickstand_fleet.simulation.fleet import make_fleet
+from kickstand_fleet.simulation.route import Route, random_route
+from kickstand_fleet.simulation.vehicle import HANDLING, Receiver, VehicleSensor, drive_log
 from kickstand_tools.common.errors import InputError
 from support import command
 
@@ -30,15 +30,6 @@ def test_a_fleet_has_its_manifest_and_its_truth(fleet, periods):
         moved = {"moved-between": vehicle.moved_log or 0, "moved-within": 0}.get(vehicle.trouble, "")
         assert truth["moved_log"] == str(moved) and bool(truth["moved_s"]) == (vehicle.trouble == "moved-within")
         assert (vehicle.moved_deg >= 5.0) == vehicle.trouble.startswith("moved")
-
-
-@pytest.mark.parametrize(
-    ("count", "shares"),
-    [(10, {"moved-between": 1, "moved-within": 1}), (25, {"moved-between": 2, "late": 1, "dead": 1})],
-)
-def test_faults_are_rounded_to_whole_vehicles(tmp_path, count, shares):
-    drawn = Counter(vehicle.trouble for vehicle in make_fleet(tmp_path, count, 1, 14.0, 10.0))
-    assert drawn.items() >= shares.items() and drawn["cut"] == drawn["missing"] == (count > 24 and round(0.02 * count))
 
 
 @pytest.mark.long
@@ -81,24 +72,6 @@ def test_broken_files(tmp_path):
     head, *rows = gzip.decompress(content).decode().replace('"', "").splitlines()
     assert head == "t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps,speed_mps,utc_s"
     assert all(len(cell.partition(".")[2]) <= 5 for cell in rows[7].split(",")) and rows[1].startswith("0.02,")
-
-
-def test_a_missing_log_does_not_stay_from_an_earlier_fleet(tmp_path):
-    for trouble, exists in (("", True), ("missing", False)):
-        (vehicle,) = make_fleet(tmp_path, 1, 1, 14.0, 10.0, [trouble])
-        assert vehicle.paths[0].exists() is exists
-
-
-@pytest.mark.parametrize(
-    ("trouble", "reasons"),
-    [
-        ("", ""), ("dies", ""), ("garbage", ""), ("moved-between", "mount-moved"), ("moved-within", "mount-moved"),
-        ("late", "speed-late speed-unit"), ("dead", "no-speed"), ("km/h", "speed-unit"),
-        ("circles", "few-events parts-differ uncertain"),
-    ],
-)  # fmt: skip
-def test_the_truth_says_if_a_vehicle_can_be_aligned(trouble, reasons):
-    assert MadeVehicle("a", "car", trouble, [], [np.eye(3)]).reasons == reasons
 
 
 def test_a_receiver_that_dies_keeps_the_first_log(tmp_path):
@@ -162,20 +135,13 @@ def test_circles_never_go_straight():
         assert (route.speed.max() <= 8.0) is not straight
 
 
-def test_a_motorcycle_leans_into_the_bend():
-    one = np.array([1.0])
-    assert balance_lean(Route(one, 10.0 * one, one, 0.3 * one, one, one)) == pytest.approx(
-        [-atan(3.0 / G)]
-    )  # to the left
-
-
 EXACT = VehicleSensor(np.eye(3), np.zeros(3), np.ones(3), np.zeros(3))
 COUNT_G, COUNT_DPS = 1.0 / 16384.0, 1.0 / 131.0
 
 
 def road(speed=10.0, acceleration=0.0, lateral=0.0, slope=0.0, camber=0.0, slope_rate=0.0, camber_rate=0.0):
     """Return 20 seconds of steady driving. lateral: acceleration to the left. slope, camber: in rad."""
-    one, t_s = np.ones(1000), np.arange(1000) * 0.02
+    one, t_s = np.ones(1000), np.linspace(0.0, 19.98, 1000)
     yaw_rate = lateral / max(speed, 1e-9)
     tilt = slope + slope_rate * (t_s - 10.0), camber + camber_rate * (t_s - 10.0)
     return Route(t_s, speed * one, acceleration * one, yaw_rate * one, *tilt)
@@ -196,6 +162,9 @@ ROLL, LEAN = radians(4.0 * 3.0 / G), atan(5.0 / G)
         ({"acceleration": -3.0}, "bus", (0.0, 1.0, -3.0 / G + sin(radians(2.0) * -3.0 / G)), (0, 0, 0)),
         ({"acceleration": -3.0}, "motorcycle", (0.0, 1.0, -3.0 / G + sin(radians(4.0) * -3.0 / G)), (0, 0, 0)),
         # The body rolls outwards in a bend
+        ({"lateral": 3.0}, "bus", (3.0 / G * cos(1.375 * ROLL) + sin(1.375 * ROLL),
+                                   cos(1.375 * ROLL) - 3.0 / G * sin(1.375 * ROLL), 0.0),
+         (degrees(0.3) * sin(1.375 * ROLL), degrees(0.3) * cos(1.375 * ROLL), 0.0)),
         ({"lateral": 3.0}, "car", (3.0 / G * cos(ROLL) + sin(ROLL), cos(ROLL) - 3.0 / G * sin(ROLL), 0.0),
          (degrees(0.3) * sin(ROLL), degrees(0.3) * cos(ROLL), 0.0)),
         # The force of a motorcycle is along its up, and it leans to the left
@@ -231,15 +200,6 @@ def test_a_sensor_adds_its_errors_and_counts():
         assert readings / count == pytest.approx(np.round(readings / count))
 
 
-def test_random_sensors_have_errors_of_one_percent():
-    chance = np.random.default_rng(1)
-    sensors = [random_sensor(chance) for _ in range(300)]
-    for name, mean, sigma in (("offset_g", 0.0, 0.01), ("slope", 1.0, 0.01), ("bias_dps", 0.0, 1.0)):
-        values = np.array([getattr(sensor, name) for sensor in sensors])
-        assert values.std() == pytest.approx(sigma, rel=0.1) and values.mean() == pytest.approx(mean, abs=0.15 * sigma)
-    assert all(sensor.mount @ sensor.mount.T == pytest.approx(np.eye(3), abs=1e-9) for sensor in sensors[:9])
-
-
 @pytest.mark.parametrize(
     ("receiver", "times_s", "shown_mps"),
     [
@@ -263,12 +223,6 @@ def test_a_receiver_is_late_and_may_end_or_send_another_unit(receiver, times_s, 
     assert log.speed_mps[shown] == pytest.approx(log.speed_mps[shown].round(2), abs=1e-9)
 
 
-@pytest.mark.parametrize(("speed", "shown"), [(0.2, False), (0.21, True)])
-def test_a_receiver_shows_a_standstill_as_zero(speed, shown):
-    speeds = logged(road(speed), receiver=Receiver(0.1)).speed_mps[::5]
-    assert bool(np.any(speeds)) is shown and np.all(speeds >= 0.0)
-
-
 def test_a_moving_mount_turns_within_a_third_of_a_second():
     log = logged(road(0.0), moved=(10.0, turn_of(30.0, (0.0, 0.0, 1.0))))
     before, after = log.t_s < 9.99, log.t_s >= 10.0
@@ -277,9 +231,3 @@ def test_a_moving_mount_turns_within_a_third_of_a_second():
     turning = np.abs(log.gyro_dps[:, 2]) > 50.0
     assert log.t_s[turning][[0, -1]] == pytest.approx([9.86, 10.14], abs=0.011)
     assert np.sum(log.gyro_dps[turning], axis=0) * 0.02 == pytest.approx([0.0, 0.0, 30.0], abs=2.1)
-
-
-def test_a_simulated_drive_is_in_balance():
-    log, sensor = drive(3, "motorcycle", 100.0)
-    force = log.accel_g @ sensor.mount.T
-    assert np.abs(force[:, 0]).mean() < 0.05 and force[:, 1].mean() == pytest.approx(1.0, abs=0.06)
