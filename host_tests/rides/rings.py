@@ -10,6 +10,7 @@ KB_4 = 4096
 
 
 def write_block(ring, size=100):
+    """Write a block of a ride. Return the number of steps until the ring was ready."""
     steps = 0
     while not ring.ready():
         steps += 1
