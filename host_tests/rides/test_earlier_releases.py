@@ -7,9 +7,11 @@ import re
 import numpy as np
 import pytest
 from kickstand.calibration.store import Store
+from kickstand.rides import block as block_format
 from kickstand_tools.calibration.file import read_calibration
 from kickstand_tools.deploy import config_check
 from kickstand_tools.rides import block_reader, ride_log
+from support.recordings import ride_writer
 
 
 def unpacked(text):
@@ -98,6 +100,23 @@ def test_recorded_ride_stays_readable(release, tmp_path):
     assert (place is not None) is release.startswith("with")
     if place:
         assert (place.lat_deg, place.lon_deg, place.utc_s) == (48.0, -5.5, 1_778_976_001.5)
+
+
+def test_todays_firmware_writes_the_same_bytes(monkeypatch):
+    """If you change the bytes that are written, change the format's number and keep the reader of the old format."""
+    monkeypatch.setattr(block_format, "__version__", "0.4.0")
+    ride = unpacked(RIDES["with positions"])
+    (stored,) = block_reader.read(ride)[0]
+    block = block_format.RideBlock(5000)
+    block.begin(len(ride), 7, 0, 1_000_000, ride_writer.CHIP, 200, stored.body)
+    for i in range(3):
+        if i == 1:
+            block.add_speed(1234)
+        if i == 2:
+            block.add_place((26 << 9 | 5 << 5 | 17, 1500, 48 * 6_000_000, -33_000_000))
+        block.add([200 * i, -100, 8192, 60, 4, -4, 8], 2, 10_000 + i)
+    block.close()
+    assert bytes(block.buffer[: block.length]) == ride
 
 
 # CAL.json of 0.1.0 (on one line), and what 0.3.0 added
