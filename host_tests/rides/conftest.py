@@ -6,7 +6,7 @@ import pytest
 from kickstand.rides import ride_paths
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.fakes import fake_os, fake_time
-from rings import FLASH, KB_4
+from rings import FLASH, KB_4, opened
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def clock(monkeypatch):
 
 @pytest.fixture
 def root(tmp_path, monkeypatch):
-    """Return the flash and the card of a board: space.free bytes of space.all are free."""
+    """Yield the flash and the card of a board: space.free bytes of space.all are free."""
     space = types.SimpleNamespace(free=400 * KB_4, all=500 * KB_4, path=tmp_path)
 
     def statvfs(_path):
@@ -32,4 +32,6 @@ def root(tmp_path, monkeypatch):
     monkeypatch.setattr("os.statvfs", statvfs, raising=False)
     monkeypatch.setattr("os.ilistdir", fake_os.ilistdir, raising=False)
     monkeypatch.setattr(ride_paths, "directory", lambda settings: "rides" if settings is FLASH else "card")
-    return space
+    yield space
+    while opened:
+        opened.pop().abandon()

@@ -5,6 +5,7 @@ import contextlib
 import gc
 import io
 import re
+import warnings
 from binascii import a2b_base64
 from itertools import pairwise
 
@@ -87,8 +88,12 @@ class Watch:
 
 @pytest.fixture(autouse=True)
 def just_booted(monkeypatch):
-    """Forget the slow prints of earlier tests."""
+    """Forget the slow prints of earlier tests. At the end, forget the files that a power cut has left open."""
     monkeypatch.setattr(console, "_slow_ms", None)
+    yield
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)
+        gc.collect()
 
 
 @pytest.fixture

@@ -308,3 +308,4 @@ def test_second_start_reuses_the_recorder(at_rest, root, clock):
     recording.stop()
     assert not recorder.active
     assert recording.start() is None and recording.recorder is recorder and recorder.active
+    recording.stop()

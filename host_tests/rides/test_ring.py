@@ -9,15 +9,14 @@ from types import SimpleNamespace
 import pytest
 from kickstand.rides import flash_ring, ride_paths
 from kickstand.rides.block import block_length
-from kickstand.rides.flash_ring import RideRing
-from rings import CARD, FLASH, KB_4, old_ride, write_block
+from rings import CARD, FLASH, KB_4, old_ride, ride_ring, write_block
 from support.recordings import ride_writer
 
 
 @pytest.mark.parametrize(("settings", "blocks"), [(FLASH, 16), (CARD, 256)])
 def test_part_has_16_blocks_in_flash_and_256_on_a_card(settings, blocks, root):
     root.free = root.all = 2000 * KB_4
-    ring = RideRing(settings)
+    ring = ride_ring(settings)
     assert ring.stops_interrupts is (settings is FLASH)
     ring.begin()
     lengths = []
@@ -36,7 +35,7 @@ def test_room_is_made_exactly_when_a_part_does_not_fit(root):
     for free, steps in ((needed, 1), (needed - KB_4, 3)):
         directory = old_ride(root, 1)
         root.free = free
-        ring = RideRing(FLASH)
+        ring = ride_ring(FLASH)
         assert ring.begin() > 1
         assert write_block(ring) == steps  # the steps are: find the oldest ride, remove its part, open the new part
         assert (directory / "00000.rid").exists() is (steps == 1)
@@ -46,7 +45,7 @@ def test_room_is_made_exactly_when_a_part_does_not_fit(root):
 def test_its_own_first_parts_are_removed_last(root):
     root.free = flash_ring.RESERVE + 18 * KB_4
     old_ride(root, 1)
-    ring = RideRing(FLASH)
+    ring = ride_ring(FLASH)
     assert ring.begin() == 2
     for _ in range(16):
         write_block(ring, KB_4)
@@ -71,7 +70,7 @@ def test_oldest_rides_are_removed_first(root):
     (root.path / "rides/002").mkdir()
     (root.path / "rides/000/00").mkdir()
     root.free = 10 * KB_4
-    ring = RideRing(FLASH)
+    ring = ride_ring(FLASH)
     assert ring.begin() == 301
 
     def paths():
@@ -96,7 +95,7 @@ def test_oldest_rides_are_removed_first(root):
 
 def test_without_the_current_ride_there_is_no_room(root):
     root.free = 0
-    ring = RideRing(FLASH)
+    ring = ride_ring(FLASH)
     ring.begin()
     shutil.rmtree("rides/000")
     with pytest.raises(OSError) as error:
@@ -120,7 +119,7 @@ class FullFile:
 def test_full_flash_ends_a_ride_and_its_file_is_closed_once(root, monkeypatch):
     file = FullFile()
     monkeypatch.setattr("builtins.open", lambda path, mode: file)
-    ring = RideRing(FLASH)
+    ring = ride_ring(FLASH)
     ring.end()  # end() of a ring without an open part
     ring.begin()
     while not ring.ready():
@@ -145,7 +144,7 @@ def test_full_flash_ends_a_ride_and_its_file_is_closed_once(root, monkeypatch):
     ],
 )  # fmt: skip
 def test_faults_have_their_codes(settings, error, code):
-    assert RideRing(settings).fault_code(error) == code
+    assert ride_ring(settings).fault_code(error) == code
 
 
 def test_free_and_all_bytes_are_blocks_of_the_size_that_counts(root):
@@ -159,7 +158,7 @@ def test_numbers_of_rides_continue(root):
     assert ride_paths.newest_ride("rides") == 0
     old_ride(root, 99)
     (root.path / "rides/002").mkdir()  # a group without parts, as after a power cut before the first block
-    ring = RideRing(FLASH)
+    ring = ride_ring(FLASH)
     assert ring.begin() == ring.begin() == 100
     write_block(ring)
     ring.end()
@@ -190,7 +189,7 @@ def test_no_stray_name_makes_a_ride_overwrite_another(names, root):
     contents = {path: path.read_bytes() for path in Path("rides").rglob("*") if path.is_file()}
     numbers = []
     for k in range(5):
-        ring = RideRing(FLASH)
+        ring = ride_ring(FLASH)
         numbers.append(ring.begin())
         write_block(ring, 100 + k)
         ring.end()
@@ -200,7 +199,7 @@ def test_no_stray_name_makes_a_ride_overwrite_another(names, root):
 
 
 def test_existing_part_is_never_opened_for_writing(root):
-    ring = RideRing(FLASH)
+    ring = ride_ring(FLASH)
     path = root.path / ride_paths.part_path("rides", ring.begin(), 0)
     path.write_bytes(b"a ride")
     write_block(ring)
@@ -221,7 +220,7 @@ FLASH_KB = {"Pico": 1408, "Pico W": 848, "Pico 2": 3072, "Pico 2 W": 2560, "ESP3
 def room_s(root, settings, size, used):
     """Return the recording time in s that a board reports if its flash or card has no rides."""
     root.all, root.free = size, size - used
-    ring = RideRing(SimpleNamespace(SD_SPI=settings.SD_SPI) if settings is CARD else FLASH)
+    ring = ride_ring(SimpleNamespace(SD_SPI=settings.SD_SPI) if settings is CARD else FLASH)
     ring.begin()
     return ring.room() / BYTES_S
 
