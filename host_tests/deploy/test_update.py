@@ -111,7 +111,7 @@ def cut_before(board, number):
 
 
 def test_interrupted_update_starts_nothing_and_is_repeatable():
-    number, cut = 0, True
+    number, cut, config, result = 0, True, b"", None
     while cut:
         board = board_with(SMALL_OLD | NOTES)
         cut_before(board, number)
@@ -132,7 +132,7 @@ def test_interrupted_update_starts_nothing_and_is_repeatable():
         assert board.files() == SMALL_NEW | NOTES | {"/config.py": config}, f"after a cut before change {number}"
         assert board.folders() == {"/kickstand", "/kickstand/lean"}
         number += 1
-    assert number > 25 and config == SMALL_NEW["/config.py"]
+    assert result and number > 25 and config == SMALL_NEW["/config.py"]
     assert sorted(result.removed) == ["/kickstand/empty/old.py", "/kickstand/lean.mpy", "/kickstand/lean_filter.py"]
     assert result.kept == ["/kickstand/errors.mpy"] and result.copied[-1] == "/main.py"
     assert result.copied_bytes == 3 + 3000 + 3 + 3000 + 3000 and not result.config_differs
