@@ -62,6 +62,7 @@ def test_settings_behind_a_mark_differ_from_the_default(tmp_path, port, esp32):
     assert judge_in_a_process(path, port, machine).unused == lines + [f"{path}, line 7: BUTTON_PIN = 2"] * (not esp32)
 
 
+SD = "SD_SPI = {}\nSD_SCK = 12\nSD_MOSI = 13\nSD_MISO = 14\nSD_CS = 27\n"
 PINS = "BUTTON_PIN = 0\nSENSOR_SDA = 2\nSENSOR_SCL = 4\nLCD_SDA = 5\nLCD_SCL = 14\n"
 
 
@@ -71,6 +72,9 @@ PINS = "BUTTON_PIN = 0\nSENSOR_SDA = 2\nSENSOR_SCL = 4\nLCD_SDA = 5\nLCD_SCL = 1
         ("pico", "BUTTON_PIN = 4\n", "a pin is used twice"),  # on a Pico pin 4 is the sensor's SDA
         ("pico 2", "BUTTON_PIN = 4\n", "a pin is used twice"),
         ("esp32", "BUTTON_PIN = 4\n", None),
+        # on an ESP32 the number is a slot of machine.SDCard; slots 0 and 1 are not SPI
+        *(("pico", SD.format(spi), None if spi < 2 else "SD_SPI = 2, but it must be") for spi in (0, 1, 2)),
+        *(("esp32", SD.format(spi), None if spi > 1 else "SD_SPI = 1, but it must be") for spi in (1, 2, 3)),
         *((machine, "SIDE = 'left'\n", "no usual pins are known for this board (") for machine in ("s3", "c6")),
         ("xiao rp2040", "SIDE = 'left'\n", "set BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL: correct it"),
         ("s3", PINS, None),

@@ -96,7 +96,8 @@ def test_port_of_another_program_is_in_use(tmp_path):
     name = os.ttyname(child)
     with serial.Serial(name, exclusive=True):
         command.refused(tmp_path, "flash", "--port", name, words=f"{name} is in use")
-    os.close(parent), os.close(child)
+    for descriptor in (parent, child):
+        os.close(descriptor)
 
 
 # The prompt

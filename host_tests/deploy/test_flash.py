@@ -4,6 +4,7 @@ import errno
 import functools
 import re
 import sys
+from typing import Any
 
 import pytest
 from kickstand_tools.common import errors, firmware_path
@@ -111,6 +112,7 @@ def test_fault_while_copying_leaves_no_main(board, fault, message):
 
 @pytest.mark.parametrize("verb", ["flash", "status", "check"])
 def test_device_without_micropython_is_refused(board, monkeypatch, verb):
+    fitted: dict[str, Any]
     for fitted, message in (
         ({"python": "circuitpython"}, "runs circuitpython: put MicroPython on the board"),
         ({"answers": False}, "no MicroPython answers on /dev/ttyACM0"),

@@ -48,7 +48,7 @@ PACKAGES = {
     "ui": _package("firmware/kickstand/ui/*.py", "ui/*"),
     "rides": _package(
         "firmware/kickstand/rides/*.py",
-        "rides/test_block rides/test_recording rides/test_ring rides/test_stream rides/test_card_trial",
+        "rides/test_block rides/test_recorder rides/test_ring rides/test_card rides/test_earlier_releases",
     ),
     "live": _package("firmware/kickstand/live/*.py", "live/test_bonds live/test_live_packets live/test_live_device"),
     "board": _package(
@@ -104,10 +104,9 @@ PACKAGES = {
     ),
     "deploy": _package(
         "tools/kickstand_tools/deploy/*.py",
-        "deploy/test_c*_limits deploy/test_check_order deploy/test_update_limits deploy/test_*_parts"
-        " deploy/test_config_[ft]*"
+        "deploy/test_connection deploy/test_check_limits deploy/test_config_text"
         # these flash and check whole boards, and run only if the others noticed nothing
-        " deploy/test_others deploy/test_c[ho]* deploy/test_update deploy/test_[nm]* deploy/test_cli_flash",
+        " deploy/test_c[ho]* deploy/test_update deploy/test_[nmp]* deploy/test_flash",
     ),
     "simulation": _package(
         "tools/kickstand_tools/simulation/**/*.py",
@@ -115,16 +114,15 @@ PACKAGES = {
     ),
     "pull": _package(
         "tools/kickstand_tools/rides/*.py",
-        "rides/test_pull_parts rides/test_ride_file rides/test_stream rides/test_cli_pull rides/test_cli_record",
+        "rides/test_ride_log rides/test_block_damage rides/test_pull rides/test_record",
     ),
     "common": _package(
         "tools/kickstand_tools/common/*.py",
-        "cli/test_common_parts cli/test_output cli/test_blame cli/test_added_commands api/test_remedies",
+        "cli/test_common cli/test_added api/test_remedies",
     ),
     "cli": _package(
         "tools/kickstand_tools/cli/*.py",
-        "cli/test_printed_lines cli/test_options cli/test_cli_usage cli/test_blame cli/test_added_commands"
-        " calibration/test_cli_calibration_file",
+        "cli/test_usage cli/test_added cli/test_transcripts calibration/test_cli_calibration_file",
     ),
     "simulated_board": _package(
         "tools/kickstand_tools/simulated_board/*.py tools/kickstand_tools/simulated_board/fakes/*.py",
