@@ -71,16 +71,15 @@ PACKAGES = {
     ),
     "logs": _package(
         "tools/kickstand_tools/logs/*.py",
-        "logs/test_csv_limits logs/test_reader_limits logs/test_log_parts logs/test_[!cm]* logs/test_c*",
+        "logs/test_[!d]* logs/test_damaged",
     ),
     "imports": _package(
         "tools/kickstand_tools/imports/**/*.py",
-        "imports/test_import* imports/test_[lf]*_limits imports/test_app_signs imports/test_[!a]* imports/test_apps",
+        "imports/test_units imports/test_[!u]*",
     ),
     "joining": _package(
         "tools/kickstand_tools/joining/*.py",
-        "joining/test_fit_limits joining/test_match_limits joining/test_joining_parts joining/test_track_steps"
-        " joining/test_matching joining/test_c* imports/test_joining",
+        "joining/test_[!c]* joining/test_c*",
     ),
     "estimation": _package(
         "tools/kickstand_tools/estimation/*.py",
