@@ -76,6 +76,7 @@ def test_vehicles_are_aligned(engine):
 
 
 EIGHT = [list(STAND), [6.0, 1.0, 0.0], *[[10.0, 0.1, 30.0], [8.0, -0.6, -40.0], [2.0, -1.2, -40.0]] * 6]
+TWO_STOPS = [*around(1), [8.0, -1.0, 0.0], [2.0, -1.0, 0.0], STAND]
 REFUSED = {
     "it only stood still": ([[60.0, 0.0, 0.0]], {}),
     "it never stood still": (around(3, stands=False), {"samples": {"start_mps": 5.0}}),
@@ -88,6 +89,7 @@ REFUSED = {
     "2.5 s late": (around(), {"source": {"late_s": 2.5}}),
     "the mount has moved": (around(8), {"moved": [55.0, turned(MOUNT, 1, 90.0)]}),
     "standing": (around(6), {"moved": [5.8, turned(MOUNT, 0, 12.0)]}),
+    "two stops differ by over 8 degrees": (TWO_STOPS, {"moved": [30.0, turned(MOUNT, 0, 9.0)]}),
 }
 
 
@@ -139,6 +141,17 @@ def test_the_state_is_the_next_step_of_the_driver():
         alignment.READY,
     }
     assert drive(legs, vehicle="motorcycle", bias=[0.0] * 3)["states"][0] == alignment.WAITING_FOR_BRAKING
+
+
+@pytest.mark.parametrize(
+    ("silent_s", "state"), [(4.9, alignment.WAITING_FOR_BRAKING), (5.2, alignment.WAITING_FOR_SPEED)]
+)
+def test_a_speed_is_stale_after_5_s(silent_s, state):
+    bike = alignment.DriveAlignment("motorcycle")
+    bike.measure_speed(9.0)
+    for _ in range(round(silent_s * 10)):
+        bike.update([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], 100_000)
+    assert bike.state == state
 
 
 @pytest.mark.parametrize(
