@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 from kickstand.drive_alignment import parts
-from kickstand.drive_alignment.events import DrivingEvents, EventFinder, LastEvent
+from kickstand.drive_alignment.events import DrivingEvents, EventFinder
 from kickstand.drive_alignment.history import BIN_US, MASK, SIZE, ForceHistory, difference
-from kickstand.drive_alignment.parts import DriveParts
 from kickstand.drive_alignment.quality import DrivingQuality
 from kickstand.drive_alignment.regression import BLOCKS, Fit, ForwardRegression
 from kickstand.drive_alignment.vertical import StandingVertical, Vertical
@@ -32,27 +31,6 @@ def test_an_event_is_a_lasting_change_of_speed(sign, changes, seconds, ended, go
     finder = EventFinder(1)
     assert [finder.update(sign * change, seconds, [True]) for change in changes] == ended
     assert finder.going_on is going_on
-
-
-def test_only_straight_changes_make_an_event_straight():
-    finder = EventFinder(2)
-    finder.update(-1.0, 1.0, [True, False])
-    finder.update(-0.5, 1.0, [True, True])
-    assert (finder.was_straight(0), finder.was_straight(1)) == (True, False)
-    finder.interrupt()
-    assert (finder.going_on, finder.change, finder.was_straight(0)) == (False, 0.0, False)
-
-
-def test_the_last_event_by_hand():
-    """The accelerations are -0.2 g for 0.5 s and -0.4 g for 1 s, so the weight is 0.5 x 0.04 + 1 x 0.16. The force is
-    the vertical (0, 1, 0) plus forward (0, 0, 1) times the acceleration."""
-    event, out = LastEvent(), [0.0] * 3
-    event.add(0.5, -0.1, [0.0, 0.5, -0.1])
-    event.add(1.0, -0.4, [0.0, 1.0, -0.4])
-    assert event.forward(out, [0.0, 1.0, 0.0]) == pytest.approx(0.18)
-    assert out == pytest.approx([0.0, 0.0, 1.0])
-    event.clear()
-    assert event.forward(out, [0.0, 1.0, 0.0]) == 0.0 and out == [0.0] * 3
 
 
 def driven(yaw_dps=0.0, speeds=(20.0, 19.0, 18.0), every_us=500_000, force=(0.0, 1.0, -0.2), use=True):
@@ -106,17 +84,6 @@ def test_events_are_counted_by_their_kind(yaw_dps, speeds, braking, acceleration
     assert (events.straight_count, events.counted) == (braking + acceleration, braking + min(2, acceleration))
 
 
-def test_missing_samples_drop_the_intervals_that_wait():
-    history = ForceHistory()
-    events = DrivingEvents(history)
-    events.measure_speed(10.0, history.now + 500_000)
-    assert not events.due
-    history.add([0.0] * 3, 0.0, 600_000)
-    assert events.due
-    events.interrupt()
-    assert not events.due
-
-
 def test_history_is_exact_and_wraps_round():
     """Differences between two integrals equal numpy's, also after the time or a sum has wrapped around."""
     rng = np.random.default_rng(2)
@@ -136,10 +103,11 @@ def test_history_is_exact_and_wraps_round():
         oldest = times[-1] - times[-SIZE]
         ages = sorted(int(age) for age in rng.integers(0, oldest - 1, 2))
         assert history.at(late, history.now - ages[0]) and history.at(early, history.now - ages[1])
-        at = [[np.interp(times[-1] - age, times, np.array(totals)[:, i]) for i in range(4)] for age in ages]
-        exact = [difference(a, b) for a, b in zip(late, early, strict=True)]
+        columns = np.array(totals).T
+        exact = [np.array([np.interp(times[-1] - age, times, column) for column in columns]) for age in ages]
+        looked_up = [difference(a, b) for a, b in zip(late, early, strict=True)]
         # The values are about a million. A difference of 200 allows for the rounding of about 60 bins
-        assert np.abs(np.array(exact) - np.subtract(*at)).max() < 200
+        assert np.abs(np.array(looked_up) - (exact[0] - exact[1])).max() < 200
         assert not history.at(late, history.now + 1000) and not history.at(late, history.now - oldest - 1000)
     history.clear()
     assert not history.at(late, history.now)
@@ -192,23 +160,6 @@ def test_full_blocks_are_joined_in_pairs():
     assert list(regression.fitting(fit, 0, 0, 4, 1))[-1] is None and fit.seconds == 12.0
 
 
-def test_two_fits_at_the_same_time_do_not_interfere():
-    """The main loop may compare an alignment with the drive while another fit, for the quality, is in progress."""
-    rng = np.random.default_rng(5)
-    regression = ForwardRegression()
-    for k in range(8):
-        for change, curve in rng.normal(size=(6, 2)):
-            regression.add(0, 0.5, 0.1 * change, 0.03 * curve, [0.1 * change * k, 0.5, 0.1 * change])
-        list(regression.end_event())
-    alone, begun, between = Fit(), Fit(), Fit()
-    assert regression.fit(alone, 0)
-    work = regression.fitting(begun, 0)
-    next(work)
-    assert regression.fit(between, 0, 0, 1)
-    list(work)
-    assert begun.found and begun.forward == alone.forward != between.forward
-
-
 @pytest.mark.parametrize("engine", ENGINES)
 def test_parts_of_a_drive(engine):
     """Forward turns by 12 degrees after five of eight blocks. The pitch changes by 5 degrees after four blocks. The
@@ -232,26 +183,6 @@ def test_parts_of_a_drive(engine):
         assert forward_deg == pytest.approx(means[1] - means[0], abs=0.1)
         assert sigmas == pytest.approx(forward_deg / np.sqrt(variance), rel=0.01)
         assert (roll_deg, pitch_deg) == (0.0, pytest.approx(5.0, rel=1e-3))
-
-
-@pytest.mark.parametrize(
-    ("count", "weight", "seconds", "forward", "vertical"),
-    [
-        (4, 0.11, 20.0, True, True),
-        (3, 0.2, 30.0, False, True),
-        (4, 0.04, 20.0, False, True),
-        (4, 0.2, 6.0, True, False),
-        (2, 9.0, 19.9, False, False),
-    ],
-)
-def test_parts_need_blocks_weight_and_time(count, weight, seconds, forward, vertical):
-    compared = DriveParts()
-    for second in [k >= count // 2 for k in range(count)]:
-        compared.add(np.sin(0.5 * second), np.cos(0.5 * second), 0.02 * second, 0.1 * second, weight, seconds)
-    list(compared.compare())
-    assert (compared.forward_deg > 0.0) is forward
-    turned = np.degrees([0.02, 0.1]) * vertical
-    assert (compared.roll_deg, compared.pitch_deg) == pytest.approx(turned, rel=1e-5)
 
 
 class Drive:

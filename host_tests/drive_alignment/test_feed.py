@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from kickstand.drive_alignment import verdict
 from kickstand.drive_alignment.alignment import DriveAlignment
-from kickstand.drive_alignment.history import BIN_US
 from kickstand.rotation import matrix
 from kickstand_tools.calibration.drive import fit_drive, fit_logs
 from kickstand_tools.calibration.drive_feed import drive_bins
@@ -65,24 +64,6 @@ def test_bins_give_the_board_s_matrix(every, gap):
     assert fit.quality_deg == pytest.approx(board.quality_deg, abs=0.02)
 
 
-def test_bins_hold_every_sample_and_every_speed_once():
-    log = driven(events=1, jitter_s=0.003)
-    log = log.part((log.t_s < 9.02) | (log.t_s > 10.0))
-    bins = list(drive_bins(log, CalibrationFile(), BIN_US))
-    assert sum(part.samples for part in bins) == len(log.t_s)
-    speeds = [[part.start_mps, *(mps for _, mps in part.speeds), part.end_mps] for part in bins]
-    assert [mps for part in speeds for mps in part if mps is not None] == log.speed_mps[
-        ~np.isnan(log.speed_mps)
-    ].tolist()
-    assert [part.begins for part in bins].count(True) == 2
-    assert all(BIN_US <= part.first_us + part.last_us < BIN_US + 20_000 for part in bins if part.last_us)
-    force = sum(np.array(part.force) * (part.first_us + part.last_us) for part in bins)
-    step_us = np.diff(log.time_us, prepend=0)
-    assert force == pytest.approx(
-        np.sum(log.accel_g * np.where(step_us > 500_000, 0, step_us)[:, None], axis=0), rel=1e-9
-    )
-
-
 def test_bins_have_their_speeds_where_they_came():
     """A bin is 50 ms long. Speeds come at a bin's first sample, in its middle and at its end, and after a gap of 2 s.
     The age of a speed in the middle is counted from the second-to-last sample of the bin."""
@@ -115,7 +96,7 @@ def test_a_car_is_aligned_by_its_drive():
     assert (fit.status, fit.reason, fit.refusal, fit.poses) == ("aligned", "", None, None)
     assert 5 <= fit.used <= 8 and fit.turned == 0 and fit.stops >= 1
     assert fit.quality_deg < 3.0 and fit.attitude_deg == pytest.approx(np.hypot(fit.quality_deg, 1.1))
-    assert fit.lag_s == pytest.approx(0.0, abs=0.3) and fit.halves_deg < 3.0
+    assert fit.lag_s == pytest.approx(0.0, abs=0.3) and fit.halves_deg is not None and fit.halves_deg < 3.0
     (ready_s,) = [event.t_s for event in events if event.what == "ready"]
     assert fit.ready_s == ready_s and events == fit.events
     assert done == sorted(done) and done[-1] == (2 * len(log.t_s),) * 2
@@ -142,7 +123,7 @@ def test_two_poses_are_compared_with_the_drive(yaw_deg, expected, error_deg):
     )
     fit = fit_logs([driven("motorcycle", 6)], earlier)
     assert fit.vehicle == fit.calibration.vehicle == "motorcycle" and fit.calibration.kickstand_side == ""
-    assert fit.calibration.notes == notes and fit.poses.verdict == expected
+    assert fit.calibration.notes == notes and fit.poses and fit.poses.verdict == expected
     assert (fit.poses.yaw_deg - error_deg + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=1.5)
 
 

@@ -222,13 +222,6 @@ def test_which_braking_counts(seconds, mps2, forces, counted, turned):
     assert (drive.alignment.counted, drive.alignment.turned) == (counted, turned)
 
 
-def test_a_small_braking_adds_nothing_to_the_next_one():
-    drive = Drive()
-    drive.brake(seconds=0.5, mps2=-2.0)
-    drive.brake(seconds=0.5, mps2=-2.0)
-    assert drive.alignment.counted == 0
-
-
 def lost_samples(drive):
     drive.alignment.update((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), GAP_US + 1)
 
@@ -249,20 +242,6 @@ def test_a_braking_with_a_gap_is_dropped_and_earlier_ones_stay(lost):
     assert (drive.alignment.counted, drive.alignment.turned) == (1, 0)
     drive.brake()
     assert drive.alignment.counted == 2
-
-
-@pytest.mark.parametrize("lost", [lost_samples, lost_speeds])
-def test_the_loss_of_a_dropped_braking_does_not_count(lost):
-    """The speed falls by 3 m/s before the gap, and by 0.5 s x 2 m/s2 = 1 m/s after the gap. Only the fall after the gap
-    counts, which is less than the 1.5 m/s that a braking event needs."""
-    drive = Drive()
-    drive.reach_15_mps()
-    drive.go(BRAKES, 1.0, -3.0)
-    lost(drive)
-    drive.go(STEADY, 1.0)
-    drive.go(BRAKES, 0.5, -2.0)
-    drive.go(STEADY, 1.0)
-    assert (drive.alignment.counted, drive.alignment.turned) == (0, 0)
 
 
 def test_brakings_before_the_first_stop_do_not_count():

@@ -121,14 +121,6 @@ def test_slow_or_far_from_balance_turn_rates_are_measured():
     assert rates_at(0.5, 3.0, 0.1, -1.6) == (0.1, -1.6)
 
 
-def test_the_state_stays_within_its_bounds():
-    x, sums = [0.0] * STATES, [0.0] * 9
-    for _ in range(300):
-        predict(x, (0.0, 1.0, -1.0), (-1.0, 0.0, 0.0), STEP_S, sums)
-    assert x[PITCH] == bike_model.MAX_PITCH
-    assert x[SPEED] == 0.0
-
-
 @pytest.mark.parametrize("lean", [-0.6, 0.0, 0.6])
 @pytest.mark.parametrize("pitch", [-0.2, 0.2])
 def test_pitch_seen_by_the_yaw_error_is_not_lean(lean, pitch):

@@ -220,14 +220,6 @@ def test_the_delay_of_the_low_pass_is_compensated():
     near(prompt.lean_deg, 6.0, 0.2)
 
 
-def test_the_formulas_lean_takes_the_yaw_rate():
-    """The bike leans into a turn by 30 degrees. The sign of the rate about left is reversed, which must not matter."""
-    force, rate = force_and_rate(30.0, 15.0)
-    shown = meter()
-    shown.update(reading(force, [-rate[0], rate[1], rate[2]]), 0)
-    near(shown.lean_formula_deg, 30.0, 0.01)
-
-
 def test_a_negative_speed_is_ignored():
     measured, alone = meter(), meter()
     for shown in (measured, alone):

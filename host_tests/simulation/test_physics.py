@@ -12,7 +12,7 @@ from kickstand_tools.simulation.physics.chip import Chip
 from kickstand_tools.simulation.physics.engine import crank_rpm, vibration
 from kickstand_tools.simulation.physics.kinematics import Motion, body_rates, specific_force
 from kickstand_tools.simulation.physics.mount import MOUNTS, Holder
-from kickstand_tools.simulation.physics.signals import band_noise, integral, second_order, smoothed, smoothstep
+from kickstand_tools.simulation.physics.signals import integral, second_order, smoothed, smoothstep
 
 RATE = 1000.0
 EDGE = slice(50, -50)  # derivatives are one-sided at both ends
@@ -23,14 +23,6 @@ def test_steps_and_smoothing():
     assert smoothstep(np.array([-1.0, 0.25, 0.5, 2.0])) == pytest.approx([0.0, 0.103515625, 0.5, 1.0])
     step = smoothed(np.where(np.arange(4000) < 2000, 0.0, 1.0), 0.1, RATE)
     assert step[[0, 1900, -1]] == pytest.approx([0.0, 0.1587, 1.0], abs=0.003)  # the normal distribution
-
-
-def test_noise_has_its_size_and_its_band():
-    noise = band_noise(np.random.default_rng(1), 20_000, 1.0, 5.0, 200.0)
-    power, hz = np.abs(np.fft.rfft(noise)) ** 2, np.linspace(0.0, 100.0, 10_001)
-    assert np.std(noise) == pytest.approx(1.0, rel=0.1)
-    assert np.mean(power[(hz > 1.5) & (hz < 3.0)]) > 8.0 * np.mean(power[hz < 0.5])
-    assert np.mean(power[(hz > 1.5) & (hz < 3.0)]) > 40.0 * np.mean(power[(hz > 19) & (hz < 21)])
 
 
 @pytest.mark.parametrize(("hz", "damping", "gain", "delayed"), [(0.0, 0.7, 1.0, 0.0), (10.0, 0.5, 1.0, 0.25),
@@ -221,17 +213,6 @@ def test_vibration_grows_with_the_square_of_engine_speed(mps, rms_g, running, ex
     assert np.degrees(np.sqrt((rates**2).mean(axis=0))) == pytest.approx([15.0 * expected_g] * 3, rel=0.02)
 
 
-def test_engine_shakes_at_its_three_orders():
-    """A four-stroke engine fires once in two revolutions. 3900 /min are 65 Hz."""
-    n = 20000
-    force, rates = vibration(np.random.default_rng(2), np.full(n, 15.0), np.ones(n), 0.1, 5000.0, RATE)
-    waves = np.fft.rfftfreq(n, 1.0 / RATE)
-    for shaken in np.column_stack((force, rates)).T:
-        power = np.abs(np.fft.rfft(shaken)) ** 2
-        shares = [np.sum(power[np.abs(waves - order) < 0.2]) / np.sum(power) for order in (32.5, 65.0, 130.0)]
-        assert sum(shares) == pytest.approx(1.0, abs=0.01) and min(shares) > 1e-4
-
-
 N = 10000
 PERFECT = Chip(np.eye(3), np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3), np.zeros(3), gyro_walk=0.0)
 STILL = np.zeros((N, 3))
@@ -331,7 +312,7 @@ def test_mounts_change_what_they_name():
     clipped = MOUNTS["clipping"](chance, PERFECT).chip
     assert (clipped.accel_range_g, clipped.gyro_range_dps) == (2.0, 250.0)
     warming = [MOUNTS["warming"](chance, PERFECT) for _ in range(200)]
-    rises = [mount.rise_c for mount in warming]
+    rises = [mount.rise_c or 0.0 for mount in warming]
     assert 15.0 < min(rises) < 15.5 and 24.5 < max(rises) < 25.0
     assert np.abs([mount.chip.accel_per_c for mount in warming]).max() == pytest.approx(0.0015, rel=0.05)
     holders = [Holder.random(chance) for _ in range(300)]

@@ -197,19 +197,6 @@ def test_a_rough_road_and_a_bad_mount_change_the_readings():
         assert not np.allclose(rough.readings, bad.readings, atol=0.01)
 
 
-@pytest.mark.long
-def test_a_creeping_mount_turns_by_some_degrees():
-    """At the end, the measured direction of gravity differs from the true lean and pitch."""
-    simulated = ride("creep", 4, 60.0, share=0.0)
-    force = simulated.readings[:, :3] @ simulated.vehicle_from_sensor.T
-    off = []
-    for part in (slice(200, 600), slice(-600, -200)):
-        left, up, forward = force[part].mean(axis=0)
-        lean, pitch = (np.mean(simulated.truth[name][part]) for name in ("lean_deg", "pitch_deg"))
-        off.append([np.degrees(np.arctan2(left, up)) - lean, np.degrees(np.arcsin(forward)) - pitch])
-    assert np.max(np.abs(np.subtract(*off))) > 0.5
-
-
 def test_a_given_dive_is_used():
     """The springs turn the sensor, but the road is unchanged."""
     soft, stiff = (ride("track", 3, 40.0, dive=dive) for dive in ((6.0, 3.0), (0.0, 0.0)))
