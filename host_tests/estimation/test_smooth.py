@@ -70,6 +70,7 @@ def test_smoothed_lean_beats_the_display_and_knows_its_error(name):
     assert np.mean(np.abs(off) < 2.0 * sigma) > (0.5 if name == "warming up" else 0.65)
     assert np.mean(np.abs(off) < 3.0 * sigma) > 0.95
     assert 0.4 * rms(off) < np.mean(lean.lean_sigma_deg) < 1.3
+    assert name not in DEFAULT or np.mean(sigma) < 1.7 * rms(off)
     assert not np.any(lean.doubtful) and codes(lean) == (["pose-off"] if name == "creep" else [])
 
 
