@@ -36,6 +36,17 @@ class BoardLoop(asyncio.SelectorEventLoop):
             self.run_forever()
 
 
+@contextlib.contextmanager
+def only_loop():
+    """Hide playwright's idle event loop, if this process has used a browser."""
+    browsers = asyncio._get_running_loop()
+    asyncio._set_running_loop(None)
+    try:
+        yield
+    finally:
+        asyncio._set_running_loop(browsers)
+
+
 def uuid_of(value):
     return core.UUID.from_16_bits(value) if isinstance(value, int) else core.UUID(value)
 
