@@ -2,6 +2,7 @@
 FIFO."""
 
 from collections import Counter
+from typing import Any
 
 import pytest
 from kickstand_tools.simulated_board.i2c import LOW, OPEN
@@ -178,7 +179,7 @@ def test_transfers_that_fail_are_told_from_a_missing_sensor(on_board):
     def explained(board, settings):
         from kickstand.devices import open_sensor
 
-        sensor = open_sensor(settings)
+        sensor: Any = open_sensor(settings)
         notice, addresses = sensor.explain(sensor.chip, OSError(5))
         return notice.code, notice.values, addresses
 
@@ -192,11 +193,11 @@ class NeverFills(Fifo):
 
 
 class StaysFull(Fifo):
-    count = 1024
+    count = property(lambda self: 1024)
 
 
 class StandsStill(Fifo):
-    count = 14
+    count = property(lambda self: 14)
 
 
 class Repeats(Fifo):

@@ -6,7 +6,8 @@ import sys
 import pytest
 from kickstand.errors import StoreError, report
 from kickstand_tools.common import firmware_path
-from support import device_runs, mpy
+from support import mpy
+from support.device_runs import FreshFirmware, take_firmware
 
 INCOMPLETE, NO_MEMORY = ["Incomplete:     ", "flash it again  "], ["No memory for it", "restart it      "]
 RAW = {"lean": [[0, 25]]}
@@ -28,11 +29,10 @@ class Missing:
 def without():
     """Return without(name, error, times): the firmware is imported anew, and its module of this name raises the
     error."""
-    imported, hooks = device_runs.take_firmware(), list(sys.meta_path)
-    yield lambda name, error, times=-1: sys.meta_path.insert(0, Missing("kickstand." + name, error, times))
+    hooks = list(sys.meta_path)
+    with FreshFirmware():
+        yield lambda name, error, times=-1: sys.meta_path.insert(0, Missing("kickstand." + name, error, times))
     sys.meta_path[:] = hooks
-    device_runs.take_firmware()
-    sys.modules.update(imported)
 
 
 def frames_with(record, lines):
@@ -188,7 +188,7 @@ print(attempt(use), len(objects))
 def test_report_without_its_words_gives_its_code(without, on_board, capsys):
     """After a failure of flash or heap, the module with the words may not load."""
     on_board(lambda *_: report(StoreError("not-written", "EIO")))
-    device_runs.take_firmware()
+    take_firmware()
     without("console", ImportError)
     on_board(lambda *_: report(StoreError("not-written", "EIO")))
     assert capsys.readouterr().out == "calibration not saved: EIO; the old one is kept\nnot-written\n"

@@ -62,8 +62,8 @@ def test_racechrono_finds_the_board_filters_and_decodes(on_air, on_the_road):
     silent, two, ended, every = central.done.result()
     assert silent == {} and two.keys() == {1, 2} and sum(ended.values()) <= 2
     assert 178 <= two[1] <= 182 and 446 <= two[2] <= 453 and 18 <= every[1] <= 21 and every[1] == every[2]
+    values = {}
     for t_s in times[:2]:
-        values = {}
         for sent_s, _, data in central.heard:
             values.update(channels(data) if sent_s <= t_s else {})
         assert abs(values["lean angle"] - record.lean_at(t_s)) <= 1
