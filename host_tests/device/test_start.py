@@ -58,6 +58,13 @@ def test_button_held_at_power_on_starts_safe_mode(held_s, safe, charge_us, run):
         assert record.last[0].startswith("Raw")
 
 
+def test_closed_button_is_told_from_one_that_is_held(run):
+    record = run({**RAW, "presses": [[0.0, 1000.0]], "until": 30})
+    assert record.at(4.0) == ["Safe mode       ", "Ready for USB   "]
+    assert record.last == ("Button is closed", "check its wires ") and record.ends == ["returned"]
+    assert "The button on GPIO 15 stays closed" in record.console
+
+
 @pytest.mark.parametrize(
     ("config", "line", "words"),
     [

@@ -112,4 +112,6 @@ def test_reading_that_did_not_fit_is_named(status):
         return (reading[0] + 0.5 * (t_s > 12.0), *reading[1:])
 
     lines = status(world=shifted, ride_s=30.0)
-    assert line(lines, "Sensor odd").startswith("the readings did not fit, again and again: force to the left.")
+    assert line(lines, "Sensor odd").startswith(
+        "the readings did not fit, again and again: force to the left. Check SIDE"
+    )
