@@ -48,6 +48,7 @@ ARROWS = {
     "app": {"board", "imu", "calibration", "lean", "drive_alignment", "speed", "rides", "ui", "devices"},
     "state": set(),
     "user_code": set(),
+    "safe_mode": set(),
     "start": {"board", "devices", "settings"},
     "__init__": {"status_report"},
 }
@@ -59,7 +60,7 @@ LATE = {
     "status_report": {"rides"},  # reports whether the machine code of rides is used
     "app": {"state", "user_code"},
     "devices": {"diagnosis"},  # diagnosis finds out why no sensor answers
-    "start": {"app", "console", "ui.messages", "live"},  # loaded while the display says "starting"
+    "start": {"app", "console", "ui.messages", "live", "safe_mode"},  # loaded while the display says "starting"
 }
 # MicroPython's hardware modules, which only drivers may import
 HARDWARE = {"machine", "micropython", "esp32", "rp2", "neopixel", "network", "bluetooth"}

@@ -46,19 +46,6 @@ def _held(button):
     return button.held()
 
 
-def _safe_mode(lcd, button, pin, closed_ms):
-    """Say that nothing is started. Then tell a button that is held from one that is closed forever."""
-    print("Kickstand %s: safe mode, the button was held at power-up." % __version__)
-    _show(lcd, "Safe mode", "Ready for USB")
-    for _ in range(closed_ms // 100):
-        sleep_ms(100)
-        if not button.held():
-            return
-    if closed_ms:
-        print("The button on GPIO %d stays closed: check its wires; turn a button with four legs by 90 degrees." % pin)
-        _show(lcd, "Button is closed", "check its wires")
-
-
 def main(loop=None, closed_ms=5000):
     """Run until Ctrl-C, power-off or a reset. An exception is reported on display and console, then the board restarts.
 
@@ -75,7 +62,9 @@ def main(loop=None, closed_ms=5000):
         if machine.reset_cause() == machine.PWRON_RESET:
             button = open_button(chosen)
             if _held(button):
-                _safe_mode(lcd, button, chosen.BUTTON_PIN, closed_ms)
+                from .safe_mode import report_safe_mode  # imported here, because it is rarely needed
+
+                report_safe_mode(lcd, button, chosen.BUTTON_PIN, closed_ms)
                 return
         lcd.show("Kickstand", "starting")  # replace a lean that was shown before a reset
         run(chosen, lcd, loop)
