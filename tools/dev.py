@@ -1,9 +1,8 @@
 #!/usr/bin/env python3
 """One command per task, on a machine with only Python 3.11 or newer:
 
-    python3 tools/dev.py demo         the firmware on a simulated board, live in the terminal
-    python3 tools/dev.py test         ruff, pyright and the tests; further arguments go to pytest
-    python3 tools/dev.py mutants imu  lists the single changes of a package's code that its tests do not notice
+    python3 tools/dev.py demo    the firmware on a simulated board, live in the terminal
+    python3 tools/dev.py test    ruff, pyright and the tests; further arguments go to pytest
 
 Each command creates .venv beside pyproject.toml, and installs the project in it. It installs again only if
 pyproject.toml has changed.
@@ -22,7 +21,7 @@ PYTHON = os.path.join(VENV, "Scripts", "python.exe") if os.name == "nt" else os.
 STAMP = os.path.join(VENV, "installed.txt")
 LOG = os.path.join(VENV, "install.log")
 OLDEST = (3, 11)
-EXTRAS = ("", "test", "mutants")  # extras of pyproject.toml; each contains the earlier ones
+EXTRAS = ("", "test")  # extras of pyproject.toml; each contains the earlier ones
 REPORT_S = 5  # time between two lines of progress while installing
 COMPILE = "from kickstand_emulator import native; native.build()"  # compiled, the emulated Pico is twice as fast
 
@@ -36,14 +35,12 @@ def main(arguments):
         raise SetupStopped(
             "Python 3.11 or newer is needed, this is %d.%d: start it with a newer python3" % sys.version_info[:2]
         )
-    if not arguments or arguments[0] not in ("demo", "test", "mutants"):
-        raise SetupStopped("no task is named: run %s demo, test or mutants" % sys.argv[0])
+    if not arguments or arguments[0] not in ("demo", "test"):
+        raise SetupStopped("no task is named: run %s demo or test" % sys.argv[0])
     name, rest = arguments[0], arguments[1:]
     prepare("" if name == "demo" else name)
     if name == "test":
         return test(rest)
-    if name == "mutants":
-        return run("-m", "kickstand_workshop.mutants", *rest)
     return run("-m", "kickstand_tools.cli", "demo", *rest)
 
 
