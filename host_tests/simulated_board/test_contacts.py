@@ -1,13 +1,10 @@
-"""The models of button, wheel, SD card, GPS receiver, other devices, and of each chip's pins, against known numbers."""
+"""The models of button, wheel and GPS receiver, and of each chip's pins, against known numbers."""
 
 import pytest
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.contacts import Button, Wheel
 from kickstand_tools.simulated_board.fakes import chips
 from kickstand_tools.simulated_board.gps import Gps, sentence
-from kickstand_tools.simulated_board.other_devices import Ds3231, Registers
-from kickstand_tools.simulated_board.sd_card import SdCard
-from support.board_access import read, write
 
 
 def edges(contact, clock, until_us):
@@ -88,103 +85,6 @@ def test_a_wheel_follows_its_speed_bounces_breaks_and_picks_up_noise():
     assert sum(level == 0 for _, level in edges(wheel, clock, 1_000_000)) == pytest.approx(200, abs=6)
 
 
-def exchanged(card, *values):
-    return [card.exchange(bytes([value]))[0] for value in values]
-
-
-def command(card, number, argument=0):
-    """Send a command, and return the first byte of its answer."""
-    card.select(1)
-    card.select(0)
-    card.exchange(bytes([0x40 | number]) + argument.to_bytes(4, "big") + b"\x95")
-    return exchanged(card, 0xFF, 0xFF)[1]
-
-
-def new_card(**kind):
-    """Return an SD card and its clock, after its initialisation."""
-    clock = Clock()
-    card = SdCard(clock, **kind)
-    assert command(card, 0) == 0x01
-    clock.advance(100_000)
-    return card, clock
-
-
-def store(card, token, content):
-    """Send a sector. Return the card's answer: 5 if it is accepted."""
-    exchanged(card, token)
-    card.exchange(content)
-    exchanged(card, 0xFF, 0xFF)
-    return exchanged(card, 0xFF)[0] & 0x1F
-
-
-def test_a_card_answers_while_it_is_selected_ready_and_present():
-    card, clock = new_card()
-    assert command(card, 41) == 0x00
-    command(card, 0)
-    for wait_us, answer in ((99_999, 0x01), (1, 0x00)):
-        clock.advance(wait_us)
-        assert command(card, 41) == answer
-    card.select(1)
-    assert card.exchange(b"\x51\0\0\0\0\xff\xff") == b"\xff" * 7
-    card.select(0)
-    card.removed = True
-    assert command(card, 17) == 0xFF
-    assert command(new_card(init_s=None)[0], 41) == 0x01
-
-
-def test_a_card_stores_sectors():
-    card, clock = new_card()
-    content = bytes(range(256)) * 2
-    assert command(card, 24, 7) == 0x00 and store(card, 0xFE, content) == 5
-    assert exchanged(card, 0xFF) == [0x00]  # busy
-    clock.advance(2000)
-    assert exchanged(card, 0xFF) == [0xFF] and card.data == {7: content}
-    begin_us = clock.now_us
-    assert command(card, 17, 7) == 0x00 and clock.now_us - begin_us == 500
-    assert exchanged(card, 0xFF, 0xFF)[1] == 0xFE and card.exchange(b"\xff" * 512) == content
-    assert command(card, 17, 8) == 0x00
-    exchanged(card, 0xFF, 0xFF)
-    assert card.exchange(b"\xff" * 512) == bytes(512)
-    command(card, 25, 3)  # several sectors, until the stop token
-    for value in (1, 2):
-        assert store(card, 0xFC, bytes([value]) * 512) == 5
-        clock.advance(2000)
-    exchanged(card, 0xFD, 0xFF)
-    assert exchanged(card, 0xFF) == [0x00]
-    clock.advance(2000)
-    assert {number: data[0] for number, data in card.data.items()} == {7: 0, 3: 1, 4: 2}
-
-
-def test_a_card_may_reject_or_stay_busy():
-    card, clock = new_card()
-    card.rejects = 1
-    vars(card)["busy_next_s"] = 0.5
-    for answer in (0x0D, 0x05):
-        command(card, 24, 1)
-        assert store(card, 0xFE, b"x" * 512) == answer
-        assert bool(card.data) is (answer == 0x05)
-    clock.advance(499_999)
-    assert exchanged(card, 0xFF) == [0x00]
-    clock.advance(1)
-    assert exchanged(card, 0xFF) == [0xFF] and card.busy_next_s is None
-
-
-def test_a_cards_size_and_its_file_system():
-    card, _ = new_card(sectors=4096)
-    assert command(card, 9) == 0x00 and exchanged(card, 0xFF, 0xFF)[1] == 0xFE
-    csd = card.exchange(b"\xff" * 16)
-    assert csd == b"\x40" + bytes(6) + b"\x00\x00\x03" + bytes(6)  # the size is (3 + 1) * 512 KB
-    assert exchanged(card, 0xFF, 0xFF, 0xFF) == [0xFF] * 3  # two bytes of check sum, and one after the data
-    assert [card.ioctl(op, 0) for op in (4, 5, 1)] == [4096, 512, 0]
-    card.writeblocks(2, b"a" * 512 + bytes(512) + b"c" * 512)
-    assert sorted(card.data) == [2, 4]  # sectors of zeros are not stored
-    buffer = bytearray(1024)
-    card.readblocks(3, buffer)
-    assert buffer == bytes(512) + b"c" * 512
-    card.writeblocks(2, bytes(512))
-    assert sorted(card.data) == [4]
-
-
 def heard(seconds, **kind):
     """Return [(time of its last byte in s, sentence)] of a receiver."""
     clock, sentences, text = Clock(), [], []
@@ -215,31 +115,6 @@ def test_a_receiver_sends_each_fix_late_and_byte_by_byte():
     assert first.startswith("$GNRMC,115940.20,A,4807.03800,N,01131.00000,E,3.888")
     assert faster[0][0] == pytest.approx(0.25, abs=0.02) and not any("VTG" in line for _, line in faster)
     assert len(faster) in (12, 14)
-
-
-def test_a_receiver_may_have_no_fix_or_repeat_itself():
-    faults = [["void", 2.0, 3.0], ["stuck", 4.0, 5.0]]
-    fixes = [line for _, line in heard(6.6, kinds=("RMC",), faults=faults) if "RMC" in line]
-    assert [line.split(",")[2] for line in fixes] == ["A", "V", "A", "A", "A", "A"]
-    assert "V,,,,,,,211126,,,N*" in fixes[1] and fixes[3] == fixes[2] and fixes[4] != fixes[3]
-    assert {int(time_s) for time_s, _ in heard(4.6, faults=[["unplugged", 1.9, 2.9]])} == {1, 3, 4}
-    garbled = heard(3.6, kinds=("RMC",), faults=[["garbled", 2.0, 3.0]])
-    valid = [line == sentence(line[1:-3]).strip() for _, line in garbled]
-    assert valid[:2] == [True, True] and not all(valid)
-
-
-def test_other_devices_keep_what_is_written():
-    device = Registers(0x50, {0: 1, 1: 2, 2: 3}, writable=(1,))
-    write(device, 1, 9, 9)
-    assert read(device, 0, 3) == [1, 9, 3] and device.written == [1, 2]
-
-
-def test_a_clock_at_the_sensors_address_counts_in_decimal_digits():
-    clock = Clock()
-    device = Ds3231(clock)
-    for advance_s, digits in ((0, [0x15, 0x40, 0x11]), (50, [0x05, 0x41, 0x11]), (50_000, [0x25, 0x34, 0x01])):
-        clock.advance(advance_s * 1_000_000)
-        assert read(device, 0, 3) == digits
 
 
 @pytest.mark.parametrize(
