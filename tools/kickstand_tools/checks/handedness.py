@@ -21,15 +21,13 @@ import numpy as np
 from kickstand.units import AXES
 
 from ..common.messages import Message, Remedy, WrongAxes
-from ..signals import Array, Bools, Ints, stretches
-from .bends import LeftHanded, calm_rates
+from ..signals import Array
+from .bends import LeftHanded
 from .cells import CELL_S, LogCells
-from .turning import Turning, TurningFit
+from .turning import Turning, TurningFit, liveliest
 
-WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # short windows are used if the log has no long window without a gap
-MOST_WINDOWS = 10  # number of windows that are judged: the windows with the largest rates
-CALM_DPS = 2.0  # value of calm_rate for calm_rates(), in deg/s
-TRIED, STEPS = 4, 4  # number of exchanges that are fitted with their bias, and steps of the bias
+FAR_DPS = 10.0 * np.array(list(itertools.product((1.0, -1.0), repeat=3)))  # guesses of a large bias of the gyro
+TRIED = 4  # number of exchanges that are fitted with their bias, besides none and all axes reversed
 
 # Another exchange must reduce the mean square of the residual force (g2) by this factor, or by FEW_CLEARLY in at most
 # FEW_WINDOWS windows. In correct logs the factor was at most 1.6 in windows of simulated and recorded rides.
@@ -112,8 +110,8 @@ def handedness(cells: LogCells) -> Message | None:
 
     Returns None if the axes seem right, or if the log is not enough to judge them.
     """
-    windows = liveliest(cells)
-    fits = None if windows is None else fit_exchanges(*windows)
+    found = liveliest(cells.force, cells.rate, cells.known, CELL_S)
+    fits = None if found is None else fit_exchanges(*found)
     if fits is None or not is_wrong(fits):
         return None
     best = likeliest(fits)
@@ -123,24 +121,31 @@ def handedness(cells: LogCells) -> Message | None:
     return LeftHanded() if reversed_all else RatesMisfit(*map(tuple, EXCHANGES[best].astype(int).tolist()))
 
 
-def fit_exchanges(turning: Turning, biases: list[Array]) -> dict[int, TurningFit]:
+def fit_exchanges(turning: Turning, guesses: list[Array]) -> dict[int, TurningFit]:
     """Fit the log's own axes, all axes reversed, and the exchanges that explain the forces best.
 
-    biases: first guesses of the gyro's bias. The gyro's bias is the same for each exchange, so the bias of the best fit
-        is tried for all.
+    If the log's own axes seem wrong, all exchanges are fitted, from more guesses: else the right one may be missed.
+
+    guesses: guesses of the gyro's bias, each of shape (3), in deg/s. The bias is the same for each exchange, so the
+        bias of the best fit is tried for all.
     Returns the fits by their index in EXCHANGES.
     """
     fits: dict[int, TurningFit] = {}
 
-    def fit(rough: Array, guesses: list[Array]) -> None:
-        """rough: residual of each exchange for each guess, shape (48, guesses)."""
-        for k in {0, 1, *fits, *np.argsort(np.min(rough, axis=1))[:TRIED].tolist()}:
-            found = turning.fit(EXCHANGES[k], guesses[int(np.argmin(rough[k]))], STEPS)
+    def fit(biases: list[Array], tried: int) -> None:
+        rough = np.column_stack([turning.rough(EXCHANGES, bias) for bias in biases])
+        for k in {0, 1, *fits, *np.argsort(np.min(rough, axis=1))[:tried].tolist()}:
+            found = turning.fit(EXCHANGES[k], biases[int(np.argmin(rough[k]))])
             fits[k] = min(fits.get(k, found), found, key=lambda each: each.cost)
 
-    fit(np.column_stack([turning.rough(EXCHANGES, bias) for bias in biases]), biases)
-    bias = min(fits.values(), key=lambda each: each.cost).bias
-    fit(turning.rough(EXCHANGES, bias)[:, None], [bias])
+    def best() -> Array:
+        return min(fits.values(), key=lambda each: each.cost).bias
+
+    fit(guesses, TRIED)
+    fit([best()], TRIED)
+    if is_wrong(fits):
+        fit([best(), *guesses, *FAR_DPS], len(EXCHANGES))
+        fit([best()], TRIED)
     return fits
 
 
@@ -156,33 +161,6 @@ def likeliest(fits: dict[int, TurningFit]) -> int | None:
     scores = {k: float(np.mean(fit.left)) * _penalty(EXCHANGES[k]) for k, fit in fits.items()}
     best, second = sorted(scores, key=lambda k: scores[k])[:2]
     return best if scores[second] > NAMED * scores[best] else None
-
-
-def liveliest(cells: LogCells) -> tuple[Turning, list[Array]] | None:
-    """Return the windows of the log with the largest rates, and guesses of the gyro's bias; None without a window.
-
-    A phone has no bias. The other guesses are the median rates of the log and of its calmest seconds.
-    """
-    places = _windows(cells.known, WINDOW_S)
-    places = places if len(places) else _windows(cells.known, SHORT_WINDOW_S)
-    if not len(places):
-        return None
-    usual = np.median(cells.rate[cells.known], axis=0)
-    seconds = _windows(cells.known, 1.0)
-    calm = np.median(calm_rates(cells.force[seconds], cells.rate[seconds], CALM_DPS), axis=0)
-    turned = np.sum((cells.rate[places] - usual) ** 2, axis=(1, 2))
-    places = places[np.sort(np.argsort(-turned)[:MOST_WINDOWS])]
-    return Turning(cells.force[places], cells.rate[places], CELL_S), [np.zeros(3), usual, calm]
-
-
-def _windows(known: Bools, seconds: float) -> Ints:
-    """Find the windows of this many seconds without an unknown cell.
-
-    Returns the indices of the cells of each window, shape (windows, cells).
-    """
-    length = round(seconds / CELL_S)
-    starts = [k for begin, end in stretches(known) for k in range(begin, end - length + 1, length)]
-    return np.array(starts, dtype=int).reshape(-1, 1) + np.arange(length)
 
 
 def _penalty(exchange: Array) -> float:

@@ -64,6 +64,7 @@ _COUNTER = re.compile(r"^(no|nr|n|i|index|count|counter|record|sample|frame|id|r
 CALM_S = 0.5  # length of the moving window in which the motion is measured to find calm samples
 CALMEST = 0.2  # share of the samples that count as calm
 NEAR = 1.3  # a calm acceleration is within this factor of gravity, also with clones of the chip and on rough rides
+LEANT = 1.75  # in a long bend, even the calm acceleration is longer than gravity by this factor: 55 degrees of lean
 NOISE_DPS = 0.1  # standard deviation of a gyro at rest
 # Length of the mean acceleration, divided by the mean length of the accelerations. Without gravity the ratio is smaller
 # than this.
@@ -152,6 +153,18 @@ def find(sheet: Sheet) -> Findings:
     if speed is not None:
         findings.found["speed"] = speed
     return findings
+
+
+def with_sums(sheet: Sheet) -> Sheet:
+    """Add columns of the total acceleration to a table that has an acceleration without gravity, and gravity alone."""
+    first = {three.kind: three for three in reversed(_find_triples(sheet))}
+    if "accel" in first or not {"linear", "gravity"} <= set(first):
+        return sheet
+    linear, gravity = first["linear"], first["gravity"]
+    stated = stated_unit(sheet.columns[linear.places[0]])
+    names = [f"total acceleration {axis}" + (f" ({stated})" if stated else "") for axis in "xyz"]
+    total = linear.values + gravity.values
+    return Sheet(sheet.name, [*sheet.columns, *names], [*sheet.cells, *total.T], sheet.left_out)
 
 
 # Time
@@ -428,7 +441,8 @@ def _has_gravity(three: _Triple, seconds: Array | None, near: bool) -> bool:
     length = float(np.median(np.linalg.norm(values, axis=1)))
     if length <= 0.0 or float(np.percentile(means, 10.0)) < LINEAR * length:
         return False
-    if near and not any(1.0 / NEAR < length / gravity < NEAR for gravity in _gravities().values()):
+    most = NEAR if _are_whole(values) else LEANT  # raw counts differ by a factor of 2
+    if near and not any(1.0 / NEAR < length / gravity < most for gravity in _gravities().values()):
         return False
     return float(np.std(means)) / length < (0.25 if near else 0.02)
 
@@ -464,15 +478,16 @@ def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> Col
     whole = _are_whole(values)
     gravities = {name: size for name, size in _gravities().items() if whole or not name.startswith("counts")}
     near = min(gravities, key=lambda name: abs(np.log(length / gravities[name])))
-    off = max(length / gravities[near], gravities[near] / length)
     why = f"gravity at rest is {length:.4g} long"
     if counts_per(stated):
         gravities[stated] = counts_per(stated)
-    if stated in gravities and max(length / gravities[stated], gravities[stated] / length) < NEAR:
+    most = NEAR if whole else LEANT
+    if stated in gravities and 1.0 / NEAR < length / gravities[stated] < most:
         return ColumnFinding([], stated, f"{why}, as its name says")
     if near.startswith("counts"):
         why += f": raw counts of a sensor with {near.partition('/')[2]} counts (LSB) per g"
-    return ColumnFinding([], near, why, off < NEAR and stated in ("", near, "counts"))
+    certain = 1.0 / NEAR < length / gravities[near] < most and stated in ("", near, "counts")
+    return ColumnFinding([], near, why, certain)
 
 
 def _are_whole(values: Array) -> bool:
