@@ -13,10 +13,12 @@ import machine
 
 from . import settings
 from .board import port
-from .board.display import STOPPED
-from .devices import open_button, open_lcd, open_sensor
-from .errors import LiveError, SettingsError, report, tried
-from .units import __version__, const
+
+port.begin()  # before the other imports, which make lasting objects
+from .board.display import STOPPED  # noqa: E402
+from .devices import open_button, open_lcd, open_sensor  # noqa: E402
+from .errors import LiveError, SettingsError, report, tried  # noqa: E402
+from .units import __version__, const  # noqa: E402
 
 _CHARGE_MS = const(100)
 

@@ -140,7 +140,7 @@ def test_accepted_chip_that_keeps_no_settings_is_named(number, shown, run, statu
     ("who_am_i", "name"), [(0x70, "MPU6500"), (0x19, "MPU6886"), (0x12, "ICM20602"), (0x11, "ICM20600")]
 )
 def test_relative_of_the_mpu6050_works(who_am_i, name, run, status):
-    assert display(run, **{"lean": [[0, 25]], "board": {"who_am_i": who_am_i}})[0].startswith("Raw   25°")
+    assert display(run, lean=[[0, 25]], board={"who_am_i": who_am_i})[0].startswith("Raw   25°")
     assert status(who_am_i=who_am_i)[2].startswith(f"Sensor       {name} (0x{who_am_i:02x})")
 
 

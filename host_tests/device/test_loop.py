@@ -5,7 +5,9 @@ import gc
 import itertools
 
 import pytest
+from kickstand_tools.simulated_board.fakes import fake_time
 from kickstand_tools.simulated_board.simulator import Board
+from support import device_runs
 from support.board_access import level
 from support.device_runs import FreshFirmware
 
@@ -96,3 +98,14 @@ def test_small_heap_of_an_esp32_is_collected_earlier(free, could_grow, turns, mo
         monkeypatch.setattr(esp32, "idf_heap_info", lambda kind: regions)
         monkeypatch.setattr(gc, "mem_free", lambda: free)
         assert port.turns_to_collect(40) == turns
+
+
+@pytest.mark.parametrize(("chip", "processor_hz"), [("esp32", 240_000_000), ("pico", 160_000_000)])
+def test_an_esp32_runs_at_240_mhz_and_yields(chip, processor_hz, monkeypatch):
+    """Only sleep_ms() gives time to an ESP32's idle task and its radio. A Pico keeps its clock."""
+    waits_ms, sleep_ms = [], fake_time.sleep_ms
+    monkeypatch.setattr(fake_time, "sleep_ms", lambda ms: waits_ms.append(ms) or sleep_ms(ms))
+    device = device_runs.Device(lambda t_s: (0.0, 1.0, 0.0, 0.0, 0.0, 0.0), machine=chip)
+    device.run({}, [3.0])
+    assert device.board.processor_hz == processor_hz
+    assert sum(ms >= 5 for ms in waits_ms) > 100

@@ -6,7 +6,7 @@
         display.tick(time.ticks_ms())  # one step of the work
         time.sleep_ms(10)
 
-A driver (hd44780.Lcd, oled.Oled) has the following members. host_tests/simulated_board/test_board_display.py tests each
+A driver (hd44780.Lcd, oled.Oled) has the following members. host_tests/simulated_board/test_display.py tests each
 driver.
 
 begin(i2c, address, hz, fresh)  prepares for a display that has just answered. fresh: True if the display may have been
