@@ -9,6 +9,8 @@ RS, RW, E, LIGHT = 0x01, 0x02, 0x04, 0x08
 
 
 def nibble(lcd, value, rs=0):
+    """Send half a byte. RS is stable before E rises."""
+    lcd.write_byte(value & 0xF0 | LIGHT | rs)
     for pins in (value & 0xF0 | LIGHT | rs | E, value & 0xF0 | LIGHT | rs):
         lcd.write_byte(pins)
         lcd.clock.advance(90)
@@ -41,11 +43,24 @@ def write(lcd, text, *commands):
 def status(lcd):
     """Read the busy flag and the address counter."""
     halves = []
+    lcd.write_byte(0xF0 | LIGHT | RW)
     for _ in range(2):
         lcd.write_byte(0xF0 | LIGHT | RW | E)
         halves.append(lcd.read_byte() & 0xF0)
         lcd.write_byte(0xF0 | LIGHT | RW)
     return halves[0] | halves[1] >> 4
+
+
+def test_rs_must_be_stable_before_e_rises():
+    """A letter whose RS rises together with E arrives as a command (tAS of the data sheet)."""
+    lcd = new_lcd()
+    for half in (0x40, 0x10):
+        lcd.write_byte(half | LIGHT)
+        lcd.write_byte(half | LIGHT | RS | E)
+        lcd.write_byte(half | LIGHT | RS)
+        lcd.clock.advance(90)
+    assert lcd.text()[0] == " " * 16
+    assert write(lcd, "A", 0x80).text()[0].startswith("A")
 
 
 @pytest.mark.parametrize(

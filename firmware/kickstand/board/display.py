@@ -78,6 +78,7 @@ class Display:
         self.address = None
         self.draws = False
         self._probes = 0  # number of successive searches that found no display
+        self._others = 1  # number of other addresses of a backpack that the next search asks
         self._probed_ms = None
         self._wait_ms = _PROBE_MS
         self._fresh = ticks_ms() < _POWER_UP_MS
@@ -104,8 +105,11 @@ class Display:
             self._fresh = True
 
     def flush(self):
-        """Send everything now, in about 0.1 s. Use this method before the loop runs or after the loop has failed."""
+        """Send everything now, in about 0.1 s. Use this method before the loop runs or after the loop has failed.
+
+        Without a loop there is only one search, so it asks every address."""
         self._probed_ms = None
+        self._others = len(_FAMILY)
         for _ in range(_FLUSH_STEPS):
             self.tick(ticks_ms())
             if self.address is None or not self._driver.busy:
@@ -140,9 +144,11 @@ class Display:
         for address in self._addresses:
             if self._answers(address):
                 return
-        other = _FAMILY[self._probes % len(_FAMILY)]
-        if self._addresses is ADDRESSES and self._kind in ("auto", "lcd") and self._answers(other):
-            return
+        others, self._others = self._others, 1
+        if self._addresses is ADDRESSES and self._kind in ("auto", "lcd"):
+            for k in range(others):
+                if self._answers(_FAMILY[(self._probes + k) % len(_FAMILY)]):
+                    return
         # No display was found. A display that answers later has just been powered, and may be another display
         self._fresh = True
         self._wait_ms = _PROBE_MS

@@ -70,7 +70,7 @@ class Lcd:
         self._shown = [bytearray(_COLUMNS), bytearray(_COLUMNS)]
         self._texts = [_NO_TEXT, _NO_TEXT]  # the last text of each line, if it was a str
         self._changed = True  # True if a line may still have to be sent
-        self._packed = bytearray(4 * (_BEHIND + 1))
+        self._packed = bytearray(4 * (_BEHIND + 1) + 2)
         self._port = bytearray(1)
         self._glyphs = _bar_glyphs()
 
@@ -134,7 +134,7 @@ class Lcd:
     def _initialise(self, step):
         if step < len(_NIBBLES):
             nibble = (_NIBBLES[step] >> 4 if self._low else _NIBBLES[step]) | self._light
-            self._i2c.writeto(self._address, bytes((nibble | self._e, nibble)))
+            self._i2c.writeto(self._address, bytes((nibble, nibble | self._e, nibble)))
         elif step == len(_NIBBLES):
             for command in _COMMANDS:
                 self._send(command, b"")
@@ -180,18 +180,20 @@ class Lcd:
         return False
 
     def _send(self, command, data):
-        """Send an instruction and the data that follow it in one transfer."""
-        packed = self._packed
-        self._pack(0, command, self._light)
+        """Send an instruction and the data that follow it in one transfer.
+
+        RS must be stable for 40 ns before E rises (tAS, p. 49), so a byte that only changes RS comes first."""
+        packed, light = self._packed, self._light
+        packed[0] = light
+        self._pack(1, command, light)
+        packed[5] = light | self._rs
         for i in range(len(data)):
-            self._pack(4 * (i + 1), data[i], self._light | self._rs)
-        self._i2c.writeto(self._address, memoryview(packed)[: 4 * (len(data) + 1)])
+            self._pack(4 * i + 6, data[i], light | self._rs)
+        self._i2c.writeto(self._address, memoryview(packed)[: 4 * len(data) + 6])
 
     def _pack(self, at, value, control):
         """Put a byte into _packed as two nibbles. Each nibble is sent with E high, then with E low, because the falling
-        edge of E latches it.
-
-        RS changes together with the rise of E. At 100 kHz, RS changes 90 us before E falls."""
+        edge of E latches it."""
         packed, enable = self._packed, self._e
         if self._low:
             high = value >> 4 | control

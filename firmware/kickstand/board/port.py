@@ -9,11 +9,6 @@ import sys
 
 import machine
 
-# Collect garbage often while the other modules are loaded. Otherwise lasting objects would be placed behind the
-# garbage, far along the heap. Then every later collection would scan the heap up to those objects. App resets the
-# threshold before its loop begins.
-gc.threshold(80_000)
-
 IS_ESP32 = sys.platform == "esp32"
 # The board and its chip, such as "Raspberry Pi Pico with RP2040" or "ESP32C3 module with ESP32-C3"
 MACHINE = getattr(sys.implementation, "_machine", "")
@@ -60,6 +55,19 @@ _WATCHDOG_MS = 8000  # the watchdog of a Pico allows at most 8388 ms
 _WEEK_MS = 604_800_000  # a week. An ESP32 counts a time-out in 32 bits, with four counts per ms, so it allows 12 days
 
 _watchdog = None
+
+
+def begin():
+    """Prepare the chip. Call this function at the start of the firmware, before other modules are imported."""
+    # Collect garbage often while the other modules are loaded. Otherwise lasting objects would be placed behind the
+    # garbage, far along the heap. Then every later collection would scan the heap up to those objects. App resets the
+    # threshold before its loop begins.
+    gc.threshold(80_000)
+    if IS_ESP32:
+        try:
+            machine.freq(240_000_000)  # MicroPython starts a classic ESP32 with 160 MHz
+        except ValueError:  # the C series and the H2 run at their highest frequency from the start
+            pass
 
 
 def open_i2c(controller, sda, scl, frequency, timeout_us):
@@ -115,7 +123,7 @@ def rest_watchdog():
         return
     # Data sheets RP2040 section 4.7.6 and RP2350 section 12.9.7: ENABLE is bit 30 of the watchdog's CTRL, at its base
     # address. Sections 2.1.2 and 2.1.3: a write to address + 0x3000 clears the bits that are 1.
-    base = 0x400D8000 if "RP2350" in getattr(sys.implementation, "_machine", "") else 0x40058000
+    base = 0x400D8000 if "RP2350" in MACHINE else 0x40058000
     machine.mem32[base + 0x3000] = 1 << 30
 
 

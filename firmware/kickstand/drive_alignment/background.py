@@ -11,7 +11,6 @@ from ..errors import Notice, StoreError
 from ..rotation import matrix
 from ..units import const
 from .alignment import BRAKING, CAR, MOTORCYCLE, TURNING, DriveAlignment
-from .quality import MIN_EVENTS_TO_CHECK_SPEED
 from .verdict import MOVED, REFINED, REVERSED, SAME, compare, turn_round
 
 # Number of passes of the loop whose counts are added up before they are converted to floats, to save time
@@ -125,7 +124,7 @@ class BackgroundAlignment:
     def _share(self, speed):
         """Pass a speed to the lean filter if it is reliable.
 
-        A speed that no braking event has confirmed is not passed, because a wheel may have two magnets. Zero is not
+        A speed that the braking events have not confirmed is not passed, because a wheel may have two magnets. Zero is not
         passed either, because a broken wire also reads zero. The filter detects a standstill on its own.
 
         Args:
@@ -136,9 +135,7 @@ class BackgroundAlignment:
         """
         if not self._leans:
             return speed
-        drive = self.drive
-        confirmed = drive.counted >= MIN_EVENTS_TO_CHECK_SPEED and drive.quality.speed_problem is None
-        if speed <= 0.0 or drive.problem is not None or not confirmed:
+        if speed <= 0.0 or self.drive.problem is not None or not self.drive.quality.speed_confirmed:
             return None
         speed = int(100 * speed + 0.5) / 100
         self._meter.measure_speed(speed)

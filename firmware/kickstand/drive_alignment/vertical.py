@@ -128,8 +128,8 @@ class StandingVertical:
         if not self._counted:
             self._counted = True
             self.stops += 1
-        size = norm(self._stop_force)
-        self._direction = [component / size for component in self._stop_force]
+        self._direction = list(self._stop_force)
+        normalize(self._direction)
         self.bias[:] = self._stop_bias
         self.up = [self._sum[i] + self._direction[i] for i in range(3)]
         normalize(self.up)

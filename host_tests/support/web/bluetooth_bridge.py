@@ -11,7 +11,7 @@ from concurrent.futures import Future
 from pathlib import Path
 
 from support import virtual_radio
-from support.device_runs import Device, _world
+from support.device_runs import Device, world_of
 from support.radio_decoder import SERVICE
 
 FAKE = Path(__file__).with_name("fake_bluetooth.js").read_text()
@@ -35,7 +35,7 @@ class Bridge:
 
     def _run(self, plan, begin_s, directory):
         os.chdir(directory)
-        world, _ = _world(plan)
+        world, _ = world_of(plan)
         device = self.device = Device(world, machine="pico w")
         for press in plan["presses"]:
             device.board.press(*press)

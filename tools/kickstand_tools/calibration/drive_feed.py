@@ -119,7 +119,10 @@ def standing(logs: Sequence[Log], calibration: CalibrationFile, steps: "Steps") 
             last_mps = next((max(0.0, mps) for mps in reversed(new) if mps is not None), None)
             speed_mps, silent_us = (speed_mps, silent_us + length_us) if last_mps is None else (last_mps, 0)
             if speed_mps >= 0.0 and silent_us <= STALE_US and part.last_us:
-                standing.update(part.force, part.rate, speed_mps, length_us * 1e-6)
+                try:
+                    standing.update(part.force, part.rate, speed_mps, length_us * 1e-6)
+                except ValueError as error:  # raised for a null vector
+                    raise _no_gravity(log, part.end_us) from error
             steps.more(part.samples)
     return standing
 
@@ -159,12 +162,16 @@ def feed(
                 if part.end_mps is not None:
                     measure(part.end_mps, 0, end_us)
             except ValueError as error:  # raised for a null vector
-                what = f"{log.name}, at {end_us / 1e6:.1f} s: accelerations of nearly 0"
-                raise InputError(f"{what}: at rest 1 g is needed, check the sensor") from error
+                raise _no_gravity(log, end_us) from error
             steps.more(part.samples)
         if log is logs[-1]:
             alignment.finish()
         watch.end(end_us / 1e6)
+
+
+def _no_gravity(log: Log, end_us: int) -> InputError:
+    what = f"{log.name}, at {end_us / 1e6:.1f} s: accelerations of nearly 0"
+    return InputError(f"{what}: at rest 1 g is needed, check the sensor")
 
 
 def _end_stop(standing: StandingVertical) -> None:

@@ -1,5 +1,6 @@
 """Updates the firmware on a board: copies and verifies changed files, and removes files of older versions."""
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -99,7 +100,8 @@ def flash(
             if config and judged.fault:
                 raise InputError(judged.fault, config_check.CORRECT)
             wanted, why_sources = _contents(transport, compiler)
-            wanted[CONFIG] = cleaned(source.read_bytes())
+            with contextlib.suppress(InputError):  # in another encoding it was refused above, if it was to be copied
+                wanted[CONFIG] = cleaned(source.read_bytes())
             if not config and there.mended and there.config is not None:
                 wanted[CONFIG] = there.config
             update = prepare(transport, wanted, bool(config) or there.mended, there)

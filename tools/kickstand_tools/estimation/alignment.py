@@ -15,7 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..calibration.file import CalibrationFile
-from ..checks.handedness import RatesMisfit
+from ..checks.bends import LeftHanded
+from ..checks.handedness import AxesMisfit, RatesMisfit
 from ..common.errors import InputError, RefusedInput
 from ..common.messages import AT_REST, Message, Remedy
 from ..logs.cells import MOST_DPS, MOST_G
@@ -165,7 +166,7 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
     if phone is not None and phone not in PHONES:
         raise InputError(f"no phone is mounted {phone}: there are {', '.join(PHONES)}")
     log = without_frozen(read_log(log))
-    misfit = next((notice for notice in log.notices if isinstance(notice, RatesMisfit)), None)
+    misfit = next((notice for notice in log.notices if isinstance(notice, (LeftHanded, RatesMisfit, AxesMisfit))), None)
     if misfit:
         raise RefusedInput(misfit, log.name)
     step_s = float(log.t_s[-1]) / (len(log.t_s) - 1)

@@ -124,6 +124,7 @@ def table_in(files: list[RecordingFile]) -> MappedTable | None:
     together, return the largest."""
     largest = max(files, key=lambda file: len(file.text))
     sheet = sheet_in(largest)
+    sheet = None if sheet is None else findings.with_sums(sheet)
     found = None if sheet is None else findings.find(sheet)
     if len(files) > 1 and (found is None or found.lacking):
         joined = joined_sheet(files)
@@ -143,7 +144,7 @@ def sheet_of(files: list[RecordingFile], name: str, columns: Mapping[str, str]) 
         raise InputError(f"{name} holds {len(files)} files: give --columns with one, such as {files[0].name}")
     if sheet is None:
         raise InputError(f"{name}: no table of sensors: no two lines have {FEWEST_CELLS} numbers in as many cells")
-    return sheet
+    return findings.with_sums(sheet)
 
 
 def read_table(table: MappedTable, units: Mapping[str, str]) -> AppRecording | None:

@@ -129,10 +129,14 @@ class Radio:
         """Pair with the PIN that the rider typed into the phone. Returns True if it was right."""
         if not self.config.get("mitm"):
             return False
-        self._tell(PASSKEY, 0, _DISPLAY, 0)
-        if pin == self._passkey:
+        if pin == self.ask_pin():
             self.pair()
         return self.paired
+
+    def ask_pin(self):
+        """Ask the board for the PIN that a phone must enter. Returns it."""
+        self._tell(PASSKEY, 0, _DISPLAY, 0)
+        return self._passkey
 
     def pair(self):
         """Complete the pairing after the right PIN."""

@@ -92,6 +92,7 @@ class Board:
         self.boots = 0
         self.ticks_at_boot_us = 0  # first value of ticks_us(); a value near 1 << 30 makes ticks wrap soon
         self.reset_cause = fake_machine.PWRON_RESET
+        self.processor_hz = 160_000_000  # what the board starts with
         self._off = True
         self._pins = {}  # number: [mode, pull, driven level, time of first use]
         self._fakes = Installer()
