@@ -148,23 +148,11 @@ def find(sheet: Sheet) -> Findings:
     if lat is not None and lon is not None:
         findings.found |= {"lat": lat, "lon": lon}
     if speed is not None and time is not None and not speed.unit and lat is not None and lon is not None:
-        places = [sheet.columns.index(one.columns[0]) for one in (speed, lat, lon)]
-        speed.unit = unit_by_positions(sheet, sheet.times(sheet.columns.index(time.columns[0]), time.unit), *places)
+        at, *places = (sheet.columns.index(one.columns[0]) for one in (time, speed, lat, lon))
+        speed.unit = unit_by_positions(sheet, sheet.times(at, time.unit), places[0], places[1], places[2])
     if speed is not None:
         findings.found["speed"] = speed
     return findings
-
-
-def with_sums(sheet: Sheet) -> Sheet:
-    """Add columns of the total acceleration to a table that has an acceleration without gravity, and gravity alone."""
-    first = {three.kind: three for three in reversed(_find_triples(sheet))}
-    if "accel" in first or not {"linear", "gravity"} <= set(first):
-        return sheet
-    linear, gravity = first["linear"], first["gravity"]
-    stated = stated_unit(sheet.columns[linear.places[0]])
-    names = [f"total acceleration {axis}" + (f" ({stated})" if stated else "") for axis in "xyz"]
-    total = linear.values + gravity.values
-    return Sheet(sheet.name, [*sheet.columns, *names], [*sheet.cells, *total.T], sheet.left_out)
 
 
 # Time
@@ -253,6 +241,43 @@ class _Triple:
     values: Array
 
 
+def completed(sheet: Sheet) -> Sheet:
+    """Complete columns that belong together: seconds and their fractions, axes that are in several rows, and the user's
+    acceleration and gravity."""
+    names = [plain(name) for name in sheet.columns]
+    for fraction, size in _FRACTIONS.items():
+        k = next((k for k, name in enumerate(names) if k and name.endswith(fraction)), 0)
+        if k and re.search(r"secs?$|seconds?$|stamp$|time$", names[k - 1]) and names[k - 1] != names[k]:
+            whole, part = sheet.cells[k - 1], sheet.numbers(k)
+            if whole.dtype.kind == "i" and np.nanmin(part) >= 0.0 and np.nanmax(part) * size < 10**9:
+                part_ns = np.nan_to_num(part * size).astype(np.int64)
+                sheet.columns.append(f"time {sheet.columns[k - 1]} + {sheet.columns[k]} (ns)")
+                sheet.cells.append(whole.astype(np.int64) * 10**9 + part_ns)
+                break
+    threes = {three.kind: three for three in reversed(_find_triples(sheet))}
+    for three in threes.values():
+        if not np.any(np.all(np.isfinite(three.values), axis=1)):
+            _merge_rows(sheet, three)
+    if "linear" in threes and "gravity" in threes and "accel" not in threes:
+        total = threes["linear"].values + threes["gravity"].values
+        stated = stated_unit(sheet.columns[threes["linear"].places[0]])
+        sheet.columns += [f"total acceleration {axis}" + (f" ({stated})" if stated else "") for axis in "xyz"]
+        sheet.cells += list(total.T)
+    return sheet
+
+
+_FRACTIONS = {"nsecs": 1, "nsec": 1, "nanosec": 1, "nanoseconds": 1, "usecs": 1000, "usec": 1000, "microseconds": 1000}
+
+
+def _merge_rows(sheet: Sheet, three: _Triple) -> None:
+    """Fill axes that are in successive rows into the row of the last axis."""
+    starts = np.argmax(np.isfinite(three.values), axis=0)
+    ends = np.isfinite(three.values[:, int(np.argmax(starts))])
+    for place, column in zip(three.places, three.values.T):
+        row = np.maximum.accumulate(np.where(np.isfinite(column), np.arange(len(column)), 0))
+        sheet.cells[place] = np.where(ends, column[row], np.nan)
+
+
 def _find_triples(sheet: Sheet) -> list[_Triple]:
     """The groups of three columns that belong together."""
     stems: dict[str, dict[str, int]] = {}
@@ -331,7 +356,7 @@ def _split_axis(name: str) -> Iterable[tuple[str, str]]:
         yield sensor + (head + last[:-1]).strip(), last[-1]
     elif len(whole) > 1 and whole[0] in "xyz":
         yield sensor + whole[1:], whole[0]
-    elif match := re.fullmatch(r"(.*?)(\d{1,2})", whole):
+    elif (match := re.fullmatch(r"(.*?)(\d{1,2})", whole)) and not bare.startswith("#"):
         yield sensor + match[1], match[2]
 
 
@@ -383,8 +408,9 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
     possible = [*kinds["accel"], *kinds["either"], *([] if kinds["accel"] else kinds[""])]
     without = kinds["linear"] or kinds["accel"]
     accel = _first_with_gravity(possible, seconds) or _first_with_gravity(kinds["linear"], seconds)
+    accel = accel or next((three for three in kinds["accel"] if not _is_linear(three, seconds)), None)
     exchanged = None if accel else _first_with_gravity(kinds["gyro"], seconds)
-    rates = _partner(accel, kinds["gyro"]) or next((three for three in unnamed if three is not accel), None)
+    rates = _partner(accel, kinds["gyro"]) or _partner(accel, [three for three in unnamed if three is not accel])
     if exchanged is not None and without:
         accel, rates = exchanged, without[0]
     if accel is None:
@@ -445,6 +471,15 @@ def _has_gravity(three: _Triple, seconds: Array | None, near: bool) -> bool:
     if near and not any(1.0 / NEAR < length / gravity < most for gravity in _gravities().values()):
         return False
     return float(np.std(means)) / length < (0.25 if near else 0.02)
+
+
+def _is_linear(three: _Triple, seconds: Array | None) -> bool:
+    """True if the mean of the values over some seconds is short, because they do not contain gravity."""
+    values = three.values[np.all(np.isfinite(three.values), axis=1)]
+    if len(values) < 3:
+        return True
+    means = np.linalg.norm(moving_mean(values, _rows_in(10.0 * CALM_S, seconds, len(three.values))), axis=1)
+    return float(np.median(means)) < LINEAR * float(np.median(np.linalg.norm(values, axis=1)))
 
 
 def _rows_in(span_s: float, seconds: Array | None, count: int) -> int:
