@@ -34,7 +34,8 @@ from ..units import const
 _OLED_ADDRESSES = const((0x3C, 0x3D))
 # 0x27 and 0x3F are the addresses of a backpack's PCF8574 and PCF8574A with all jumpers open
 ADDRESSES = (0x27, 0x3F) + _OLED_ADDRESSES
-_FAMILY = tuple(range(0x20, 0x27)) + tuple(range(0x38, 0x3C)) + (0x3E,)  # other addresses of a backpack
+_OWN_I2C = const(0x3E)  # address of a controller with I2C, see other_lcds.py
+_FAMILY = tuple(range(0x20, 0x27)) + tuple(range(0x38, 0x3C)) + (_OWN_I2C,)  # other addresses of a backpack
 LCD_HZ, OLED_HZ = 100_000, 400_000  # fastest clocks of a PCF8574 and of the OLEDs
 STOPPED = "Kickstand", "stopped"  # text of the display after the firmware has ended
 KINDS = ("auto", "lcd", "ssd1306", "sh1106", "ssd1306-32")
@@ -71,7 +72,6 @@ class Display:
         self._addresses = addresses
         self._look = contrast, inverted
         self._wiring = wiring
-        self._oled = False  # True if the driver is an Oled
         self._i2c = self._driver = None
         self._wanted = "", "", None
         self._status = bytearray(1)
@@ -157,7 +157,12 @@ class Display:
         try:
             self._i2c.readfrom_into(address, self._status)
         except OSError:
-            return False
+            try:
+                if address != _OWN_I2C:
+                    return False
+                self._i2c.writeto(address, b"\0")  # a controller that cannot be read may answer no read
+            except OSError:
+                return False
         self._probes = 0
         if attempt(self._begin, address):  # attempt() reports a missing driver or too little memory
             self._wait_ms = min(2 * self._wait_ms, MOST_WAIT_MS)
@@ -167,18 +172,19 @@ class Display:
 
     def _begin(self, address):
         oled = self._kind[0] == "s" or (self._kind == "auto" and address in _OLED_ADDRESSES)
-        if self._driver is None or self._oled != oled:
-            self._driver = None
-            if oled:
-                from .oled import Oled
+        if oled:
+            from .oled import Oled as Driver
 
-                self._driver = Oled(self._kind, *self._look)
-            else:
-                from .hd44780 import Lcd
+            arguments = (self._kind,) + self._look
+        else:
+            from .hd44780 import driver_at
 
-                self._driver = Lcd(self._wiring)
+            Driver, arguments = driver_at(self._i2c, address), (self._wiring,)
+        if type(self._driver) is not Driver:
+            self._driver = None  # frees its memory
+            self._driver = Driver(*arguments)
             self._driver.show(*self._wanted)
-            self._oled, self.draws = oled, self._driver.draws
+            self.draws = self._driver.draws
         hz = self._bus_hz or (OLED_HZ if oled else LCD_HZ)
         if hz != (self._bus_hz or LCD_HZ):
             self._i2c = self._reopen(hz)

@@ -1,5 +1,5 @@
 """Driver for an HD44780 character display, 16x2 or larger, behind a PCF8574 port expander (the usual I2C backpack).
-display.py finds it and describes its methods.
+display.py finds it and describes its methods. other_lcds.py has the drivers of other character displays.
 
 Sources: data sheets Hitachi HD44780U (ADE-207-272) and NXP PCF8574. The driver uses the 4-bit mode. The driver sends
 the changed part of a line in two transfers: first dashes, then the text. A transfer of a whole line takes 6 ms at 100
@@ -13,13 +13,17 @@ from time import ticks_diff, ticks_ms
 
 from micropython import const
 
-# Index: LCD_WIRING - 1. Each row has the bits of RS, E and the backlight, then True if D4 to D7 are wired to P0 to P3
+# Index: LCD_WIRING - 1. Each row has the bits of RS, E and the backlight, then 4 minus the pin of D4
 WIRINGS = (
-    (0x01, 0x04, 0x08, False),  # the usual wiring: RS at P0, E at P2, backlight at P3
-    (0x40, 0x10, 0x00, True),  # MJKDZ, GY-IICLCD: RS at P6, E at P4, backlight at P7, on while P7 is low
-    (0x10, 0x40, 0x80, True),  # RS at P4, E at P6, backlight at P7
-    (0x01, 0x04, 0x00, False),  # like the first wiring, but the backlight is on while P3 is low
+    (0x01, 0x04, 0x08, 0),  # the usual wiring: RS at P0, E at P2, backlight at P3
+    (0x40, 0x10, 0x00, 4),  # MJKDZ, GY-IICLCD: RS at P6, E at P4, backlight at P7, on while P7 is low
+    (0x10, 0x40, 0x80, 4),  # RS at P4, E at P6, backlight at P7
+    (0x01, 0x04, 0x00, 0),  # like the first wiring, but the backlight is on while P3 is low
 )
+# driver_at() sends this byte. A PCF8574 puts it on its pins, where no wiring has E, and reads it back. For an MCP23008
+# it is the number of a register that contains 0.
+_TEST = b"\x01"
+_OWN_I2C = const(0x3E)  # address of OwnI2c in other_lcds.py
 _LINE_ADDRESSES = (0x80, 0xC0)  # instruction "set DDRAM address" for the beginning of each line (table 6)
 _CGRAM_ADDRESS = const(0x40)  # instruction "set CGRAM address" (table 6)
 
@@ -62,10 +66,11 @@ class Lcd:
     """The driver of the character display. display.py describes its methods."""
 
     draws = False
+    COMMANDS = _COMMANDS
 
     def __init__(self, wiring=1):
         """wiring: number of the wiring in WIRINGS, from 1, like the setting LCD_WIRING."""
-        self._rs, self._e, self._light, self._low = WIRINGS[wiring - 1]
+        self._rs, self._e, self._light, self._shift = WIRINGS[wiring - 1]
         self._wanted = [bytearray(b" " * _COLUMNS), bytearray(b" " * _COLUMNS)]
         self._shown = [bytearray(_COLUMNS), bytearray(_COLUMNS)]
         self._texts = [_NO_TEXT, _NO_TEXT]  # the last text of each line, if it was a str
@@ -133,10 +138,9 @@ class Lcd:
 
     def _initialise(self, step):
         if step < len(_NIBBLES):
-            nibble = (_NIBBLES[step] >> 4 if self._low else _NIBBLES[step]) | self._light
-            self._i2c.writeto(self._address, bytes((nibble, nibble | self._e, nibble)))
+            self._wake(step)
         elif step == len(_NIBBLES):
-            for command in _COMMANDS:
+            for command in self.COMMANDS:
                 self._send(command, b"")
         elif step >= _STEPS - 2:
             self._send(_LINE_ADDRESSES[step - _STEPS] + _COLUMNS, b" " * _BEHIND)
@@ -146,6 +150,15 @@ class Lcd:
             for shown in self._shown:  # write both lines again
                 shown[:] = _NEVER
             self._changed = True
+
+    def _wake(self, step):
+        """Bring the display into the mode of COMMANDS, in as many steps as _NIBBLES."""
+        nibble = _NIBBLES[step] >> self._shift | self._light
+        self._write(bytes((nibble, nibble | self._e, nibble)))
+
+    def _write(self, levels):
+        """Set the levels of the expander's pins, one after another."""
+        self._i2c.writeto(self._address, levels)
 
     def _kept_power(self):
         """Return False if the display has lost its power since the last transfer, even for a moment.
@@ -189,19 +202,30 @@ class Lcd:
         packed[5] = light | self._rs
         for i in range(len(data)):
             self._pack(4 * i + 6, data[i], light | self._rs)
-        self._i2c.writeto(self._address, memoryview(packed)[: 4 * len(data) + 6])
+        self._write(memoryview(packed)[: 4 * len(data) + 6])
 
     def _pack(self, at, value, control):
         """Put a byte into _packed as two nibbles. Each nibble is sent with E high, then with E low, because the falling
         edge of E latches it."""
         packed, enable = self._packed, self._e
-        if self._low:
-            high = value >> 4 | control
-            low = value & 0x0F | control
-        else:
-            high = value & 0xF0 | control
-            low = value << 4 & 0xF0 | control
+        high = (value & 0xF0) >> self._shift | control
+        low = (value << 4 & 0xF0) >> self._shift | control
         packed[at] = high | enable
         packed[at + 1] = high
         packed[at + 2] = low | enable
         packed[at + 3] = low
+
+
+def driver_at(i2c, address):
+    """Return the driver's class for the character display at this address. Raises OSError without an answer."""
+    answer = bytearray(1)
+    i2c.writeto(address, _TEST)
+    try:
+        i2c.readfrom_into(address, answer)
+    except OSError:  # a controller with I2C that cannot be read
+        pass
+    if answer == _TEST or (answer[0] and address != _OWN_I2C):
+        return Lcd
+    from . import other_lcds
+
+    return other_lcds.OwnI2c if address == _OWN_I2C else other_lcds.Mcp23008
