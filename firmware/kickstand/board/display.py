@@ -155,14 +155,12 @@ class Display:
 
     def _answers(self, address):
         try:
-            self._i2c.readfrom_into(address, self._status)
+            if address == _OWN_I2C:  # a controller with I2C may not answer a read
+                self._i2c.writeto(address, b"\1")
+            else:
+                self._i2c.readfrom_into(address, self._status)
         except OSError:
-            try:
-                if address != _OWN_I2C:
-                    return False
-                self._i2c.writeto(address, b"\0")  # a controller that cannot be read may answer no read
-            except OSError:
-                return False
+            return False
         self._probes = 0
         if attempt(self._begin, address):  # attempt() reports a missing driver or too little memory
             self._wait_ms = min(2 * self._wait_ms, MOST_WAIT_MS)
@@ -177,9 +175,21 @@ class Display:
 
             arguments = (self._kind,) + self._look
         else:
-            from .hd44780 import driver_at
+            from .hd44780 import Lcd as Driver
 
-            Driver, arguments = driver_at(self._i2c, address), (self._wiring,)
+            arguments = (self._wiring,)
+            # A PCF8574 puts this byte on its pins, where no wiring has E, and returns it. For an MCP23008 it is the
+            # number of a register that is 0
+            status = self._status
+            self._i2c.writeto(address, b"\1")
+            try:
+                self._i2c.readfrom_into(address, status)
+            except OSError:
+                status[0] = 0
+            if status[0] != 1 and (address == _OWN_I2C or not status[0]):
+                from . import other_lcds
+
+                Driver = other_lcds.OwnI2c if address == _OWN_I2C else other_lcds.Mcp23008
         if type(self._driver) is not Driver:
             self._driver = None  # frees its memory
             self._driver = Driver(*arguments)

@@ -20,10 +20,6 @@ WIRINGS = (
     (0x10, 0x40, 0x80, 4),  # RS at P4, E at P6, backlight at P7
     (0x01, 0x04, 0x00, 0),  # like the first wiring, but the backlight is on while P3 is low
 )
-# driver_at() sends this byte. A PCF8574 puts it on its pins, where no wiring has E, and reads it back. For an MCP23008
-# it is the number of a register that contains 0.
-_TEST = b"\x01"
-_OWN_I2C = const(0x3E)  # address of OwnI2c in other_lcds.py
 _LINE_ADDRESSES = (0x80, 0xC0)  # instruction "set DDRAM address" for the beginning of each line (table 6)
 _CGRAM_ADDRESS = const(0x40)  # instruction "set CGRAM address" (table 6)
 
@@ -66,7 +62,6 @@ class Lcd:
     """The driver of the character display. display.py describes its methods."""
 
     draws = False
-    COMMANDS = _COMMANDS
 
     def __init__(self, wiring=1):
         """wiring: number of the wiring in WIRINGS, from 1, like the setting LCD_WIRING."""
@@ -138,9 +133,10 @@ class Lcd:
 
     def _initialise(self, step):
         if step < len(_NIBBLES):
-            self._wake(step)
+            nibble = _NIBBLES[step] >> self._shift | self._light
+            self._i2c.writeto(self._address, bytes((nibble, nibble | self._e, nibble)))
         elif step == len(_NIBBLES):
-            for command in self.COMMANDS:
+            for command in _COMMANDS:
                 self._send(command, b"")
         elif step >= _STEPS - 2:
             self._send(_LINE_ADDRESSES[step - _STEPS] + _COLUMNS, b" " * _BEHIND)
@@ -150,15 +146,6 @@ class Lcd:
             for shown in self._shown:  # write both lines again
                 shown[:] = _NEVER
             self._changed = True
-
-    def _wake(self, step):
-        """Bring the display into the mode of COMMANDS, in as many steps as _NIBBLES."""
-        nibble = _NIBBLES[step] >> self._shift | self._light
-        self._write(bytes((nibble, nibble | self._e, nibble)))
-
-    def _write(self, levels):
-        """Set the levels of the expander's pins, one after another."""
-        self._i2c.writeto(self._address, levels)
 
     def _kept_power(self):
         """Return False if the display has lost its power since the last transfer, even for a moment.
@@ -202,7 +189,7 @@ class Lcd:
         packed[5] = light | self._rs
         for i in range(len(data)):
             self._pack(4 * i + 6, data[i], light | self._rs)
-        self._write(memoryview(packed)[: 4 * len(data) + 6])
+        self._i2c.writeto(self._address, memoryview(packed)[: 4 * len(data) + 6])
 
     def _pack(self, at, value, control):
         """Put a byte into _packed as two nibbles. Each nibble is sent with E high, then with E low, because the falling
@@ -214,18 +201,3 @@ class Lcd:
         packed[at + 1] = high
         packed[at + 2] = low | enable
         packed[at + 3] = low
-
-
-def driver_at(i2c, address):
-    """Return the driver's class for the character display at this address. Raises OSError without an answer."""
-    answer = bytearray(1)
-    i2c.writeto(address, _TEST)
-    try:
-        i2c.readfrom_into(address, answer)
-    except OSError:  # a controller with I2C that cannot be read
-        pass
-    if answer == _TEST or (answer[0] and address != _OWN_I2C):
-        return Lcd
-    from . import other_lcds
-
-    return other_lcds.OwnI2c if address == _OWN_I2C else other_lcds.Mcp23008

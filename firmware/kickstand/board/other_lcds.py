@@ -7,9 +7,10 @@ from micropython import const
 
 from .hd44780 import Lcd
 
-# Commands of OwnI2c in each step. Every controller gets the commands of the ST7032: oscillator, contrast, booster,
-# voltage follower. The others take them for addresses, which the next command replaces.
-_WAKE = (b"\x00\x38", b"\x00\x39\x14\x73", b"\x00\x56\x6c", b"\x00\x38")
+# Commands of OwnI2c in the first steps. Every controller gets the commands of the ST7032: oscillator, contrast,
+# booster, voltage follower. The others take them for addresses, which the next command replaces. The last step is that
+# of an HD44780: display on, entry mode, return home.
+_STEPS = (b"\x00\x38", b"\x00\x39\x14\x73", b"\x00\x56\x6c", b"\x00\x38", b"\x00\x0c\x06\x02")
 _IODIR, _IOCON, _GPIO = const(0), const(5), const(9)  # registers of an MCP23008
 _SAME_REGISTER = const(0x20)  # bit of IOCON: the bytes of a transfer go to one register
 
@@ -19,22 +20,38 @@ class OwnI2c(Lcd):
 
     It cannot be read."""
 
-    COMMANDS = b"\x0c\x06\x02"  # display on, entry mode, return home, as for an HD44780
-
-    def _wake(self, step):
-        self._write(_WAKE[step])
+    def _initialise(self, step):
+        if step < len(_STEPS):
+            self._i2c.writeto(self._address, _STEPS[step])
+        else:
+            super()._initialise(step)
 
     def _kept_power(self):
-        self._write(b"\x00\x0c")  # "display on", because any write shows whether the display answers
+        self._i2c.writeto(self._address, b"\x00\x0c")  # "display on", because any write shows whether it answers
         return True
 
     def _send(self, command, data):
         packed, n = self._packed, len(data)
-        packed[0] = 0x80 if n else 0  # a command and another control byte, or only commands
+        packed[0] = 0x80  # a command, then another control byte
         packed[1] = command
         packed[2] = 0x40  # characters
         packed[3 : 3 + n] = data
-        self._write(memoryview(packed)[: 3 + n if n else 2])
+        self._i2c.writeto(self._address, memoryview(packed)[: 3 + n])
+
+
+class _Expander:
+    """An MCP23008 with the methods that Lcd uses of a bus with a PCF8574."""
+
+    def __init__(self, i2c):
+        self._i2c = i2c
+
+    def writeto(self, address, levels):
+        self._i2c.writeto_mem(address, _GPIO, levels)
+
+    def readfrom_into(self, address, port):
+        """Read all pins as high if the chip has lost its settings, as a PCF8574 after power-up."""
+        self._i2c.readfrom_mem_into(address, _IOCON, port)
+        port[0] = 0 if port[0] == _SAME_REGISTER else 0xFF
 
 
 class Mcp23008(Lcd):
@@ -44,15 +61,12 @@ class Mcp23008(Lcd):
         super().__init__()
         self._rs, self._e, self._light, self._shift = 0x02, 0x04, 0x80, 1
 
-    def _wake(self, step):
+    def begin(self, i2c, address, hz, fresh):
+        self._bus = i2c
+        super().begin(_Expander(i2c), address, hz, fresh)
+
+    def _initialise(self, step):
         if step == 0:
-            self._i2c.writeto_mem(self._address, _IOCON, bytes((_SAME_REGISTER,)))
-            self._i2c.writeto_mem(self._address, _IODIR, b"\0")
-        super()._wake(step)
-
-    def _write(self, levels):
-        self._i2c.writeto_mem(self._address, _GPIO, levels)
-
-    def _kept_power(self):
-        self._i2c.readfrom_mem_into(self._address, _IOCON, self._port)
-        return self._port[0] == _SAME_REGISTER
+            self._bus.writeto_mem(self._address, _IOCON, bytes((_SAME_REGISTER,)))
+            self._bus.writeto_mem(self._address, _IODIR, b"\0")  # all pins are outputs
+        super()._initialise(step)
