@@ -45,7 +45,7 @@ REQUIRED = ("t", *ACCEL, *GYRO)
 OPTIONAL = ("speed", "lat", "lon", "temp")
 _KINDS = {  # kinds of sensors, by the words in their columns' names
     "linear": r"lin|user|withoutgravity|nograv",
-    "gravity": r"grav",
+    "gravity": r"^(?!.*(incl|with)).*grav",
     "other": r"mag|compass|orient|euler|quat|angle|roll|pitch|yaw|azimuth|^[bmqh]$|^mg?$|press|baro",
     "gyro": r"gyr|rot|omega|angular|angvel|^gy$|^as$|^[wr]$|rate$",
     "accel": r"acc|force|^ac$|^gf$|^f$|^a$",
@@ -207,12 +207,16 @@ def _scales(sheet: Sheet) -> dict[str, str]:
     found: dict[str, str] = {}
     for key, text in _SCALE.findall(sheet.head):
         scale, kind = float(text), key[0].lower()
-        if key.lower().startswith("t"):
-            found["t"] = next((name for name, size in TIMES.items() if abs(size / 1e9 - scale) < 1e-3 * scale), "")
+        if kind == "t":
+            found["t"] = _time_unit_of(scale)
         elif scale > 0.0:
             counts = scale if key.lower().endswith("1g") else 1.0 / (np.degrees(scale) if kind == "g" else scale)
             found[kind] = f"counts/{counts:.6g}"
     return found
+
+
+def _time_unit_of(seconds: float) -> str:
+    return next((name for name, size in TIMES.items() if abs(size / 1e9 - seconds) < 1e-3 * seconds), "")
 
 
 def _mean_step(numbers: Array) -> float:
@@ -245,8 +249,13 @@ def completed(sheet: Sheet) -> Sheet:
     """Complete columns that belong together: seconds and their fractions, axes that are in several rows, and the user's
     acceleration and gravity."""
     names = [plain(name) for name in sheet.columns]
+    scale = next((float(text) for key, text in _SCALE.findall(sheet.head) if key.lower() == "tscale"), 0.0)
+    if scale and not _time_unit_of(scale):
+        sheet.columns[0], sheet.cells[0] = f"{sheet.columns[0]} (s)", sheet.numbers(0) * scale
     for fraction, size in _FRACTIONS.items():
-        k = next((k for k, name in enumerate(names) if k and name.endswith(fraction)), 0)
+        k = next(
+            (k for k, name in enumerate(names) if k and name.removesuffix("s").endswith(fraction.removesuffix("s"))), 0
+        )
         if k and re.search(r"secs?$|seconds?$|stamp$|time$", names[k - 1]) and names[k - 1] != names[k]:
             whole, part = sheet.cells[k - 1], sheet.numbers(k)
             if whole.dtype.kind == "i" and np.nanmin(part) >= 0.0 and np.nanmax(part) * size < 10**9:
@@ -266,7 +275,9 @@ def completed(sheet: Sheet) -> Sheet:
     return sheet
 
 
-_FRACTIONS = {"nsecs": 1, "nsec": 1, "nanosec": 1, "nanoseconds": 1, "usecs": 1000, "usec": 1000, "microseconds": 1000}
+# The ends of names of columns with fractions of a second, and the ns of their unit
+_FRACTIONS = {"nsec": 1, "nanosec": 1, "nanosecond": 1, "usec": 1000, "microsecond": 1000, "msec": 10**6}
+_FRACTIONS |= {"millisecond": 10**6, "millis": 10**6}
 
 
 def _merge_rows(sheet: Sheet, three: _Triple) -> None:
@@ -344,6 +355,9 @@ def _split_axis(name: str) -> Iterable[tuple[str, str]]:
     sensor, colon, bare = bare.rpartition(":")
     words = re.sub(r"axis|[\W_]+", " ", bare.lower()).split()
     sensor = plain(sensor) + (":" if colon else "")
+    if len(words) == 1:  # LongAcc, accLat
+        word = next((word for word in _AXES if words[0].startswith(word) or words[0].endswith(word)), "")
+        words = [word, words[0].replace(word, "", 1)] if word and word != words[0] else words
     for k, word in enumerate(words):
         rest = " ".join(words[:k] + words[k + 1 :])
         axis = word if word in ("x", "y", "z") else _AXES.get(word, "")
@@ -540,7 +554,9 @@ def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None
     by_fit = fit.unit_among(candidates)
     if stated in RATES or counts_per(stated):
         also = f", and so do the turns of gravity: {by_fit}" if by_fit == stated else ""
-        against = f", but gravity turns as by {by_fit}" if by_fit not in ("", stated) else ""
+        size = RATES.get(stated) or 1.0 / counts_per(stated)
+        apart = by_fit and not 0.7 < candidates[by_fit] / size < 1.4
+        against = f", but gravity turns as by {by_fit}" if apart else ""
         return ColumnFinding([], stated, f"its name says so{also}{against}", not against)
     if by_fit:
         return ColumnFinding([], by_fit, "in it the rates turn gravity as it turns")
