@@ -122,6 +122,25 @@ def test_device_without_micropython_is_refused(board, monkeypatch, verb):
         assert other.closed
 
 
+@pytest.mark.parametrize(
+    ("version", "platform", "words"),
+    [
+        ((1, 22, 2, ""), "rp2", "MicroPython 1.22.2: put MicroPython 1.23 or newer on the board first"),
+        ((1, 19, 1), "esp32", "MicroPython 1.19.1: put MicroPython 1.23 or newer on the board first"),
+        ((1, 23, 0, "preview"), "rp2", None),
+        ((2, 0, 0, ""), "rp2", None),
+        ((1, 28, 0, ""), "pyboard", "Kickstand runs on a Raspberry Pi Pico and on an ESP32"),
+    ],
+)
+def test_unsupported_micropython_is_refused(version, platform, words, board, monkeypatch):
+    other = fake_board.FakeBoard(board.root, version=version, platform=platform)
+    fake_board.plug_in(monkeypatch, other)
+    if words:
+        command.refused(board.root, "flash", words=words)
+    else:
+        command.works("flash")
+
+
 @pytest.mark.parametrize("installed", [False, True])
 def test_status_needs_a_firmware_of_this_version(board, installed):
     message = "kickstand flash brings it up to date" if installed else "install it with kickstand flash"

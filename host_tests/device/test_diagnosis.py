@@ -198,6 +198,12 @@ def test_open_or_low_wire_is_named(fit, shown, words, run, status):
     assert words in status(fit=fit)[2]
 
 
+def test_open_wires_of_a_pico_2_are_named(status):
+    """A pin of an RP2350 that was high stays high against its pull-down (erratum RP2350-E9)."""
+    words = status(fit=wires(OPEN, OPEN), machine="pico 2")[2]
+    assert "SDA 4 and SCL 5 have no pull-up" in words
+
+
 @pytest.mark.parametrize("board", [{"sensor_pins": (5, 4)}, {"machine": "esp32", "sensor_pins": (22, 21)}])
 def test_exchanged_wires_are_named(board, run, status):
     assert display(run, board=board) == ("SDA and SCL are", "exchanged")
