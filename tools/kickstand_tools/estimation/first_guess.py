@@ -99,14 +99,14 @@ def in_hand(w: Windows) -> tuple[Bools, Bools]:
         surely: True where a hand certainly moves the sensor, or the bike has fallen, shape (n).
         perhaps: the same, but also True in the seconds around these windows, because the bike may not be riding there.
     """
-    there = ~w.gap
-    mean = averaged(w.force * there[:, None], MOUNTED_S)
-    off = there & (mean[:, 1] < np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(mean, axis=1))
-    places = np.flatnonzero(off)
+    valid = ~w.gap
+    mean = averaged(w.force * valid[:, None], MOUNTED_S)
+    off = valid & (mean[:, 1] < np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(mean, axis=1))
+    indices = np.flatnonzero(off)
     # If the time between two movements in a hand is short, the sensor was perhaps in the hand all this time. The same
     # holds for the time from the beginning of the log to the first movement, and from the last movement to the end.
-    if len(places):
-        ends = np.concatenate(([0], places, [len(w) - 1]))
+    if len(indices):
+        ends = np.concatenate(([0], indices, [len(w) - 1]))
         for begin, end in itertools.pairwise(ends):
             if w.edges[end + 1] - w.edges[begin] < BETWEEN_S:
                 off[begin : end + 1] = True
@@ -125,13 +125,13 @@ def lean_and_speed(w: Windows, still: Bools) -> tuple[Array, Array]:
         lean: shape (n), in rad.
         speed: shape (n), in m/s.
     """
-    known, yaw = w.known_speed, w.rate[:, 1]
+    logged, yaw = w.known_speed, w.rate[:, 1]
     force = averaged(np.linalg.norm(w.force[:, :2], axis=1), 2.0)
     steep = np.tan(np.arccos(np.clip(1.0 / np.maximum(force, 0.1), 0.3, 1.0)))
     turning = np.abs(averaged(yaw, 1.0))
-    both = averaged(steep * turning, TURNS_S) * STANDARD_GRAVITY + USUAL_RADPS**2 * USUAL_MPS
-    speed = np.clip(both / (averaged(turning**2, TURNS_S) + USUAL_RADPS**2), 3.0, 50.0)
-    speed = np.where(still, 0.0, np.where(np.isnan(known), speed, known))
+    weighted = averaged(steep * turning, TURNS_S) * STANDARD_GRAVITY + USUAL_RADPS**2 * USUAL_MPS
+    speed = np.clip(weighted / (averaged(turning**2, TURNS_S) + USUAL_RADPS**2), 3.0, 50.0)
+    speed = np.where(still, 0.0, np.where(np.isnan(logged), speed, logged))
     slow = np.arctan(-speed * yaw / STANDARD_GRAVITY)
     slow = np.where(still, np.arctan2(w.force[:, 0], w.force[:, 1]), slow)
     rolled = np.cumsum(w.rate[:, 2] * w.seconds)
@@ -165,10 +165,10 @@ def axes(w: Windows) -> Axes:
     seconds = float(np.sum(w.seconds[riding]))
     if seconds < MIN_RIDING_S:
         raise RefusedInput(RideShort(seconds, MIN_RIDING_S))
-    found = leaning_of(w.rate, w.force, riding)
-    _refuse_no_motorcycle(found, without_drift(w.force @ found.matrix[0]), riding)
-    _refuse_wrong_speed(w.known_speed[riding], found.rolled[riding], found.turned[riding])
-    return Axes(found.matrix, bias)
+    leaning = leaning_of(w.rate, w.force, riding)
+    _refuse_no_motorcycle(leaning, without_drift(w.force @ leaning.matrix[0]), riding)
+    _refuse_wrong_speed(w.known_speed[riding], leaning.rolled[riding], leaning.turned[riding])
+    return Axes(leaning.matrix, bias)
 
 
 def _bias(w: Windows) -> Array:
@@ -178,47 +178,47 @@ def _bias(w: Windows) -> Array:
     ride, because most of a ride is nearly straight.
     """
     for over_s in (STILL_S, CALM_S):
-        places = _calm(w, over_s)
-        if np.any(places):
-            return np.median(w.rate[places], axis=0)
+        calm = _calm(w, over_s)
+        if np.any(calm):
+            return np.median(w.rate[calm], axis=0)
     return np.median(averaged(w.rate, CALM_S), axis=0)
 
 
-def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: Bools) -> None:
+def _refuse_no_motorcycle(leaning: Leaning, sideways: Array, riding: Bools) -> None:
     """Raise RefusedInput if the ride is not a motorcycle's, has too little lean, or has left-handed rates.
 
     sideways: the force to the left without its slow changes, shape (n), in g.
     """
-    in_radians_mps = speed_in_radians(found)
+    in_radians_mps = speed_in_radians(leaning)
     if in_radians_mps is not None:
         raise RefusedInput(RatesInRadians(in_radians_mps))
-    rolled, turned, sideways = found.rolled[riding], found.turned[riding], sideways[riding]
+    rolled, turned, sideways = leaning.rolled[riding], leaning.turned[riding], sideways[riding]
     lean, side = float(np.sqrt(np.mean(rolled**2))), float(np.sqrt(np.mean(sideways**2)))
     pushed = abs(float(sideways @ turned)) / max(abs(float(rolled @ turned)), 1e-30)
     if pushed > MAX_PUSHED and side > CAR_G and lean < CAR_LEAN:
         raise RefusedInput(NotLeaning())
     if lean < MIN_LEAN:
         raise RefusedInput(NoBends(float(np.degrees(lean))))
-    if pushed > MAX_PUSHED or found.likeness < MIN_LIKENESS:
+    if pushed > MAX_PUSHED or leaning.likeness < MIN_LIKENESS:
         raise RefusedInput(RideContradicts())
     # A leaning bike that turns also rotates about its own left. The sign of this rotation shows the handedness.
-    if found.share < 0.0:
+    if leaning.share < 0.0:
         raise RefusedInput(LeftHanded())
 
 
-def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array) -> None:
+def _refuse_wrong_speed(logged: Array, rolled: Array, turned: Array) -> None:
     """Raise RefusedInput if the log's speed is stuck or not in m/s.
 
     The log's speed is compared with the speed at which yaw rate and lean balance in the bends.
 
-    known: the log's speed, in m/s; NaN without a speed.
+    logged: the log's speed, in m/s; NaN without a speed.
     """
-    if not len(known) or np.isnan(known[0]):
+    if not len(logged) or np.isnan(logged[0]):
         return
-    if np.ptp(known) < STUCK_MPS:
-        raise RefusedInput(SpeedStuck(float(known[0])))
-    expected = known * turned
-    both = -float(expected @ rolled) * STANDARD_GRAVITY
-    factor = float(expected @ expected) / both if both > 0.0 else 0.0
+    if np.ptp(logged) < STUCK_MPS:
+        raise RefusedInput(SpeedStuck(float(logged[0])))
+    expected = logged * turned
+    product = -float(expected @ rolled) * STANDARD_GRAVITY
+    factor = float(expected @ expected) / product if product > 0.0 else 0.0
     if not 1.0 / MAX_SPEED_FACTOR < factor < MAX_SPEED_FACTOR:
         raise RefusedInput(SpeedUnit(factor))

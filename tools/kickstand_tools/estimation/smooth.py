@@ -123,14 +123,14 @@ def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None 
     >>> from kickstand_tools.api import CalibrationFile, Log, simulate_ride
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)
     >>> calibration = CalibrationFile(vehicle_from_sensor=ride.vehicle_from_sensor, aligned=True)
-    >>> found = smooth(Log.from_readings(ride.readings, ride.rate_hz), calibration)
-    >>> float(abs(found.lean_deg - ride.truth["lean_deg"]).max()) < 10.0
+    >>> lean = smooth(Log.from_readings(ride.readings, ride.rate_hz), calibration)
+    >>> float(abs(lean.lean_deg - ride.truth["lean_deg"]).max()) < 10.0
     True
     """
     notices: list[Message] = []
     blocks = list(_checked_blocks(log, calibration, progress, notices))
     time_s = np.concatenate([block.t_s for block, _ in blocks])
-    return SmoothedRide(time_s, *np.concatenate([found for _, found in blocks]).T, notices=notices)
+    return SmoothedRide(time_s, *np.concatenate([values for _, values in blocks]).T, notices=notices)
 
 
 def smooth_to_csv(
@@ -151,11 +151,11 @@ def _checked_blocks(
 
     Raises InputError, also for under SLOWEST_HZ samples per second.
     """
-    whole, stretch = split_stretch(log)
-    for block, found in smooth_blocks(whole, calibration, progress, notices):
-        if found is None:
+    source, stretch = split_stretch(log)
+    for block, values in smooth_blocks(source, calibration, progress, notices):
+        if values is None:
             raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples per second: too few to smooth the lean")
-        yield from within(stretch, block, found)
+        yield from within(stretch, block, values)
 
 
 def smooth_blocks(
@@ -182,8 +182,8 @@ def smooth_blocks(
     for segment in _segments(read_blocks(log, 2, progress, notices, lines=lines, calibration=calibration)):
         waiting.append(segment)
         if len(waiting) > TOGETHER:
-            past, waiting, before = waiting[:TOGETHER], waiting[TOGETHER:], past[-1:]
-            yield from smoother.together(before, past, waiting)
+            past, waiting, previous = waiting[:TOGETHER], waiting[TOGETHER:], past[-1:]
+            yield from smoother.together(previous, past, waiting)
     # The rest of a ride may be short, so up to TOGETHER earlier segments are estimated with it.
     yield from smoother.together(past[-max(1, TOGETHER - len(waiting)) :], waiting, [])
     if notices is not None:
@@ -208,26 +208,26 @@ class Smoother:
         self._doubtful_s = self._riding_s = self._leaned = self._odd = 0.0
 
     def together(
-        self, before: list[Block], own: list[Block], after: list[Block]
+        self, previous: list[Block], batch: list[Block], following: list[Block]
     ) -> Iterator[tuple[Block, Array | None]]:
-        """Yield the segments `own` with their values.
+        """Yield the segments `batch` with their values.
 
         The segments before and after them are used in the same estimate, but are not returned.
         """
-        measured = [segment.measured for segment in (*before, *own, *after)]
+        measured = [segment.measured for segment in (*previous, *batch, *following)]
         ends = np.cumsum([0, *(len(segment.time_us) for segment in measured)])
-        first = int(ends[len(before)])
-        values = self.estimated(measured, slice(first, int(ends[len(before) + len(own)])))
-        for segment in own:
+        first = int(ends[len(previous)])
+        values = self.estimated(measured, slice(first, int(ends[len(previous) + len(batch)])))
+        for segment in batch:
             if values is None:
                 yield segment, None
                 continue
-            found = np.full((len(segment.time_us), len(COLUMNS)), np.nan)
-            there = ~segment.frozen
-            count = int(np.count_nonzero(there))
-            found[there] = values[first : first + count]
+            rows = np.full((len(segment.time_us), len(COLUMNS)), np.nan)
+            valid = ~segment.frozen
+            count = int(np.count_nonzero(valid))
+            rows[valid] = values[first : first + count]
             first += count
-            yield segment, found
+            yield segment, rows
 
     def estimated(self, segments: list[Block], own: slice) -> Array | None:
         """Estimate the values of the samples in these segments.
@@ -239,15 +239,15 @@ class Smoother:
         t_s = np.concatenate([segment.t_s for segment in segments])
         readings = np.concatenate([segment.readings for segment in segments])
         speed = np.concatenate([segment.speed_mps for segment in segments])
-        nothing = np.full((len(t_s), len(COLUMNS)), np.nan)
+        unknown = np.full((len(t_s), len(COLUMNS)), np.nan)
         if len(t_s) < 2:
-            return nothing
+            return unknown
         if float(np.median(np.diff(t_s))) * SLOWEST_HZ > 1.0:
             return None
-        there, warm = ~np.isnan(readings[:, 3]), np.zeros(len(t_s))
-        if np.any(there):
-            self._start_c = readings[there, 3][0] if np.isnan(self._start_c) else self._start_c
-            warm = np.interp(t_s, t_s[there], readings[there, 3]) - self._start_c
+        measured, warm = ~np.isnan(readings[:, 3]), np.zeros(len(t_s))
+        if np.any(measured):
+            self._start_c = readings[measured, 3][0] if np.isnan(self._start_c) else self._start_c
+            warm = np.interp(t_s, t_s[measured], readings[measured, 3]) - self._start_c
         force, rate = self._calibration.in_vehicle(readings)
         rate = np.radians(rate)
         windows = windows_of(t_s, force, rate, speed, warm, aligned=True)
@@ -255,18 +255,18 @@ class Smoother:
             prior = Prior.of_pose(self._calibration.six_done, self._calibration.gyro_sigma_in_vehicle())
             estimate = Estimate(windows, prior, ALL)
         except np.linalg.LinAlgError:
-            return nothing  # the readings are not from riding
+            return unknown  # the readings are not from riding
         noise, mine = estimate.noise, np.unique(windows.number[own])
         roll = float(np.mean(estimate.parameters[:, ROLL]))
         self.add(windows.seconds[mine], noise.riding[mine], noise.doubtful[mine], roll)
         doubtful = noise.doubtful[windows.number].astype(float)
-        found = np.column_stack((at_samples(windows, rate, estimate, self._calibration.delay_s()), doubtful))
-        found[:, :3] = np.degrees(found[:, :3])
+        columns = np.column_stack((at_samples(windows, rate, estimate, self._calibration.delay_s()), doubtful))
+        columns[:, :3] = np.degrees(columns[:, :3])
         odd = oddness(estimate)
         if odd > ODD_SIGMAS:
             self._odd = max(self._odd, odd)
-            found[:, 1] *= odd
-        return found
+            columns[:, 1] *= odd
+        return columns
 
     def add(self, seconds: Array, riding: Bools, doubtful: Bools, pose_rad: float) -> None:
         """Count n windows for the remarks.
@@ -282,30 +282,30 @@ class Smoother:
         self._doubtful_s += float(np.sum(seconds[riding & doubtful]))
         self._leaned += riding_s * float(np.degrees(pose_rad))
 
-    def remarks(self, known: Iterable[Message]) -> list[Message]:
-        """Return the remarks about the whole ride. known: earlier remarks about the log."""
-        if not self._riding_s or is_explained(known):
+    def remarks(self, earlier: Iterable[Message]) -> list[Message]:
+        """Return the remarks about the whole ride. earlier: remarks about the log."""
+        if not self._riding_s or is_explained(earlier):
             return []
         if self._odd:
             return [SensorOdd(self._odd)]
         share, pose_deg = self._doubtful_s / self._riding_s, self._leaned / self._riding_s
-        found: list[Message] = [NotTheBikes(100.0 * share)] if share > DOUBTFUL else []
-        return [*found, PoseOff(pose_deg)] if abs(pose_deg) > POSE_DEG else found
+        messages: list[Message] = [NotTheBikes(100.0 * share)] if share > DOUBTFUL else []
+        return [*messages, PoseOff(pose_deg)] if abs(pose_deg) > POSE_DEG else messages
 
 
-def oddness(found: Estimate) -> float:
+def oddness(estimate: Estimate) -> float:
     """Return the gyro's largest error of scale or axes, in standard deviations of its prior."""
-    return float(np.max(np.abs(found.parameters - found.prior.mean)[:, GYRO] / found.prior.sigma[GYRO]))
+    return float(np.max(np.abs(estimate.parameters - estimate.prior.mean)[:, GYRO] / estimate.prior.sigma[GYRO]))
 
 
-def at_samples(windows: Windows, rate: Array, found: Estimate, delay_s: float) -> Array:
+def at_samples(windows: Windows, rate: Array, estimate: Estimate, delay_s: float) -> Array:
     """Interpolate the estimate at each sample. Between the edges of the windows, the lean follows the corrected gyro.
 
     rate: the rates that were passed to windows_of(), shape (samples, 3), in rad/s.
     delay_s: delay of the gyro's low-pass filter.
     Returns four columns, shape (samples, 4): lean, its standard deviation and pitch in rad, and speed in m/s.
     """
-    number, sigma = windows.number, found.sigma()[:, LEAN]
+    number, sigma = windows.number, estimate.sigma()[:, LEAN]
     duration = windows.before + windows.after
     last = np.append(np.diff(number) > 0, True)  # True for the last sample of each window
     window = np.cumsum(last) - last
@@ -321,14 +321,14 @@ def at_samples(windows: Windows, rate: Array, found: Estimate, delay_s: float) -
 
     since, seconds = integral(np.ones(len(number)))
     share = since / seconds
-    before, after = found.states[number], found.states[number + 1]
-    lean, pitch, speed = (before + share[:, None] * (after - before))[:, [LEAN, PITCH, FORWARD]].T
-    wx, wy, wz = corrected_rates(rate.T, found.unknowns(number, 0.5 * (before + after)), windows.warm[number])
+    begin, end = estimate.states[number], estimate.states[number + 1]
+    lean, pitch, speed = (begin + share[:, None] * (end - begin))[:, [LEAN, PITCH, FORWARD]].T
+    wx, wy, wz = corrected_rates(rate.T, estimate.unknowns(number, 0.5 * (begin + end)), windows.warm[number])
     roll_rate = wz - np.tan(pitch) * (wx * np.sin(lean) + wy * np.cos(lean))
-    rolled, whole = integral(roll_rate)
-    lean = before[:, LEAN] + rolled + share * ((after - before)[:, LEAN] - whole)
+    rolled, window_roll = integral(roll_rate)
+    lean = begin[:, LEAN] + rolled + share * ((end - begin)[:, LEAN] - window_roll)
     spread = sigma[number] + share * (sigma[number + 1] - sigma[number])
     jolt = 2.0 * np.sqrt(np.clip(share * (1.0 - share), 0.0, 1.0)) * jolted(windows)[number]
-    for more in (TIMING_S * roll_rate, LEANED_SHARE * lean, jolt):
-        spread = np.hypot(spread, more)
+    for part in (TIMING_S * roll_rate, LEANED_SHARE * lean, jolt):
+        spread = np.hypot(spread, part)
     return np.column_stack((lean + delay_s * roll_rate, spread, pitch, speed))
