@@ -210,34 +210,33 @@ def test_a_silent_source_is_not_a_stuck_one():
     assert alignment.REFUSED not in result["states"] and result["ready"], result
 
 
-def test_nothing_is_joined_across_missing_samples():
-    """Samples are missing for 1.5 s in every 25 s, and the vehicle is still aligned."""
-    car, source, gap_us = alignment.DriveAlignment("car"), driving_runs.SpeedSource(), 0
-    for k, (force, rate, speed) in enumerate(driving_runs.samples(around(8))):
+def fed(vehicle, brakings, lost=range(0)):
+    """Pass a drive to an alignment whose sensor is mounted as PLAIN. lost: samples that are missing in each 25 s."""
+    source, gap_us = driving_runs.SpeedSource(), 0
+    for k, (force, rate, speed) in enumerate(driving_runs.samples(around(brakings), "motorcycle")):
         value = source.step_to(speed)
-        if 100 < k % 2500 < 250:
+        if k % 2500 in lost:
             gap_us += 10_000
             continue
-        car.update(force, rate, 10_000 + gap_us)
+        vehicle.update(force, rate, 10_000 + gap_us)
         gap_us = 0
         if value is not None:
-            car.measure_speed(value)
-    assert car.ready
-    forward = car.quality.fit.forward
+            vehicle.measure_speed(value)
+    vehicle.finish()
+    return vehicle
+
+
+def test_nothing_is_joined_across_missing_samples():
+    """Samples are missing for 1.5 s in every 25 s, and the vehicle is still aligned."""
+    bike = fed(alignment.DriveAlignment("motorcycle", PLAIN[3:6], [0.0] * 3), 8, range(101, 250))
+    assert bike.ready
+    forward = bike.quality.fit.forward
     assert np.degrees(np.arctan2(forward[0], forward[2])) == pytest.approx(0.0, abs=0.3)
 
 
 @functools.cache
 def straight_drive(brakings):
-    """Return the DriveAlignment of a motorcycle that has driven this number of braking events, mounted as PLAIN."""
-    bike, source = alignment.DriveAlignment("motorcycle", PLAIN[3:6], [0.0] * 3), driving_runs.SpeedSource()
-    for force, rate, speed in driving_runs.samples(around(brakings), "motorcycle"):
-        bike.update(force, rate, 10_000)
-        value = source.step_to(speed)
-        if value is not None:
-            bike.measure_speed(value)
-    bike.finish()
-    return bike
+    return fed(alignment.DriveAlignment("motorcycle", PLAIN[3:6], [0.0] * 3), brakings)
 
 
 @pytest.mark.parametrize(
