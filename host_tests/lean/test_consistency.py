@@ -4,7 +4,6 @@ MicroPython."""
 from math import radians
 
 from bike_motion import DT_US, force_and_rate, meter, near, ride, roll, speed_up
-from kickstand.calibration.parameters import Calibration
 from kickstand.lean import consistency
 from kickstand.lean.consistency import HOLDS_S, Consistency
 
@@ -61,13 +60,6 @@ def test_each_kind_of_misfit_is_found_in_its_time():
         assert not windows(judge, 2.0, pitch=radians(-8.0), push=-0.8)
 
 
-def test_an_accelerometer_of_six_positions_has_the_narrow_limits():
-    for six_done in (True, False):
-        calibration = Calibration()
-        calibration.six_done = six_done
-        assert bool(windows(meter(calibration).filter.consistency, 30.0, up=0.55)) == six_done
-
-
 def test_a_lean_is_believed_again_when_it_has_fitted_for_a_while():
     judge = doubted()
     windows(judge, HOLDS_S[0] - WINDOW_S)
@@ -116,20 +108,6 @@ def test_repeated_misfits_are_reported():
     assert judge.doubt  # in the end only turns show that it fits again
     windows(judge, HOLDS_S[3] + 1.0, yaw_rate=0.1)
     assert not judge.doubt and judge.odd is None
-
-
-def test_after_a_gap_it_must_fit_or_rest_first():
-    for seconds, doubt in ((4.2, True), (4.8, False)):
-        judge = Consistency()
-        judge.gap()
-        windows(judge, seconds)
-        assert judge.doubt == doubt
-    judge.gap()
-    judge.rest(WINDOW_S)
-    assert not judge.doubt
-    judge.gap(False)
-    judge.rest(60.0)
-    assert judge.doubt
 
 
 def weave(shown, seconds, bias_dps=0.0, gain=1.0, then=lambda lean_deg: None):
