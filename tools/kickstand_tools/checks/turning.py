@@ -13,6 +13,7 @@ direction, plus a little across it for a phone in a hand. The method of least sq
 and the gyro's bias, with a prior for V and the bias. The residual shows how well the rates fit the forces.
 """
 
+import itertools
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -24,6 +25,7 @@ from ..signals import Array, Bools, Ints, cross_matrix, rotation_matrix, stretch
 WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # short windows are used if the log has no long window without a gap
 MOST_WINDOWS = 10  # number of windows that are fitted: the windows with the largest rates
 
+FAR_DPS = 10.0 * np.array(list(itertools.product((1.0, -1.0), repeat=3)))  # guesses of a large bias
 MERGED_S = 0.2  # cells are merged to this length
 KNOT_S = 2.5  # time between the knots of the velocity
 EVENED_S = 1.0  # time over which the rotated forces are averaged, to remove vibration
@@ -82,7 +84,7 @@ def bias_dps(force: Array, rate: Array, known: Bools, cell_s: float) -> Array | 
     if found is None:
         return None
     turning, guesses = found
-    return min((turning.fit(np.eye(3), guess) for guess in guesses), key=lambda fit: fit.cost).bias
+    return min((turning.fit(np.eye(3), guess) for guess in [*guesses, *FAR_DPS]), key=lambda fit: fit.cost).bias
 
 
 def windows(known: Bools, length: int) -> Ints:

@@ -169,8 +169,8 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
     misfit = next((notice for notice in log.notices if isinstance(notice, (LeftHanded, RatesMisfit, AxesMisfit))), None)
     if misfit:
         raise RefusedInput(misfit, log.name)
-    step_s = float(log.t_s[-1]) / (len(log.t_s) - 1)
-    if step_s * SLOWEST_HZ > 1.0:
+    step_s = min(float(log.t_s[-1]) / (len(log.t_s) - 1), float(np.median(np.diff(log.t_s))))  # without the gaps
+    if step_s * SLOWEST_HZ > 1.002:
         raise InputError(f"{log.name}: a sample every {step_s:.2f} s: at least {SLOWEST_HZ:.0f} per second are needed")
     try:
         windows = mounted_windows(log)
