@@ -25,6 +25,7 @@ def picture():
                     self.digits[x, y] = digit
                     return
             self.calls.append(("scale", x, y))
+            self.scale = glyph
 
         def __getattr__(self, name):
             return lambda *arguments: self.calls.append((name, *arguments))
@@ -67,6 +68,11 @@ def test_a_lean_is_drawn_as_number_arc_and_side(picture, lean_deg, digits, colum
     back is 29 pixels high."""
     canvas = picture("lean", recording=True, lean_deg=lean_deg)
     assert canvas.calls[0] == ("scale", 0, 0) and canvas.digits == digits
+    edges = {0: 2, 15: 3, 30: 7, 60: 22}  # the scale is one row, and seven rows at every 30 degrees
+    for x, row in edges.items():
+        for column in (64 + x, 64 - x):
+            lit = [y for y in range(32) if canvas.scale.pixel(column, y)]
+            assert lit == list(range(row, row + (7 if x % 30 == 0 else 1)))
     lines = [call for call in canvas.calls if call[0] == "vline"]
     assert [line[1] for line in lines[: len(columns)]] == list(columns) and lines[0][2:] == (2, 7, 1)
     assert len(columns) < 61 or lines[60][2] == 22
