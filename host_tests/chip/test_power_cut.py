@@ -10,9 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from kickstand.calibration.store import Store
-from kickstand.rides.block import BLOCK
-from kickstand.rides.flash_ring import PART_BLOCKS
-from kickstand.rides.ride_paths import part_path
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.rides import block_reader, ride_log
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, wait
@@ -192,20 +189,6 @@ def test_board_records_again_after_a_power_cut(at_prompt, operation):
     assert len([*rides(at_prompt.files()).values()][-1]) >= 2
 
 
-@pytest.mark.esp32
-@pytest.mark.long
-def test_a_ride_removes_only_the_oldest_parts_that_it_needs():
-    parts = [part_path("rides", ride, number) for ride in (1, 2) for number in range(11)]
-    full_flash = dict.fromkeys(parts, bytes(PART_BLOCKS * BLOCK))
-    with esp32(leaning(20.0), modules("esp32") | calibrated() | full_flash) as device:
-        device.exec(f"{_FEED}{_START}feed({SAMPLES})\nrecorder.stop()", 30.0)
-        files = device.files()
-    removed = [path for path in parts if path not in files]
-    assert 0 < len(removed) < 11 and removed == parts[: len(removed)]
-    assert files.items() >= calibrated().items()
-    assert len(rides({"rides/3": files[part_path("rides", 3, 0)]})[3]) >= 2
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_pull_and_record_through_mpremote(tmp_path, monkeypatch, chip):
@@ -245,6 +228,29 @@ def test_pull_and_record_through_mpremote(tmp_path, monkeypatch, chip):
         command.works("replay", path, "--calibration", calibration, "--out", tmp_path / "lean.csv")
 
 
+_LONG_RIDE = """
+import gc
+chip, sums = Chip(), [0] * 7
+recorder.start(chip, Calibration())
+for _ in range(4):
+    recorder.add(sums, 2, 500_000_000)
+gc.collect()
+free = gc.mem_free()
+for _ in range(20):
+    recorder.add(sums, 2, 10000)
+print(free - gc.mem_free(), recorder.seconds())
+"""
+
+
+@pytest.mark.long
+def test_recording_takes_no_heap_after_18_minutes(at_prompt):
+    """Integers of over 30 bits would take 16 bytes of heap in each pass of the loop."""
+    at_prompt.exec("import gc\ngc.disable()")
+    heap, seconds = map(int, at_prompt.exec(_FEED + _LONG_RIDE, 20.0).split())
+    assert seconds == 2000
+    assert heap < 200
+
+
 # Run the unchanged app with recording for 6 s, and note the lean that each pass of its loop has for user.py.
 _USER = b"""
 leans = []
@@ -270,7 +276,7 @@ def test_recording_loses_no_sample_and_marks_the_display(at_prompt):
         at_prompt.run(0.1)
         texts.add(at_prompt.lcd()[0])
     assert samples.lost() == 0
-    assert len(texts) > 10
+    assert len(texts) > 4
     assert all(text.endswith("*") for text in texts if "°" in text)
     leans = ast.literal_eval(at_prompt.exec("import user\nprint(user.leans)", 20.0))
     assert max(leans) - min(leans) > 10

@@ -8,7 +8,7 @@ from kickstand_tools.common.errors import InputError
 from kickstand_tools.deploy import check
 from kickstand_tools.simulated_board.i2c import OPEN
 from kickstand_tools.simulated_board.mpu6050 import FIFO_COUNTH, FIFO_COUNTL, PWR_MGMT_1, Fifo
-from kickstand_tools.simulated_board.other_devices import Ds3231, Registers
+from kickstand_tools.simulated_board.other_devices import Registers
 from support import command
 from support.checked_board import CheckedBoard, part
 
@@ -107,15 +107,11 @@ def faulty(name, *events):
 
 DEFECTS = {
     "gyro x dead": ("noise, gyro x", changed(3, lambda value, t_s: 0.5), None),
-    "accelerometer z dead": ("noise, accelerometer z", changed(2, lambda value, t_s: 0.75), None),
     "gyro y noisy": ("noise, gyro y", changed(4, noise(1.0)), None),
-    "accelerometer x noisy": ("noise, accelerometer x", changed(0, noise(0.1)), None),
-    "gyro x biased": ("bias, gyro x", changed(3, lambda value, t_s: value + 27), None),
     "gyro z biased": ("bias, gyro z", changed(5, lambda value, t_s: value + 45), None),
     "accelerometer off": ("bias, accelerometer", changed(2, lambda value, t_s: value + 0.6), None),
     "hot": ("temperature", lambda t_s: (*REST(t_s)[:6], 95.0), None),
     "self-test of gyro y": ("self-test, gyro y", REST, model(self_test=[1, 1, 1, 1, 0.7, 1])),
-    "self-test of accel x": ("self-test, accelerometer x", REST, model(self_test=[1.3, 1, 1, 1, 1, 1])),
     "sample clock": ("sample clock", REST, model(clock_error=0.05)),
     "FIFO stays empty": ("FIFO", REST, model(_queue=lambda: None)),
     "FIFO stays full": ("FIFO", REST, answered(lambda at, value, n: {FIFO_COUNTH: 4, FIFO_COUNTL: 0}.get(at, value))),
@@ -125,7 +121,6 @@ DEFECTS = {
     "standby": ("sensor", REST, answered(lambda at, value, n: 0x07 if at == PWR_MGMT_2 else value)),
     "asleep": ("sensor", REST, answered(lambda at, value, n: value | 0x40 if at == PWR_MGMT_1 else value)),
     "no sensor": ("sensor", REST, lambda board: board.remove_sensor()),
-    "a clock instead": ("sensor", REST, replaced_by(lambda board: Ds3231(board.clock))),
     "another chip": ("sensor", REST, replaced_by(lambda board: Registers(0x68, {WHO_AM_I: 0x47}))),
     "an open wire": ("sensor", REST, lambda board: setattr(board.sensor_bus, "sda_wire", OPEN)),
     "drop-outs": ("sensor while running", REST, faulty("nack_for", *((0x68, 3 + k, 0.06) for k in range(60)))),

@@ -4,6 +4,7 @@ import errno
 import functools
 import re
 import sys
+from typing import Any
 
 import pytest
 from kickstand_tools.common import errors, firmware_path
@@ -111,6 +112,7 @@ def test_fault_while_copying_leaves_no_main(board, fault, message):
 
 @pytest.mark.parametrize("verb", ["flash", "status", "check"])
 def test_device_without_micropython_is_refused(board, monkeypatch, verb):
+    fitted: dict[str, Any]
     for fitted, message in (
         ({"python": "circuitpython"}, "runs circuitpython: put MicroPython on the board"),
         ({"answers": False}, "no MicroPython answers on /dev/ttyACM0"),
@@ -118,6 +120,25 @@ def test_device_without_micropython_is_refused(board, monkeypatch, verb):
         other = fake_board.plug_in(monkeypatch, fake_board.FakeBoard(board.root, **fitted))
         command.refused(board.root, verb, words=message)
         assert other.closed
+
+
+@pytest.mark.parametrize(
+    ("version", "platform", "words"),
+    [
+        ((1, 22, 2, ""), "rp2", "MicroPython 1.22.2: put MicroPython 1.23 or newer on the board first"),
+        ((1, 19, 1), "esp32", "MicroPython 1.19.1: put MicroPython 1.23 or newer on the board first"),
+        ((1, 23, 0, "preview"), "rp2", None),
+        ((2, 0, 0, ""), "rp2", None),
+        ((1, 28, 0, ""), "pyboard", "Kickstand runs on a Raspberry Pi Pico and on an ESP32"),
+    ],
+)
+def test_unsupported_micropython_is_refused(version, platform, words, board, monkeypatch):
+    other = fake_board.FakeBoard(board.root, version=version, platform=platform)
+    fake_board.plug_in(monkeypatch, other)
+    if words:
+        command.refused(board.root, "flash", words=words)
+    else:
+        command.works("flash")
 
 
 @pytest.mark.parametrize("installed", [False, True])

@@ -153,29 +153,3 @@ def test_device_works_on_an_esp32(tmp_path):
     assert record.at(3.6)[0].startswith("Raw   25°")
     assert record.at(4.4) == [" " * 16] * 2
     assert record.at(5.5)[0].startswith("Raw   25°")
-
-
-_SD_SPI = """
-from kickstand_tools.simulated_board.simulator import Board
-Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=MACHINE).install()
-from kickstand.errors import SettingsError
-from kickstand.settings import Settings
-accepted = []
-for number in range(5):
-    class Config:
-        SD_SPI, SD_SCK, SD_MOSI, SD_MISO, SD_CS = number, 12, 13, 14, 27
-    try:
-        accepted.append(Settings(Config).SD_SPI)
-    except SettingsError as error:
-        assert error.values[0] == "SD_SPI"
-print(accepted)
-"""
-
-
-@pytest.mark.parametrize(("machine", "accepted"), [("pico", [0, 1]), ("esp32", [2, 3])])
-def test_sd_card_is_on_an_spi_of_the_port(machine, accepted):
-    """On an ESP32 the number of the SPI selects a slot of machine.SDCard. Slots 0 and 1 belong to the chip's SDMMC
-    host, so they are not SPI."""
-    script = _SD_SPI.replace("MACHINE", repr(machine))
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
-    assert (done.stdout.strip(), done.stderr) == (str(accepted), "")

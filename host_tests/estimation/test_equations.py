@@ -88,13 +88,6 @@ def test_dive_and_delay_of_the_speed_follow_the_braking():
     assert residuals([0.0] * 3, force, {FORWARD: -2.0})[eq.BACKWARD] == pytest.approx(-2.0)
 
 
-def test_a_standing_bike_has_the_measured_rates_and_velocity():
-    states = {LEFT: 0.1, UP: 0.2, FORWARD: 0.3}
-    measured = residuals([0.01, 0.02, 0.03], [0.0, 1.0, 0.0], states)
-    assert measured[eq.RESTING] == pytest.approx([0.1, 0.2, 0.3])
-    assert measured[eq.RESTING_RATE] == pytest.approx([0.01, 0.02, 0.03])
-
-
 def test_a_warmer_sensor_has_other_offsets():
     left, forward = of.OFFSET_PER_C.start, of.OFFSET_PER_C.stop - 1
     errors = {left: 0.001, forward: 0.002, of.BIAS_PER_C.stop - 1: 0.01}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from kickstand_tools.estimation import equations as eq, unknowns as of
-from kickstand_tools.estimation.noise import Noise, jolted
+from kickstand_tools.estimation.noise import Noise
 from window_input import windows
 
 MOTION = [of.LEFT, of.UP, of.FORWARD]
@@ -70,18 +70,6 @@ def test_noise_of_special_windows(row, fields, sigma):
     assert noise_of(windows(**fields)).sigma()[5, row] == pytest.approx(sigma)
 
 
-def test_a_jolt_begins_at_150_degrees_per_second():
-    assert jolted(windows(2, jolt=np.radians([149.0, 250.0]))) == pytest.approx([0.0, 6.0 * DEG])
-
-
-def test_factors_of_the_noise():
-    noise, plain = noise_of(windows()), noise_of(windows()).sigma()[5]
-    noise.roughness, noise.misfit, noise.unbalance = np.full(20, 2.0), np.full(20, 3.0), 0.5
-    row = noise.sigma()[5] / np.where(np.isinf(plain), 1.0, plain)
-    measured = [eq.SLIDING, eq.CLIMBING, eq.SLOPING, eq.BALANCED]
-    assert row[[of.LEAN, of.PITCH, *MOTION, *measured]] == pytest.approx([2, 2, 6, 6, 6, 2, 2, 1, 0.5])
-
-
 def test_a_hand_makes_its_own_time_uncertain():
     """The sensor is on its side in 300 of 1500 windows, surely in a hand in the middle, perhaps around them."""
     force = np.tile([0.0, 1.0, 0.0], (1500, 1))
@@ -102,27 +90,6 @@ def test_outliers_weigh_less():
     assert robust[of.BIAS] == pytest.approx(np.ones(3))
     assert robust[eq.MEASURED_SPEED] == pytest.approx(np.hypot(1.0, 2.0))
     assert robust[eq.SLIDING] == pytest.approx(np.hypot(1.0, 4.0 * np.sqrt(5.0) / 2.0))
-
-
-@pytest.mark.parametrize(
-    ("factor", "misfit", "still", "roughness"),
-    [
-        (1.0, 1.0, False, 1.0),
-        (0.5, 1.0, False, 0.5),
-        (0.01, 1.0, False, 0.1),
-        (9.0, 1.0, False, 4.0),
-        (0.01, 3.0, False, 0.42),
-        (0.5, 1.0, True, 1.0),
-    ],
-)
-def test_roughness_follows_the_residuals(factor, misfit, still, roughness):
-    """In a rough ride, the residuals have the rms 0.38 (process) and 0.5 (measurements)."""
-    residual = np.zeros((400, eq.ROWS))
-    residual[:, [of.LEAN, of.PITCH, *MOTION]], residual[:, [eq.SLIDING, eq.CLIMBING]] = 0.38 * factor, 0.5 * factor
-    noise = noise_of(windows(400), still=still)
-    noise.misfit = np.full(400, misfit)
-    noise.estimate_roughness(residual)
-    assert noise.roughness[200] == pytest.approx(roughness)
 
 
 def test_unbalance_follows_the_force_to_the_side():
@@ -162,19 +129,3 @@ def test_misfit_is_the_square_of_a_lasting_climb():
     assert misfit_of(swinging).misfit[300] == 1.0
     rest = misfit_of(0.25, still=True)
     assert rest.misfit[300] == 1.0 and not rest.doubtful.any()
-
-
-def test_own_misfit_has_the_unit_of_25_metres_per_second():
-    ratio = climb(20.0) / climb(25.0)
-    for noise, size in ((misfit_of(0.15), 0.15), (misfit_of(0.3, pitch=10.0 * DEG), 0.15)):
-        assert noise.misfit[300] == pytest.approx(lasting(size))
-        noise.count_own_misfit()
-        assert noise.misfit[300] == pytest.approx(lasting(size * ratio))
-
-
-def test_a_huge_brief_climb_is_no_lasting_misfit():
-    brief = np.zeros(600)
-    brief[300:310] = 1e6
-    assert misfit_of(brief).misfit[300] < 2.0
-    brief[200:400:20] = 1e6
-    assert 1.0 < misfit_of(brief).misfit[300] < 6.0

@@ -9,17 +9,6 @@ from kickstand_tools.estimation.unknowns import Prior
 
 PRIOR = Prior.of_pose(six_done=True)
 PLACE = {int(index): k for k, index in enumerate(PRIOR.unknown)}  # the place of each estimated parameter
-BIKE = [of.HEIGHT, of.AHEAD, of.TYRES, of.DELAY, of.DIVE]
-
-
-def test_six_positions_make_the_accelerometer_certain():
-    unmeasured = Prior.of_pose(six_done=False)
-    assert PRIOR.sigma[[*range(21, 24), of.UP_SCALE]].tolist() == [0.001, 0.003, 0.003, 0.004]
-    assert unmeasured.sigma[[*range(21, 24), of.UP_SCALE]].tolist() == [0.04, 0.04, 0.04, 0.015]
-    assert np.degrees(PRIOR.sigma[of.ROTATION]) == pytest.approx([1.5, 5.0, 2.0])
-    assert PRIOR.mean[BIKE].tolist() == [0.5, 0.6, 0.07, 0.4, 0.026]
-    assert PRIOR.sigma[BIKE].tolist() == [0.3, 0.5, 0.06, 0.4, 0.035]
-    assert of.ACCEL.start not in PRIOR.unknown and of.UP_SCALE in PRIOR.unknown
 
 
 def test_a_measured_gyro_is_not_estimated_again():

@@ -1,4 +1,4 @@
-"""The smoothed lean is compared with the truth of two simulators. The rides have 50 samples per second."""
+"""The smoothed lean is compared with the truth of two simulators."""
 
 import functools
 from dataclasses import replace
@@ -10,7 +10,7 @@ from kickstand_tools.checks.bends import LeftHanded
 from kickstand_tools.common.messages import sentence
 from kickstand_tools.estimation.hypotheses import ALL
 from kickstand_tools.estimation.least_squares import Estimate
-from kickstand_tools.estimation.smooth import Smoother
+from kickstand_tools.estimation.smooth import PoseOff, Smoother
 from kickstand_tools.estimation.unknowns import DIVE, Prior
 from kickstand_tools.estimation.windows import windows_of
 from kickstand_tools.signals import rotation_matrix
@@ -31,13 +31,15 @@ RIDES = {
     "sweeper": lambda: simulated("sweeper", 304, 200.0),
     "creep": lambda: simulated("creep", 10, 150.0),
 }
-DEFAULT = "street", "turn after turn", "wheelie"
+# Largest rms errors of the default rides in degrees. The standard deviation fits them within a factor of 1.5.
+DEFAULT = {"street": 0.26, "turn after turn": 0.40, "wheelie": 0.15}
 
 
 @functools.cache
 def ride_of(name):
+    """Return a ride, which has 50 samples per second in the default tests and otherwise 200."""
     ride = RIDES[name]()
-    return ride.part(np.arange(len(ride.log.t_s)) % 4 == 0)
+    return ride.part(np.arange(len(ride.log.t_s)) % 4 == 0) if name in DEFAULT else ride
 
 
 @functools.cache
@@ -60,16 +62,18 @@ def error(ride, log=None, calibration=None):
 )
 def test_smoothed_lean_beats_the_display_and_knows_its_error(name):
     """The whole ride is compared, including the first turns. The limits are for one short ride. Over many rides, at
-    least 0.58 of the errors are below one standard deviation."""
+    least 0.58 of the errors are below one standard deviation. In "creep" the mount yields slowly by 2 to 5 degrees."""
     ride, lean = ride_of(name), smoothed(name)
     off, sigma = (lean.lean_deg - ride.lean_deg)[ride.riding], lean.lean_sigma_deg[ride.riding]
     live = (ride.live() - ride.lean_deg)[ride.riding]
     assert rms(off) < (0.85 if name == "creep" else 0.65) * rms(live[~np.isnan(live)])
     assert np.max(np.abs(off)) < 2.5
-    assert np.mean(np.abs(off) < sigma) > 0.35
+    assert np.mean(np.abs(off) < 2.0 * sigma) > (0.5 if name == "warming up" else 0.65)
     assert np.mean(np.abs(off) < 3.0 * sigma) > 0.95
     assert 0.4 * rms(off) < np.mean(lean.lean_sigma_deg) < 1.3
-    assert not np.any(lean.doubtful) and codes(lean) == []
+    if name in DEFAULT:
+        assert rms(off) < DEFAULT[name] and 1.0 < np.mean(sigma) / rms(off) < 1.5
+    assert not np.any(lean.doubtful) and codes(lean) == (["pose-off"] if name == "creep" else [])
 
 
 def test_speed_follows_the_ride_with_and_without_a_logged_one():
@@ -81,15 +85,6 @@ def test_speed_follows_the_ride_with_and_without_a_logged_one():
     riding = np.cumsum(speed > 0.5) > 0
     assert rms((smooth(log, calibration).speed_mps - speed)[riding]) < 0.4
     assert rms((unlogged - speed)[riding]) < 1.0
-
-
-@pytest.mark.long
-def test_wind_and_a_yielding_mount_make_the_lean_less_sure():
-    """A side wind that changes its direction has the same effect as a wrong upright pose."""
-    windy, yielding, calm = (
-        np.mean(smoothed(name).lean_sigma_deg[-2_500:]) for name in ("crosswind", "creep", "street")
-    )
-    assert windy > 2.0 * calm and yielding > 1.5 * calm
 
 
 @pytest.mark.parametrize("mount", ["foreign", "firm"])
@@ -149,11 +144,12 @@ def test_pose_that_was_not_upright_is_reported(wrong_deg):
     ride = ride_of("street")
     turned = rotation_matrix(np.radians([0.0, 0.0, -wrong_deg])) @ ride.calibration.vehicle_from_sensor
     lean = smooth(ride.log, replace(ride.calibration, vehicle_from_sensor=turned))
-    assert codes(lean) == ["pose-off"]
-    angle_deg = lean.notices[0].angle_deg
+    (notice,) = lean.notices
+    assert isinstance(notice, PoseOff)
+    angle_deg = notice.angle_deg
     assert abs(angle_deg - wrong_deg) < 2.1
     side = "right" if wrong_deg > 0.0 else "left"
-    assert f"in balance {abs(angle_deg):.1f} degrees to the {side}" in sentence(lean.notices[0])
+    assert f"in balance {abs(angle_deg):.1f} degrees to the {side}" in sentence(notice)
     assert rms((lean.lean_deg - smoothed("street").lean_deg)[ride.riding]) < 0.5
 
 
@@ -181,29 +177,6 @@ def test_remarks_about_a_ride_have_their_limits(windows, expected):
     """A fifth of the riding may be doubtful, and the mean pose of the riding may be off by 1.8 degrees."""
     assert [remark.code for remark in counted(*windows).remarks([])] == expected
     assert counted(*windows).remarks([LeftHanded()]) == []
-
-
-def test_remarks_have_the_figures_of_all_riding():
-    doubtful, pose = counted((6.0, True, True, -2.04), (4.0, True, False, -2.04)).remarks([])
-    assert doubtful.line().startswith("in 60 % of the riding")
-    assert "in balance 2.0 degrees to the left of" in pose.line()
-
-
-@pytest.mark.long
-def test_slipping_mount_has_little_effect_afterwards():
-    """The mount slips by 1.5 degrees about forward within 0.3 s. The gyro measures the rotation of the mount. From then
-    on the bike seems to lean on straights."""
-    ride = simulated("street", 3, 130.0)
-    log, matrix = ride.log, ride.calibration.vehicle_from_sensor
-    angle = np.radians(1.5) * np.clip((log.t_s - 65.0) / 0.3, 0.0, 1.0)
-    s, c = np.sin(angle), np.cos(angle)
-    turned = []
-    for x, y, z in ((log.accel_g @ matrix.T).T, (log.gyro_dps @ matrix.T).T):
-        turned.append(np.column_stack((c * x + s * y, c * y - s * x, z)))
-    turned[1][:, 2] += np.degrees(np.gradient(angle, log.t_s))
-    off, sigma = error(ride, replace(log, accel_g=turned[0] @ matrix, gyro_dps=turned[1] @ matrix))
-    end = log.t_s > log.t_s[-1] - 50.0
-    assert abs(np.mean(off[end])) < min(0.5, 3.0 * np.mean(sigma[end]))
 
 
 def test_smoothed_lean_is_independent_of_the_mounting():
@@ -288,14 +261,6 @@ def test_a_long_ride_is_estimated_in_parts_without_seams():
     assert np.max(np.abs(lean.lean_deg)) < 0.5 and np.max(np.abs(np.diff(lean.lean_deg))) < 0.3
     assert np.min(lean.lean_sigma_deg) > 1.5 and lean.notices == []
     assert steps == sorted(steps) and steps[-1][0] == steps[-1][1]
-
-
-@pytest.mark.long
-def test_a_long_ride_in_parts_is_as_exact():
-    ride = simulated("hills", 22, 1100.0)
-    ride = ride.part(np.arange(len(ride.log.t_s)) % 16 == 0)
-    off, sigma = error(ride)
-    assert rms(off[ride.riding]) < 0.6 and np.mean(np.abs(off) < 3.0 * sigma) > 0.95
 
 
 def test_a_stretch_has_its_own_samples_of_the_whole_estimate():

@@ -77,14 +77,6 @@ def test_padding_has_no_duration_and_no_readings():
     assert len(windows(5).padded(5)) == 5
 
 
-def test_the_speed_is_interpolated_between_two_values():
-    speed = np.full(5, np.nan)
-    speed[1] = 2.0
-    assert np.isnan(windows(5, speed=speed).known_speed).all()
-    speed[3] = 6.0
-    assert windows(5, speed=speed).known_speed == pytest.approx([2.0, 2.0, 4.0, 6.0, 6.0])
-
-
 def test_axes_are_turned_after_the_bias_is_removed():
     quarter = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     result = windows(2, rate=(0.3, 0.1, 0.0)).turned(quarter, np.array([0.1, 0.0, 0.0]))

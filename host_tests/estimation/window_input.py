@@ -35,7 +35,7 @@ def log_of(ride, speed=True):
     return log
 
 
-def still_log(seconds, hz=RATE_HZ, force=(0.0, 1.0, 0.0)):
+def still_log(seconds: float, hz: float = RATE_HZ, force=(0.0, 1.0, 0.0)):
     """Return the log of a sensor at rest, with noise."""
     n = round(seconds * hz)
     noise = np.random.default_rng(1).normal(0.0, 0.002, (n, 6))

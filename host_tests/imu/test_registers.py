@@ -232,22 +232,19 @@ def test_how_many_frames_are_read_and_left(frames, taken, left):
 @pytest.mark.parametrize(("who_am_i", "size"), [(0x68, 1024), (MPU6500, 512), (ICM20689, 512), (MPU6886, 512)])
 def test_a_fifo_that_may_have_overflowed_is_emptied(who_am_i, size):
     """The FIFO has 1024 bytes, or 512 bytes (MPU-6500 register map p. 31). The FIFO is full if fewer than 14 bytes are
-    free. An odd number of bytes twice in a row also means an overflow, which has cut off part of a frame."""
+    free."""
     wires = Wires(who_am_i)
     chip = started(wires)
     restart = [(FIFO_EN, 0), (USER_CTRL, 0x04), (USER_CTRL, 0x40), (FIFO_EN, 0xF8)]
     most = (size - 14) // 14
     for waiting, taken, left, overflows in (
         (14 * most, 8, most - 8, 0),
-        (size - 14, 0, most + 1, 0),  # there is room for one frame, and a frame is being written
+        (size - 14, 8, most - 8, 0),  # there is room for one frame, and a frame is being written
         (14, 1, 0, 0),
         (14 * (most + 1), 0, 0, 1),
         (size, 0, 0, 2),
-        (28 + 5, 0, 3, 2),
-        (42, 3, 0, 2),
-        (33, 0, 3, 2),
-        (47, 0, 0, 3),
-        (5, 0, 1, 3),  # the emptied FIFO has an odd number of bytes for the first time
+        (28, 2, 0, 2),
+        (5, 0, 0, 2),
     ):
         wires.writes.clear()
         emptied = chip.overflows < overflows
@@ -255,6 +252,22 @@ def test_a_fifo_that_may_have_overflowed_is_emptied(who_am_i, size):
         assert (chip.fetch(), chip.frames_left, chip.overflows) == (taken, left, overflows), waiting
         assert wires.writes == (restart if emptied else [])
     assert chip.least_free_samples() == 0
+
+
+def test_whole_frames_are_read_while_the_chip_writes_one():
+    """The loop may meet the chip in the middle of a frame for many passes. Bytes that the bus lost or doubled look the
+    same, but then the temperature jumps."""
+    wires = Wires()
+    chip = started(wires)
+    wires.frame = bytes(range(1, 15))
+    for waiting, taken in ((28, 2), *[(28 + 5, 2)] * 20, (9, 0)):
+        wires.waiting = waiting
+        assert (chip.fetch(), chip.overflows) == (taken, 0)
+    wires.frame = bytes(range(101, 115))
+    wires.waiting = 28
+    assert (chip.fetch(), chip.overflows) == (2, 0), "a heated chip, with whole frames"
+    wires.frame, wires.waiting = bytes(range(1, 15)), 28 + 5
+    assert (chip.fetch(), chip.overflows, chip.frames_left) == (0, 1, 0)
 
 
 @pytest.mark.parametrize(("rate_hz", "good"), [(200, 20), (100, 10)])

@@ -1,7 +1,5 @@
 """The simulated board: clock, power, watchdog, files, pins, timer, radio, and the fakes of MicroPython's modules."""
 
-import errno
-import io
 import os
 import sys
 import time
@@ -13,13 +11,6 @@ from kickstand_tools.simulated_board.fakes.fake_machine import I2C, UART, WDT, P
 from kickstand_tools.simulated_board.radio import EVENT_S, ROOM, Radio
 from kickstand_tools.simulated_board.simulator import Board
 from support.board_access import firmware, level, on_board, raised
-
-
-def number(function, *args):
-    """Return the number of the OSError that function(*args) raises."""
-    error = raised(function, *args)
-    assert isinstance(error, OSError)
-    return error.args[0]
 
 
 def test_the_deadline_stops_the_clock_and_stays():
@@ -103,25 +94,6 @@ def test_watchdogs_and_what_stops_them():
         assert on_board(program, 100_000.0, port=port)[0] == outcome
 
 
-@firmware(2.0)
-def test_a_press_bounces_on_the_pin(board):
-    board.press(0.1, 0.2)
-    pin, changes, last = Pin(15, Pin.IN, Pin.PULL_UP), [], 1
-    while board.clock.now_us < 500_000:
-        value = pin.value()
-        if value != last:
-            changes.append(board.clock.now_us)
-            last = value
-        board.clock.advance(18)
-    down, up = ([t for t in changes if (t < 200_000) == first] for first in (True, False))
-    for begin_us, edges in ((100_000, down), (300_000, up)):
-        assert (
-            len(edges) > 2 and len(edges) % 2 and begin_us <= edges[0] < begin_us + 100 and edges[-1] < begin_us + 5000
-        )
-    board.press()
-    assert pin.value() == 0
-
-
 @firmware(10.0)
 def test_an_interrupt_comes_at_the_chosen_edge_only(board):
     pin = Pin(board.button_pin, Pin.IN, Pin.PULL_UP)
@@ -186,41 +158,6 @@ def test_a_classic_esp32_crashes_if_a_flash_pin_is_driven(machine, pin, outcome)
     assert on_board(program, machine=machine)[0] == outcome
 
 
-def test_files_fail_while_their_fault_lasts(tmp_path):
-    path, other = tmp_path / "a.cal", tmp_path / "b"
-    path.write_text("text")
-
-    def program(board):
-        def read_file():
-            with open(path) as text, open(path, "rb") as data:
-                return text.read() + data.read().decode()
-
-        for fault, outcome in ((board.faults.file_error, None), (board.faults.file_empty, "")):
-            fault(".cal", board.clock.now_us / 1e6 + 0.1, 0.1)
-            assert read_file() == "texttext"
-            board.clock.advance(150_000)
-            assert isinstance(raised(read_file), OSError) if outcome is None else read_file() == outcome
-            board.clock.advance(100_000)
-            assert read_file() == "texttext"
-        board.faults.disk_full(board.clock.now_us / 1e6 + 0.1, 0.1)
-        board.clock.advance(150_000)
-        with open(other, "w") as file:
-            assert number(file.write, "x") == errno.ENOSPC
-        board.clock.advance(100_000)
-        with open(other, "w") as file:
-            assert file.write("x") == 1
-        board.faults.slow_flash(0.0, 100.0, 0.25)  # each new block of 4096 bytes takes its time
-        board.clock.advance(1)
-        begin_us = board.clock.now_us
-        with open(other, "wb") as file:
-            for count, blocks in ((10, 1), (4086, 1), (4097, 3)):
-                file.write(bytes(count))
-                assert board.clock.now_us - begin_us == 250_000 * blocks
-
-    assert on_board(program, 10.0)[0] == "returned"
-    assert open is io.open
-
-
 def test_the_power_is_cut_in_the_middle_of_a_file(tmp_path):
     def program(board):
         board.faults.cut_file(".cal", 3)
@@ -232,14 +169,6 @@ def test_the_power_is_cut_in_the_middle_of_a_file(tmp_path):
     outcome, board = on_board(program)
     assert (outcome, board.faults.files_cut) == ("off", 1)
     assert ((tmp_path / "a.txt").read_text(), (tmp_path / "a.cal").read_text()) == ("text", "abc")
-
-
-@firmware()
-def test_a_busy_processor_loses_time_several_times(board):
-    board.faults.busy(0.1, 0.05, times=2)
-    for us, now_us in ((99_000, 99_000), (2000, 150_000), (40_000, 230_000)):
-        board.clock.advance(us)
-        assert now_us <= board.clock.now_us < now_us + 15_000
 
 
 def test_the_real_modules_are_restored():
@@ -330,29 +259,3 @@ def test_a_phone_that_knows_the_pin_pairs_and_is_known_again():
     assert radio.give_pin(123456) and events[-1] == (30, 2, b"\x01\x02\x03\x04\x05\x06", b"\x00key")
     assert radio.read(second) == b""
     assert connected(True, secret=b"key", bond=True)[0].paired and not connected(True, secret=b"key")[0].paired
-
-
-@pytest.mark.parametrize("machine", ["pico w", "esp32"])
-def test_bluetooth_has_the_errors_of_the_ports(machine):
-    def program(board):
-        ble = fake_bluetooth.BLE()
-        assert hasattr(ble, "gap_passkey") == (machine == "esp32")
-        board.radio.fails = True
-        assert number(ble.active, True) == errno.ETIMEDOUT
-        board.radio.fails = False
-        assert number(ble.gap_advertise, 1) == errno.ENODEV
-        assert ble.active(True) and ble.active() and ble.config("mac") == (0, board.radio.address)
-        assert isinstance(raised(lambda: ble.config(colour=1)), ValueError)
-        assert (raised(lambda: ble.config(bond=True)) is None) == (machine == "esp32")
-        assert not ble.gap_disconnect(0) and isinstance(raised(ble.gatts_notify, None, 1), TypeError)
-        begin_us = board.clock.now_us
-        assert number(ble.gatts_notify, 0, 1) == errno.ENOTCONN
-        assert board.clock.now_us - begin_us == fake_bluetooth.NOTIFY_US
-        ble.gap_advertise(1, b"a", resp_data=b"b")
-        assert (board.radio.found, board.radio.named) == (b"a", b"b")
-        phone = Phone()
-        board.radio.connect(phone)
-        assert number(ble.gap_advertise, 1) == errno.ENOMEM
-        assert ble.gap_disconnect(0) and phone.drops == 1 and not ble.active(False)
-
-    assert on_board(program, machine=machine)[0] == "returned"

@@ -81,8 +81,9 @@ def test_sectors_are_written_and_read_again():
         data = bytearray(1024)
         card.readblocks(8, data)
         assert bytes(data) == b"".join(SECTORS[1:]) and board.card.most_hz == 10_000_000
+        assert [card.ioctl(op, 0) for op in (4, 5)] == [4096, 512]
 
-    on_card(program)
+    on_card(program, sectors=4096)
 
 
 @pytest.mark.parametrize("count", [1, 3])

@@ -280,10 +280,24 @@ def test_a_receiver_stays_silent_for_days():
                 assert fault and fault.code == "gps-silent", (days, k)
 
 
-def test_a_turn_of_the_loop_reads_64_bytes_at_most():
-    with Board(level):
-        from kickstand.speed.gps import Gps
+def test_a_fast_receiver_with_many_satellites_loses_no_speed():
+    """At 115,200 baud 115 bytes arrive per pass, and the buffer has 2304 bytes. A pass may take 0.15 s."""
+    gsv = [sentence("GPGSV,10,%d,40,01,40,083,46,02,17,308,41,12,07,344,39,14,22,228,45,1" % k) for k in range(1, 11)]  # noqa: UP031
+    for hz, count in ((1, 14), (10, 8)):
+        for first in (0, count):  # RMC before and after the satellites
+            with Board(level):
+                from kickstand.speed.gps import Gps
 
-        wire = Wire(200 * b"x")
-        Gps(wire).poll(1000)
-        assert len(wire.data) == 136
+                wire, wanted, heard = Wire(), [], 0
+                gps = Gps(wire)
+                for turn in range(1000):
+                    if turn % (100 // hz) == 0:
+                        second, part = divmod(turn, 100)
+                        bodies = (gsv + gsv)[:count]
+                        bodies.insert(first, rmc(time=f"1200{second:02}.{part:02}"))
+                        wanted.append("".join(bodies).encode())
+                    line = b"".join(wanted)
+                    wire.data, wanted = (wire.data + line[:115])[:2304], [line[115:]]
+                    if turn % 200 > 15:  # a stall of 0.15 s every 2 s
+                        heard += gps.poll(1000 + 10 * turn) is not None
+                assert heard >= 0.9 * 10 * hz, (hz, first, heard)

@@ -2,7 +2,7 @@
 
 import pytest
 from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.mpu6050 import START_UP_US, WAKE_US, Fifo, Mpu6050
+from kickstand_tools.simulated_board.mpu6050 import START_UP_US, WAKE_US, Mpu6050
 from support.board_access import counts, level, read, write
 
 DIVIDER, CONFIG, GYRO, ACCEL, FIFO_EN, USER, POWER = 0x19, 0x1A, 0x1B, 0x1C, 0x23, 0x6A, 0x6B
@@ -146,18 +146,6 @@ def test_the_count_is_latched_and_a_reset_acts_only_while_disabled():
     assert waiting(chip) == 0
 
 
-def test_a_fifo_loses_the_oldest_or_the_newest_bytes():
-    fifo = Fifo(4)
-    assert fifo.pop(2) == b"\0\0"
-    assert not fifo.push(b"abc") and not fifo.push(b"d") and fifo.count == 4
-    assert fifo.push(b"e") and fifo.pop(2) == b"bc"
-    assert fifo.push(b"xyz", keep_old=True) and fifo.pop(9) == b"dexyyyyyy"
-    assert fifo.count == 0 and fifo.pop() == b"y"
-    fifo.push(b"abc")
-    fifo.clear()
-    assert fifo.count == 0
-
-
 @pytest.mark.parametrize(("axis", "bit"), [(0, 0x80), (1, 0x40), (2, 0x20)])
 def test_the_self_test_adds_the_factory_trim(axis, bit):
     """Formulas of the register map, pages 10 and 11, with the trim codes 13, 17, 22 and 9, 14, 11."""
@@ -170,25 +158,3 @@ def test_the_self_test_adds_the_factory_trim(axis, bit):
         data = counts(chip)
         added = [accel * share if k == axis else gyro * share if k == 4 + axis else 0 for k in range(7) if k != 3]
         assert data[:3] + data[4:] == pytest.approx(added, abs=1)
-
-
-def test_faults_of_the_data():
-    chip = sensor()
-    for fault, world, data in ((0xFF, tilted, -1), ("freeze", level, -1), (None, level, 0)):
-        chip.override(fault)
-        chip.world = world
-        chip.clock.advance(10_000)
-        assert counts(chip)[:2] == [data, data]
-
-
-@pytest.mark.parametrize(
-    ("leaves", "power", "data"),
-    [("asleep", 0x40, 0), ("frozen", 0x40, 4096), ("default_ranges", 0x01, 8192), ("torn", 0x40, 0)],
-)
-def test_a_dip_of_the_supply(leaves, power, data):
-    chip = sensor(registers=((ACCEL, 0x08),))
-    assert counts(chip)[0] == 4096
-    chip.supply_dip(leaves)
-    chip.clock.advance(10_000)
-    assert (chip.peek(POWER), counts(chip)[0]) == (power, data)
-    assert chip.fifo.count == (14 if leaves == "torn" else 0)

@@ -1,10 +1,10 @@
-"""The simulated wires of I2C and SPI, with machine.I2C, SoftI2C and Pin: times, errors, faults, and a stuck bus."""
+"""The simulated wires of I2C and SPI, with machine.I2C, SoftI2C and Pin: times, errors, and a stuck bus."""
 
 import errno
 
 import pytest
 from kickstand_tools.simulated_board.fakes import fake_machine, fake_time
-from kickstand_tools.simulated_board.fakes.fake_machine import ADC, I2C, SPI, Pin, SoftI2C
+from kickstand_tools.simulated_board.fakes.fake_machine import I2C, SPI, Pin, SoftI2C
 from support.board_access import firmware, on_board, raised
 
 SENSOR, LCD = 0x68, 0x27
@@ -25,49 +25,6 @@ def read_byte(i2c, address=SENSOR):
     """Return the number of the error of a transfer, or "" without an error."""
     error = raised(i2c.readfrom_mem, address, 0x75, 1)
     return error.args[0] if error else ""
-
-
-@firmware()
-def test_transfers_fail_by_number_or_for_a_time(board):
-    i2c, faults = sensor_bus(), board.faults
-    for nth, during, code in (
-        (faults.nack, faults.nack_for, errno.EIO), (faults.timeout, faults.timeout_for, errno.ETIMEDOUT)
-    ):  # fmt: skip
-        board.sensor_bus.faults.clear()
-        nth(SENSOR)
-        assert [read_byte(i2c) for _ in range(3)] == [code, "", ""]
-        nth(SENSOR, 2, 2)
-        assert [read_byte(i2c) for _ in range(4)] == ["", code, code, ""]
-        nth(LCD)
-        assert read_byte(i2c) == "" and not board.sensor_bus.open
-        now_s = board.clock.now_us / 1e6
-        during(SENSOR, now_s + 0.1, 0.05)
-        for until_s, outcome in ((0.09, ""), (0.105, code), (0.14, code), (0.16, "")):
-            board.clock.advance(max(0, round((now_s + until_s) * 1e6) - board.clock.now_us))
-            assert read_byte(i2c) == outcome
-
-
-@firmware()
-def test_one_byte_is_corrupted_or_cut(board):
-    i2c = sensor_bus()
-    board.faults.corrupt(SENSOR, byte=1, mask=0x81)
-    assert [i2c.readfrom_mem(SENSOR, 0x1B, 2) for _ in range(2)] == [b"\x00\x81", b"\x00\x00"]
-    board.faults.corrupt(SENSOR, nth=2)
-    assert [i2c.readfrom_mem(SENSOR, 0x75, 1) for _ in range(3)] == [b"\x68", b"\x69", b"\x68"]
-    board.faults.cut(SENSOR, board.clock.now_us / 1e6, 2)
-    board.clock.advance(1)
-    errors = [raised(i2c.writeto_mem, SENSOR, 0x1B, b"\x08\x10\x18") for _ in range(2)]
-    assert [error and error.args for error in errors] == [(errno.EIO,), None] and not board.sensor_bus.open
-
-
-@firmware()
-def test_parts_are_unplugged_for_their_time(board):
-    i2c = sensor_bus()
-    board.faults.unplug_sensor(0.1, 0.1)
-    board.faults.unplug_lcd(0.1)
-    for until_s, plugged in ((0.09, (True, True)), (0.15, (False, False)), (0.25, (True, False))):
-        board.clock.advance(round(until_s * 1e6) - board.clock.now_us)
-        assert (read_byte(i2c) == "", LCD in board.lcd_bus.devices) == plugged
 
 
 @pytest.mark.parametrize(("machine", "pins", "code"), [("pico", (4, 5), errno.EIO), ("esp32", (21, 22), errno.ENODEV)])
@@ -96,16 +53,6 @@ def test_transfers_take_the_time_of_their_bits(board):
     begin_us = board.clock.now_us
     spi.write(bytes(100))
     assert board.clock.now_us - begin_us == 820
-
-
-@firmware()
-def test_missing_parts_read_as_open_inputs(board):
-    spi, data = SPI(0), bytearray(2)
-    spi.readinto(data)
-    assert spi.read(3) == b"\xff\xff\xff" and data == b"\xff\xff" and ADC(26).read_u16() == 0
-    for volts, code in ((1.65, 32767), (5.0, 65535)):
-        board.volts[26] = volts
-        assert ADC(Pin(26)).read_u16() == code
 
 
 def transfer_us(board, i2c, count, code):

@@ -95,15 +95,20 @@ class Journal:
         """
         line = _line(key, result, again) + b"\n"
         try:
-            self._file.seek(self._end)
-            self._file.write(line)
-            self._file.flush()
+            self._write(line)
         except OSError as error:
             with contextlib.suppress(OSError):
-                self._file.truncate(self._end)
+                self._file.raw.truncate(self._end)
             raise self._write_error(error) from error
         self._note(line)
         self._end += len(line)
+
+    def _write(self, line: bytes) -> None:
+        """Append a line without a buffer, because a buffer would later write the rest of a line that did not fit."""
+        self._file.raw.seek(self._end)
+        rest = memoryview(line)
+        while rest:
+            rest = rest[self._file.raw.write(rest) :]
 
     def sync(self) -> None:
         """Flush the results to the disk, so that they survive a power loss. Raises InputError."""

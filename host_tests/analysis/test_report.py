@@ -1,0 +1,303 @@
+"""The words and figures of a report, computed by hand, and the commands `report` and `plot`."""
+
+import io
+import json
+import re
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kickstand_tools.analysis import report
+from kickstand_tools.analysis.overview import overview
+from kickstand_tools.analysis.plot import picture
+from kickstand_tools.analysis.ride import open_ride
+from kickstand_tools.checks.bends import LeftHanded
+from kickstand_tools.checks.log import Mirrored
+from kickstand_tools.checks.mount import ForwardExchanged, UpOff
+from kickstand_tools.estimation.smooth import PoseOff
+from kickstand_tools.simulation.scripted import script
+from rich.console import Console
+from roads import Road
+from small_rides import STOP, overview_of, quality_of, samples
+from support import command
+from support.recordings import analysis_rides
+
+EXCHANGED = ForwardExchanged(False, "left", 0.0)
+NAN = np.nan
+
+
+def rows_of(seen):
+    return {name: (value, time) for name, value, time in report.words(seen).ride}
+
+
+def test_the_rows_of_a_report():
+    lean = np.where(np.arange(12_000) > 6000, -42.0, 0.0)
+    course = samples(12_000, lean_deg=lean, speed_mps=20.0, shown_g=np.where(lean < 0.0, -0.517, 0.25))
+    rows = {
+        "Duration": ("2:00", "riding 1:00"), "Lean": ("as the display showed it", ""),
+        "Max left": ("42°", "at 1:00"), "Max right": ("--", ""), "Over 30°": ("60.0 s", ""), "Over 40°": ("60.0 s", ""),
+        "Max braking": ("0.52 g", "at 1:00"), "Max acceleration": ("0.25 g", "at 0:00"),
+        "Max speed": ("72 km/h", "at 0:00"),
+    }  # fmt: skip
+    assert rows_of(overview_of(course)) == rows
+    names = {"Duration", "Max braking", "Max acceleration", "Max speed"}
+    assert rows_of(overview_of(course, vehicle="car")) == {name: rows[name] for name in names}
+    assert rows_of(overview_of(course, smoothed=True))["Lean"] == ("best estimate", "from the whole ride")
+    unsure = rows_of(overview_of(samples(1000, sure=0.0)))
+    assert all(unsure[name][0] == "--" for name in ("Max left", "Over 30°", "Over 40°", "Max braking"))
+
+
+@pytest.mark.parametrize(
+    ("times_s", "rows"),
+    [
+        ((1.0, 2.5, 0.1), {"Lean not sure": "0:01", "No readings": "2.4 s", "Readings frozen": "0.1 s"}),
+        ((65.4, 0.0, 0.0), {"Lean not sure": "1:05"}),
+        ((0.9, 0.05, 0.0), {}),
+    ],
+)
+def test_uncertain_and_missing_time_is_reported(times_s, rows):
+    seen = overview_of(samples(1000))
+    seen.summary.not_sure_s, seen.summary.missing_s, seen.summary.frozen_s = times_s
+    words = {name: value for name, (value, _) in rows_of(seen).items()}
+    assert {name: words[name] for name in ("Lean not sure", "No readings", "Readings frozen") if name in words} == rows
+    assert report.as_data(seen)["lean_unsure_s"] == times_s[0]
+
+
+@pytest.mark.parametrize(
+    ("riding_s", "words"),
+    [
+        (10.0, ""),
+        (9.9, "0:30 of log, 10 s of it riding: too little for a report."),
+        (1.0, "0:30 of log, 1 s of it riding: too little for a report."),
+        (0.9, "0:30 of log, all of it standing: too little for a report."),
+    ],
+)
+def test_a_short_ride_is_too_little_for_a_report(riding_s, words):
+    assert report.words(overview_of(samples(3000), riding_s=riding_s)).too_little == words
+
+
+def test_the_row_of_a_stop():
+    def row(**changed):
+        return report.words(overview_of(samples(100), stops=[replace(STOP, **changed)])).stops[0]
+
+    assert row() == ("1:01", "72.0", "2.50", "30.0", "7.11", "8.12", "12", "0.2 left")
+    other = row(side_m=-0.24, speed_from="integrated")
+    assert (other[1], other[-1]) == ("72.0*", "0.2 right")
+
+
+def braked():
+    """Return a course whose speed falls to a stop, while the force says nothing."""
+    road = Road((5.0, 0.0), (5.0, 4.0), (3.0, 0.0), (4.0, -5.0), (5.0, 0.0))
+    speed = np.full(len(road.t_s), NAN)
+    speed[::10] = road.mps[::10]
+    return road.channels(speed_mps=speed, forward_g=0.0 * road.t_s)
+
+
+SLOW, FAST, BLIND = samples(1000, speed_mps=5.0), samples(1000, speed_mps=20.0), samples(1000)
+
+
+@pytest.mark.parametrize(
+    ("course", "how", "remark"),
+    [
+        (BLIND, {"stops": [STOP]}, ""),
+        (BLIND, {"stops": [replace(STOP, speed_from="integrated")]},
+         "* no speed in the log: integrated from the acceleration"),
+        (BLIND, {"riding_s": 10.1}, "Stops: not known, the log has no speed."),
+        (BLIND, {"riding_s": 10.0}, "No stop from over 10 km/h found."),
+        (SLOW, {}, "No stop from over 10 km/h found."),
+        (SLOW, {"notices": [EXCHANGED]}, "Stops: not known, see the warning."),
+        (braked(), {}, "The speed falls to a stop, the force says otherwise: is the calibration this ride's?"),
+    ],
+)  # fmt: skip
+def test_the_remark_about_the_stops(course, how, remark):
+    assert report.words(overview_of(course, **how)).remark == remark
+
+
+GOOD = "Alignment: good. "
+RIDE, DRIVE = "; calibrate ride takes it out", "; calibrate ride or drive takes it out"
+
+
+@pytest.mark.parametrize(
+    ("angles", "how", "parts"),
+    [
+        ((0.1, None, 1.0), {}, ["^Alignment: good. It seems off by roll [+]0.1°, yaw [+]1.0°, which costs less than "
+                                "0.25° of lean.$"]),
+        ((0.1, None, 1.0, 1.0), {}, [GOOD, "At rest the force is 1.000 g: right, 0.02 g from 1 are allowed.$"]),
+        ((0.1, None, 1.0, 0.981), {}, [": right, 0.02 g"]),
+        ((0.1, None, 1.0, 1.021), {}, ["At rest the force is 1.021 g and not 1: kickstand calibrate six"]),
+        ((0.1, None, 1.0, 0.979), {}, ["and not 1: kickstand"]),
+        ((None, None, None), {}, ["^Alignment: not enough straight riding to know how far it is off."]),
+        ((-0.04, None, 2.04), {}, ["roll [+]0.0°, yaw [+]2.0°"]),  # never -0.0
+        # A roll costs the part over 3.5 degrees; a yaw or pitch of 2 degrees costs 0.10 or 0.17 degrees
+        ((3.4, None, 4.0), {}, [GOOD]),
+        ((3.9, None, 0.0), {}, ["seems off by roll [+]3.9°, yaw [+]0.0°[.]"]),
+        ((0.0, 1.0, 2.0), {}, [GOOD]),
+        ((0.0, 2.0, 2.0), {}, ["seems off"]),
+        ((None, 0.0, 0.0), {}, ["seems off"]),
+        ((0.0, None, None), {}, ["seems off"]),
+        ((0.0, None, 4.7), {}, [GOOD]),
+        ((0.0, None, 4.9), {}, [f"yaw [+]4.9°. Yaw usually costs about 0.3° of lean{RIDE}."]),
+        ((0.0, None, 9.0), {"speed": 20.0}, [f"Yaw usually costs about 0.5° of lean{DRIVE}"]),
+        ((0.0, -3.0, 0.0), {}, ["Pitch usually costs about 0.3° of lean; calibrate ride takes it out, or"]),
+        # A pose on the kickstand is more than 4 degrees from upright
+        ((4.1, None, 9.0), {"speed": 20.0}, [": was it held upright[?].*Roll usually costs about 0.6° of lean"]),
+        ((-4.1, None, 9.0), {"speed": 20.0}, [": was it held upright[?]"]),
+        ((4.1, None, 9.0), {}, [": were the poses swapped[?]"]),
+        ((-4.1, None, 9.0), {"speed": 20.0, "notices": [EXCHANGED]}, [": were the poses swapped[?]$"]),
+        ((4.1, None, 9.0), {"speed": 20.0, "vehicle": "car"}, ["yaw [+]9.0°[.]$"]),  # a car has no lean
+        ((0.1, None, 1.0), {"notices": [PoseOff(2.0)]}, ["^Alignment: it seems off"]),
+        # In a mirrored log the angles look right, although left and right are exchanged
+        ((0.1, None, 1.0), {"notices": [UpOff(30.0, False)]}, ["^Alignment: not judged, see the warning.$"]),
+        ((0.1, None, 1.0), {"notices": [Mirrored()]}, ["not judged"]),
+        ((0.1, None, 1.0), {"notices": [LeftHanded()]}, ["not judged"]),
+    ],
+)  # fmt: skip
+def test_the_alignment_in_words(angles, how, parts):
+    course = samples(1000, speed_mps=how.pop("speed", NAN)) if "speed" in how else BLIND
+    words = report.words(overview_of(course, quality_of(*angles), **how)).alignment
+    for part in parts:
+        assert re.search(part, words), words
+
+
+def test_remedies_on_a_page_name_its_buttons():
+    words = report.words(overview_of(BLIND, quality_of(0.0, None, 9.0, 1.05)), on_page=True).alignment
+    assert words.endswith("and not 1: the six positions of the sensor take that out.") and "kickstand " not in words
+
+
+def test_the_figures_of_a_report_are_rounded():
+    lean = np.where(np.arange(1000) > 500, 33.33333, 0.0)
+    seen = overview_of(samples(1000, lean_deg=lean, speed_mps=12.34567), stops=[STOP], riding_s=5.55)
+    seen.summary.missing_s, seen.summary.frozen_s = 1.0, 0.3
+    data = report.as_data(seen)
+    expected = {
+        "ride": "trip/RIDE.csv", "vehicle": "motorcycle", "lean": "live", "duration_s": 9.99, "samples": 1000,
+        "missing_s": 0.7, "frozen_s": 0.3, "max_right_deg": {"value": 33.3333, "time_s": 5.01}, "max_left_deg": None,
+        "max_speed_mps": {"value": 12.3457, "time_s": 0.0}, "beyond_30_deg_s": 4.99, "beyond_40_deg_s": 0.0,
+        "alignment": {"roll_deg": 0.1, "pitch_deg": None, "yaw_deg": 1.0, "gravity_g": 1.0, "straight_s": 30.0},
+        "lean_cost": {"roll_deg": 0.0, "pitch_deg": None, "yaw_deg": 0.05}, "remark": "", "remarks": [],
+    }  # fmt: skip
+    assert {name: data[name] for name in expected} == expected
+    assert data["stops"][0]["distance_m"] == 30.04 and data["stops"][0]["duration_s"] == 2.5
+    car = report.as_data(overview_of(samples(100), vehicle="car"))
+    assert {"lean", "max_left_deg", "lean_cost"}.isdisjoint(car)
+    assert report.as_data(overview_of(samples(100), smoothed=True))["lean"] == "smoothed"
+
+
+def test_contradictions_hide_figures():
+    data = report.as_data(overview_of(samples(1000), notices=[EXCHANGED]))
+    assert set(data["lean_cost"].values()) == {None} and data["alignment"]["roll_deg"] == 0.1
+    assert data["remark"] == EXCHANGED.line() and [remark["code"] for remark in data["remarks"]] == [
+        "forward-exchanged"
+    ]
+    data = report.as_data(overview_of(samples(1000), notices=[UpOff(30.0, False)]))
+    assert set(data["alignment"].values()) == set(data["lean_cost"].values()) == {None}
+
+
+def terminal(seen):
+    console = Console(width=80, record=True, file=io.StringIO())
+    console.print(report.page(seen))
+    return console.export_text().splitlines()
+
+
+def test_a_report_on_a_terminal_has_its_parts_in_order():
+    lines = terminal(overview_of(samples(1000), stops=[STOP]))
+    assert lines[0].strip() == "RIDE.csv" and lines[1].split()[:2] == ["Duration", "0:10"]
+    order = [next(k for k, text in enumerate(lines) if text.startswith(word)) for word in ("Dur", "Alignment", "Stops")]
+    assert order == sorted(order) and "MFDD: mean deceleration" in " ".join(lines[-4:])
+    row = next(text for text in lines if text.split()[:1] == ["1:01"])
+    assert row.split() == ["1:01", "72.0", "2.50", "30.0", "7.11", "8.12", "12", "0.2", "left"]
+    short = terminal(overview_of(SLOW, riding_s=3.0))
+    assert short[1].strip() == "0:10 of log, 3 s of it riding: too little for a report."
+    assert "MFDD" not in "".join(short) and short[-1].strip() == "No stop from over 10 km/h found."
+
+
+def test_the_command_reports_a_ride(short_ride, monkeypatch):
+    data = json.loads(command.works("report", short_ride, "--json").out)
+    assert data["vehicle"] == "motorcycle" and data["duration_s"] == pytest.approx(33.99, abs=0.02)
+    assert data["max_left_deg"]["value"] == pytest.approx(30.0, abs=2.5) and 9.0 < data["max_left_deg"]["time_s"] < 16.0
+    assert data["max_right_deg"]["value"] == pytest.approx(42.0, abs=2.5)
+    assert 3.5 < data["beyond_40_deg_s"] < 5.5 < data["beyond_30_deg_s"] and data["max_brake_g"]["value"] > 0.7
+    (stop,) = data["stops"]
+    assert stop["speed_from"] == "log" and stop["initial_speed_mps"] == pytest.approx(15.0, abs=0.3)
+    assert stop["distance_m"] == pytest.approx(21.0, abs=1.5) and abs(stop["side_m"]) < 0.2
+    assert data["alignment"]["gravity_g"] == pytest.approx(1.0, abs=0.002) and abs(data["alignment"]["roll_deg"]) < 0.5
+    monkeypatch.setenv("COLUMNS", "80")
+    text = command.works("report", short_ride, "--live").out
+    for words in "as the display showed it", "Max left", "Over 40°", "Max braking", "MFDD", "km/h", "Alignment":
+        assert words in text
+    assert max(len(line) for line in text.split("\n")) <= 80
+    assert re.search(r"^ *0:\d\d +5\d\.\d +2\.\d\d +2\d\.\d( +\d+\.\d\d){2} +\d+ +0\.\d (left|right) *$", text, re.M)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "vehicle", "words"),
+    [
+        (
+            [[-1, 0, 0], [0, 1, 0], [0, 0, -1]],
+            "motorcycle",
+            "forward and backward are exchanged: calibrate two --side right?",
+        ),
+        ([[-1, 0, 0], [0, 1, 0], [0, 0, -1]], "car", "exchanged: calibrate drive again?"),
+        ([[0, 0, 1], [0, 1, 0], [-1, 0, 0]], "motorcycle", "The speed falls to a stop, the force says otherwise"),
+        ([[1, 0, 0], [0, 0, 1], [0, -1, 0]], "motorcycle", "the calibration's up is"),
+    ],
+)
+def test_a_calibration_of_another_mount_is_noticed(short_ride, tmp_path, matrix, vehicle, words):
+    cal = analysis_rides.calibration(
+        tmp_path / "changed.json", vehicle_from_sensor=matrix, kickstand_side="left", vehicle=vehicle
+    )
+    done = command.works("report", short_ride, "--calibration", cal, "--live")
+    assert words in " ".join((done.err + done.out).split()) and not re.search(r"^ *0:\d\d +5\d\.\d ", done.out, re.M)
+    assert ("Max left" in done.out) == (vehicle == "motorcycle")
+
+
+def test_without_a_speed_stops_are_marked(tmp_path):
+    text = command.works("report", analysis_rides.short(tmp_path, rate_hz=50)).out
+    assert re.search(r" 5\d\.\d\* ", text) and "* no speed in the log: integrated" in text
+    ride = analysis_rides.write(tmp_path, [script.upright(4), script.accelerate(15, 5), script.straight(20)], 50)
+    assert "Stops: not known, the log has no speed." in command.works("report", ride).out
+
+
+def test_a_log_with_a_gap_or_an_early_end_is_reported(short_ride, tmp_path):
+    header, *rows = short_ride.read_text().splitlines()
+    analysis_rides.calibration(tmp_path / "RIDE.cal.json")
+    for lines, words in ((rows[:1200] + rows[1240:], "No readings"), (rows[:900], "s of it riding: too little")):
+        (tmp_path / "RIDE.csv").write_text("\n".join([header, *lines]) + "\n")
+        assert words in command.works("report", tmp_path / "RIDE.csv", "--live").out
+
+
+def test_picture_and_page_are_complete(short_ride, tmp_path):
+    pytest.importorskip("matplotlib")
+    pytest.importorskip("plotly")
+    out = tmp_path / "new" / "pictures"
+    command.works("plot", short_ride, "--live", "--out", out)
+    png = (out / "RIDE.png").read_bytes()
+    assert png[:8] == b"\x89PNG\r\n\x1a\n" and struct.unpack(">2I", png[16:24]) == (1100, 950)
+    html = (out / "RIDE.html").read_text()
+    assert "Plotly.newPlot" in html and not re.search(r"<(script|link)[^>]*(src|href)=", html)  # loads no other file
+    assert sorted(path.name for path in out.iterdir()) == ["RIDE.html", "RIDE.png"]
+
+
+def test_the_shortest_log_is_reported_and_drawn(tmp_path):
+    pytest.importorskip("matplotlib")
+    pytest.importorskip("plotly")
+    log = command.still(tmp_path / "log.csv", (0, 1, 0), seconds=0.02)
+    seen = overview(open_ride(log, analysis_rides.calibration(tmp_path / "log.cal.json")))
+    assert "all of it standing" in report.words(seen).too_little
+    picture.draw(tmp_path / "x.png", seen)
+
+
+def test_plot_refuses_files_as_directories(short_ride, tmp_path):
+    (tmp_path / "file").write_text("")
+    command.refused(tmp_path, "plot", short_ride, "--out", tmp_path / "file", words="is a file")
+    command.refused(tmp_path, "plot", short_ride, "--out", tmp_path / "ride.html", words="give the directory")
+
+
+def test_an_interrupted_plot_leaves_no_empty_directory(short_ride, tmp_path, monkeypatch):
+    def ctrl_c(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(picture, "draw", ctrl_c)
+    assert command.run("plot", short_ride, "--live", "--out", tmp_path / "pictures").status == 130
+    assert not (tmp_path / "pictures").exists()
