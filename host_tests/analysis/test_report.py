@@ -27,8 +27,8 @@ EXCHANGED = ForwardExchanged(False, "left", 0.0)
 NAN = np.nan
 
 
-def rows_of(seen):
-    return {name: (value, time) for name, value, time in report.words(seen).ride}
+def rows_of(ride_overview):
+    return {name: (value, time) for name, value, time in report.words(ride_overview).ride}
 
 
 def test_the_rows_of_a_report():
@@ -57,11 +57,11 @@ def test_the_rows_of_a_report():
     ],
 )
 def test_uncertain_and_missing_time_is_reported(times_s, rows):
-    seen = overview_of(samples(1000))
-    seen.summary.not_sure_s, seen.summary.missing_s, seen.summary.frozen_s = times_s
-    words = {name: value for name, (value, _) in rows_of(seen).items()}
+    ride_overview = overview_of(samples(1000))
+    ride_overview.summary.not_sure_s, ride_overview.summary.missing_s, ride_overview.summary.frozen_s = times_s
+    words = {name: value for name, (value, _) in rows_of(ride_overview).items()}
     assert {name: words[name] for name in ("Lean not sure", "No readings", "Readings frozen") if name in words} == rows
-    assert report.as_data(seen)["lean_unsure_s"] == times_s[0]
+    assert report.as_data(ride_overview)["lean_unsure_s"] == times_s[0]
 
 
 @pytest.mark.parametrize(
@@ -167,9 +167,9 @@ def test_remedies_on_a_page_name_its_buttons():
 
 def test_the_figures_of_a_report_are_rounded():
     lean = np.where(np.arange(1000) > 500, 33.33333, 0.0)
-    seen = overview_of(samples(1000, lean_deg=lean, speed_mps=12.34567), stops=[STOP], riding_s=5.55)
-    seen.summary.missing_s, seen.summary.frozen_s = 1.0, 0.3
-    data = report.as_data(seen)
+    ride_overview = overview_of(samples(1000, lean_deg=lean, speed_mps=12.34567), stops=[STOP], riding_s=5.55)
+    ride_overview.summary.missing_s, ride_overview.summary.frozen_s = 1.0, 0.3
+    data = report.as_data(ride_overview)
     expected = {
         "ride": "trip/RIDE.csv", "vehicle": "motorcycle", "lean": "live", "duration_s": 9.99, "samples": 1000,
         "missing_s": 0.7, "frozen_s": 0.3, "max_right_deg": {"value": 33.3333, "time_s": 5.01}, "max_left_deg": None,
@@ -194,9 +194,9 @@ def test_contradictions_hide_figures():
     assert set(data["alignment"].values()) == set(data["lean_cost"].values()) == {None}
 
 
-def terminal(seen):
+def terminal(ride_overview):
     console = Console(width=80, record=True, file=io.StringIO())
-    console.print(report.page(seen))
+    console.print(report.page(ride_overview))
     return console.export_text().splitlines()
 
 
@@ -283,9 +283,9 @@ def test_the_shortest_log_is_reported_and_drawn(tmp_path):
     pytest.importorskip("matplotlib")
     pytest.importorskip("plotly")
     log = command.still(tmp_path / "log.csv", (0, 1, 0), seconds=0.02)
-    seen = overview(open_ride(log, analysis_rides.calibration(tmp_path / "log.cal.json")))
-    assert "all of it standing" in report.words(seen).too_little
-    picture.draw(tmp_path / "x.png", seen)
+    ride_overview = overview(open_ride(log, analysis_rides.calibration(tmp_path / "log.cal.json")))
+    assert "all of it standing" in report.words(ride_overview).too_little
+    picture.draw(tmp_path / "x.png", ride_overview)
 
 
 def test_plot_refuses_files_as_directories(short_ride, tmp_path):

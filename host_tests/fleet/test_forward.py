@@ -93,16 +93,16 @@ def test_the_mean_with_the_firmware_is_weighted_by_variance(yaw, quality_deg, sh
 
 def test_whole_logs_show_forward_better_than_the_device():
     """Buses brake gently about ten times. With these seeds the device's forward has an error of about a degree."""
-    device, whole = [], []
+    device, fleet = [], []
     for seed in (101, 102, 106, 109):
         log, sensor = drive(seed, "bus", 150.0)
         fit = fit_logs([log], None, "car")
         result = find_forward([evidence.intervals(log, "car", fit.lag_s or 0.0, fit.bias_dps)], fit)
         assert result and result.sigma_deg < 0.7
         device.append(yaw_deg(fit.calibration.vehicle_from_sensor, sensor.mount))
-        whole.append(yaw_deg(result.frame, sensor.mount))
-        assert abs(whole[-1]) < 2.0 * result.sigma_deg
-    assert np.sqrt(np.mean(np.square(device))) > 0.95 and np.sqrt(np.mean(np.square(whole))) < 0.75
+        fleet.append(yaw_deg(result.frame, sensor.mount))
+        assert abs(fleet[-1]) < 2.0 * result.sigma_deg
+    assert np.sqrt(np.mean(np.square(device))) > 0.95 and np.sqrt(np.mean(np.square(fleet))) < 0.75
 
 
 @pytest.mark.parametrize(("seed", "doubt"), [(138, "uncertain"), (114, "parts-differ")])

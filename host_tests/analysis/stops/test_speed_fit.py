@@ -36,11 +36,11 @@ def conditioned(part, speed, acceleration, delay_s):
     time = part.t_s
     values = np.flatnonzero(~np.isnan(part.speed_mps))
     values = values[time[values] - delay_s >= BEGIN_S - 4.0 - 1e-6]
-    wanted = np.array([int(np.argmin(np.abs(time - (time[value] - delay_s)))) for value in values])
-    count = int(np.ceil((time[-1] - min(time[wanted[0]], BEGIN_S) + 0.5) / 0.5 - 1e-9))
+    sample_index = np.array([int(np.argmin(np.abs(time - (time[value] - delay_s)))) for value in values])
+    count = int(np.ceil((time[-1] - min(time[sample_index[0]], BEGIN_S) + 0.5) / 0.5 - 1e-9))
     knots = time[-1] - 0.5 * np.arange(count)
-    back = np.arange(count)
-    covariance = 0.05**2 + 0.1**2 * 0.5 * np.minimum(back[:, None], back[None, :])
+    age = np.arange(count)
+    covariance = 0.05**2 + 0.1**2 * 0.5 * np.minimum(age[:, None], age[None, :])
     slopes = []  # how an acceleration error at each point changes the speed of each sample
     for k in range(count):
         hat = np.interp(-time, -knots, np.eye(count)[k])
@@ -49,13 +49,13 @@ def conditioned(part, speed, acceleration, delay_s):
     slopes = np.array(slopes).T
     full = np.zeros((len(time), count + 2))
     full[:, 0], full[:, 1:-1] = speed, slopes
-    design = full[wanted]
+    design = full[sample_index]
     n = 5  # the acceleration is averaged over 0.2 s, which is five samples on each side
-    design[:, -1] = [-np.mean(np.pad(acceleration, n, mode="edge")[k : k + 2 * n + 1]) for k in wanted]
+    design[:, -1] = [-np.mean(np.pad(acceleration, n, mode="edge")[k : k + 2 * n + 1]) for k in sample_index]
     prior = np.zeros((count + 2, count + 2))
     prior[0, 0], prior[-1, -1], prior[1:-1, 1:-1] = 0.01**2, 0.05**2, covariance
     gain = prior @ design.T @ np.linalg.inv(design @ prior @ design.T + 0.05**2 * np.eye(len(design)))
-    return speed + full @ (gain @ (part.speed_mps[values] - speed[wanted]))
+    return speed + full @ (gain @ (part.speed_mps[values] - speed[sample_index]))
 
 
 @pytest.mark.parametrize(
