@@ -23,8 +23,8 @@ NAN = np.nan
 HELD = np.where(np.arange(6000) > 3000, 40.0, 0.0)  # a lean to the right in the second half
 
 
-def chart_of(seen, title) -> Any:
-    drawn = charts.charts(seen)
+def chart_of(ride_overview, title) -> Any:
+    drawn = charts.charts(ride_overview)
     (chart,) = (chart for chart in (*drawn.over_time, *drawn.below) if chart.title.startswith(title))
     return chart
 
@@ -78,13 +78,13 @@ def test_the_chart_of_g_against_g_counts_seconds():
 
 def test_the_alignment_chart_has_the_line_of_the_yaw():
     """Forces to the left are on the left. The line that shows the yaw error goes through the points."""
-    seen = overview_of(samples(600), quality_of(1.0, None, 45.0, 1.01, [0.3, -0.2], [0.8, -0.6]))
-    alignment = chart_of(seen, "Alignment")
+    ride_overview = overview_of(samples(600), quality_of(1.0, None, 45.0, 1.01, [0.3, -0.2], [0.8, -0.6]))
+    alignment = chart_of(ride_overview, "Alignment")
     guide, dots, line = alignment.traces
     assert alignment.x_range == pytest.approx((-0.88, 0.88)) and guide.y == pytest.approx([-0.88, 0.88])
     assert dots.x.tolist() == [-0.3, 0.2] and line.x == pytest.approx([0.8, -0.8]) and line.y.tolist() == [-0.8, 0.8]
     assert alignment.left == "roll +1.0°\nyaw +45.0°\nat rest\n1.010 g"
-    unjudged = chart_of(replace(seen, notices=[UpOff(20.0, False)]), "Alignment")
+    unjudged = chart_of(replace(ride_overview, notices=[UpOff(20.0, False)]), "Alignment")
     assert unjudged.left == "not judged" and len(unjudged.traces) == 2
     empty = chart_of(overview_of(samples(600), quality_of()), "Alignment")
     assert empty.left == "not enough straight riding" and empty.x_range == (-0.5, 0.5) and len(empty.traces) == 2
@@ -164,10 +164,37 @@ def test_the_picture_draws_the_same_charts(short_overview):
     assert figure.get_supxlabel().startswith(words)
 
 
+@pytest.mark.parametrize("most", [(1.0, 1.0), (0.0, 6.0), (12.0, 11.0), (60.0, 60.0)])
+def test_labels_of_the_lean_histogram_do_not_overlap(most):
+    pytest.importorskip("matplotlib")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    ride_overview = overview_of(samples(600))
+    (ride_overview.summary.left_deg.value, ride_overview.summary.right_deg.value) = most
+    ride_overview.summary.left_deg.time_s = ride_overview.summary.right_deg.time_s = 1.0
+    ride_overview.summary.histogram_s[:] = np.where(np.abs(np.arange(-69.5, 70.0)) <= 5.0, 8.0, 0.1)
+    figure = Figure(figsize=(11, 3), layout="constrained")
+    canvas, axes = FigureCanvasAgg(figure), figure.add_subplot(1, 3, 2)
+    picture.draw_chart(axes, chart_of(ride_overview, "How long"))
+    canvas.draw()
+    boxes = [text.get_window_extent() for text in axes.texts if text.get_text()]
+    assert len(boxes) == 3 and not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+    inside = axes.get_window_extent()
+    assert max(box.x1 for box in boxes) < inside.x1 + 15 and (
+        max(most) <= 6.0 or min(box.x0 for box in boxes) > inside.x0
+    )
+    (corner,) = (text.get_window_extent() for text in axes.texts if "upright" in text.get_text())
+    tops = [line.get_window_extent().y1 for line in axes.lines]
+    assert len(tops) == 2 and max(tops) < corner.y0  # no line crosses the words "upright"
+
+
 def test_a_page_has_its_warnings_if_asked_and_names_as_text():
-    seen = overview_of(samples(100), notices=[UpOff(30.0, False)])
+    ride_overview = overview_of(samples(100), notices=[UpOff(30.0, False)])
     words = '<p class="warning">Warning: the calibration&#39;s up is 30'
-    assert words not in page.page(seen, "", "") and words in page.page(seen, "", "", warnings=True)
-    html = page.page(replace(seen, ride=replace(seen.ride, log=Path("<b>&.csv"))), "LIBRARY", "ALLOWED")
+    assert words not in page.page(ride_overview, "", "") and words in page.page(ride_overview, "", "", warnings=True)
+    html = page.page(
+        replace(ride_overview, ride=replace(ride_overview.ride, log=Path("<b>&.csv"))), "LIBRARY", "ALLOWED"
+    )
     assert "<title>&lt;b&gt;&amp;</title>" in html and "<b>" not in html
     assert "LIBRARY" in html and "script-src ALLOWED " in html

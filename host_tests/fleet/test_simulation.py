@@ -58,15 +58,15 @@ def test_a_seed_gives_the_same_fleet_by_command_and_function(tmp_path):
 def test_broken_files(tmp_path):
     progress = []
     names = ["garbage", "empty", "cut", "missing", ""]
-    made = make_fleet(tmp_path, 5, 3, 20.0, troubles=names, progress=lambda *counts: progress.append(counts))
-    garbage, empty, cut, missing, good = (vehicle.paths for vehicle in made)
+    vehicles = make_fleet(tmp_path, 5, 3, 20.0, troubles=names, progress=lambda *counts: progress.append(counts))
+    garbage, empty, cut, missing, intact = (vehicle.paths for vehicle in vehicles)
     assert progress == [(k, 5) for k in range(1, 6)]
     assert garbage[0].read_bytes() == bytes(range(128, 256)) * 20 and empty[0].read_bytes() == b""
     with pytest.raises(EOFError):
         gzip.decompress(cut[0].read_bytes())
     assert not missing[0].exists()
     assert all(len(paths) in (2, 3) and paths[1].stat().st_size for paths in (garbage, empty, missing))
-    content = good[0].read_bytes()
+    content = intact[0].read_bytes()
     assert content[4:8] == bytes(4)  # no date, so that the same seed gives the same bytes
     head, *rows = gzip.decompress(content).decode().replace('"', "").splitlines()
     assert head == "t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps,speed_mps,utc_s"
@@ -112,16 +112,38 @@ def test_routes_are_as_fast_and_hard_as_their_vehicles(kind, cruise_mps, speed_u
     assert min(stops) >= 1 and max(stops) >= 3
 
 
+def test_roads_have_their_slopes():
+    """The slope is linear between random values every 120 m. The camber is on average to the right."""
+    routes = [random_route(np.random.default_rng(seed), HANDLING["car"], 300.0, 20.0) for seed in range(20)]
+    slopes = np.degrees(np.concatenate([route.slope for route in routes]))
+    cambers = np.degrees(np.concatenate([route.camber for route in routes]))
+    assert 0.8 < np.std(slopes) < 1.4 and abs(np.mean(slopes)) < 0.3
+    assert 0.4 < np.std(cambers) < 1.1 and 0.3 < np.mean(cambers) < 1.2
+    distance, slope = np.cumsum(routes[0].speed) / 20.0, routes[0].slope
+    fast = routes[0].speed > 5.0
+    bent = np.abs(np.gradient(np.gradient(slope[fast], distance[fast]), distance[fast]))
+    offsets_m = distance[fast][bent > 0.3 * bent.max()] % 120.0
+    assert np.all(np.minimum(offsets_m, 120.0 - offsets_m) < 20.0)
+
+
+def test_circles_never_go_straight():
+    for straight in (False, True):
+        route = random_route(np.random.default_rng(2), HANDLING["car"], 100.0, 20.0, straight)
+        moving = route.speed > 3.0
+        assert ((np.abs(route.yaw_rate[moving]) > 0.05).mean() > 0.8) is not straight
+        assert (route.speed.max() <= 8.0) is not straight
+
+
 EXACT = VehicleSensor(np.eye(3), np.zeros(3), np.ones(3), np.zeros(3))
 COUNT_G, COUNT_DPS = 1.0 / 16384.0, 1.0 / 131.0
 
 
 def road(speed=10.0, acceleration=0.0, lateral=0.0, slope=0.0, camber=0.0, slope_rate=0.0, camber_rate=0.0):
     """Return 20 seconds of steady driving. lateral: acceleration to the left. slope, camber: in rad."""
-    one, t_s = np.ones(1000), np.linspace(0.0, 19.98, 1000)
+    ones, t_s = np.ones(1000), np.linspace(0.0, 19.98, 1000)
     yaw_rate = lateral / max(speed, 1e-9)
     tilt = slope + slope_rate * (t_s - 10.0), camber + camber_rate * (t_s - 10.0)
-    return Route(t_s, speed * one, acceleration * one, yaw_rate * one, *tilt)
+    return Route(t_s, speed * ones, acceleration * ones, yaw_rate * ones, *tilt)
 
 
 def logged(route, kind="car", sensor=EXACT, receiver=None, moved=None):
