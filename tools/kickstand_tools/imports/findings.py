@@ -292,7 +292,9 @@ def _find_triples(sheet: Sheet) -> list[_Triple]:
     stems: dict[str, dict[str, int]] = {}
     for place, name in enumerate(sheet.columns):
         for stem, axis in _split_axis(name):
-            stems.setdefault(stem, {}).setdefault(axis, place)
+            while axis in stems.setdefault(stem, {}):
+                stem += " "  # another sensor with the same names
+            stems[stem][axis] = place
     found, used = [], set()
     for stem, axes in stems.items():
         groups = ["xyz"] if set("xyz") <= set(axes) else _numbered(axes)
