@@ -206,7 +206,7 @@ def test_an_uncertain_table_gives_a_command_line_that_works(tmp_path, monkeypatc
 
 TYPED = {  # names of the columns, factors of the time, the forces and the rates, and words of the refusal
     "exchanged names": ("t,rx,ry,rz,ax,ay,az", 1.0, 1.0, 1.0, "so these columns are the accelerometer's"),
-    "3000 rows per second": ("t,ax,ay,az,gx,gy,gz", 1.0 / 60.0, 1.0, 1.0, "samples per second in s, which is doubtful"),
+    "3000 rows per second": ("t,ax,ay,az,gx,gy,gz", 1.0 / 60.0, 1.0, 1.0, "samples per second, which is doubtful"),
     "a speed without a unit": ("t,ax,ay,az,gx,gy,gz,speed", 1.0, 1.0, 1.0, "its noise at rest"),
     "names twice": ("t,x,y,z,x,y,z", 1.0, 1.0, 1.0, "its noise at rest"),
 }
