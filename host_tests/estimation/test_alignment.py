@@ -66,14 +66,14 @@ def test_ride_aligns_a_randomly_mounted_sensor(profile, seed, seconds, speed):
     assert fit.riding_s + fit.standing_s == pytest.approx(log.t_s[-1], abs=0.3)
     riding = ride.truth["speed_mps"] > 1.0
     assert fit.lean_deg == pytest.approx(np.sqrt(np.mean(ride.truth["lean_deg"][riding] ** 2)), rel=0.1)
-    made = fit.calibration
-    assert (made.aligned, made.six_done, made.vehicle) == (True, False, "motorcycle")
+    calibration = fit.calibration
+    assert (calibration.aligned, calibration.six_done, calibration.vehicle) == (True, False, "motorcycle")
     at_rest = np.mean(ride.readings[:400], axis=0)
-    assert made.gyro_bias_dps == pytest.approx(at_rest[4:], abs=0.3)
+    assert calibration.gyro_bias_dps == pytest.approx(at_rest[4:], abs=0.3)
     # On an upright bike at rest, the calibrated force is up
-    still = made.vehicle_from_sensor @ (np.mean(ride.upright, axis=0)[:3] + made.accel_offset_g)
-    assert still == pytest.approx([0.0, 1.0, 0.0], abs=0.045)
-    assert fit.offset_g @ made.vehicle_from_sensor == pytest.approx(made.accel_offset_g)
+    force = calibration.vehicle_from_sensor @ (np.mean(ride.upright, axis=0)[:3] + calibration.accel_offset_g)
+    assert force == pytest.approx([0.0, 1.0, 0.0], abs=0.045)
+    assert fit.offset_g @ calibration.vehicle_from_sensor == pytest.approx(calibration.accel_offset_g)
     assert np.all((0.005 < fit.offset_sigma_g) & (fit.offset_sigma_g < 0.03))
 
 
@@ -81,11 +81,11 @@ def test_a_ride_is_as_good_as_two_poses_and_serves_the_display():
     """A kickstand pose hardly determines yaw, and an offset of the accelerometer falsifies the roll of the poses."""
     ride = ride_of("hills", 22)
     log = log_of(ride, speed=False)
-    made = api.fit_ride(log).calibration
+    calibration = api.fit_ride(log).calibration
     kickstand, upright = (api.Log.from_readings(pose, ride.rate_hz) for pose in (ride.kickstand, ride.upright))
     poses = errors_deg(api.fit_two_positions(kickstand, upright).calibration, ride.vehicle_from_sensor)
-    assert np.all(errors_deg(made, ride.vehicle_from_sensor)[1:] < poses[1:])
-    live = api.replay(log, made)
+    assert np.all(errors_deg(calibration, ride.vehicle_from_sensor)[1:] < poses[1:])
+    live = api.replay(log, calibration)
     shown = ~np.isnan(live.lean_sigma_deg)
     assert np.mean(shown) > 0.9
     assert np.sqrt(np.mean((live.lean_deg - ride.truth["lean_deg"][::4])[shown] ** 2)) < 1.5
@@ -138,8 +138,8 @@ def test_a_phone_may_be_tilted_in_its_holder(phone, k):
 
 @pytest.mark.parametrize("phone", PHONES)
 def test_a_phone_mounted_otherwise_is_refused(phone):
-    for other in PHONES.keys() - {phone}:
-        for mounting in PHONES[other]:
+    for different in PHONES.keys() - {phone}:
+        for mounting in PHONES[different]:
             assert refusal(phone_log(mounting, (20.0, 10.0, 0.0))[0], phone).code in (
                 "phone-otherwise",
                 "phone-upside-down",

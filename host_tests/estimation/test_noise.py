@@ -11,9 +11,9 @@ ROOT = np.sqrt(0.2)  # the square root of a window's duration
 DEG = np.radians(1.0)
 
 
-def noise_of(given, still=False, speed=20.0, lean=0.0, pitch=0.0) -> Noise:
-    n = len(given)
-    noise = Noise(given, np.full(n, still))
+def noise_of(cut, still=False, speed=20.0, lean=0.0, pitch=0.0) -> Noise:
+    n = len(cut)
+    noise = Noise(cut, np.full(n, still))
     noise.speed, noise.lean, noise.pitch = np.full(n, speed), np.full(n, lean), np.full(n, pitch)
     return noise
 
@@ -47,9 +47,9 @@ RIDING = [
 ]
 
 
-@pytest.mark.parametrize(("row", "given", "sigma"), RIDING)
-def test_noise_of_riding_and_of_rest(row, given, sigma):
-    assert noise_of(windows(), **given).sigma()[5, row] == pytest.approx(sigma)
+@pytest.mark.parametrize(("row", "state", "sigma"), RIDING)
+def test_noise_of_riding_and_of_rest(row, state, sigma):
+    assert noise_of(windows(), **state).sigma()[5, row] == pytest.approx(sigma)
 
 
 EDGES = np.arange(21) * 0.2 + 1000.0 * (np.arange(21) > 5)
@@ -99,8 +99,8 @@ def test_unbalance_follows_the_force_to_the_side():
     noise = noise_of(windows(2000))
     noise.estimate_unbalance(force, 3.0)
     assert noise.unbalance == pytest.approx(np.sqrt(0.8 / (2.0 * np.exp(-1.0))), abs=0.05)
-    for given, over_s, limit in ((np.full(2000, 0.1), 3.0, 0.12), (1000.0 * force, 10.0, 6.0)):
-        noise.estimate_unbalance(given, over_s)
+    for lateral, over_s, limit in ((np.full(2000, 0.1), 3.0, 0.12), (1000.0 * force, 10.0, 6.0)):
+        noise.estimate_unbalance(lateral, over_s)
         assert noise.unbalance == pytest.approx(limit)
     short = noise_of(windows(49))
     short.estimate_unbalance(force[:49], 3.0)

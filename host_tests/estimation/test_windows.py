@@ -42,7 +42,9 @@ def test_gravity_keeps_its_length_while_the_bike_rolls():
     t = np.arange(400) / 200.0
     lean = np.radians(150.0) * (t - 1.0)
     force = np.column_stack((np.sin(lean), np.cos(lean), np.zeros(400)))
-    rolling, aligned = (cut(t, force, (0.0, 0.0, np.radians(150.0)), aligned=known) for known in (False, True))
+    rolling, aligned = (
+        cut(t, force, (0.0, 0.0, np.radians(150.0)), aligned=is_aligned) for is_aligned in (False, True)
+    )
     middle = np.radians(150.0) * (0.5 * (aligned.edges[1:] + aligned.edges[:-1]) - 1.0)
     assert np.all(np.linalg.norm(rolling.force, axis=1) < 0.99)
     assert np.allclose(aligned.force, np.column_stack((np.sin(middle), np.cos(middle), 0 * middle)), atol=1e-4)

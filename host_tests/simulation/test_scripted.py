@@ -38,11 +38,11 @@ def test_scripted_motion_matches_the_simulated_kinematics():
     t = np.arange(0.0, ride.seconds, 0.001)
     lean, speed, yaw_rate, slope = np.array([[ride.state(x)[i] for i in (1, 3, 5, 6)] for x in t]).T
     on_the_roll_axis = Bike(sensor_height=0.06, sensor_forward=0.0)
-    same = Motion(1000.0, speed, slope, yaw_rate, lean, slope, np.zeros_like(t))
+    simulated = Motion(1000.0, speed, slope, yaw_rate, lean, slope, np.zeros_like(t))
     motion = np.array([ride.motion(x) for x in t])
     assert np.all(np.ptp(motion, axis=0) > (0.001, 0.3, 0.5, 10.0, 40.0, 40.0))
-    assert np.abs(specific_force(same, on_the_roll_axis) / G - motion[:, :3])[1:-1].max() < 1e-3
-    assert np.abs(np.degrees(body_rates(same)) - motion[:, 3:])[1:-1].max() < 0.01
+    assert np.abs(specific_force(simulated, on_the_roll_axis) / G - motion[:, :3])[1:-1].max() < 1e-3
+    assert np.abs(np.degrees(body_rates(simulated)) - motion[:, 3:])[1:-1].max() < 0.01
     distance = np.array([ride.state(x)[8] for x in t])
     assert np.abs(distance - np.cumsum(speed) * 0.001).max() < 0.1
     riding = [ride.truth(x) for x in t[10_000:-8_000:50]]
@@ -127,8 +127,8 @@ def test_seed_determines_the_simulated_sensor():
     assert np.abs(mountings @ np.swapaxes(mountings, 1, 2) - np.eye(3)).max() < 1e-12
     assert np.linalg.det(mountings) == pytest.approx(np.ones(50)) and len(np.unique(mountings, axis=0)) == 50
     ride = Ride(HILLY)
-    first, again, other = (Sensor(seed=seed).world(ride.motion)(7.5) for seed in (1, 1, 2))
-    assert first == again != other
+    first, repeated, different = (Sensor(seed=seed).world(ride.motion)(7.5) for seed in (1, 1, 2))
+    assert first == repeated != different
     numbers = [sensor_errors.normal(sensor_errors.scrambled(k)) for k in range(4000)]
     assert np.mean(numbers) == pytest.approx(0.0, abs=0.05) and np.std(numbers) == pytest.approx(1.0, abs=0.03)
 
@@ -186,7 +186,7 @@ for n in range(60):
 
 @pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
 def test_the_same_readings_under_micropython():
-    here: dict = {}
-    exec(BOTH, here)
+    host: dict = {}
+    exec(BOTH, host)
     board = json.loads(mpy.run_mpy(BOTH + "print(json.dumps(readings))"))
-    assert np.abs(np.array(here["readings"]) - np.array(board)).max() < 1e-9
+    assert np.abs(np.array(host["readings"]) - np.array(board)).max() < 1e-9
