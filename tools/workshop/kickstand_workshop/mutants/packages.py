@@ -34,13 +34,12 @@ PACKAGES = {
     ),
     "lean": _package(
         "firmware/kickstand/lean/*.py",
-        # All other tests of lean take longer
-        "lean/test_known_ride lean/test_filter_states lean/test_[bkmru]* lean/test_formula",
+        "lean/test_known_ride lean/test_filter_states lean/test_filter_parts lean/test_[bkm]* lean/test_*",
     ),
     "drive_alignment": _package(
         "firmware/kickstand/drive_alignment/*.py",
-        "drive_alignment/test_[ebq]* drive_alignment/test_drive_limits drive_alignment/test_parts"
-        " drive_alignment/test_drive*",
+        "drive_alignment/test_events drive_alignment/test_stops drive_alignment/test_background"
+        " drive_alignment/test_drive_alignment",
     ),
     "speed": _package(
         "firmware/kickstand/speed/*.py", "simulated_board/test_board_speed simulated_board/test_board_place"
@@ -65,9 +64,9 @@ PACKAGES = {
     "published": _package("tools/kickstand_tools/calibration/published.py", "drive_alignment/test_published"),
     "aligning": _package(
         "tools/kickstand_tools/calibration/[!p]*.py tools/kickstand_tools/calibration/p[or]*.py",
-        "calibration/test_aligning_parts calibration/test_poses_of_logs drive_alignment/test_drive_feed"
+        "calibration/test_aligning_parts calibration/test_poses_of_logs drive_alignment/test_feed"
         " calibration/test_sensor_fit calibration/test_cli_calibration_file"
-        " calibration/test_cli_calibrate drive_alignment/test_drive_bins drive_alignment/test_cli_drive",
+        " calibration/test_cli_calibrate drive_alignment/test_cli_drive",
     ),
     "logs": _package(
         "tools/kickstand_tools/logs/*.py",
@@ -84,9 +83,7 @@ PACKAGES = {
     ),
     "estimation": _package(
         "tools/kickstand_tools/estimation/*.py",
-        "estimation/test_smooth_steps estimation/test_*_limits estimation/test_least_squares_steps"
-        " estimation/test_estimation_parts estimation/test_equations estimation/test_solver"
-        " estimation/test_known_alignment",  # the others take minutes
+        "estimation/test_[efnpw]* estimation/test_solver estimation/test_smooth estimation/test_alignment",
     ),
     "analysis": _package(
         "tools/kickstand_tools/analysis/*.py tools/kickstand_tools/analysis/plot/*.py",
@@ -111,7 +108,7 @@ PACKAGES = {
     ),
     "simulation": _package(
         "tools/kickstand_tools/simulation/**/*.py",
-        "simulation/test_simulation_parts simulation/test_known_plans simulation/test_*",
+        "simulation/test_physics simulation/test_rides simulation/test_scripted",
     ),
     "pull": _package(
         "tools/kickstand_tools/rides/*.py",
