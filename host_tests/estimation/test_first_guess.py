@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 from kickstand_tools.common.errors import RefusedInput
 from kickstand_tools.estimation.alignment import mounted_windows
-from kickstand_tools.estimation.first_guess import in_hand, lean_and_speed, standing
+from kickstand_tools.estimation.first_guess import in_hand, standing
 from window_input import still_log, windows
-
-G = 9.80665
 
 
 def alternating(size):
@@ -68,22 +66,6 @@ def test_under_20_s_between_two_hands_count_as_a_hand(between, parts):
 def test_under_20_s_at_either_end_count_as_a_hand(begin, first):
     assert held((begin, begin + 200))[0][0] == first
     assert held((1300 - begin, 1500 - begin))[0][1] == 1499 - first
-
-
-def test_lean_and_speed_of_a_steady_bend():
-    """The bike leans by 0.5 rad to the left at 15 m/s. The force gives the speed. A prior speed of 10 m/s has the
-    weight of a yaw rate of 0.14 rad/s."""
-    yaw = G * np.tan(0.5) / 15.0
-    bend = windows(600, force=(0.0, 1.0 / np.cos(0.5), 0.0), rate=(-yaw * np.sin(0.5), yaw * np.cos(0.5), 0.0))
-    still = np.zeros(600, dtype=bool)
-    turning = yaw * np.cos(0.5)
-    lean, speed = lean_and_speed(bend, still)
-    by_hand = (np.tan(0.5) * turning * G + 0.14**2 * 10.0) / (turning**2 + 0.14**2)
-    assert speed[300] == pytest.approx(by_hand) and lean[300] == pytest.approx(-np.arctan(by_hand * turning / G))
-    logged = windows(600, bend.rate, bend.force, 12.0)
-    assert lean_and_speed(logged, still)[1][300] == pytest.approx(12.0)
-    lean, speed = lean_and_speed(windows(600, force=(np.sin(0.2), np.cos(0.2), 0.0)), ~still)
-    assert lean[300] == pytest.approx(0.2) and speed[300] == 0.0
 
 
 def mounted(log):

@@ -32,15 +32,6 @@ def test_a_pose_measures_the_sum_of_rotation_and_offset():
     assert free[roll, left] == 0.0 and free[left, left] == pytest.approx(1e6)
 
 
-def test_hypotheses_are_three_mounts_times_three_winds():
-    assert ALL.minus_two_log_prior.tolist() == [0.0, 8.0, 5.0, 1.0, 9.0, 6.0, 1.0, 9.0, 6.0]
-    assert np.degrees(ALL.turning) == pytest.approx([0.05] * 6 + [0.11] * 3)
-    assert np.degrees(ALL.rolling) == pytest.approx([0.05] * 3 + [0.11] * 6)
-    assert ALL.pushed == pytest.approx([0.00052, 0.01047, 0.03142] * 3)
-    first = ALL.first()
-    assert first.weight.tolist() == [1.0] and first.pushed == pytest.approx([0.00052])
-
-
 def test_random_walks_of_the_hypotheses():
     parameters = np.tile(PRIOR.mean, (3, 1))
     parameters[1:, of.BESIDE] = 0.01

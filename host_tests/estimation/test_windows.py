@@ -71,14 +71,6 @@ def test_a_jolt_is_the_largest_difference_from_the_mean():
     assert result.warm == pytest.approx([0.0, 2.0, 4.0, 6.0, 8.0])
 
 
-def test_padding_has_no_duration_and_no_readings():
-    padded = windows(5, speed=3.0).padded(4)
-    assert len(padded) == 8 and padded.gap.tolist() == [False] * 5 + [True] * 3
-    assert padded.covered == pytest.approx([0.2] * 5 + [0.0] * 3)
-    assert np.sum(padded.seconds[5:]) == 0.0 and np.isnan(padded.speed[5:]).all() and np.all(padded.force[5:] == 0.0)
-    assert len(windows(5).padded(5)) == 5
-
-
 def test_axes_are_turned_after_the_bias_is_removed():
     quarter = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     result = windows(2, rate=(0.3, 0.1, 0.0)).turned(quarter, np.array([0.1, 0.0, 0.0]))

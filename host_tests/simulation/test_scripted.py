@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY as G
 from kickstand_tools.common import unix_port
-from kickstand_tools.demo.hand_bike import CRUISE_MPS, HandBike
 from kickstand_tools.signals import rotation_matrix
 from kickstand_tools.simulation.physics.bike import Bike
 from kickstand_tools.simulation.physics.kinematics import Motion, body_rates, specific_force
@@ -77,26 +76,6 @@ def test_vibration_has_its_size_and_stops_with_the_engine(vibration_g):
     shake = np.array([np.subtract(ride.motion(x), calm.motion(x)) for x in np.arange(10.0, 26.0, 0.0037)])
     assert ride.motion(2.0) == calm.motion(2.0)
     assert np.std(shake[:, 1]) == pytest.approx(vibration_g, rel=0.05) and 0.2 < np.std(shake[:, 3]) < 4.0
-
-
-def test_a_bike_steered_by_hand_stays_in_balance():
-    bike = HandBike(vibration_g=0.0)
-    assert bike.truth(1.0)[3] == "kickstand"
-    bike.command("left")
-    assert bike.truth(2.0)[:2] == (pytest.approx(KICKSTAND_DEG), 0.0)  # the bike does not ride off from the kickstand
-    bike.command("upright")
-    assert bike.truth(5.0)[0] == pytest.approx(0.0, abs=0.2)
-    for _ in range(5):
-        bike.command("left")  # the first command only sets the bike off
-    lean, speed, yaw_rate, phase = bike.truth(16.0)
-    assert (lean, speed) == (pytest.approx(-20.0, abs=0.6), pytest.approx(CRUISE_MPS, rel=0.01))
-    assert phase == "held turn" and yaw_rate > 0
-    left, up, _, w_left, w_up, _ = bike.motion(16.0)
-    assert (left, up) == (pytest.approx(0.0, abs=1e-9), pytest.approx(1 / np.cos(np.radians(lean))))
-    assert np.hypot(w_left, w_up) == pytest.approx(yaw_rate)
-    bike.command("kickstand")
-    assert min(bike.motion(t)[2] for t in np.arange(16.0, 18.0, 0.1)) < -0.4
-    assert bike.truth(30.0) == (pytest.approx(KICKSTAND_DEG), 0.0, 0.0, "kickstand")
 
 
 def test_readings_contain_the_stated_errors():
