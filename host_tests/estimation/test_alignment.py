@@ -91,7 +91,8 @@ def test_a_ride_is_as_good_as_two_poses_and_serves_the_display():
     assert np.sqrt(np.mean((live.lean_deg - ride.truth["lean_deg"][::4])[shown] ** 2)) < 1.5
 
 
-@pytest.mark.parametrize("extra", [0.05, pytest.param(-0.05, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("extra", [0.05, -0.05])
 def test_an_offset_across_the_bike_is_estimated(extra):
     """50 mg across the bike would be 2.9 degrees of roll."""
     ride = ride_of("street")
