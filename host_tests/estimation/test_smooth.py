@@ -104,8 +104,8 @@ def test_the_dive_of_a_bike_is_learned(dive_deg_per_g):
     ride = simulate_ride("track", seed=31, seconds=90.0, dive=(dive_deg_per_g, dive_deg_per_g))
     calibration = CalibrationFile(vehicle_from_sensor=ride.vehicle_from_sensor, aligned=True)
     force, rate = calibration.in_vehicle(ride.readings[::4])
-    t_s, nothing = ride.time[::4], np.full(len(force), np.nan)
-    windows = windows_of(t_s, force, np.radians(rate), nothing, np.zeros(len(force)), aligned=True)
+    t_s, no_speed = ride.time[::4], np.full(len(force), np.nan)
+    windows = windows_of(t_s, force, np.radians(rate), no_speed, np.zeros(len(force)), aligned=True)
     estimate = Estimate(windows, Prior.of_pose(six_done=False), ALL)
     assert np.degrees(estimate.parameters[0, DIVE]) == pytest.approx(dive_deg_per_g, abs=1.5)
 
@@ -141,10 +141,10 @@ def test_smoothed_lean_is_independent_of_the_mounting():
     ride, rng = ride_of("street"), np.random.default_rng(1)
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     turn *= np.linalg.det(turn)
-    log, old = ride.log, ride.calibration
-    force, rate = log.accel_g * old.accel_slope + old.accel_offset_g, log.gyro_dps - old.gyro_bias_dps
+    log, first = ride.log, ride.calibration
+    force, rate = log.accel_g * first.accel_slope + first.accel_offset_g, log.gyro_dps - first.gyro_bias_dps
     other_log = Log(log.t_s, force @ turn.T, rate @ turn.T, temperature_c=log.temperature_c)
-    mounting = CalibrationFile(vehicle_from_sensor=old.vehicle_from_sensor @ turn.T, aligned=True, six_done=True)
+    mounting = CalibrationFile(vehicle_from_sensor=first.vehicle_from_sensor @ turn.T, aligned=True, six_done=True)
     assert np.allclose(smoothed("street").lean_deg, smooth(other_log, mounting).lean_deg, atol=0.01)
 
 

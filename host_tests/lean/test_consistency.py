@@ -33,7 +33,7 @@ def test_each_kind_of_misfit_is_found_in_its_time():
     """The rows are the kind, its value, a time that is too short, and a time that is long enough. Vibration, a real
     slope, and larger means on a rough road are no misfits."""
     steep, never = radians(10.0), 0.0
-    for least_s, most_s, given in (
+    for least_s, most_s, kind in (
         (0.4, 1.0, {"left": -4.0}),
         (0.4, 1.0, {"up": -4.0}),
         (1.0, 3.2, {"left": 1.5}),
@@ -52,8 +52,8 @@ def test_each_kind_of_misfit_is_found_in_its_time():
         (30.0, never, {"up": 0.55, "shaken": 1.5}),
     ):
         judge = Consistency()
-        assert not windows(judge, least_s, **given) and not judge.doubt, given
-        assert bool(windows(judge, most_s - least_s, **given)) == (most_s > 0.0), given
+        assert not windows(judge, least_s, **kind) and not judge.doubt, kind
+        assert bool(windows(judge, most_s - least_s, **kind)) == (most_s > 0.0), kind
     judge = Consistency()
     for _ in range(10):  # a rider who accelerates down a slope soon brakes on it
         assert not windows(judge, 2.0, pitch=radians(-8.0), push=0.4)
