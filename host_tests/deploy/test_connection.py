@@ -127,7 +127,7 @@ def test_starting_board_gets_a_second_chance(port):
     assert port.opened == [("P", 10)] and port.closed == 1
 
 
-@pytest.mark.parametrize(("name", "silent_s"), [("P", 16.0), ("socket://x", 192.0)])
+@pytest.mark.parametrize(("name", "silent_s"), [("P", 13.0), ("socket://x", 156.0)])
 def test_silent_board_is_abandoned_later_if_emulated(port, tmp_path, name, silent_s):
     port.deaf = 9
     command.refused(tmp_path, "status", "--port", name, words=f"no MicroPython answers on {name}: check that this is")
