@@ -94,19 +94,6 @@ def test_port_that_opens_at_the_second_attempt_is_reported(port):
     assert port.closed == 1
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("/dev/tty-no-such-port", "there is no port /dev/tty-no-such-port"),
-        ("socket://127.0.0.1:1", "nothing listens at socket://127.0.0.1:1"),
-        ("telepathy://board", "is not a port"),
-    ],
-)
-def test_missing_port_is_refused_by_the_command(tmp_path, monkeypatch, name, message):
-    monkeypatch.setattr(connection, "RETURN_S", 0)
-    command.refused(tmp_path, "flash", "--port", name, words=message)
-
-
 @pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals are of Unix")
 def test_port_of_another_program_is_in_use(tmp_path, monkeypatch):
     monkeypatch.setattr(connection, "RETURN_S", 0)

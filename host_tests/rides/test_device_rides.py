@@ -3,8 +3,6 @@
 import binascii
 import contextlib
 import gc
-import io
-import re
 import warnings
 from binascii import a2b_base64
 from itertools import pairwise
@@ -240,37 +238,7 @@ def test_loss_is_counted_and_its_wrong_lean_is_not_shown(who_am_i, erase_s, fifo
     assert sum(dt for _, trusted, dt in errors_deg if not trusted) < 0.5 * (UNTIL_S - FROM_S)
 
 
-def test_status_shows_the_time_for_a_block(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(gc, "mem_free", lambda: 150_000, raising=False)
-    with Board(lambda t_s: (0, 1, 0, 0, 0, 0)) as board:
-        import kickstand
-
-        board.faults.slow_flash(0.0, 1000.0, 0.4)
-        board.run(kickstand.status, 60.0)
-    assert re.search("KB free, 40[01] ms to write a block", capsys.readouterr().out)
-    assert not list(tmp_path.iterdir())
-
-
 # The stream over USB
-
-
-def test_stream_is_base64_lines_with_a_point_per_block(clock):
-    from kickstand.rides.usb_stream import RideStream
-
-    stream = RideStream()
-    assert (stream.begin(), stream.ready(), stream.room(), stream.stops_interrupts) == (0, True, None, False)
-    assert stream.next_length() == stream.next_length() == 512
-    with contextlib.redirect_stdout(io.StringIO()) as output:
-        stream.write(b"abc" * 50)
-        stream.write(b"\0\xff")
-        stream.end_block()
-        stream.write(b"x")
-        stream.end()
-        stream.abandon()
-    lines = output.getvalue().split("\n")
-    assert [a2b_base64(line) for line in (lines[0], lines[1], lines[3])] == [b"abc" * 50, b"\0\xff", b"x"]
-    assert lines[2] == "." and lines[4:] == [""] and stream.fault_code(OSError(5)) == "usb-fault"
 
 
 @pytest.mark.parametrize(("apart_s", "ends"), [(59.0, True), (61.0, False)])

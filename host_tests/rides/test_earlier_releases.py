@@ -138,42 +138,17 @@ def test_calibration_file_stays_readable(added, tmp_path):
 
 
 # The settings of 0.1.0 to 0.4.0, each in use and with another value than the default where a Pico allows one
-CONFIG = """SIDE = "right"
-SAMPLE_HZ = 100
-ACCEL_RANGE_G = 4
-GYRO_RANGE_DPS = 1000
-DLPF = 4
-ACCEPT_WHO_AM_I = 0x47
-SENSOR_ADDRESS = 0x69
-SENSOR_I2C = 0
-SENSOR_SDA = 4
-SENSOR_SCL = 5
-SENSOR_BUS_HZ = 100_000
-LCD_I2C = 1
-LCD_SDA = 6
-LCD_SCL = 7
-LCD_BUS_HZ = 100_000
-LCD_ADDRESSES = (0x26,)
-BUTTON_PIN = 15
-VEHICLE = "car"
-SPEED = "wheel"
-GPS_UART = 1
-GPS_RX = 9
-GPS_TX = 8
-GPS_BAUD = 38400
-WHEEL_PIN = 14
-PULSES_PER_METRE = 2.0
-WATCHDOG = False
-RECORD = True
-SD_SPI = 0
-SD_SCK = 18
-SD_MOSI = 19
-SD_MISO = 16
-SD_CS = 17
+CONFIG = """
+SIDE = "right"; SAMPLE_HZ = 100; ACCEL_RANGE_G = 4; GYRO_RANGE_DPS = 1000; DLPF = 4
+ACCEPT_WHO_AM_I = 0x47; SENSOR_ADDRESS = 0x69; SENSOR_I2C = 0; SENSOR_SDA = 4; SENSOR_SCL = 5
+SENSOR_BUS_HZ = 100_000; LCD_I2C = 1; LCD_SDA = 6; LCD_SCL = 7; LCD_BUS_HZ = 100_000
+LCD_ADDRESSES = (0x26,); BUTTON_PIN = 15; VEHICLE = "car"; SPEED = "wheel"; GPS_UART = 1; GPS_RX = 9
+GPS_TX = 8; GPS_BAUD = 38400; WHEEL_PIN = 14; PULSES_PER_METRE = 2.0; WATCHDOG = False; RECORD = True
+SD_SPI = 0; SD_SCK = 18; SD_MOSI = 19; SD_MISO = 16; SD_CS = 17
 """
 
 
 def test_settings_file_stays_valid(tmp_path):
-    (tmp_path / "config.py").write_text(CONFIG)
+    (tmp_path / "config.py").write_text(CONFIG.replace("; ", "\n"))
     verdict = config_check.judge(tmp_path / "config.py", "rp2", "Raspberry Pi Pico with RP2040")
     assert verdict == config_check.Judged(None, [])

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from kickstand import __version__
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.rides.pull import pull
 from ride_boards import RideBoard
 from support import command
 from support.recordings import ride_writer
@@ -235,15 +234,6 @@ def test_ride_that_grows_meanwhile_is_complete(board, tmp_path):
     turns = ride_writer.blocks(5, ride=3, length=lambda _: 1024)[1]
     assert command.works("pull", "--out", tmp_path / "out").err == ""
     assert len(read_log(logs(tmp_path)[0]).t_s) == len(turns)
-
-
-def test_progress_counts_each_byte_once(board, tmp_path):
-    board.put("000/03/00000.rid", small(4))
-    on_the_cable(lambda lines: [lines[0].replace(b"A", b"B", 1), *lines[1:]], times=1)(board)
-    steps: list = []
-    result = pull(None, tmp_path / "out", progress=lambda *step: steps.append(step))
-    assert [done for _, done, _ in steps] == [0, 1536, 3072, 4096]
-    assert {(what, total) for what, _, total in steps} == {("pulling ride 3, part 0", 4096)} and result.rides[0].whole
 
 
 # The files on this computer

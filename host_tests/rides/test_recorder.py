@@ -25,7 +25,7 @@ class Keeper:
     stops_interrupts = True
     fails = ""
     error: Exception = OSError(5)
-    is_ready, free, length = True, 1_000_000, 1024
+    free, length = 1_000_000, 1024
 
     def __init__(self, clock):
         self.clock, self.steps, self.blocks, self.begun, self.takes_ms = clock, [], [], b"", {}
@@ -48,7 +48,7 @@ class Keeper:
 
     def ready(self):
         self._step("ready")
-        return self.is_ready
+        return True
 
     def write(self, piece):
         self._step("write")
@@ -141,18 +141,6 @@ def test_all_blocks_have_their_ride_and_sequence(tick, recorder, keeper, clock):
     assert [turn.time_us for turn in keeper.turns()] == [blocks[0].time_us + TURN_US * (i + 1) for i in range(1500)]
     assert [block.time_us for block in blocks[1:]] == [block.turns[-1].time_us for block in blocks[:-1]]
     assert blocks[0].calibration().aligned
-
-
-def test_writer_that_is_not_ready_is_asked_in_the_next_pass(recorder, keeper):
-    start(recorder)
-    keeper.is_ready = False
-    while "ready" not in keeper.steps:
-        add(recorder, 1)
-    add(recorder, 5)
-    assert keeper.steps.count("ready") == 6 and "write" not in keeper.steps
-    keeper.is_ready = True
-    add(recorder, 5)
-    assert len(keeper.blocks) == 1
 
 
 @pytest.mark.parametrize("stops_interrupts", [True, False])
