@@ -243,25 +243,18 @@ def test_check_measures_in_its_order():
 
 
 @pytest.mark.parametrize(
-    ("values", "left_out", "what", "verdict"),
+    ("values", "left_out"),
     [
-        ({"sensor": ("", 0, 0, 0, "no", 0)}, {"i2c", "fifo", "self_test", "noise", "clock"}, "sensor", check.BAD),
-        ({"sensor": ("MPU6500", 0x70, 0x68, 0x68, "", 0)}, {"self_test"}, "self-test", check.SKIPPED),
-        ({"fifo": ("stands still", 0, 300, 0, 0, True, 1)}, {"noise", "clock"}, "FIFO", check.BAD),
-        ({"flash": ((9, 150), 0, 99, "")}, {"fifo(parts, 1)"}, "flash", check.GOOD),
-        ({"flash": ((9, 149), 0, 99, "")}, {"fifo(parts, 0)"}, "flash", check.GOOD),
-        ({"flash": ((9,), 0, 99, "full")}, {"fifo(parts, 1)"}, "flash", check.BAD),
-        ({"clock": check.GuestFailed("OSError: 5")}, {"clock"}, "sample clock", check.BAD),
-        # half of the 300 ms in which the FIFO fills
-        ({"loop": (151_000, 1, 0, 0, 1, "", 9, 50_000)}, set(), "longest turn", check.BAD),
-        ({"loop": (149_000, 1, 0, 0, 1, "", 9, 50_000)}, set(), "longest turn", check.LOOK),
+        ({"sensor": ("", 0, 0, 0, "no", 0)}, {"i2c", "fifo", "self_test", "noise", "clock"}),
+        ({"sensor": ("MPU6500", 0x70, 0x68, 0x68, "", 0)}, {"self_test"}),
+        ({"fifo": ("stands still", 0, 300, 0, 0, True, 1)}, {"noise", "clock"}),
+        ({"clock": check.GuestFailed("OSError: 5")}, {"clock"}),
     ],
 )
-def test_check_leaves_out_what_cannot_be_measured(values, left_out, what, verdict):
+def test_check_leaves_out_what_cannot_be_measured(values, left_out):
     calls, findings = measured(**values)
-    names = {call.partition("(")[0] for call in calls}
-    assert not left_out & {*calls, *names} and findings[what].verdict == verdict
-    assert len(names) == 12 - len([name for name in left_out if "(" not in name])
+    assert len(calls) == 12 - len(left_out) and not left_out & {call.partition("(")[0] for call in calls}
+    assert "clock" not in values or findings["sample clock"].words == "broken off by OSError: 5"
 
 
 @pytest.mark.parametrize("answer", [(1, 2), "x", ("a", "b", "c", "d"), float("nan")])

@@ -1,15 +1,8 @@
 """Rides on a card with MicroPython's own FAT: no step of the recorder takes long, and a power cut loses one block."""
 
-import contextlib
-import io
 import json
-import os
-import types
 
 import pytest
-from kickstand.errors import CardError
-from kickstand.rides import ride_paths
-from rings import CARD
 from support.mpy import run_mpy
 
 SECTOR_S = 3.1e-3  # time to transfer a sector at 1.32 MHz, including the commands
@@ -199,48 +192,3 @@ print(len(opened))
 def test_folder_in_the_flash_is_not_the_card():
     """A copy of a card's files may leave a folder /sd in the flash. Rides must not be written there."""
     assert int(run_mpy(_FOLDER)) == 1
-
-
-# The trial of a card before a ride
-
-
-def raises(error):
-    def call(*_):
-        raise error
-
-    return call
-
-
-REFUSAL = CardError("no-driver")
-
-
-@pytest.mark.parametrize(
-    ("fault", "error"),
-    [
-        (None, None),
-        ("mount", REFUSAL),
-        *(("statvfs", error) for error in (OSError(5), ValueError("a driver's own"), MemoryError())),
-        ("read back", OSError(5)),
-    ],
-)
-def test_card_is_tested_before_it_is_needed(fault, error, root, monkeypatch):
-    from kickstand.rides import card_trial
-
-    if fault == "mount":
-        monkeypatch.setattr(ride_paths, "directory", raises(error))
-    elif fault == "statvfs":
-        monkeypatch.setattr(os, "statvfs", raises(error))
-    elif fault:
-        (root.path / "card").mkdir()
-        (root.path / "card" / "probe").symlink_to(os.devnull)
-    recorder = types.SimpleNamespace(problem=None, keeper=types.SimpleNamespace(refused=None))
-    with contextlib.redirect_stdout(io.StringIO()) as console:
-        card_trial.prepare(recorder, CARD)
-    problem = recorder.problem
-    assert problem is recorder.keeper.refused and console.getvalue().count("\n") == (fault is not None)
-    if not fault:
-        assert problem is None and os.listdir("card") == []  # the test file was removed
-    elif error is REFUSAL:
-        assert problem is REFUSAL
-    else:
-        assert isinstance(problem, CardError) and (problem.code, problem.values) == ("no-card", (str(error),))

@@ -68,8 +68,7 @@ def is_complete(path: Path) -> bool:
     data = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
     if path.suffix in (".csv", ".gz"):
         return data.endswith(b"\n") and data.startswith(b"t_s,") and len(data) > 20_000
-    ends = {".json": b"}", ".png": b"IEND\xaeB`\x82", ".html": b"</html>"}
-    return path.suffix in ends and data.strip().endswith(ends[path.suffix])
+    return path.suffix == ".json" and data.strip().endswith(b"}")
 
 
 class Pull(Scene):
@@ -127,10 +126,8 @@ class Flash(Scene):
         return super().lost() + ([] if WEATHER in programs else ["main.py of another project"])
 
 
-class Computed(Scene):
+class Smooth(Scene):
     """A command that replaces the results of an earlier run. source: the folder of a simulated ride."""
-
-    verb = ""
 
     def __init__(self, place, source):
         super().__init__(place)
@@ -139,25 +136,7 @@ class Computed(Scene):
             self.keep(name)
         ride, cal = place / "RIDE.csv", ["--calibration", place / "RIDE.cal.json"]
         result = self.keep("out/old.csv", b"t_s,of,before\n")
-        for name in ("RIDE.png", "RIDE.html"):
-            self.keep(f"out/{name}", b"an earlier picture")
-        self.arguments = {
-            "import": ["import", ride, "--out", result],
-            "smooth": ["smooth", ride, *cal, "--out", result],
-            "plot": ["plot", ride, *cal, "--out", self.out],
-        }[self.verb]
-
-
-class Import(Computed):
-    verb = "import"
-
-
-class Smooth(Computed):
-    verb = "smooth"
-
-
-class Plot(Computed):
-    verb = "plot"
+        self.arguments = ["smooth", ride, *cal, "--out", result]
 
 
 @pytest.fixture(scope="module")
@@ -166,8 +145,7 @@ def source(tmp_path_factory):
     place = tmp_path_factory.mktemp("source")
     command.works("simulate", "--profile", "street", "--seconds", 20, "--out", place)
     command.works("calibrate", "two", place / "KICKSTAND.csv", place / "UPRIGHT.csv", "--out", place / "RIDE.cal.json")
-    for scene in (Import, Smooth):  # import now, so each fork finds the modules already imported
-        command.works(*scene(place / scene.verb, place).arguments)
+    command.works(*Smooth(place / "smooth", place).arguments)  # so each fork finds the modules already imported
     return place
 
 
@@ -219,10 +197,9 @@ def cut(board, share):
     board.serial.inWaiting = in_waiting
 
 
-BOARDS, FILES = (Record, Pull, Flash), (Import, Smooth, Plot)
 OFTEN = {(Record, "full"), (Pull, "kill"), (Pull, "cable"), (Flash, "cable"), (Smooth, "kill")}
-KINDS = [(scene, fault) for scene in BOARDS for fault in ("kill", "full", "cable", "term")]
-KINDS += [(scene, fault) for scene in FILES for fault in ("kill", "full", "term")]
+KINDS = [(scene, fault) for scene in (Record, Pull, Flash) for fault in ("kill", "full", "cable", "term")]
+KINDS += [(Smooth, fault) for fault in ("kill", "full", "term")]
 
 
 @pytest.mark.parametrize(
