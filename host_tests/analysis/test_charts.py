@@ -164,31 +164,6 @@ def test_the_picture_draws_the_same_charts(short_overview):
     assert figure.get_supxlabel().startswith(words)
 
 
-@pytest.mark.parametrize("most", [(1.0, 1.0), (0.0, 6.0), (12.0, 11.0), (60.0, 60.0)])
-def test_labels_of_the_lean_histogram_do_not_overlap(most):
-    pytest.importorskip("matplotlib")
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    ride_overview = overview_of(samples(600))
-    (ride_overview.summary.left_deg.value, ride_overview.summary.right_deg.value) = most
-    ride_overview.summary.left_deg.time_s = ride_overview.summary.right_deg.time_s = 1.0
-    ride_overview.summary.histogram_s[:] = np.where(np.abs(np.arange(-69.5, 70.0)) <= 5.0, 8.0, 0.1)
-    figure = Figure(figsize=(11, 3), layout="constrained")
-    canvas, axes = FigureCanvasAgg(figure), figure.add_subplot(1, 3, 2)
-    picture.draw_chart(axes, chart_of(ride_overview, "How long"))
-    canvas.draw()
-    boxes = [text.get_window_extent() for text in axes.texts if text.get_text()]
-    assert len(boxes) == 3 and not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
-    inside = axes.get_window_extent()
-    assert max(box.x1 for box in boxes) < inside.x1 + 15 and (
-        max(most) <= 6.0 or min(box.x0 for box in boxes) > inside.x0
-    )
-    (corner,) = (text.get_window_extent() for text in axes.texts if "upright" in text.get_text())
-    tops = [line.get_window_extent().y1 for line in axes.lines]
-    assert len(tops) == 2 and max(tops) < corner.y0  # no line crosses the words "upright"
-
-
 def test_a_page_has_its_warnings_if_asked_and_names_as_text():
     ride_overview = overview_of(samples(100), notices=[UpOff(30.0, False)])
     words = '<p class="warning">Warning: the calibration&#39;s up is 30'

@@ -129,31 +129,6 @@ def test_camber_at_the_stops_does_not_reach_forward(method, yaw_deg):
     assert total < max(2.3, 1.1 * abs(yaw))
 
 
-def test_the_state_is_the_next_step_of_the_driver():
-    legs = [[2.0, 1.0, 0.0], [2.0, -1.0, 0.0], *around(2), [8.0, 1.5, 0.0], [4.0, -2.0, 15.0], *around(6, stands=False)]
-    states = drive(legs)["states"]
-    assert alignment.DriveAlignment("car").state == alignment.WAITING_FOR_SPEED
-    assert states[:2] == [alignment.WAITING_FOR_STOP, alignment.WAITING_FOR_BRAKING]
-    assert set(states[2:]) == {
-        alignment.WAITING_FOR_BRAKING,
-        alignment.BRAKING,
-        alignment.TURNING,
-        alignment.READY,
-    }
-    assert drive(legs, vehicle="motorcycle", bias=[0.0] * 3)["states"][0] == alignment.WAITING_FOR_BRAKING
-
-
-@pytest.mark.parametrize(
-    ("silent_s", "state"), [(4.9, alignment.WAITING_FOR_BRAKING), (5.2, alignment.WAITING_FOR_SPEED)]
-)
-def test_a_speed_is_stale_after_5_s(silent_s, state):
-    bike = alignment.DriveAlignment("motorcycle")
-    bike.measure_speed(9.0)
-    for _ in range(round(silent_s * 10)):
-        bike.update([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], 100_000)
-    assert bike.state == state
-
-
 @pytest.mark.parametrize("source", [{"every_s": 1.0, "step": 1 / 3.6}, {"late_s": 1.7}, {"scale": 1.25}])
 def test_a_coarse_or_late_speed_aligns(source):
     result = drive(around(), source=source)

@@ -195,25 +195,6 @@ def test_the_quality_of_a_drive_by_numpy():
 
 
 @pytest.mark.parametrize(
-    ("first", "angles", "good"),
-    [
-        ([0.0] * 3, [3.9] * 3, True),  # the halves differ by up to 4 degrees
-        ([0.0] * 3, [4.1] * 3, False),
-        ([5.0, -5.0] * 2, [5.0, -5.0], False),  # a standard error of 2 degrees is too large
-    ],
-)
-def test_a_drive_becomes_ready_within_its_limits(first, angles, good):
-    assert Drive().judge([*first, *angles]).good is good
-
-
-@pytest.mark.parametrize(("angle", "good"), [(5.9, True), (6.1, False)])
-def test_a_ready_drive_stays_ready_within_wider_limits(angle, good):
-    drive = Drive()
-    assert drive.judge([0.0] * 3).good
-    assert drive.judge([angle] * 3).good is good
-
-
-@pytest.mark.parametrize(
     ("drive", "events", "good", "speed", "mount"),
     [
         ({"counted": 4}, {}, False, None, None),

@@ -91,29 +91,6 @@ def test_a_ride_is_as_good_as_two_poses_and_serves_the_display():
     assert np.sqrt(np.mean((live.lean_deg - ride.truth["lean_deg"][::4])[shown] ** 2)) < 1.5
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("extra", [0.05, -0.05])
-def test_an_offset_across_the_bike_is_estimated(extra):
-    """50 mg across the bike would be 2.9 degrees of roll."""
-    ride = ride_of("street")
-    log, across = log_of(ride), ride.vehicle_from_sensor[0]
-    plain, shifted = api.fit_ride(log), api.fit_ride(replace(log, accel_g=log.accel_g + extra * across))
-    assert shifted.offset_g[0] - plain.offset_g[0] == pytest.approx(-extra, abs=0.02)
-    assert np.all(errors_deg(shifted.calibration, ride.vehicle_from_sensor) < [1.0, 1.5, 1.5])
-
-
-@pytest.mark.parametrize(
-    ("axis", "half"), [(0, 1), pytest.param(1, 2, marks=pytest.mark.long), pytest.param(2, 0, marks=pytest.mark.long)]
-)
-def test_a_moving_mount_enlarges_the_standard_error(axis, half):
-    """The sensor turns by 5 degrees in the middle of the ride. The halves are roll, pitch and yaw."""
-    ride, log = ride_of("hills", 22), log_of(ride_of("hills", 22))
-    turn = rotation_matrix(np.radians(-5.0) * np.eye(3)[axis])
-    fit = api.fit_ride(moved(log, ride.vehicle_from_sensor.T @ turn @ ride.vehicle_from_sensor))
-    assert fit.halves_deg[half] == pytest.approx(5.0, abs=2.5)
-    assert stated_deg(fit)[axis] > 0.5 * abs(fit.halves_deg[half])
-
-
 def phone_log(mounting, tilt_deg=(0.0, 0.0, 0.0)):
     """Return the street ride of a phone, and its true matrix. tilt_deg: rotation about left, up, forward."""
     ride = ride_of("street")

@@ -4,68 +4,7 @@ import numpy as np
 import pytest
 from kickstand_tools.common.errors import RefusedInput
 from kickstand_tools.estimation.alignment import mounted_windows
-from kickstand_tools.estimation.first_guess import in_hand, standing
-from window_input import still_log, windows
-
-
-def alternating(size):
-    """Return 60 values with this standard deviation, shape (60, 3). Only the first component changes."""
-    return np.outer(np.where(np.arange(60) % 2, size, -size), [1.0, 0.0, 0.0])
-
-
-# The moving standard deviation over 9 windows is sqrt(80) / 9 = 0.9938 times the size.
-@pytest.mark.parametrize(
-    ("rate_dps", "force_g", "mean_dps", "speed", "still"),
-    [
-        (0.35, 0.0, 0.0, np.nan, True),
-        (0.355, 0.0, 0.0, np.nan, False),
-        (0.0, 0.01, 0.0, np.nan, True),
-        (0.0, 0.0102, 0.0, np.nan, False),
-        (0.0, 0.0, 3.9, np.nan, True),
-        (0.0, 0.0, 4.1, np.nan, False),
-        (0.0, 0.0, 0.0, 5.0, False),
-    ],
-)
-def test_a_standing_bike_may_shake_a_little(rate_dps, force_g, mean_dps, speed, still):
-    rate = np.radians(alternating(rate_dps) + [0.0, mean_dps, 0.0])
-    assert standing(windows(60, rate, alternating(force_g) + [0.0, 1.0, 0.0], speed))[30] == still
-
-
-def test_a_jolt_ends_a_standstill_for_four_windows():
-    force = np.tile([0.0, 1.0, 0.0], (60, 1))
-    force[30, 0] = 0.5
-    assert np.flatnonzero(~standing(windows(60, force=force))).tolist() == list(range(26, 35))
-    assert np.flatnonzero(~standing(windows(60, gap=np.arange(60) == 10))).tolist() == [10]
-
-
-def held(*parts: tuple[int, int], deg=90.0):
-    """Return in_hand() of a sensor that is turned by this angle from the first to before the last window of a part.
-
-    Each result is a list of the first and the last window of each stretch.
-    """
-    force = np.tile([0.0, 1.0, 0.0], (1500, 1))
-    for begin, end in parts:
-        force[begin:end] = [np.sin(np.radians(deg)), np.cos(np.radians(deg)), 0.0]
-    edges = (np.flatnonzero(np.diff([0, *hand.astype(int), 0])) for hand in in_hand(windows(1500, force=force)))
-    return [(edge - np.arange(len(edge)) % 2).tolist() for edge in edges]
-
-
-def test_a_hand_changes_the_mean_force_over_10_s():
-    """The mean over 51 windows is beyond 35 degrees if 22 of them are on their side, because tan(35) = 0.7. So the hand
-    is found from 4 windows before its beginning. It is sure 10 windows later, and perhaps 25 windows earlier."""
-    assert held((600, 900)) == [[606, 893], [571, 928]]
-    assert [len(held((600, 900), deg=deg)[0]) for deg in (34.9, 35.1)] == [0, 2]
-
-
-@pytest.mark.parametrize(("between", "parts"), [(104, 1), (108, 2)])
-def test_under_20_s_between_two_hands_count_as_a_hand(between, parts):
-    assert len(held((400, 500), (500 + between, 600 + between))[0]) == 2 * parts
-
-
-@pytest.mark.parametrize(("begin", "first"), [(101, 0), (105, 111)])
-def test_under_20_s_at_either_end_count_as_a_hand(begin, first):
-    assert held((begin, begin + 200))[0][0] == first
-    assert held((1300 - begin, 1500 - begin))[0][1] == 1499 - first
+from window_input import still_log
 
 
 def mounted(log):

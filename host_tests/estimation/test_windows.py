@@ -59,18 +59,3 @@ def test_a_long_step_between_samples_is_a_gap(hz, step_s, gaps):
     # A gap begins and ends half a step from a reading
     assert np.sum(result.seconds[result.gap]) == pytest.approx(gaps * (step_s - 1.0 / hz))
     assert (result.edges[0], result.before[0]) == pytest.approx((-0.5 / hz, 0.5 / hz))
-
-
-def test_a_jolt_is_the_largest_difference_from_the_mean():
-    """Each window has 20 samples. One of them has 2 rad/s about two axes, so the mean is 0.1 rad/s."""
-    rate = np.zeros((100, 3))
-    rate[30, :2] = 2.0
-    result = cut(np.arange(100) / 100.0, rate=rate, warm=np.arange(100) / 10.0)
-    assert result.jolt == pytest.approx([0.0, np.sqrt(2.0) * 1.9, 0.0, 0.0, 0.0])
-    assert result.warm == pytest.approx([0.0, 2.0, 4.0, 6.0, 8.0])
-
-
-def test_axes_are_turned_after_the_bias_is_removed():
-    quarter = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    result = windows(2, rate=(0.3, 0.1, 0.0)).turned(quarter, np.array([0.1, 0.0, 0.0]))
-    assert result.rate[0] == pytest.approx([0.1, -0.2, 0.0]) and result.force[0] == pytest.approx([1.0, 0.0, 0.0])

@@ -63,49 +63,6 @@ def test_a_short_drive_has_the_alignment_of_the_firmware(halves_deg):
     assert result.attitude_deg == pytest.approx(np.hypot(0.5, UP_DEG))
 
 
-@pytest.mark.parametrize(
-    ("yaw", "quality_deg", "share", "variance"),
-    [
-        (0.0, 0.0, 0.5, 0.75 * 0.09),  # both have the variance 0.09 deg^2, and half of their errors are common
-        (0.5, 0.0, 0.5, 0.75 * 0.09),  # up to two standard deviations apart
-        (1.0, 0.0, 0.5, 0.75 * 0.09 * (1.0 / 0.6) ** 2),
-        (1.0, np.sqrt(0.27), 0.2, 0.64 * 0.09 + 0.04 * 0.36 + 0.32 * 0.5 * 0.18),
-    ],
-)
-def test_the_mean_with_the_firmware_is_weighted_by_variance(yaw, quality_deg, share, variance):
-    """Up is the firmware's."""
-    theirs = turn_of(yaw, UP) @ turn_of(2.0, FORWARD) @ MOUNT
-    result = forward_of(drive_intervals(64.0, speed=1e3), device=device_of(theirs, quality_deg))
-    assert result.frame[1] == pytest.approx(theirs[1])
-    assert np.degrees(np.arcsin(result.frame[2] @ theirs[0])) == pytest.approx(yaw * (1.0 - share), abs=0.03)
-    assert result.sigma_deg == pytest.approx(np.sqrt(variance), rel=0.02)
-    assert result.attitude_deg == pytest.approx(np.hypot(result.sigma_deg, UP_DEG), rel=0.01)
-
-
-def test_whole_logs_show_forward_better_than_the_device():
-    """Buses brake gently about ten times. With these seeds the device's forward has an error of about a degree."""
-    device, fleet = [], []
-    for seed in (101, 102, 106, 109):
-        log, sensor = drive(seed, "bus", 150.0)
-        fit = fit_logs([log], None, "car")
-        result = find_forward([evidence.intervals(log, "car", fit.lag_s or 0.0, fit.bias_dps)], fit)
-        assert result and result.sigma_deg < 0.7
-        device.append(yaw_deg(fit.calibration.vehicle_from_sensor, sensor.mount))
-        fleet.append(yaw_deg(result.frame, sensor.mount))
-        assert abs(fleet[-1]) < 2.0 * result.sigma_deg
-    assert np.sqrt(np.mean(np.square(device))) > 0.95 and np.sqrt(np.mean(np.square(fleet))) < 0.75
-
-
-@pytest.mark.parametrize(("seed", "doubt"), [(138, "uncertain"), (114, "parts-differ")])
-def test_a_sure_forward_overrides_the_doubt_of_the_device(tmp_path, seed, doubt):
-    log, sensor = drive(seed, "bus", 150.0)
-    assert fit_logs([log], None, "car").reason == doubt
-    result = result_of(tmp_path, log)
-    row = result.alignment
-    assert (row["status"], row["reason"], row["message"]) == ("aligned", "", "") and result.brake_tests
-    assert abs(yaw_deg(row["vehicle_from_sensor"], sensor.mount)) < 0.8
-
-
 # Matrices from the sensor's axes to the vehicle's, with the rows left, up, forward, measured with the recordings' own
 # receivers.
 REFERENCES = {

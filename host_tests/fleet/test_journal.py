@@ -47,15 +47,6 @@ def test_results_are_read_again_in_the_order_of_their_keys(journal_of):
             journal.add("c", result("c", "final"))
 
 
-def test_many_results_of_a_store_are_read(tmp_path):
-    address = f"memory:///{tmp_path.name}-many"
-    with StoreJournal(address) as journal:
-        for k in range(401):
-            journal.add(f"k{k}", result(str(k)))
-    with StoreJournal(address) as journal:
-        assert vehicles(journal, [f"k{k}" for k in range(401)]) == [str(k) for k in range(401)]
-
-
 def test_a_damaged_result_in_a_store_is_counted_and_computed_again(tmp_path):
     address = f"memory:///{tmp_path.name}-damaged"
     with StoreJournal(address) as journal:

@@ -112,28 +112,6 @@ def test_routes_are_as_fast_and_hard_as_their_vehicles(kind, cruise_mps, speed_u
     assert min(stops) >= 1 and max(stops) >= 3
 
 
-def test_roads_have_their_slopes():
-    """The slope is linear between random values every 120 m. The camber is on average to the right."""
-    routes = [random_route(np.random.default_rng(seed), HANDLING["car"], 300.0, 20.0) for seed in range(20)]
-    slopes = np.degrees(np.concatenate([route.slope for route in routes]))
-    cambers = np.degrees(np.concatenate([route.camber for route in routes]))
-    assert 0.8 < np.std(slopes) < 1.4 and abs(np.mean(slopes)) < 0.3
-    assert 0.4 < np.std(cambers) < 1.1 and 0.3 < np.mean(cambers) < 1.2
-    distance, slope = np.cumsum(routes[0].speed) / 20.0, routes[0].slope
-    fast = routes[0].speed > 5.0
-    bent = np.abs(np.gradient(np.gradient(slope[fast], distance[fast]), distance[fast]))
-    offsets_m = distance[fast][bent > 0.3 * bent.max()] % 120.0
-    assert np.all(np.minimum(offsets_m, 120.0 - offsets_m) < 20.0)
-
-
-def test_circles_never_go_straight():
-    for straight in (False, True):
-        route = random_route(np.random.default_rng(2), HANDLING["car"], 100.0, 20.0, straight)
-        moving = route.speed > 3.0
-        assert ((np.abs(route.yaw_rate[moving]) > 0.05).mean() > 0.8) is not straight
-        assert (route.speed.max() <= 8.0) is not straight
-
-
 EXACT = VehicleSensor(np.eye(3), np.zeros(3), np.ones(3), np.zeros(3))
 COUNT_G, COUNT_DPS = 1.0 / 16384.0, 1.0 / 131.0
 

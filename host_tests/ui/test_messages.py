@@ -14,7 +14,16 @@ CLASSES = {name for name in vars(errors) if name[0].isupper()}
 INDIRECT = {"other-side", "mount-moved", "incomplete", "no-memory", "out-of-memory", "out-of-room"}
 INDIRECT |= {"sensor-lost", "sensor-frozen", "sensor-silent", "sensor-reset", "flash-fault", "card-fault", "usb-fault"}
 # Codes for which the display shows the setting's name
-OTHER_SETTINGS = {"i2c-number", "not-allowed", "card-pins", "one-i2c", "no-such-pin", "i2c-pins", "uart-pins", "aliasing"}
+OTHER_SETTINGS = {
+    "i2c-number",
+    "not-allowed",
+    "card-pins",
+    "one-i2c",
+    "no-such-pin",
+    "i2c-pins",
+    "uart-pins",
+    "aliasing",
+}
 CONSOLE_ONLY = {"wrong-code"}  # codes that are reported during imports, before a display exists
 # Values for the words of each code. Some are long numbers and long names.
 VALUES = {"dead-axis": ("x", 0.1), "odd-axis": ("x", 0.1, 1.0), "side-tilted": ("+x", 25.0, 20.0)}
