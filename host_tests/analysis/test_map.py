@@ -2,185 +2,137 @@
 map and the charts show the same moment."""
 
 import functools
-import json
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.analysis.overview import Overview, overview
+from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.plot import page, track_map
 from kickstand_tools.analysis.summary import Peak
+from kickstand_tools.signals import EARTH_M
+from small_rides import ALIGNED, overview_of, samples
 from support.recordings import app_exports
-
-pytest.importorskip("plotly")
-EARTH_M = 6_371_000.0
-MOTORCYCLE = api.CalibrationFile(aligned=True)
 
 
 @functools.cache
-def seen(lat_deg: float = 52.5, lon_deg: float = 13.4, gap: bool = False, car: bool = False) -> Overview:
+def ride(lat_deg=52.5, lon_deg=13.4, gap=False):
     """Simulate a ride of half a minute that starts at this place, with a position every half second. gap: True to leave
     out the positions from 10 to 16 s."""
-    ride = app_exports.riding().every(2)
-    known = np.arange(len(ride.t_s)) % 50 == 3
+    motion = app_exports.riding().every(4)
+    placed = np.arange(len(motion.t_s)) % 25 == 3
     if gap:
-        known &= (ride.t_s < 10.0) | (ride.t_s > 16.0)
+        placed &= (motion.t_s < 10.0) | (motion.t_s > 16.0)
     narrow = np.cos(np.radians(52.5)) / np.cos(np.radians(lat_deg))
-    lat = np.where(known, ride.lat_deg - 52.5 + lat_deg, np.nan)
-    lon = np.where(known, ((ride.lon_deg - 13.4) * narrow + lon_deg + 180.0) % 360.0 - 180.0, np.nan)
-    speed = np.where(known, ride.speed_mps, np.nan)
-    log = api.Log(ride.t_s, ride.force_g, ride.rates_dps, speed, lat_deg=lat, lon_deg=lon, name="RIDE.csv")
-    return overview(api.open_ride(log, replace(MOTORCYCLE, vehicle="car") if car else MOTORCYCLE))
+    lat = np.where(placed, motion.lat_deg - 52.5 + lat_deg, np.nan)
+    lon = np.where(placed, ((motion.lon_deg - 13.4) * narrow + lon_deg + 180.0) % 360.0 - 180.0, np.nan)
+    speed = np.where(placed, motion.speed_mps, np.nan)
+    log = api.Log(motion.t_s, motion.force_g, motion.rates_dps, speed, lat_deg=lat, lon_deg=lon, name="RIDE.csv")
+    return overview(api.open_ride(log, ALIGNED))
 
 
-def points_of(*place, **kind) -> track_map.MapPoints:
-    found = track_map.map_points(seen(*place, **kind))
-    assert found is not None
-    return found
+def points_of(ride_overview):
+    points = track_map.map_points(ride_overview)
+    assert points is not None
+    return points
 
 
 @pytest.mark.parametrize(
-    ("east_m", "north_m", "shape"), [(100.0, 100.0, 1.0), (900.0, 100.0, 2.2), (100.0, 900.0, 0.6), (0.0, 0.0, 1.0)]
+    ("east_m", "north_m", "shape"),
+    [(100.0, 100.0, 1.0), (900.0, 100.0, 2.2), (100.0, 900.0, 0.6), (150.0, 100.0, 1.5), (0.0, 0.0, 1.0)],
 )
 def test_the_map_has_the_shape_of_its_track_within_limits(east_m, north_m, shape):
-    track = replace(points_of(), east_m=np.array([0.0, np.nan, east_m]), north_m=np.array([north_m, np.nan, 0.0]))
-    assert track_map.shape(track) == pytest.approx(shape)
+    points = points_of(track(11))
+    turned = replace(points, east_m=np.array([0.0, np.nan, east_m]), north_m=np.array([north_m, np.nan, 0.0]))
+    assert track_map.shape(turned) == pytest.approx(shape)
 
 
-@pytest.mark.parametrize("place", [(-33.9, 151.2), (69.6, 18.9), (47.6, 179.999), (-0.001, 0.001)])
-def test_metre_of_the_map_is_right_in_both_directions(place):
-    """A metre is right at every latitude, on both sides of the equator and across the meridian of 180 degrees."""
-    found = points_of(*place)
-    ride = app_exports.riding()
-    north = (ride.lat_deg - ride.lat_deg[0]) * np.radians(EARTH_M)
-    east = (ride.lon_deg - ride.lon_deg[0]) * np.radians(EARTH_M) * np.cos(np.radians(52.5))
-    for got, true in ((found.north_m, north), (found.east_m, east)):
-        want = np.interp(found.t_s, ride.t_s, true)
-        assert np.max(np.abs(got - got[0] - (want - want[0]))) < 0.5
-    moved = np.hypot(np.diff(found.east_m), np.diff(found.north_m))
-    assert np.sum(moved) == pytest.approx(np.sum(np.hypot(np.diff(east), np.diff(north))), rel=0.01)
-    assert np.min(moved) > 0.3  # the points of a standstill are joined into one
+@pytest.mark.parametrize("place", [(-33.9, 151.2), (47.6, 179.999), (-0.001, 0.001)])
+def test_a_metre_of_the_map_is_right_in_both_directions(place):
+    """At every latitude, on both sides of the equator and across the meridian of 180 degrees."""
+    points, motion = points_of(ride(*place)), app_exports.riding()
+    north = (motion.lat_deg - motion.lat_deg[0]) * np.radians(EARTH_M)
+    east = (motion.lon_deg - motion.lon_deg[0]) * np.radians(EARTH_M) * np.cos(np.radians(52.5))
+    for metres, true in ((points.north_m, north), (points.east_m, east)):
+        expected = np.interp(points.t_s, motion.t_s, true)
+        assert np.max(np.abs(metres - metres[0] - (expected - expected[0]))) < 0.5
+    steps = np.hypot(np.diff(points.east_m), np.diff(points.north_m))
+    assert np.min(steps) > 0.3  # the points of a standstill are joined into one
+    assert np.sum(steps) == pytest.approx(np.sum(np.hypot(np.diff(east), np.diff(north))), rel=0.01)
 
 
-def test_map_shows_lean_and_speed_at_each_moment():
-    _, dots = track_map.figure(points_of(car=True), seen(car=True))["data"]
-    # The track of a car has one colour, because a car has no lean
-    assert isinstance(dots["marker"]["color"], str) and len(dots["x"]) > 50
-    found, channels = points_of(), seen().course
-    lean = np.interp(found.t_s, channels.t_s, channels.lean_deg)
-    known = np.isfinite(found.lean_deg)
-    assert np.count_nonzero(known) > 0.9 * len(known)
-    assert found.lean_deg[known] == pytest.approx(lean[known], abs=0.7)
-    ride = app_exports.riding()
-    assert found.speed_kmh == pytest.approx(3.6 * np.interp(found.t_s, ride.t_s, ride.speed_mps), abs=4.0)
+def test_the_line_of_the_map_is_broken_in_a_gap():
+    points = points_of(ride(gap=True))
+    (gap,) = np.flatnonzero(np.isnan(points.east_m))
+    assert points.t_s[gap - 1] < 10.0 < 16.0 < points.t_s[gap + 1]
+    line, dots = track_map.figure(points, ride(gap=True))["data"]
+    assert [k for k, x in enumerate(line["x"]) if x is None] == [gap] and np.all(np.isfinite(dots["x"]))
 
 
-def test_line_of_the_map_is_broken_in_a_gap():
-    found = points_of(gap=True)
-    (gap,) = np.flatnonzero(np.isnan(found.east_m))
-    assert found.t_s[gap - 1] < 10.0 < 16.0 < found.t_s[gap + 1]
-    line, dots = track_map.figure(found, seen(gap=True))["data"]
-    assert [k for k, x in enumerate(line["x"]) if x is None] == [gap]
-    assert np.all(np.isfinite(dots["x"]))
-
-
-def test_map_has_left_blue_right_orange_and_north_up():
-    made = track_map.figure(points_of(), seen())
-    _, dots = made["data"]
-    scale = dict(dots["marker"]["colorscale"])
+def test_the_map_has_left_blue_right_orange_and_north_up():
+    figure = track_map.figure(points_of(ride()), ride())
+    dots, layout = figure["data"][1], figure["layout"]
     assert dots["marker"]["cmin"] == -dots["marker"]["cmax"] < 0.0
-    steeper = replace(seen(), summary=replace(seen().summary, right_deg=Peak(43.6, 1.0)))  # the title shows 44 degrees
-    bar = track_map.figure(points_of(), steeper)["data"][1]["marker"]["colorbar"]
-    assert bar["ticktext"] == ["44", "0", "44"]
-    for place, colour in scale.items():
-        red, blue = int(colour[1:3], 16), int(colour[5:7], 16)
-        assert np.sign(blue - red) == np.sign(0.5 - place)
+    for place, colour in dots["marker"]["colorscale"]:
+        assert np.sign(int(colour[5:7], 16) - int(colour[1:3], 16)) == np.sign(0.5 - place)
     lean = np.asarray(dots["marker"]["color"])
     assert lean.min() < -20.0 and lean.max() > 30.0
-    assert made["layout"]["yaxis"]["scaleanchor"] == "x"
-    assert "autorange" not in made["layout"]["yaxis"]  # without autorange, y grows upwards
-    assert "N" in made["layout"]["annotations"][1]["text"]
+    assert layout["yaxis"]["scaleanchor"] == "x" and "autorange" not in layout["yaxis"]  # y grows upwards
+    assert "N" in layout["annotations"][1]["text"]
+    steeper = replace(ride(), summary=replace(ride().summary, right_deg=Peak(43.6, 1.0)))
+    bar = track_map.figure(points_of(ride()), steeper)["data"][1]["marker"]["colorbar"]
+    assert bar["ticktext"] == ["44", "0", "44"]
 
 
-def page_of(tmp_path: Path, which: Overview, tiles: bool = False) -> str:
-    page.draw(tmp_path / "ride.html", which, tiles)
-    return (tmp_path / "ride.html").read_text()
+def track(n=301, step_s=1.0, vehicle="motorcycle", **columns):
+    """Return a ride whose positions go north by 1.1 m per sample."""
+    positions = {"lat_deg": 10.0 + np.arange(n) * 1e-5, "lon_deg": 8.0} | columns
+    return overview_of(samples(n, step_s=step_s, **positions), vehicle=vehicle)
 
 
-@pytest.mark.parametrize("positions", [0, 1])
-def test_without_positions_there_is_no_map(tmp_path, positions):
-    """One position is not a track."""
-    course = seen().course
-    places = {name: np.where(np.arange(len(course.t_s)) < positions, 5.0, np.nan) for name in ("lat_deg", "lon_deg")}
-    html = page_of(tmp_path, replace(seen(), course=replace(course, **places)))
-    assert 'id="chart"' in html
-    assert 'id="map"' not in html
-    assert 'id="map"' in page_of(tmp_path, seen())
+def test_a_track_is_in_metres_from_its_middle():
+    """At 60 degrees north, 0.01 degrees of longitude are 556 m, and 0.01 degrees of latitude are 1112 m. The points are
+    at least 0.2 s apart."""
+    steps = np.arange(1001) * 1e-5
+    points = points_of(track(1001, 0.01, lat_deg=60.0 + steps, lon_deg=8.0 + steps, speed_mps=10.0))
+    assert len(points.t_s) == 51 and points.t_s[:2] == pytest.approx([0.0, 0.2])
+    assert (points.lat_deg, points.lon_deg) == pytest.approx((60.005, 8.0))
+    assert points.east_m[[0, -1]] == pytest.approx([0.0, 555.9], abs=0.5)
+    assert points.north_m[[0, -1]] == pytest.approx([-556.0, 556.0], abs=0.5)
+    assert points.speed_kmh == pytest.approx(36.0) and track_map.map_points(track(10, lat_deg=np.nan)) is None
 
 
-def test_page_loads_nothing_unless_tiles_are_requested(tmp_path):
-    html = page_of(tmp_path, seen())
-    assert not re.search(r"<(script|link|img)[^>]*(src|href)=", html)
-    assert page.TILES_URL not in html
-    assert '"tiles": null' in html
-    assert "OpenStreetMap contributors" not in html.rpartition("<p id=")[2]
-    html = page_of(tmp_path, seen(), tiles=True)
-    assert page.TILES_URL in html
-    assert "openstreetmap.org/copyright" in html.rpartition('<p id="tiles">')[2]
+@pytest.mark.parametrize(("vehicle", "lean"), [("motorcycle", True), ("car", False)])
+def test_the_points_of_a_map_have_time_lean_and_speed(vehicle, lean):
+    ride_overview = track(lean_deg=np.arange(301) / 10.0, speed_mps=10.0, vehicle=vehicle)
+    points = points_of(ride_overview)
+    line, dots = track_map.figure(points, ride_overview)["data"]
+    assert line["customdata"][0] == [0.0, 0.0, 36.0] and line["customdata"][-1][0] == pytest.approx(300.0, abs=1.0)
+    assert dots["customdata"] == [row[0] for row in line["customdata"]] and len(dots["x"]) == len(line["x"])
+    assert dots["customdata"] == pytest.approx(points.t_s, abs=0.051)
+    if lean:
+        assert dots["marker"]["color"][-1] == pytest.approx(30.0, abs=0.1)
+        assert dots["marker"]["colorbar"]["ticktext"] == ["30", "0", "30"]
+    else:
+        assert isinstance(dots["marker"]["color"], str) and "colorbar" not in dots["marker"]
 
 
-@pytest.mark.parametrize("place", [(52.5, 13.4), (-33.9, 151.2), (47.6, -0.01)])
-def test_tiles_match_the_track(place):
-    """The map's metres give the same tile for the start as the formula of web maps for latitude and longitude."""
-    found = points_of(*place)
-    tiles = page.tiles_at(found)
-    size = tiles["world_m"] / 2**15
-    lat, lon = np.radians(found.lat_deg), found.lon_deg
-    column = (lon + 180.0) / 360.0 * 2**15
-    row = (1.0 - np.log(np.tan(lat) + 1.0 / np.cos(lat)) / np.pi) / 2.0 * 2**15
-    assert tiles["west_m"] / size == pytest.approx(column, abs=1e-6)
-    assert tiles["north_m"] / size == pytest.approx(row, abs=1e-6)
+def test_a_lean_that_is_not_trusted_has_no_dot_on_the_map():
+    ride_overview = track(sure=np.where(np.arange(301) < 150, 0.0, 1.0))
+    line, dots = track_map.figure(points_of(ride_overview), ride_overview)["data"]
+    assert line["customdata"][0][1] is None and line["customdata"][-1][1] == 0.0
+    assert min(dots["customdata"]) == pytest.approx(150.0, abs=1.0) and len(dots["x"]) < len(line["x"])
 
 
-_POINT = """() => {
-  const k = Math.floor(map.data[0].x.length * 0.6), x = map._fullLayout.xaxis, y = map._fullLayout.yaxis;
-  return [x._offset + x.d2p(map.data[0].x[k]), y._offset + y.d2p(map.data[0].y[k]), map.data[0].customdata[k][0]];
-}"""
-
-
-def test_in_a_browser_chart_and_map_show_the_same_moment(tmp_path, chromium):
-    page_of(tmp_path, seen())
-    view = chromium.new_page(viewport={"width": 1300, "height": 800})
-    view.set_default_timeout(120_000)  # drawing is slow on a busy machine
-    asked, errors = [], []
-    view.on("request", lambda request: asked.append(request.url))
-    view.on("pageerror", lambda error: errors.append(str(error)))
-    view.goto((tmp_path / "ride.html").as_uri())
-    view.wait_for_function("map.layout.annotations[0].text != ''")
-    bar = view.evaluate("[map.layout.annotations[0].text, map.layout.shapes[1].x1, map.layout.xaxis.range]")
-    area, chart = view.locator("#map").bounding_box(), view.locator("#chart").bounding_box()
-    at = view.evaluate(_POINT)
-    before = view.locator("#here").text_content()
-    view.mouse.move(area["x"] + at[0], area["y"] + at[1])
-    view.wait_for_function("before => document.querySelector('#here').textContent !== before", arg=before)
-    said = view.locator("#here").text_content()
-    view.mouse.move(chart["x"] + 0.6 * chart["width"], chart["y"] + 180)
-    view.wait_for_timeout(300)
-    there = view.evaluate("[map.layout.shapes[0].xanchor, map.layout.shapes[0].yanchor]")
-    later, tip = (view.locator(one).text_content() for one in ("#here", "#tip"))
-    view.close()
-    assert errors == []
-    assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
-    metres, (west, east) = float(bar[0].split()[0]), bar[2]
-    assert bar[0].endswith(" m")
-    assert (bar[1] - 0.02) * (east - west) == pytest.approx(metres, rel=1e-6)
-    assert said.split()[0] == f"0:{round(at[2]):02}"
-    assert tip.split(",")[0] == later.split()[0], "one moment has two times"
-    points = points_of()
-    minutes, seconds = later.split()[0].split(":")
-    k = np.argmin(np.hypot(points.east_m - there[0], points.north_m - there[1]))
-    assert points.t_s[k] == pytest.approx(60 * int(minutes) + int(seconds), abs=1.1)
-    assert json.dumps(there) != json.dumps([0, 0])
+def test_a_page_has_a_map_if_there_is_a_track():
+    """It loads nothing unless tiles are requested. One position is not a track."""
+    plain, streets = page.page(track(), "", ""), page.page(track(), "", "", tiles=True)
+    assert 'id="map"' in plain and '"tiles": null' in plain and page.TILES_HOST not in plain
+    assert not re.search(r"<(script|link|img)[^>]*(src|href)=", plain)
+    assert page.TILES_URL in streets and "openstreetmap.org/copyright" in streets.rpartition('<p id="tiles">')[2]
+    assert f"img-src data: blob: {page.TILES_HOST};" in streets and '"hovermode": "x"' in plain
+    single = np.where(np.arange(301) == 7, 10.0, np.nan)
+    for bare in (track(lat_deg=single, lon_deg=single), track(lat_deg=np.nan)):
+        html = page.page(bare, "", "")
+        assert 'id="chart"' in html and 'id="map"' not in html and '"hovermode": "x"' not in html

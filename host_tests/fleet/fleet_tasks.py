@@ -9,7 +9,7 @@ from pathlib import Path
 def task(number, behaviour="", note=""):
     """Return the task's number.
 
-    behaviour: "die" ends the worker, "hang" never returns, "raise" raises an error, "slow" takes longer.
+    behaviour: "die" ends the worker, "hang" never returns, "raise" raises an error.
     note: path of a file. Each start of the task adds a line with its number and the worker's process id.
     """
     if note:
@@ -21,6 +21,4 @@ def task(number, behaviour="", note=""):
         time.sleep(600.0)
     if behaviour == "raise":
         raise ValueError("on purpose")
-    if behaviour == "slow":
-        time.sleep(0.6)
     return number

@@ -1,234 +1,180 @@
-"""Tests with Dask's workers. A task that fails does not affect other tasks, and a stopped run is resumed."""
+"""What happens to the tasks of a cluster, with Dask's client replaced: retries, time limits, lost workers."""
 
-import os
-import signal
-import subprocess
-import sys
 import threading
-import time
-from collections import Counter
-from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
-import pyarrow.parquet as parquet
+import distributed
 import pytest
-from fleet_tasks import task
-from kickstand_fleet import run
-from kickstand_fleet.cluster import CRASHED, TIMED_OUT, Cluster
-from kickstand_fleet.journal import Journal
-from kickstand_fleet.manifest import Period, read_manifest
-from kickstand_fleet.period import failed
-from kickstand_fleet.run import run_fleet
-from kickstand_fleet.tables import TABLES, schema
+from kickstand_fleet import cluster as module
+from kickstand_fleet.cluster import CRASHED, TIMED_OUT, run_tasks
 from kickstand_tools.common.errors import InputError
 
-
-@pytest.fixture(scope="module")
-def cluster():
-    """Return a cluster with a long time limit, so that no task is ended because the machine is busy."""
-    with Cluster(None, 2, timeout_s=600.0) as running:
-        yield running
+ADDRESS = "tcp://a.cluster:8786"
 
 
-class Overdue(dict):
-    """Start times of tasks. Task 5 seems to have begun long ago, so it is ended at once. No other task is ended, even
-    on a busy machine."""
-
-    def __setitem__(self, key, began):
-        super().__setitem__(key, (began[0] - 1000.0 * key.startswith("fleet-5-"), began[1]))
+class KilledWorker(Exception):
+    """Dask's error for a task whose worker died."""
 
 
-def test_bad_task_costs_no_other_task(cluster, tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster, "_started", Overdue())
-    note = tmp_path / "began"
-    behaviours = {2: "die", 4: "raise", 5: "hang"}
-    items = [(k, behaviours.get(k, ""), str(note)) for k in range(14)]
-    found = {index: (result, reason) for index, result, reason, _ in cluster.run(task, items)}
-    assert found == {k: (None if k in behaviours else k, "") for k in range(14)} | {
-        2: (None, CRASHED),
-        4: (None, CRASHED),
-        5: (None, TIMED_OUT),
-    }
-    began = Counter(int(line.split()[0]) for line in note.read_text().splitlines())
-    assert began[2] == 2 and sum(began.values()) <= 14 + 6  # finished tasks are not computed again
+class Future:
+    def __init__(self, client, key, item):
+        self.client, self.key, self.item, self.status = client, key, item, "pending"
+
+    def add_done_callback(self, ended):
+        self.ended = ended
+        self.client.begin(self)
+
+    def end(self, status, error=None):
+        self.status, self.error = status, error
+        self.client.pending.remove(self)
+        self.ended(self)
+
+    def result(self):
+        if self.error:
+            raise self.error
+        return self.item
+
+    def exception(self):
+        return self.error
+
+    def cancel(self, force):
+        self.client.cancelled.append((self.item, force))
+
+    def release(self):
+        pass
 
 
-def test_killed_worker_costs_no_result(cluster, tmp_path):
-    note = tmp_path / "began"
-    items = [(k, "slow", str(note)) for k in range(8)]
-
-    def kill():
-        while not note.exists() or len(note.read_text().splitlines()) < 3:
-            time.sleep(0.05)
-        # The process is a worker of this test's cluster
-        os.kill(int(note.read_text().splitlines()[-1].split()[1]), signal.SIGKILL)
-
-    killer = threading.Thread(target=kill, daemon=True)
-    killer.start()
-    found = sorted((index, result) for index, result, _, _ in cluster.run(task, items))
-    killer.join()
-    assert found == [(k, k) for k in range(8)]
+ENDS = {
+    "": ("finished", None),
+    "lose": ("finished", OSError("the worker is gone")),
+    "raise": ("error", ValueError("on purpose")),
+    "die": ("error", KilledWorker("died")),
+    "cancel": ("cancelled", None),
+    "disconnect": ("lost", None),
+}
 
 
-def test_run_without_workers_ends(tmp_path, monkeypatch):
-    monkeypatch.setattr("kickstand_fleet.cluster._LOST_S", 1.0)
-    note = tmp_path / "began"
-    with Cluster(None, 1, timeout_s=600.0) as running:
-        outcomes = running.run(task, [(0, "", str(note)), (1, "hang", str(note)), (2, "", str(note))])
-        assert next(outcomes) == (0, 0, "", "")
-        workers = running._client.cluster
-        assert workers is not None
-        workers.scale(0)
-        with pytest.raises(InputError, match="all workers have ended; finished work is kept"):
-            list(outcomes)
+class Client:
+    """Replaces Dask's client. `set` gives it properties for one test.
+
+    ways: {item: what its tasks do, in sequence}, a list of keys of ENDS, or "hang". Other tasks return their item.
+    """
+
+    latest: "Client"
+    set: dict = {}
+
+    def __init__(self, address, timeout):
+        Client.latest = self
+        self.asked, self.status, self.ways, self.task_s = (address, timeout), "running", {}, 0.01
+        self.workers = {"w1": {}, "w2": {}}
+        self.pending, self.cancelled, self.restarted, self.most, self.begun = [], [], [], 0, []
+        self.__dict__.update(Client.set)
+        if isinstance(address, str) and "error" in Client.set:
+            raise Client.set["error"]
+
+    def wait_for_workers(self, count, timeout):
+        self.waited = count, timeout
+
+    def subscribe_topic(self, topic, note):
+        self.note = note
+
+    def scheduler_info(self, n_workers):
+        return {"workers": self.workers}
+
+    def submit(self, _announce, announced, _function, item, *, key, pure):
+        assert announced == key and not pure
+        return Future(self, key, item)
+
+    def begin(self, future):
+        self.pending.append(future)
+        self.most = max(self.most, len(self.pending))
+        self.begun.append(future.item)
+        self.note((0.0, (future.key, "w1")))
+        ways = self.ways.get(future.item)
+        way = ways.pop(0) if ways else ""
+        if way == "vanish":
+            self.workers = {}
+        elif way == "disconnect":
+            self.status = "closed"
+        if way in ENDS:
+            threading.Timer(self.task_s, future.end, ENDS[way]).start()
+
+    def restart_workers(self, workers, timeout, raise_for_error):
+        self.restarted.append((workers, raise_for_error))
+
+    def close(self, timeout):
+        pass
 
 
-def test_fleet_on_a_cluster_is_resumed(cluster, fleet, tmp_path, monkeypatch):
-    periods = read_manifest(str(fleet.manifest))
-    worked = []
-
-    def only(function, items, *_):
-        worked.append(len(items))
-        yield from cluster.run(function, items)
-
-    monkeypatch.setattr(run, "run_tasks", only)
-    first = run_fleet(periods[:4], tmp_path)
-    assert (first.vehicles, first.new) == (4, 4)
-    seen = []
-    whole = run_fleet(periods, tmp_path, with_signals=False, progress=lambda done, total: seen.append((done, total)))
-    assert (whole.new, worked) == (len(periods) - 4, [4, len(periods) - 4])
-    assert seen[0] == (4, len(periods)) and seen[-1] == (len(periods), len(periods))
-    tables = {name: parquet.read_table(tmp_path / f"{name}.parquet") for name in TABLES}
-    for name, table in tables.items():
-        assert table.schema.names == list(TABLES[name])
-        for found, written in zip(table.schema, schema(name), strict=True):
-            assert found.type == written.type or str(found.type).startswith("list<")
-            assert found.metadata[b"unit"] == written.metadata[b"unit"]
-    rows = tables["alignments"].to_pylist()
-    assert [row["vehicle"] for row in rows] == [period.vehicle for period in periods]
-    assert {row["status"] for row in rows} == {"aligned", "refused"}
-    assert all(len(row["vehicle_from_sensor"]) == 9 for row in rows if row["status"] == "aligned")
-    assert all((tmp_path / row["plot"]).is_file() for row in rows if row["plot"])
-    assert tables["moved"].num_rows == 2 and tables["brake_tests"].num_rows > 10 and tables["errors"].num_rows >= 1
-    page = (tmp_path / "index.html").read_text()
-    assert "://" not in page.replace("http://www.w3.org/2000/svg", "")
-    assert all(row["vehicle"] in page for row in rows)
-
-    # Only a changed log is processed again.
-    path = Path(periods[0].paths[0])
-    stat = path.stat()
-    os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + 1_000_000))
-    assert run_fleet(periods, tmp_path).new == 1
-    assert run_fleet(periods, tmp_path).new == 0
-    # a changed option also causes a new computation
-    assert run_fleet(periods[:1], tmp_path, with_signals=True).new == 1
-    written = sorted((tmp_path / "signals").rglob("*.parquet"))
-    assert len(written) >= len(periods[0].paths)
-    values = parquet.ParquetFile(written[0]).read()
-    assert abs(values["up_g"].to_numpy().mean() - 1.0) < 0.05
-    parts = written[0].relative_to(tmp_path / "signals").parts
-    assert [part.split("=")[0] for part in parts[:-1]] == ["vehicle", "day"]
+@pytest.fixture(autouse=True)
+def client(monkeypatch):
+    monkeypatch.setattr(distributed, "Client", Client)
+    Client.set = {}
 
 
-def test_stopped_run_keeps_its_results(tmp_path, monkeypatch):
-    periods = [Period(f"v{k}", "", "car", ("none.csv",)) for k in range(5)]
-
-    def stopped(_, items, *__):
-        for index in range(3):
-            yield index, failed(items[index][0], "unreadable", "no file"), "", ""
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(run, "run_tasks", stopped)
-    with pytest.raises(KeyboardInterrupt):
-        run_fleet(periods, tmp_path)
-    assert parquet.read_table(tmp_path / "alignments.parquet")["vehicle"].to_pylist() == ["v0", "v1", "v2"]
-    assert "3 of 5 mounted sensors so far" in (tmp_path / "index.html").read_text()
-    with Journal(tmp_path / "journal.jsonl") as journal:
-        keys = run._keys(periods, run._marks(periods), False)
-        assert [key in journal for key in keys] == [True, True, True, False, False]
+def outcomes(count, ways=None, timeout_s=600.0, **properties):
+    """Return {item: [result, reason, explanation]} of the tasks 0 to count - 1."""
+    Client.set = {"ways": {item: list(each) for item, each in (ways or {}).items()}} | properties
+    results = list(run_tasks(lambda item: item, [(k,) for k in range(count)], ADDRESS, timeout_s=timeout_s))
+    assert sorted(index for index, *_ in results) == list(range(count))  # each task has one outcome
+    return {index: rest for index, *rest in results}
 
 
-PROGRAM = """
-import signal, time
-from kickstand_fleet.cluster import Cluster
-if __name__ == "__main__":
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # programs in the background of a shell ignore Ctrl-C
-    print("starting", flush=True)
-    with Cluster(None, 2, 60.0):
-        time.sleep(60.0)
-"""
+def test_each_task_has_one_outcome():
+    assert outcomes(9) == {k: [k, "", ""] for k in range(9)}
+    assert Client.latest.asked == (ADDRESS, 20.0) and Client.latest.waited == (1, 20.0)
 
 
-@pytest.mark.nightly  # the next test is similar, but does not depend on how busy the machine is
-@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="Ctrl-C comes at once on this system")
-@pytest.mark.parametrize("after_s", [0.6, 1.6])
-def test_ctrl_c_while_workers_start_is_deferred(tmp_path, after_s):
-    """Ctrl-C takes effect only after the workers have started, because starting workers would print pages of errors."""
-    program = tmp_path / "program.py"
-    program.write_text(PROGRAM)
-    command, pipe = [sys.executable, str(program)], subprocess.PIPE
-    with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, start_new_session=True) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "starting\n"
-        time.sleep(after_s)
-        os.killpg(process.pid, signal.SIGINT)  # a terminal also sends Ctrl-C to the workers
-        _, trouble = process.communicate(timeout=120)
-    assert trouble.count("Traceback") == 1
-    assert trouble.endswith("KeyboardInterrupt\n")
+@pytest.mark.parametrize(("workers", "most"), [(1, 2), (3, 6)])
+def test_each_worker_has_two_tasks_at_a_time(workers, most):
+    outcomes(most + 1, task_s=0.3, workers=dict.fromkeys(range(workers)))
+    assert Client.latest.most == most
 
 
-CONNECTING = """
-import os, signal, threading
-from distributed import Client
-register = Client.register_plugin
-def interrupted(client, plugin):
-    threading.Timer(0.02, os.kill, (os.getpid(), signal.SIGINT)).start()
-    return register(client, plugin)
-Client.register_plugin = interrupted
-"""
+def test_without_tasks_no_cluster_is_asked():
+    Client.set = {"error": OSError("refused")}
+    assert list(run_tasks(print, [], ADDRESS)) == []
 
 
-@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="Ctrl-C comes at once on this system")
-def test_ctrl_c_while_connecting_is_deferred(tmp_path):
-    program = tmp_path / "program.py"
-    program.write_text(CONNECTING + PROGRAM)
-    trouble = subprocess.run([sys.executable, str(program)], capture_output=True, text=True, timeout=120).stderr
-    assert trouble.count("Traceback") == 1
-    assert trouble.endswith("KeyboardInterrupt\n")
+def test_an_error_of_a_task_is_its_outcome():
+    results = outcomes(3, {1: ["raise"]})
+    assert results[1] == [None, CRASHED, "ValueError: on purpose"] and results[2] == [2, "", ""]
+    assert Client.latest.begun == [0, 1, 2]
 
 
-def test_next_run_retries_a_crashed_vehicle(tmp_path, monkeypatch):
-    periods = [Period("v", "", "car", ("none.csv",))]
-    monkeypatch.setattr(run, "run_tasks", lambda *_: iter([(0, None, CRASHED, "its worker died")]))
-    first = run_fleet(periods, tmp_path)
-    assert first.seen.reasons[("error", CRASHED)] == 1
-    assert run_fleet(periods, tmp_path).new == 1
+@pytest.mark.parametrize("way", ["die", "cancel", "lose"])
+def test_a_task_whose_worker_died_runs_again_alone_at_the_end(way):
+    assert outcomes(6, {1: [way]}) == {k: [k, "", ""] for k in range(6)}
+    assert Client.latest.begun == [0, 1, 2, 3, 4, 5, 1]
 
 
-def test_a_result_that_is_lost_with_its_worker_is_computed_again():
-    """The first worker ends the task, but dies before its result is fetched. The cluster has no real workers."""
-    submitted = []
+@pytest.mark.parametrize("way", ["die", "cancel", "lose"])
+def test_a_task_whose_worker_died_twice_is_the_cause(way):
+    results = outcomes(6, {1: [way, way], 4: ["die"]})
+    assert results[1] == [None, CRASHED, "its worker died twice: out of memory, or a crash of a library"]
+    assert results[4] == [4, "", ""] and sorted(Client.latest.begun[6:]) == [1, 4]
 
-    class Ended:
-        status = "finished"
 
-        def __init__(self, key):
-            self.key = key
-            submitted.append(key)
+def test_a_task_that_takes_too_long_is_ended_with_its_worker():
+    results = outcomes(5, {2: ["hang"]}, 0.3)
+    assert results.pop(2) == [None, TIMED_OUT, "took longer than 0 s, so it was ended"]
+    assert results == {k: [k, "", ""] for k in (0, 1, 3, 4)}
+    assert Client.latest.cancelled == [(2, True)] and Client.latest.restarted == [(["w1"], False)]
 
-        def add_done_callback(self, callback):
-            callback(self)
 
-        def result(self):
-            if len(submitted) == 1:
-                raise OSError("the worker is gone")
-            return "found"
+def test_a_lost_scheduler_ends_the_run():
+    with pytest.raises(InputError, match=rf"the cluster at {ADDRESS} was lost; finished work is kept"):
+        outcomes(3, {1: ["disconnect"]})
 
-        def release(self):
-            pass
 
-    alone: Any = Cluster(None, 1, timeout_s=600.0)
-    alone._client, alone._started = SimpleNamespace(submit=lambda *_, key, pure: Ended(key)), {}
-    assert list(alone.run(task, [(0,)])) == [(0, "found", "", "")]
-    assert len(submitted) == 2
+def test_a_run_ends_if_no_worker_comes_back(monkeypatch):
+    monkeypatch.setattr(module, "_LOST_S", 0.3)
+    with pytest.raises(InputError, match=rf"all workers at {ADDRESS} have ended; finished work is kept"):
+        outcomes(1, {0: ["vanish"]})
+
+
+@pytest.mark.parametrize("error", [OSError("refused"), TimeoutError("none came"), ValueError("bad address")])
+def test_a_cluster_that_cannot_be_reached_is_named(error):
+    with pytest.raises(InputError, match=rf"no workers at {ADDRESS}: {error}"):
+        outcomes(1, error=error)
+    with pytest.raises(KeyError):  # a bug stays visible
+        outcomes(1, error=KeyError("x"))

@@ -1,172 +1,109 @@
-"""Recording on the simulated board: a replay of the recorded ride gives the lean that the display showed."""
+"""The recorder writes the passes of the loop to the ring of rides: order, times, gaps, positions, and a failure."""
 
-from itertools import pairwise
+import contextlib
+import io
+from itertools import accumulate, pairwise
 
 import pytest
-from kickstand.lean.meter import LeanMeter
-from kickstand.rides.flash_ring import RideRing
-from kickstand_tools.calibration.file import read_calibration
-from kickstand_tools.logs.reader import read_blocks
-from kickstand_tools.replay import replay_engine
-from kickstand_tools.rides import block_reader, ride_log
-from kickstand_tools.simulated_board.simulator import Board
-from support import device_plans, engines
-from support.device_plans import ALIGNED
+from kickstand.errors import Notice
+from kickstand_tools.rides import block_reader
+from rings import FLASH, ride_ring
+from support.recordings import ride_writer
 
-SHORT, LONG = 0.15, 1.2
-
-
-def menu(from_s):
-    """Return the presses that choose "Record ride" or "Stop recording" in the menu. They take 8 s."""
-    return [[from_s, LONG], *([from_s + i, SHORT] for i in (2, 3, 4, 5)), [from_s + 6, LONG]]
-
-
-def rides(flash):
-    """Return {number of a ride: its whole blocks}, and a list of all problems."""
-    found, problems = {}, []
-    for path in sorted((flash / "rides").glob("*/*/*.rid")):
-        blocks, bad = block_reader.read(path.read_bytes())
-        problems += bad
-        for block in blocks:
-            found.setdefault(block.ride, []).append(block)
-    return found, problems
-
-
-def replayed(blocks, directory):
-    """Return the lean that `replay` computes for each row of the ride's log."""
-    cal = ride_log.write(directory / "ride.csv.gz", blocks)
-    engine = replay_engine.Replay(read_calibration(cal).to_firmware())
-    return [engine.step(*row)[0] for block in read_blocks(directory / "ride.csv.gz") for row in block.rows()]
-
-
-def lean_matches(record, blocks, leans, slack_s=0.4):
-    """Assert that each displayed lean is within the replay's leans of the last slack_s. Return the number of compared
-    leans."""
-    begun = blocks[0].time_us / 1e6
-    times = [turn.time_us / 1e6 for block in blocks for turn in block.turns]
-    compared = 0
-    for t_s, *_ in record.frames:
-        shown = record.lean_at(t_s)
-        if shown is None or not begun + slack_s < t_s < times[-1]:
-            continue
-        late = [lean for t, lean in zip(times, leans, strict=True) if t_s - slack_s <= t <= t_s]
-        assert min(late) - 0.55 <= shown <= max(late) + 0.55, (t_s, shown, late)
-        compared += 1
-    return compared
+TURN_US = 10_000
 
 
 @pytest.fixture
-def computed(monkeypatch):
-    """Return a list that will contain every lean that the firmware computes on CPython."""
-    leans = []
-    update = LeanMeter.update_sum
+def recorder(clock, root):
+    from kickstand.rides.recorder import Recorder  # needs the clock of the board
 
-    def noted(self, *arguments):
-        update(self, *arguments)
-        leans.append(self.lean_deg)
-
-    monkeypatch.setattr(LeanMeter, "update_sum", noted)
-    return leans
+    return Recorder(ride_ring(FLASH), 200)
 
 
-@pytest.mark.parametrize("engine", engines.ENGINES)
-def test_a_recorded_ride_replays_as_the_display_showed(engine, tmp_path, computed):
-    """The board records from power-on. The board records one ride before the alignment and one after it. A power cut
-    ends the second ride."""
-    flash = tmp_path / "flash"
-    flash.mkdir()
-    record = device_plans.run(engine, flash, {**ALIGNED, "seed": 2, "config": {"RECORD": True}})
-    showed = list(computed)  # a copy, because the replay below computes leans as well
-    found, problems = rides(flash)
-    assert sorted(found) == [1, 2]
+def start(recorder):
+    recorder.start(ride_writer.CHIP, ride_writer.calibration())
+
+
+def add(recorder, turns, clock):
+    """Add `turns` passes of the loop of 10 ms, with the same two samples in each pass."""
+    for _ in range(turns):
+        clock.advance(TURN_US)
+        recorder.add([200, -100, 8192, 60, 4, -4, 8], 2, TURN_US)
+        recorder.tick()
+
+
+def stored(root):
+    """Return the blocks of all rides in flash, and their passes."""
+    data = b"".join(path.read_bytes() for path in sorted(root.path.rglob("*.rid")))
+    blocks, problems = block_reader.read(data)
     assert problems == []
-    assert [b.sequence for b in found[2]] == list(range(len(found[2])))
-    assert found[2][0].calibration().aligned
-    assert not found[1][0].calibration().aligned
-    leans = replayed(found[2], tmp_path)
-    assert 46 - found[2][-1].turns[-1].time_us / 1e6 < 6.0  # at most one block is missing
-    assert lean_matches(record, found[2], leans) > 50
-    if engine == "cpython":
-        before = sum(len(block.turns) for block in found[1])
-        exact = showed[before : before + len(leans)]
-        assert max(abs(a - b) for a, b in zip(exact, leans, strict=True)) < 0.03
-    assert record.at(40)[0].endswith("*")
+    return blocks, [turn for block in blocks for turn in block.turns]
 
 
-def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
-    """The firmware sets up the sensor again and restarts the filter. The ride continues in the same file."""
-    device_plans.align(tmp_path)
-    plan = {
-        "ride": [["upright", 4.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 5.0], ["turn", 40.0, 5.0]],
-        "faults": [["supply_dip", [16.0]]],
-        "config": {"RECORD": True},
-        "until": 30,
-    }
-    computed.clear()
-    record = device_plans.run("cpython", tmp_path, plan)
-    exact = list(computed)
-    assert record.first("Sensor reset") < 18
-    found, problems = rides(tmp_path)
-    assert (list(found), problems) == ([1], [])
-    steps = [b.time_us - a.time_us for a, b in pairwise(t for block in found[1] for t in block.turns)]
-    assert [step > 500_000 for step in steps].count(True) == 1
-    leans = replayed(found[1], tmp_path)
-    assert max(abs(a - b) for a, b in zip(exact[: len(leans)], leans, strict=True)) < 0.05
+@pytest.mark.parametrize("tick", [True, False])
+def test_all_blocks_have_their_ride_and_sequence(tick, recorder, root, clock):
+    """Without tick() the flash is slower than the ride. No block may be lost."""
+    written = list(ride_writer.turns(1200))
+    start(recorder)
+    for entry in written:
+        recorder.add(*entry)
+        if tick:
+            recorder.tick()
+    ends_us = list(accumulate(dt_us for *_, dt_us in written))
+    assert recorder.seconds() == ends_us[-1] // 1_000_000
+    recorder.stop()
+    blocks, turns = stored(root)
+    assert [block.sequence for block in blocks] == list(range(len(blocks))) and len(blocks) >= 2
+    assert {(block.ride, block.sample_hz, block.accel_lsb_per_g) for block in blocks} == {(1, 200, 4096)}
+    assert blocks[0].time_us == pytest.approx(3_000_000, abs=1000) and blocks[0].calibration().aligned
+    assert [turn.time_us - blocks[0].time_us for turn in turns] == ends_us
 
 
-def test_a_wheel_is_not_misread_while_flash_is_erased(tmp_path, monkeypatch):
-    """Interrupts are off for 45 ms once per block. In these 45 ms the firmware notices only one of the wheel's edges,
-    and notices it late."""
-    boards, writes = [], []
-    fit, write = Board.fit_wheel, RideRing.write
-
-    def fitted(self, *arguments, **kind):
-        fit(self, *arguments, **kind)
-        boards.append(self)
-
-    def erasing(self, piece):
-        write(self, piece)
-        writes.append(piece)
-        if len(writes) % 16 == 0:
-            wheel, missed = boards[0].wheel, []
-            edge, wheel._edge = wheel._edge, missed.append
-            boards[0].clock.advance(45_000)
-            wheel._edge = edge
-            if missed:
-                edge(0 if wheel.closed else 1)
-
-    monkeypatch.setattr(Board, "fit_wheel", fitted)
-    monkeypatch.setattr(RideRing, "write", erasing)
-    plan = {
-        "ride": [["wait", 2.0], ["accelerate", 6.0, 3.0], ["straight", 300.0]],
-        "wheel": {"pulses_per_metre": 3.0},
-        "config": {"SPEED": "wheel", "PULSES_PER_METRE": 3.0, "RECORD": True, "VEHICLE": "car"},
-        "until": 45,
-    }
-    device_plans.run("cpython", tmp_path, plan)
-    assert len(writes) > 16 * 5
-    turns = [turn for block in rides(tmp_path)[0][1] for turn in block.turns]
-    speeds = [turn.speed_mps for turn in turns if turn.speed_mps is not None and turn.time_us > 8e6]
-    assert len(speeds) > 200
-    assert speeds == pytest.approx([6.0] * len(speeds), abs=0.1)
+@pytest.mark.parametrize(("waited_us", "step_us"), [(100_000, 500_001), (3_000_000, 3_000_000), (600_000_000, 1 << 29)])
+def test_after_a_gap_the_recorded_time_is_over_half_a_second(waited_us, step_us, recorder, root, clock):
+    start(recorder)
+    add(recorder, 4, clock)
+    recorder.mark_gap()
+    clock.advance(waited_us)
+    recorder.add([0, 0, 8192, 0, 0, 0, 0], 2, 1)
+    add(recorder, 3, clock)
+    recorder.stop()
+    steps = [later.time_us - earlier.time_us for earlier, later in pairwise(stored(root)[1])]
+    assert steps == [TURN_US] * 3 + [pytest.approx(step_us, abs=1000)] + [TURN_US] * 3 and steps[3] > 500_000
 
 
-def test_the_menu_starts_and_ends_a_ride(tmp_path):
-    device_plans.align(tmp_path)
-    pages = [[16 + i, SHORT] for i in range(6)]
-    plan = {"lean": [[0, 0], [20, 10]], "presses": [*menu(8), *pages, *menu(30)], "until": 40}
-    record = device_plans.run("cpython", tmp_path, plan)
-    assert 12 < record.first("Record ride") < 14
-    assert record.at(15.9)[0].startswith("Rec         0:0") or record.at(15.9)[0].endswith("*")
-    assert record.at(20.8)[0] in ("Rec         0:05", "Rec         0:06")
-    assert record.at(20.8)[1].startswith("room ")
-    assert record.at(27)[0] == "Lean  10° right*"  # by now the filter has settled
-    assert 34 < record.first("Stop recording") < 36
-    assert record.first("Recording ended") < 38
-    assert record.at(39.5)[0] == "Lean  10° right "
-    found, problems = rides(tmp_path)
-    assert problems == []
-    assert list(found) == [1]
-    seconds = (found[1][-1].turns[-1].time_us - found[1][0].time_us) / 1e6
-    assert 20 < seconds < 25
-    assert lean_matches(record, found[1], replayed(found[1], tmp_path)) > 0
+def test_position_and_speed_belong_to_the_next_pass_only(recorder, root, clock):
+    """A pass of the loop may have a position without a speed, or a speed without a position. Zero is a valid speed."""
+    start(recorder)
+    for fixes in ([(None, 0), (None, 1)], [], [(5.0, None), (0.0, None)], [(6.0, 2)]):
+        for speed, number in fixes:  # the newest position is recorded
+            recorder.add_fix(speed, None if number is None else ride_writer.place(number))
+        add(recorder, 1, clock)
+    recorder.stop()
+    turns = stored(root)[1]
+    hundredths = [turn.place and turn.place.utc_s and round(100 * turn.place.utc_s % 100) for turn in turns]
+    assert hundredths == [20, None, None, 30] and [turn.speed_mps for turn in turns] == [None, None, 0.0, 6.0]
+
+
+@pytest.mark.parametrize("code", ["flash-fault", "out-of-room"])
+def test_failure_ends_the_ride_once_with_one_notice(code, recorder, root, clock):
+    """A file in the place of the directory of rides stops the beginning, a full flash the first block."""
+    free = root.free
+    if code == "flash-fault":
+        (root.path / "rides").write_text("a file")
+    root.free = 0
+    with contextlib.redirect_stdout(io.StringIO()) as console:
+        start(recorder)
+        for _ in range(3000):
+            if recorder.active:
+                add(recorder, 1, clock)
+        recorder.stop()
+    assert not recorder.active and console.getvalue().count("\n") == 1
+    problem = recorder.take_problem()
+    assert isinstance(problem, Notice) and problem.code == code and recorder.take_problem() is None
+    (root.path / "rides").unlink() if code == "flash-fault" else None
+    root.free = free  # the flash works again, so the next ride is recorded
+    start(recorder)
+    add(recorder, 3, clock)
+    recorder.stop()
+    assert recorder.problem is None and len(stored(root)[1]) == 3

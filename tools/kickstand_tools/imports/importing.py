@@ -164,7 +164,7 @@ def import_of_app(source: Path) -> Imported | None:
         files = read_files(source)
         of_apps = recordings(files)
         table = None if of_apps else mapped.table_in(files)
-        known = any(app is not own for app, _ in of_apps) or (table is not None and table.findings.decided)
+        known = any(app is not own for app, _ in of_apps) or (table is not None and "t_s" not in table.sheet.columns)
     except InputError:
         if source.is_dir() or is_zipfile(source):
             raise

@@ -1,0 +1,162 @@
+"""The blocks of a ride: parts that are left out, warnings, the riding time, and refusals of unusable files."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from kickstand_tools import api
+from kickstand_tools.analysis.brake_tests import car_channels
+from kickstand_tools.analysis.channels import joined
+from kickstand_tools.analysis.overview import overview
+from kickstand_tools.common.errors import InputError
+from kickstand_tools.logs.log import Stretch
+from small_rides import ALIGNED, standing_log
+from support.recordings import analysis_rides
+
+CAR = api.CalibrationFile(aligned=True, vehicle="car")
+
+
+def read(log, calibration=ALIGNED, smoothed=False):
+    """Return the channels of a ride and the codes of its notices."""
+    notices = []
+    course = joined(list(api.open_ride(log, calibration, smoothed).blocks(notices=notices)))
+    return course, notices
+
+
+def frozen_log():
+    """A log of 8 s whose readings repeat from 2 to 6 s."""
+    log = standing_log(8.0)
+    log.accel_g[200:600], log.gyro_dps[200:600] = log.accel_g[200], log.gyro_dps[200]
+    return log
+
+
+def test_a_ride_has_the_name_of_its_log():
+    ride = api.open_ride(standing_log(), ALIGNED)
+    assert (ride.name, ride.stem, ride.car, ride.smoothed) == ("trip/RIDE.csv", "RIDE", False, False)
+    assert api.open_ride(standing_log(), ALIGNED, smoothed=True).smoothed
+    car = api.open_ride(standing_log(), CAR, smoothed=True)
+    assert car.car and not car.smoothed
+
+
+def test_a_stretch_has_only_its_samples():
+    course, _ = read(Stretch(standing_log(), 1.0, 2.0))
+    assert 99 <= len(course.t_s) <= 101 and course.t_s[[0, -1]] == pytest.approx((1.0, 2.0), abs=0.011)
+
+
+def test_frozen_readings_are_left_out():
+    course, notices = read(frozen_log())
+    assert [notice.code for notice in notices] == ["frozen-readings"]
+    assert 400 <= len(course.t_s) <= 402 and np.max(np.diff(course.t_s)) == pytest.approx(4.0, abs=0.03)
+    with pytest.raises(InputError, match=r"RIDE\.csv: all readings are frozen"):
+        read(Stretch(frozen_log(), 3.0, 5.0))
+    total = overview(api.open_ride(frozen_log(), ALIGNED)).summary
+    assert (total.frozen_s, total.missing_s) == pytest.approx((4.0, 4.0), abs=0.03)
+    part = overview(api.open_ride(Stretch(frozen_log(), 0.0, 1.5), ALIGNED)).summary
+    assert part.frozen_s == part.missing_s == 0.0  # the frozen part is not in the stretch
+
+
+def test_a_car_has_no_lean():
+    (block,) = car_channels(standing_log(), CAR)
+    assert np.all(np.isnan(block.lean_deg) & np.isnan(block.lean_formula_deg)) and len(block.t_s) == 400
+    assert block.lateral_g == pytest.approx(block.left_g)
+    course, _ = read(standing_log(), CAR)
+    assert np.all(np.isnan(course.lean_deg)) and np.all(course.lean_sigma_deg == 0.0)
+
+
+LOG = "t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\n0,0,1,0,0,0,0\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "calibration", "words"),
+    [
+        (None, None, r"RIDE\.csv: there is no such file"),
+        ("no log\n", None, r"^(?!.*no calibration).*RIDE\.csv"),
+        (LOG, None, r"no calibration RIDE\.cal\.json beside it: .*--out .*RIDE\.cal\.json"),
+        (LOG, api.CalibrationFile(), r"RIDE\.cal\.json is not aligned"),
+    ],
+)
+def test_a_ride_needs_its_calibration_beside_it(tmp_path, content, calibration, words):
+    if content:
+        (tmp_path / "RIDE.csv").write_text(content)
+    if calibration:
+        api.write_calibration(tmp_path / "RIDE.cal.json", calibration)
+    with pytest.raises(InputError, match=words):
+        api.open_ride(tmp_path / "RIDE.csv")
+
+
+def test_a_calibration_is_given_or_refused(tmp_path):
+    refused: Any = (
+        ((standing_log(),), "an open file has no calibration beside it: give one"),
+        ((standing_log(), api.CalibrationFile()), "^the calibration is not aligned"),
+        ((tmp_path,), "is a directory: give the name of a ride in it"),
+    )
+    for arguments, words in refused:
+        with pytest.raises(InputError, match=words):
+            api.open_ride(*arguments)
+    (tmp_path / "RIDE.csv").write_text(LOG)
+    api.write_calibration(tmp_path / "RIDE.cal.json", ALIGNED)
+    assert api.open_ride(tmp_path / "RIDE.csv").calibration == ALIGNED
+
+
+def knocked():
+    """The hand that switches the device on knocks it with 0.4 g for 0.02 s."""
+    log = standing_log(40.0, 0.05, 1.5)
+    log.accel_g[:2, 2] = 0.4
+    return log
+
+
+def changed(seconds=40.0, **columns):
+    """A standing bike with a running engine, whose readings change from 20 to 25 s."""
+    log = standing_log(seconds, 0.05, 1.5)
+    later = (log.t_s > 20.0) & (log.t_s < 25.0)
+    log.gyro_dps[later, 1] += columns.get("yaw_dps", 0.0)
+    log.accel_g[later, 2] += columns.get("push_g", 0.0)
+    log.gyro_dps[:, 1] += columns.get("bias_dps", 0.0)
+    return log
+
+
+@pytest.mark.parametrize(
+    ("log", "rides"),
+    [
+        (standing_log(0.02, 0.003, 0.1), False),
+        (standing_log(12.0, 0.003, 0.1), False),
+        (standing_log(40.0, 0.05, 1.5), False),  # with a running engine
+        (standing_log(40.0, 0.1, 3.0, speed_mps=0.0), False),
+        (standing_log(40.0, 0.05, 1.5, bias_dps=5.0), False),
+        (standing_log(40.0, 0.05, 1.5, speed_mps=0.9), False),
+        (standing_log(40.0, 0.05, 1.5, speed_mps=1.1), True),
+        (Stretch(standing_log(40.0, 0.05, 1.5), 5.0, 30.0), True),  # it may be a straight at constant speed
+        (knocked(), False),
+        (changed(yaw_dps=2.4), False),
+        (changed(yaw_dps=3.6), True),
+        (changed(push_g=-0.035), False),
+        (changed(push_g=-0.065), True),
+        (changed(bias_dps=9.0), False),
+    ],
+)
+def test_a_standing_bike_is_not_riding(log, rides):
+    assert (overview(api.open_ride(log, ALIGNED)).riding_s > 0.0) is rides
+
+
+@pytest.mark.parametrize("speed_hz", [0, 5])
+def test_riding_time_excludes_standing(tmp_path, speed_hz):
+    """The bike stands for 4 s before the ride and for 4 s after it."""
+    ride_overview = overview(api.open_ride(analysis_rides.short(tmp_path, speed_hz=speed_hz, rate_hz=50)))
+    assert ride_overview.summary.duration_s - ride_overview.riding_s == pytest.approx(8.0, abs=2.0)
+
+
+def test_a_speed_that_is_always_0_is_no_speed(tmp_path):
+    """A broken contact at the wheel gives a speed that is always 0. It hides no ride."""
+    log = api.read_log(analysis_rides.short(tmp_path, rate_hz=50))
+    riding_s = overview(api.open_ride(log, ALIGNED)).riding_s
+    log.speed_mps[::20] = 0.0
+    ride_overview = overview(api.open_ride(log, ALIGNED))
+    assert (
+        not ride_overview.has_speed
+        and np.all(np.isnan(ride_overview.course.speed_mps))
+        and ride_overview.riding_s == riding_s > 20.0
+    )
+    log.speed_mps[::40] = 5.0
+    ride_overview = overview(api.open_ride(log, ALIGNED))
+    assert ride_overview.has_speed and np.nanmax(ride_overview.course.speed_mps) == 5.0
+    assert np.all(np.isnan(ride_overview.course.temp_c)) and np.all(np.isnan(ride_overview.course.utc_s))
