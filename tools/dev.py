@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
 """One command per task, on a machine with only Python 3.11 or newer:
 
-    python3 tools/dev.py demo         the firmware on a simulated board, live in the terminal
-    python3 tools/dev.py test         ruff, pyright and the tests; further arguments go to pytest
-    python3 tools/dev.py mutants imu  lists the single changes of a package's code that its tests do not notice
+    python3 tools/dev.py demo            the firmware on a simulated board, live in the terminal
+    python3 tools/dev.py test            ruff, pyright on changed files, and the tests: five minutes on two cores
+    python3 tools/dev.py test --changed  only the tests that the changed files can reach by imports
+    python3 tools/dev.py test --all      also the long tier, and pyright on every file
+
+Further arguments of `test` go to pytest.
 
 Each command creates .venv beside pyproject.toml, and installs the project in it. It installs again only if
 pyproject.toml has changed.
@@ -22,7 +25,7 @@ PYTHON = os.path.join(VENV, "Scripts", "python.exe") if os.name == "nt" else os.
 STAMP = os.path.join(VENV, "installed.txt")
 LOG = os.path.join(VENV, "install.log")
 OLDEST = (3, 11)
-EXTRAS = ("", "test", "mutants")  # extras of pyproject.toml; each contains the earlier ones
+EXTRAS = ("", "test")  # extras of pyproject.toml; each contains the earlier ones
 REPORT_S = 5  # time between two lines of progress while installing
 COMPILE = "from kickstand_emulator import native; native.build()"  # compiled, the emulated Pico is twice as fast
 
@@ -36,45 +39,88 @@ def main(arguments):
         raise SetupStopped(
             "Python 3.11 or newer is needed, this is %d.%d: start it with a newer python3" % sys.version_info[:2]
         )
-    if not arguments or arguments[0] not in ("demo", "test", "mutants"):
-        raise SetupStopped("no task is named: run %s demo, test or mutants" % sys.argv[0])
+    if not arguments or arguments[0] not in ("demo", "test"):
+        raise SetupStopped("no task is named: run %s demo or test" % sys.argv[0])
     name, rest = arguments[0], arguments[1:]
     prepare("" if name == "demo" else name)
     if name == "test":
         return test(rest)
-    if name == "mutants":
-        return run("-m", "kickstand_workshop.mutants", *rest)
     return run("-m", "kickstand_tools.cli", "demo", *rest)
 
 
 def test(arguments):
-    """Run ruff, ruff format, pytest and pyright, each even if an earlier one has failed. Returns 0 if all succeed,
-    otherwise 1."""
+    """Run ruff, pyright and the tests, and show the time. Returns 0 if all succeed, otherwise 1.
+
+    Without --all, the tests of the long tier are left out, and pyright reads only the files that git shows as changed.
+    --changed runs only the test files that the changed files can reach by imports.
+    """
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # if set, each process that a test starts compiles its imports
-    compiling = subprocess.Popen([PYTHON, "-c", COMPILE], cwd=ROOT)
-    # pyright runs beside the other checks, because it uses only one processor for a minute
-    pyright = subprocess.Popen(
-        [PYTHON, "-m", "pyright"], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8"
+    begin = time.time()
+    complete = "--all" in arguments
+    files = changed_files()
+    if "--changed" in arguments:
+        arguments = [a for a in arguments if a != "--changed"] + reached_tests(files)
+    beside = [  # these run beside the tests, because each uses one processor for a part of the time
+        start("ruff", "-m", "ruff", "check", "."),
+        start("ruff format", "-m", "ruff", "format", "--check", "."),
+    ]
+    typed = [] if complete else [name for name in files if name.endswith(".py") and not name.startswith("firmware/")]
+    if complete or typed:
+        beside.append(start("pyright", "-m", "pyright", *typed))
+    else:
+        say("pyright: no Python file of tools or host_tests has changed (--all checks every file)")
+    subprocess.call([PYTHON, "-c", COMPILE], cwd=ROOT)
+    processes = (os.cpu_count() or 1) + complete  # the long tier has tests of pages, which often wait
+    pytest = ("-m", "pytest", "-n", str(processes), "--dist", "loadfile", "--no-loadscope-reorder", "--durations", "10")
+    failed = ["pytest"] if run(*pytest, *arguments) != 0 else []
+    for name, process in beside:
+        say("%s: %s" % (name, process.communicate()[0].strip()))
+        if process.returncode != 0:
+            failed.append(name)
+    say(
+        "%s tier: %.0f s, %.0f s of processor time%s"
+        % (
+            "long" if complete else "default",
+            time.time() - begin,
+            sum(os.times()[2:4]),
+            ", failed: " + ", ".join(failed) if failed else "",
+        )
     )
-    processes = str((os.cpu_count() or 1) + 1)  # one process more than processors, because tests of pages often wait
-    failed = []
-    for tool, command in (
-        ("ruff", ("-m", "ruff", "check", ".")),
-        ("ruff format", ("-m", "ruff", "format", "--check", ".")),
-        ("pytest", ("-m", "pytest", "-n", processes, "--dist", "worksteal", "--durations", "10", *arguments)),
-    ):
-        say(tool)
-        if tool == "pytest":
-            compiling.wait()
-        if run(*command) != 0:
-            failed.append(tool)
-    say("pyright")
-    say(pyright.communicate()[0].strip())
-    if pyright.returncode != 0:
-        failed.append("pyright")
-    if failed:
-        say("failed: " + ", ".join(failed))
     return 1 if failed else 0
+
+
+def changed_files():
+    """Return the paths that differ from the branch main of origin, or from the last commit, without removed files."""
+    for base in ("origin/main", "HEAD"):
+        common = output("git", "merge-base", base, "HEAD")
+        if common:
+            names = output("git", "diff", "--name-only", common[0]) + output(
+                "git", "ls-files", "-o", "--exclude-standard"
+            )
+            return sorted({name for name in names if os.path.exists(os.path.join(ROOT, name))})
+    return []
+
+
+def reached_tests(files):
+    """Return the arguments for pytest: the test files that these changed files can reach."""
+    tests = output(PYTHON, "-m", "kickstand_workshop.reach", *files) if files else []
+    if not tests:
+        raise SetupStopped("no test is reached by what has changed: leave out --changed to run all")
+    return tests
+
+
+def output(*command):
+    """Return the lines that a command prints, or [] if it fails."""
+    process = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, encoding="utf-8")
+    return process.stdout.split() if process.returncode == 0 else []
+
+
+def start(name, *arguments):
+    """Start .venv's Python beside the tests. Returns the name and the process."""
+    process = subprocess.Popen(
+        [PYTHON, *arguments], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8"
+    )
+    return name, process
 
 
 def prepare(extra):

@@ -12,7 +12,7 @@ scans all garbage since the last collection, which takes up to 1 ms per pass.
 
 import gc
 import os
-from time import sleep_us, ticks_add, ticks_diff, ticks_ms, ticks_us
+from time import sleep_ms, sleep_us, ticks_add, ticks_diff, ticks_ms, ticks_us
 
 from .board import port
 from .board.display import STOPPED
@@ -168,7 +168,8 @@ class App:
         if wait_us < self._least_wait_us:
             self._least_wait_us = wait_us
         if wait_us > 0:
-            sleep_us(wait_us)
+            sleep_ms(wait_us // 1000)  # on an ESP32 only sleep_ms() gives time to the radio and the idle task
+            sleep_us(max(0, ticks_diff(self._due_us, ticks_us())))
         else:  # the pass took too long, for example because of a write to flash: do not try to catch up
             self._due_us = ticks_us()
 

@@ -1,6 +1,7 @@
 """The examples in the docstrings of kickstand_tools.api run, and its functions do what the module promises."""
 
 import doctest
+import functools
 import gzip
 import inspect
 import io
@@ -18,13 +19,22 @@ from support import command
 FUNCTIONS = [name for name, public in vars(api).items() if inspect.isfunction(public)]
 
 
+@pytest.fixture(scope="module")
+def shared_rides():
+    """Simulate the same ride only once for all examples."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(api, "simulate_ride", functools.cache(api.simulate_ride))
+        yield
+
+
+@pytest.mark.usefixtures("shared_rides")
 @pytest.mark.parametrize("name", FUNCTIONS + ["Log", "Stretch", "CalibrationFile"])
 def test_example_in_each_docstring_runs(name):
     public = getattr(api, name)
     module = sys.modules[public.__module__]
-    found = [test for test in doctest.DocTestFinder(recurse=False).find(public, name, module=module) if test.examples]
-    assert found, f"{name} has no example"
-    for test in found:
+    tests = [test for test in doctest.DocTestFinder(recurse=False).find(public, name, module=module) if test.examples]
+    assert tests, f"{name} has no example"
+    for test in tests:
         assert doctest.DocTestRunner().run(test).failed == 0
 
 

@@ -1,55 +1,29 @@
-"""Tests `kickstand demo` as a user runs it: with its output in a file, in a terminal, and with --hand."""
+"""`kickstand demo` as a user runs them: printed to a file, in a terminal, and by hand."""
 
-import functools
 import itertools
-import os
+import json
 import re
-import subprocess
 import sys
-import time
 
 import pytest
 from kickstand_tools.common import unix_port
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.demo.demo import DeviceStopped, demo
 from kickstand_tools.demo.device_process import DeviceProcess
 from kickstand_tools.simulated_board.lcd import shown_lean
-from support.command import run
+from support import command
 from support.terminal import Terminal
 
-HUNG_S = 300  # only a hanging process takes this long, even on a busy machine
-
-
-def demo_command(engine, hand=False):
-    """Return a command line that starts the demo. With --hand the ride runs six times as fast as usual."""
-    code = f"from kickstand_tools.demo import demo; demo.HAND_SPEED = 6.0; demo.demo({hand}, {engine == 'cpython'})"
-    return [sys.executable, "-c", code]
-
-
-@functools.cache
-def printed_by(engine):
-    """Return the output of the demo when standard output is not a terminal."""
-    done = subprocess.run(
-        demo_command(engine),
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        env=os.environ | {"PYTHONIOENCODING": "utf-8"},
-        timeout=HUNG_S,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert done.stderr == ""
-    return done.stdout
+no_micropython = pytest.mark.skipif(not unix_port.available(), reason="no MicroPython for this system")
 
 
 @pytest.fixture(scope="module")
-def printed():
-    """Return the printed output. test_both_engines_show_the_same tests that it does not depend on the engine."""
-    return printed_by("cpython")
+def printed() -> str:
+    return command.works("demo").out
 
 
 def frames(text):
-    """Return a tuple for each frame in the text: time, phase, true lean, and the two lines of the LCD."""
+    """Return a tuple for each printed frame: time, phase, true lean, and the two lines of the LCD."""
     head = r"^ *([\d.]+) s  ([\w ]+), true lean ([\d.]+)° ?(left|right|)"
     edge, line = r"\+-{16}\+", r"\|(.{16})\|"
     found = re.findall("\n".join([head, edge, line, line, edge]), text, re.MULTILINE)
@@ -57,104 +31,179 @@ def frames(text):
     return [(float(t), phase, signs[side] * float(lean), x, y) for t, phase, lean, side, x, y in found]
 
 
-def test_printed_the_rider_is_led_through_both_poses(printed):
+def test_the_rider_aligns_the_board_in_two_poses(printed):
     said = [(phase, f"{first} {second}") for _, phase, _, first, second in frames(printed)]
     order = []
-    for text, during in (("On stand: press", "kickstand"), ("Now upright", "kickstand"), ("Aligned!", "upright")):
-        order.append(next(i for i, (_, lcd) in enumerate(said) if text in lcd))
+    for text, during in (
+        ("On stand: press", "kickstand"),
+        ("Now upright", "kickstand"),
+        ("Aligned!", "upright"),
+    ):
+        order.append(next(k for k, (_, lcd) in enumerate(said) if text in lcd))
         assert said[order[-1]][0] == during
     assert order == sorted(order)
     tilt = re.search(r"Aligned! +([\d.]+)°", printed)
     assert tilt and float(tilt[1]) == pytest.approx(12.0, abs=1.0)
+    assert all(one[3:] != other[3:] for one, other in itertools.pairwise(frames(printed)))
 
 
-def test_printed_the_lcd_follows_the_true_lean(printed):
-    held = [(true, shown_lean([x, y])) for _, phase, true, x, y in frames(printed) if phase == "held turn"]
-    assert {true > 0 for true, _ in held} == {True, False}
-    for true, shown in held:
-        assert shown == pytest.approx(true, abs=4.0)
+def test_the_display_follows_the_true_lean(printed):
+    shown = [(true, shown_lean(lcd)) for _, phase, true, *lcd in frames(printed) if phase == "held turn"]
+    assert {true > 0 for true, _ in shown} == {True, False}
+    assert all(lean == pytest.approx(true, abs=4.0) for true, lean in shown)
 
 
-def test_printed_it_ends_with_shown_against_true(printed):
+def test_the_end_compares_shown_and_true_lean(printed):
     table = printed.split("shown on the LCD, and true")[1]
     rows = re.findall(r"│ held turn \d +│ +(\d+) │ +(-?[\d.]+) │ +(-?[\d.]+) │ +([\d.]+) │ +([-+][\d.]+) │", table)
     assert [round(float(row[1])) for row in rows] == [-30, 38, -45]
     for count, true, shown, rms, worst in rows:
-        assert int(count) > 50
-        assert float(shown) == pytest.approx(float(true), abs=3.0)
+        assert int(count) > 50 and float(shown) == pytest.approx(float(true), abs=3.0)
         assert float(rms) <= abs(float(worst))
     assert re.search(r"│ all +│ +\d{3,} │", table)
 
 
-@pytest.mark.skipif(not unix_port.available(), reason="no MicroPython for this system")
-def test_both_engines_show_the_same():
-    here, there = (printed_by(engine) for engine in ("cpython", "micropython"))
-    assert frames(here) and here == there
+@pytest.mark.long
+@no_micropython
+@pytest.mark.parametrize("display", ["lcd", "ssd1306"])
+def test_both_engines_show_the_same(display):
+    micropython = command.works("demo", "--display", display)
+    assert micropython.out.count(" s  ") > 80
+    assert command.works("demo", "--cpython", "--display", display).out == micropython.out
 
 
 def test_by_hand_needs_a_terminal():
-    done = subprocess.run(
-        demo_command("cpython", hand=True), stdin=subprocess.DEVNULL, capture_output=True, timeout=HUNG_S
-    )
-    assert done.returncode != 0 and b"InputError" in done.stderr and b"in a terminal" in done.stderr
+    with pytest.raises(InputError, match="run kickstand demo --hand in a terminal"):
+        demo(hand=True)
 
 
-@pytest.mark.parametrize(("engine", "how"), [("cpython", "quit"), ("micropython", "closed")])
-def test_the_device_ends_when_it_is_sent_quit_or_left_alone(engine, how):
-    with DeviceProcess(engine, "hand", 1.0) as device:
-        if how == "quit":
-            device.send("quit")
-        else:
-            device.hang_up()
-        began = time.monotonic()
-        while not device.ended:
-            device.ticks(0.1)
-            assert time.monotonic() - began < HUNG_S
-    assert not device.failed
-
-
-def test_where_there_is_no_micropython_it_says_so_and_runs(monkeypatch, capfd):
+def test_without_micropython_it_says_so(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(unix_port, "available", lambda: False)
-    demo()
-    first, *_ = capfd.readouterr().out.splitlines()
-    assert "No MicroPython" in first and "CPython" in first
-
-
-def test_a_device_that_stops_early_is_an_error(monkeypatch):
-    monkeypatch.setattr(unix_port, "available", lambda: True)
-    monkeypatch.setattr(unix_port, "command", lambda *_: [sys.executable, "-c", "print('no sensor in the shop')"])
-    with pytest.raises(DeviceStopped, match="no sensor in the shop"):
-        demo()
-    failed = run("demo")
-    assert failed.status == 1
-    assert "no sensor in the shop" in failed.err
-
-
-CLOCK = r"(\d+\.\d) s\s"  # the time of the ride in the corner of the picture
+    (tmp_path / "my.py").write_text("x = (\n")
+    with pytest.raises(InputError, match="CPython cannot run this file"):
+        demo(user=tmp_path / "my.py")
+    assert capsys.readouterr().out == (
+        "No MicroPython package for this system: the same firmware runs on CPython instead.\n"
+    )
 
 
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 def test_in_a_terminal_by_hand():
-    """The test uses the keys to press the button, raise the bike, ride off and lean left. The LCD follows."""
-    with Terminal(demo_command("cpython", hand=True)) as at:
-        at.wait_for("On stand: press")
-        at.press("b")
-        at.wait_for("Now upright")
-        at.press("u")
-        upright_s = float(at.wait_for(CLOCK)[1]) + 2.0
-        while float(at.wait_for(CLOCK)[1]) < upright_s:
+    """The keys press the button, raise the bike, set it off and lean it left. The ride is six times as fast."""
+    code = "from kickstand_tools.demo import demo; demo.HAND_SPEED = 6.0; demo.demo(True, True)"
+    clock = r"(\d+\.\d) s\s"
+    with Terminal([sys.executable, "-c", code]) as terminal:
+        terminal.wait_for("On stand: press")
+        terminal.press("b")
+        terminal.wait_for("Now upright")
+        terminal.press("u")
+        upright_s = float(terminal.wait_for(clock)[1]) + 2.0
+        while float(terminal.wait_for(clock)[1]) < upright_s:
             pass
-        at.press("b")
-        at.wait_for("Aligned!")
-        at.press("aaa\x1b[D\x1b[D")
-        at.wait_for("20° left")
-        at.press("q")
-        at.wait_for("and true")
-        assert at.end() == 0
+        terminal.press("b")
+        terminal.wait_for("Aligned!")
+        terminal.press("aaa\x1b[D\x1b[D")
+        terminal.wait_for("20° left")
+        terminal.press("q")
+        terminal.wait_for("and true")
+        assert terminal.end() == 0
 
 
-def test_printed_every_frame_is_a_change(printed):
-    shown = [frame[3:] for frame in frames(printed)]
-    assert len(shown) > 80
-    assert all(a != b for a, b in itertools.pairwise(shown))
+# A short program takes the place of the device
+
+
+STATE = {"of_s": 60.0, "lean_deg": -30.04, "speed_mps": 15.0, "phase": "held turn", "pressed": False}
+LEAN = {**STATE, "t_s": 1.0, "lcd": ["Lean  27° left", ""]}
+OFF = {"ended": "off"}
+
+
+@pytest.fixture
+def device(monkeypatch, capsys):
+    """Return a function that runs demo() with a device that prints these messages, and returns the printed lines."""
+
+    def run(*messages, **options):
+        lines = [message if isinstance(message, str) else json.dumps(message) for message in messages]
+        program = "print('''" + "\n".join(lines) + "''')"
+        monkeypatch.setattr(unix_port, "command", lambda *_: [sys.executable, "-X", "utf8", "-c", program])
+        demo(**options)
+        return capsys.readouterr().out.splitlines()
+
+    return run
+
+
+@no_micropython
+def test_a_changed_page_is_printed_at_once_and_its_values_every_250_ms(device):
+    shown = [
+        (1.0, "Lean  27° left", ""),
+        (1.05, "Lean  27° left", ""),
+        (1.2, "Lean  28° left", ""),
+        (1.25, "Lean  29° left", "x"),
+        (1.3, "Max   29°", ""),
+        (1.35, "?", ""),  # a picture of an OLED that is not complete yet
+        (1.4, "Lean  30° left", ""),
+    ]
+    lines = device(*({**STATE, "t_s": t_s, "lcd": lcd} for t_s, *lcd in shown), OFF)
+    assert [line.split()[0] for line in lines if " s  " in line] == ["1.00", "1.25", "1.30", "1.40"]
+    frame = [
+        "  1.00 s  held turn, true lean 30.0° left",
+        "+----------------+",
+        "|Lean  27° left  |",
+        "|" + 16 * " " + "|",
+    ]
+    assert lines[:4] == frame
+
+
+@no_micropython
+def test_pixels_are_printed_and_no_console(device):
+    pixels = {**LEAN, "lcd": ["Raw", ""], "pixels": "ff" * 1024}
+    assert device(pixels, OFF)[1:] == [*["\u28ff" * 64] * 16, "The lean was not shown yet."]
+    assert "from my code" not in device("from my code", LEAN, OFF)
+
+
+@no_micropython
+@pytest.mark.parametrize("messages", [["oh", {"ended": "returned"}], ["oh"]])
+def test_a_device_that_stops_early_is_an_error(device, messages):
+    with pytest.raises(DeviceStopped, match="oh"):
+        device(*messages)
+    failed = command.run("demo")
+    assert failed.status == 1 and "oh" in failed.err
+
+
+def test_the_device_obeys_its_commands():
+    """It sends a state every 50 ms of its time. A pause stops its time."""
+    with DeviceProcess("cpython", "hand", 20.0) as process:
+        states: list = []
+
+        def until(condition):
+            while not states or not condition(states[-1]):
+                states.extend(process.ticks(10.0))
+                assert not process.ended and (not states or states[-1]["t_s"] < 100.0)
+            return states[-1]
+
+        until(lambda state: "On stand: press" in " ".join(state["lcd"]))
+        process.send("upright")
+        assert until(lambda state: state["phase"] == "upright")["speed_mps"] == 0.0
+        process.send("short")
+        until(lambda state: state["pressed"])
+        until(lambda state: not state["pressed"])
+        process.send("pause")
+        while new := process.ticks(0.3):
+            states.extend(new)
+        process.send("pause")
+        count = len(states)
+        until(lambda state: len(states) > count)
+        process.send("quit")
+        while not process.ended:
+            process.ticks(10.0)
+    assert not process.failed
+    assert [round(20 * state["t_s"]) for state in states] == list(range(1, len(states) + 1))
+    assert {state["of_s"] for state in states} == {None}
+
+
+def test_a_device_that_is_left_alone_ends():
+    with DeviceProcess("micropython" if unix_port.available() else "cpython", "hand", 1.0) as process:
+        process.hang_up()
+        while not process.ended:
+            process.ticks(10.0)
+    assert not process.failed

@@ -1,13 +1,15 @@
-"""Tests the times, leans, speed and button in the picture of the demo, and the states that the device sends."""
+"""The demo's picture, its score, its keys, and the check of a user's program."""
 
 import os
-from types import SimpleNamespace
+import sys
 from typing import Any
 
 import pytest
-from kickstand_tools.demo.device import seen
+from kickstand_tools.common import unix_port
+from kickstand_tools.common.errors import InputError
+from kickstand_tools.demo import keyboard, user_program
 from kickstand_tools.demo.score import Score, State, table
-from kickstand_tools.demo.screen import bike, screen
+from kickstand_tools.demo.screen import bike, lean_text, oled_lines, screen
 from rich.console import Console
 
 STATE: State = {
@@ -21,12 +23,16 @@ STATE: State = {
 }
 
 
-def drawn(paused=False, **changed: Any):
-    """Return the lines of the picture."""
-    console = Console(width=100, record=True, file=open(os.devnull, "w"))
-    state: Any = {**STATE, **changed}
-    console.print(screen(state, "a title", "the keys", paused))
+def lines_of(printed) -> list[str]:
+    with open(os.devnull, "w") as nowhere:
+        console = Console(width=100, record=True, file=nowhere)
+        console.print(printed)
     return console.export_text().splitlines()
+
+
+def drawn(paused=False, **changed: Any) -> list[str]:
+    state: Any = STATE | changed
+    return lines_of(screen(state, "a title", "the keys", paused))
 
 
 def value(lines, name):
@@ -35,101 +41,146 @@ def value(lines, name):
     return line.partition(f" {name} ")[2].partition("│")[0].partition("╰")[0].strip()
 
 
-def test_the_picture_has_true_and_shown_lean():
-    lines = drawn()
-    assert value(lines, "true lean") == "30.0° left" and value(lines, "shown lean") == "27° left"
-    assert value(lines, "error") == "+3.0°"  # the shown lean minus the true lean
-    assert value(lines, "speed") == "54 km/h" and value(lines, "bike") == "held turn"
-    other = drawn(lcd=["Max left", ""], lean_deg=2.0, speed_mps=1.0)
-    assert (value(other, "true lean"), value(other, "shown lean"), value(other, "error")) == ("2.0° right", "-", "-")
-    assert value(other, "speed") == "4 km/h"
-
-
-@pytest.mark.parametrize(("pressed", "text"), [(True, "● pressed"), (False, "○")])
-def test_the_picture_has_the_button(pressed, text):
-    assert value(drawn(pressed=pressed), "button") == text
+@pytest.mark.parametrize(
+    ("changed", "values"),
+    [
+        ({}, ["30.0° left", "27° left", "+3.0°", "54 km/h", "held turn", "○"]),
+        ({"lcd": ["Max left", ""], "lean_deg": 2.0, "speed_mps": 1.0}, ["2.0° right", "-", "-", "4 km/h"]),
+        (
+            {"pressed": True, "pixels": "ff" * 1024},
+            ["30.0° left", "27° left", "+3.0°", "54 km/h", "held turn", "● pressed"],
+        ),
+    ],
+)
+def test_the_picture_has_true_and_shown_lean(changed, values):
+    lines = drawn(**changed)
+    names = "true lean", "shown lean", "error", "speed", "bike", "button"
+    assert [value(lines, name) for name in names[: len(values)]] == values
+    assert any("from behind" in line for line in lines) is ("pixels" not in changed)
+    assert sum("\u28ff" * 64 in line for line in lines) == (16 if "pixels" in changed else 0)
 
 
 @pytest.mark.parametrize(
     ("paused", "of_s", "end"), [(False, 60.0, "23.4 of 60 s"), (False, None, "23.4 s"), (True, 60.0, "paused")]
 )
-def test_the_first_line_has_the_title_and_the_time(paused, of_s, end):
-    lines = drawn(paused, of_s=of_s)
-    assert lines[0].startswith("a title") and lines[0].rstrip().endswith(end)
-    assert lines[-1].startswith("the keys")
-    assert len(lines) == len(drawn()) - (of_s is None)  # without an end of the ride, the picture has no progress bar
+def test_the_picture_fits_eighty_columns_with_title_and_time(paused, of_s, end):
+    """Without an end of the ride, there is no progress bar."""
+    for lean_deg in (-50.0, 0.0, 50.0):
+        lines = drawn(paused, of_s=of_s, lean_deg=lean_deg)
+        assert lines[0].startswith("a title") and lines[0].rstrip().endswith(end) and lines[-1].startswith("the keys")
+        assert len(lines) == len(drawn()) - (of_s is None) and max(len(line.rstrip()) for line in lines) <= 80
 
 
-def test_the_picture_of_an_oled_has_its_pixels_and_no_bike():
-    lines = drawn(pixels="ff" * 1024)
-    assert sum("\u28ff" * 64 in line for line in lines) == 16
-    assert not any("from behind" in line for line in lines) and value(lines, "speed") == "54 km/h"
-    assert any("from behind" in line for line in drawn())
+def columns(lean_deg, shown_deg, style):
+    """Return the columns of a style in the upper half of the bike's picture, from its middle."""
+    text, found = bike(lean_deg, shown_deg), []
+    for line in text.split("\n")[:6]:
+        for column, character in enumerate(line.plain):
+            styles = {str(span.style) for span in line.spans if span.start <= column < span.end}
+            if character != " " and style in styles:
+                found.append(column - 18.5)
+    return found
 
 
-def columns(picture, style):
-    """Return the columns of a style in each row of the drawing of the bike."""
-    found, row, column = [], [], 0
-    for text, part in ((segment.text, str(segment.style)) for segment in picture.render(Console(width=80))):
-        for character in text:
-            if character == "\n":
-                found.append(row)
-                row, column = [], 0
-                continue
-            if part == style and character != " ":
-                row.append(column)
-            column += 1
-    return [*found, row]
+@pytest.mark.parametrize("side", [-1, 1])
+def test_bike_and_dashed_line_lean_to_their_sides(side):
+    head = columns(30.0 * side, None, "cyan")
+    assert sum(head) / len(head) * side > 4.0
+    line = columns(0.0, 30.0 * side, "yellow")
+    assert line and all(column * side > 1.0 for column in line)
+    assert columns(0.0, None, "yellow") == []
 
 
-@pytest.mark.parametrize(("shown_deg", "side"), [(-30.0, -1), (30.0, 1)])
-def test_a_dashed_line_shows_the_shown_lean(shown_deg, side):
-    """The bike is upright. The line begins at the bike's wheel and ends at the side of the lean."""
-    rows = columns(bike(0.0, shown_deg), "yellow")
-    upper = [column - 18.5 for row in rows[:5] for column in row]
-    assert upper and all(column * side > 3.0 for column in upper)
-    assert columns(bike(0.0, None), "yellow") == [[]] * len(rows)
+def test_each_pixel_of_an_oled_has_its_dot():
+    """A braille character has two columns of four dots."""
+    dots = {(0, 0): 0x01, (0, 1): 0x02, (0, 2): 0x04, (1, 0): 0x08, (1, 2): 0x20, (0, 3): 0x40, (1, 3): 0x80}
+    for (x, y), dot in dots.items():
+        pixels = bytearray(1024)
+        pixels[(128 * (4 * 7 + y) + 2 * 5 + x) // 8] = 0x80 >> (2 * 5 + x) % 8
+        lines = oled_lines(pixels.hex())
+        assert ord(lines[7][5]) == 0x2800 + dot and "".join(lines).count("\u2800") == 64 * 16 - 1
 
 
-def test_a_state_of_the_device_has_rounded_numbers():
-    board = SimpleNamespace(
-        clock=SimpleNamespace(now_us=1_234_567),
-        lcd=SimpleNamespace(text=lambda: ["a", "b"]),
-        button=SimpleNamespace(closed=True),
-    )
-    moving = SimpleNamespace(truth=lambda t_s: (10.0 * t_s, 2.0 * t_s, 0.0, "roll"))
-    assert seen(board, moving, 60.0) == {
-        "t_s": 1.235,
-        "of_s": 60.0,
-        "lcd": ["a", "b"],
-        "lean_deg": 12.35,
-        "speed_mps": 2.47,
-        "phase": "roll",
-        "pressed": True,
-    }
-    assert seen(board, moving)["of_s"] is None
+def test_a_lean_of_zero_has_no_side():
+    assert [lean_text(lean) for lean in (-12.34, 0.04, -0.04, 7.0)] == ["12.3° left", "0.0°", "0.0°", "7.0° right"]
+    assert [lean_text(lean, 0) for lean in (-12.34, 0.6, 0.4)] == ["12° left", "1° right", "0°"]
 
 
-def test_each_held_turn_is_counted_once():
+def scored(*states):
     score = Score()
-    for phase, lean_deg in (("held turn", -30.0), ("held turn", -30.0), ("roll", -10.0), ("held turn", 20.0)):
-        score.add({**STATE, "phase": phase, "lean_deg": lean_deg})
-    figures = score.figures()
-    assert list(figures) == ["held turn 1", "held turn 2", "rolling in and out", "all"]
-    assert [part.samples for part in figures.values()] == [2, 1, 1, 4]
-    assert figures["held turn 2"].worst == -47.0 and figures["all"].rms_error == pytest.approx(
-        ((3.0**2 + 3.0**2 + 17.0**2 + 47.0**2) / 4.0) ** 0.5
+    for phase, lean_deg, shown in states:
+        score.add({**STATE, "phase": phase, "lean_deg": lean_deg, "lcd": [shown, ""]})
+    return score.figures()
+
+
+def test_the_score_compares_each_turn_by_hand():
+    """Only a shown lean counts. A turn is held again after another phase."""
+    figures = scored(
+        ("kickstand", 0.0, "Not aligned"),
+        ("held turn", -30.0, "Lean  28° left"),
+        ("held turn", -30.0, "Lean  33° left"),
+        ("straight", 0.0, "Lean   1° right"),
+        ("held turn", 20.0, "Lean  20° right"),
     )
-
-
-def test_a_line_separates_the_whole_ride_from_its_parts():
-    score = Score()
-    for phase in ("held turn", "roll"):
-        score.add({**STATE, "phase": phase})
-    console = Console(width=100, record=True, file=open(os.devnull, "w"))
-    console.print(table(score.figures()))
-    lines = console.export_text().splitlines()
-    starts = [
-        line.lstrip("│ ").split("  ")[0] if line.startswith("│") else line[0] for line in lines if line[:1] in "│├"
+    rows = [line.strip("│").split("│") for line in lines_of(table(figures)) if line.startswith("│")]
+    assert [[cell.strip() for cell in row] for row in rows] == [
+        ["held turn 1", "2", "-30.0", "-30.5", "2.5", "-3.0"],
+        ["held turn 2", "1", "20.0", "20.0", "0.0", "+0.0"],
+        ["straight on", "1", "0.0", "1.0", "1.0", "+1.0"],
+        ["all", "4", "-10.0", "-10.0", "1.9", "-3.0"],
     ]
-    assert [start.split(" │")[0].strip() for start in starts[-4:]] == ["held turn 1", "rolling in and out", "├", "all"]
+    assert lines_of(table(scored())) == ["The lean was not shown yet."]
+
+
+@pytest.mark.parametrize(
+    ("part", "phases"),
+    [
+        ("standing", ("kickstand", "upright", "moving", "wait")),
+        ("rolling in and out", ("roll in", "roll out", "roll")),
+        ("straight on", ("straight", "accelerate", "brake")),
+    ],
+)
+def test_each_phase_belongs_to_a_part_of_the_score(part, phases):
+    assert list(scored(*((phase, 5.0, "Lean   5° right") for phase in phases))) == [part, "all"]
+
+
+@pytest.mark.parametrize(
+    ("text", "keys"),
+    [
+        ("bB\x1b[D\x1b[Cq", ["b", "B", "left", "right", "q"]),
+        ("\x1bOC\x1bODd", ["right", "left", "d"]),
+        ("\xe0K\xe0Ma", ["left", "right", "a"]),  # Windows
+        ("\x1b[A1\xe0H2\0;3\x1bOB4\x1b", ["1", "2", "3", "4", "\x1b"]),  # other special keys are dropped
+    ],
+)
+def test_typed_text_is_split_into_keys(text, keys):
+    assert keyboard.split(text) == keys
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
+def test_keys_of_a_terminal_come_without_enter(monkeypatch):
+    import termios
+
+    ours, theirs = os.openpty()
+    with open(theirs) as terminal:
+        monkeypatch.setattr(sys, "stdin", terminal)
+        mode = termios.tcgetattr(terminal)
+        with keyboard.keyboard() as keys:
+            os.write(ours, b"b\x1b[Ca")
+            assert keys(5.0) == ["b", "right", "a"] and keys(0.0) == []
+            assert not termios.tcgetattr(terminal)[3] & termios.ICANON
+        assert termios.tcgetattr(terminal) == mode
+    os.close(ours)
+
+
+@pytest.mark.parametrize("engine", ["CPython", "MicroPython"])
+@pytest.mark.parametrize("program", [b"x = 1\ny = (\n", b"x = 1\0\n", b"def page(app)\n    pass\n"])
+def test_a_users_program_is_checked_before_the_ride(engine, program, tmp_path):
+    if engine == "MicroPython" and not unix_port.available():
+        pytest.skip("no MicroPython for this system")
+    path = tmp_path / "my.py"
+    path.write_text("def page(meter):\n    return 'a', 'b'\n")
+    user_program.check(path, engine)
+    path.write_bytes(program)
+    with pytest.raises(InputError, match=rf"my\.py.*: {engine} cannot run this file: correct it"):
+        user_program.check(path, engine)

@@ -1,133 +1,146 @@
-"""Tests which config.py of a rider is flashed, and how the computer and the board report a mistake in it."""
+"""Which config.py a board gets: the check of it in a process that poses as the board, for each kind of board."""
+
+import re
+from pathlib import Path
 
 import pytest
-from kickstand_tools.common import errors, firmware_path
+from kickstand_tools.deploy import config_check
 from kickstand_tools.simulated_board.fakes import chips
-from support import command, fake_board, mpy
+from support import command
+from support.mpy import run_mpy
+
+judge_in_a_process = config_check.judge  # conftest.py replaces it by one that remembers
+PICO = "Raspberry Pi Pico with RP2040"
+ESCAPES = "it ends its own check, or does not come to an end: write only settings in it"
 
 
-@pytest.fixture
-def board(tmp_path, monkeypatch):
-    """Return the only connected board. It contains a config.py."""
-    (tmp_path / "flash").mkdir()
-    board = fake_board.FakeBoard(tmp_path / "flash")
-    board.path("config.py").write_text("# on the board\n")
-    return fake_board.plug_in(monkeypatch, board)
+@pytest.mark.parametrize(
+    ("content", "line", "reason"),
+    [
+        ('# one\nSIDE = "right\n', 2, "SyntaxError: unterminated string"),
+        ("# one\n\nSIDE = right\n", 3, "NameError: name 'right' is not defined"),
+        ("def f():\n    return 1 / 0\n\n\nA = f()\n", 2, "ZeroDivisionError: division by zero"),
+        ("raise SystemExit(3)\n", 1, "SystemExit: 3"),
+        ("import json, logging.handlers\n", 1, "MicroPython has no module logging"),
+        ("A = 1\nfrom datetime import date\n", 2, "MicroPython has no module datetime"),
+        ("# one\nSIDE = 'left'\nSIDE = 'up'\n", 3, "SIDE = 'up', but it must be one of 'left', 'right'"),
+        ('SIDDE = "right"\n', 1, "SIDDE is not a setting"),
+        ('Side = "right"\n', 1, "Side is not a setting"),
+        ("SAMPLE_HZ = 50\nDLPF = 3\n", 2, "DLPF = 3 lets vibration alias at SAMPLE_HZ = 50: set DLPF"),
+        ("BUTTON_PIN = 4\n", None, "a pin is used twice"),
+        ("import json, time\nfrom os import path\nprint('hello')\n", None, None),
+        ("\ufeffDLPF = 4\n", None, None),
+        ("import os\nos._exit(0)\n", None, ESCAPES),
+        ("raise KeyboardInterrupt\n", None, ESCAPES),
+        ("import atexit\natexit.register(lambda: print('[1, 2, 3]'))\n", 1, "MicroPython has no module atexit"),
+        ("import sys\nsys.stdout.close()\n", None, ESCAPES),
+        ("class E:\n    def __eq__(self, other):\n        raise OSError\nVEHICLE = E()\n", None, ESCAPES),
+        ("while True:\n    pass\n", None, ESCAPES),
+        ("input()\n", 1, "EOFError"),
+    ],
+)  # fmt: skip
+def test_fault_of_a_config_has_its_line(tmp_path, monkeypatch, content, line, reason):
+    if reason == ESCAPES:
+        monkeypatch.setattr(config_check, "LONGEST_S", 3.0)
+    path = tmp_path / "config.py"
+    path.write_text(content, encoding="utf-8")
+    fault = judge_in_a_process(path, "rp2", PICO).fault
+    if reason is None:
+        assert fault is None
+    else:
+        assert fault and fault.startswith(f"{path}, line {line}: {reason}" if line else f"{path}: {reason}")
+        assert "\n" not in fault
 
 
-@pytest.fixture
-def config(tmp_path, monkeypatch):
-    """Return the config.py of a checkout in the current folder. The command itself is installed elsewhere."""
-    firmware = tmp_path / "checkout" / "firmware"
-    (firmware / "kickstand").mkdir(parents=True)
-    (firmware / "config.py").write_text('SIDE = "right"\n')
-    monkeypatch.chdir(tmp_path / "checkout")
-    return firmware / "config.py"
+@pytest.mark.parametrize(("port", "esp32"), [("rp2", False), ("esp32", True)])
+def test_settings_behind_a_mark_differ_from_the_default(tmp_path, port, esp32):
+    """A number in a comment "(15; 4 on an ESP32)" is a default that depends on the board."""
+    path = tmp_path / "config.py"
+    path.write_text(
+        '# SIDE = "right"  # why\n# SIDE = "left"\n# SD_SPI = 5\n# SPEED = "gps"\nDLPF = 3\n# SIDE = up\n'
+        "# BUTTON_PIN = 2  # (28; 9)\n"
+    )
+    machine = chips.MACHINES["esp32"] if esp32 else PICO
+    lines = [f'{path}, line 1: SIDE = "right"', f'{path}, line 4: SPEED = "gps"']
+    assert judge_in_a_process(path, port, machine).unused == lines + [f"{path}, line 7: BUTTON_PIN = 2"] * (not esp32)
 
 
-def test_the_checkout_s_config_is_flashed_and_named(board, config):
-    result = command.works("flash", "--config")
-    assert board.path("config.py").read_text() == 'SIDE = "right"\n'
-    assert f"config.py is {config}\n" in result.out
+XIAO = "SENSOR_SDA = 6\nSENSOR_SCL = 7\nLCD_SDA = 0\nLCD_SCL = 1\nBUTTON_PIN = 2\n"
+SD = "SD_SPI = {}\nSD_SCK = 12\nSD_MOSI = 13\nSD_MISO = 14\nSD_CS = 27\n"
+PINS = "BUTTON_PIN = 0\nSENSOR_SDA = 2\nSENSOR_SCL = 4\nLCD_SDA = 5\nLCD_SCL = 14\n"
 
 
-def test_installed_package_uses_config_of_the_current_folder(board, tmp_path, monkeypatch):
-    """Riders should not edit the config.py in site-packages, because the next update replaces it."""
-    package = tmp_path / "site-packages" / "kickstand_tools"
-    (package / "firmware").mkdir(parents=True)
-    (package / "firmware" / "config.py").write_text("# as shipped\n")
-    (package / "firmware" / "main.py").write_text("")
-    (tmp_path / "mine").mkdir()
-    monkeypatch.chdir(tmp_path / "mine")
-    monkeypatch.setattr(firmware_path, "TOOLS", package.parent)
-    said = command.works("flash", "--config").out
-    assert f"config.py is {package / 'firmware' / 'config.py'}\n" in said
-    assert "to change settings, copy that file to a folder of your own" in said
-    (tmp_path / "mine" / "config.py").write_text('SIDE = "right"\n')
-    result = command.works("flash", "--config")
-    assert f"config.py is {tmp_path / 'mine' / 'config.py'}\n" in result.out
-    assert "to change settings" not in result.out
-    assert board.path("config.py").read_text() == 'SIDE = "right"\n'
-    assert '-m pip install "kickstand-lean[rides]"' in errors.extra("rides")
-
-
-@pytest.mark.parametrize("arguments", [["flash"], ["flash", "--config"]])
-def test_setting_behind_a_mark_is_reported(arguments, board, config):
-    """A setting behind a '#' has no effect. The message gives the line of the setting, also if config.py is not copied.
-    The file as shipped has only examples behind a '#', which are not reported."""
-    shipped = (firmware_path.directory() / "config.py").read_text()
-    config.write_text(shipped.replace('# SIDE = "left" ', '# SIDE = "right"'))
-    said = f"note: {config}, line 4: SIDE = \"right\" is not used, because a '#' is in front of it"
-    result = command.works(*arguments)
-    assert said in result.out
-    assert result.out.count("note: ") == 1
-    config.write_text(shipped)
-    assert "note: " not in command.works(*arguments).out
-
-
-SLIPS = {
-    "syntax": ('# one\nSIDE = "right\n', 2, "SyntaxError: unterminated string"),
-    "no string": ("# one\n\nSIDE = right\n", 3, "NameError: name 'right' is not defined"),
-    "value": ('# one\nSIDE = "rigth"\n', 2, "SIDE = 'rigth', but it must be one of 'left', 'right'"),
-    "name": ('SIDDE = "right"\n', 1, "SIDDE is not a setting"),
-    "low-pass": ("# one\nSAMPLE_HZ = 50\nDLPF = 3\n", 3, "DLPF = 3 lets vibration alias at SAMPLE_HZ = 50: set DLPF"),
-    "capitals": ('Side = "right"\n', 1, "Side is not a setting"),
-    "no line of its own": ("BUTTON_PIN = 4\n", None, "a pin is used twice"),
-}
-
-
-@pytest.mark.parametrize("slip", SLIPS)
-def test_mistake_in_config_is_refused_before_copying(slip, board, config):
-    text, line, reason = SLIPS[slip]
-    config.write_text(text)
-    words = f"{config}, line {line}: {reason}" if line else f"{config}: {reason}"
-    command.refused(board.root, "flash", "--config", words=words)
-    assert board.resets == 1  # the board restarts, so its program runs again
-
-
-def test_a_new_board_gets_no_faulty_config_either(board, config):
-    board.path("config.py").unlink()
-    config.write_text("SIDE = right\n")
-    command.refused(board.root, "flash", words="line 1: NameError")
-
-
-def test_config_that_is_not_copied_is_not_checked(board, config):
-    config.write_text("SIDE = right\n")
-    result = command.works("flash")
-    assert board.path("config.py").read_text() == "# on the board\n"
-    assert "config.py is" not in result.out
-
-
-def pose(board, machine):
-    """Let the fake board identify itself as another board. machine: a key of chips.MACHINES."""
+@pytest.mark.parametrize(
+    ("machine", "content", "words"),
+    [
+        ("pico", "BUTTON_PIN = 4\n", "a pin is used twice"),  # on a Pico pin 4 is the sensor's SDA
+        ("pico 2", "BUTTON_PIN = 4\n", "a pin is used twice"),
+        ("esp32", "BUTTON_PIN = 4\n", None),
+        # the pins that are marked SDA and SCL on a XIAO RP2040 belong to I2C 1
+        ("xiao rp2040", XIAO, "line 1: SENSOR_SDA = 6 and SENSOR_SCL = 7 are not SDA and SCL of I2C 0: set SENSOR_I2C"),
+        (
+            "xiao rp2040",
+            XIAO + "SENSOR_I2C = 1\n",
+            "LCD_SDA = 0 and LCD_SCL = 1 are not SDA and SCL of I2C 1: set SENS",
+        ),
+        ("xiao rp2040", XIAO + "SENSOR_I2C = 1\nLCD_I2C = 0\n", None),
+        ("pico", "SENSOR_SDA = 5\nSENSOR_SCL = 4\n", "SENSOR_SDA = 5 and SENSOR_SCL = 4 are not SDA and SCL of I2C 0"),
+        # on an ESP32 the number is a slot of machine.SDCard; slots 0 and 1 are not SPI
+        *(("pico", SD.format(spi), None if spi < 2 else "SD_SPI = 2, but it must be") for spi in (0, 1, 2)),
+        *(("esp32", SD.format(spi), None if spi > 1 else "SD_SPI = 1, but it must be") for spi in (1, 2, 3)),
+        *((machine, "SIDE = 'left'\n", "no usual pins are known for this board (") for machine in ("s3", "c6")),
+        ("xiao rp2040", "SIDE = 'left'\n", "set BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL: correct it"),
+        ("s3", PINS, None),
+        ("s3", PINS.replace("LCD_SCL = 14", "LCD_SCL = 19"), "LCD_SCL = 19, but it must be a number from 0 to 48, no"),
+    ],
+)
+def test_config_is_checked_for_the_board(machine, content, words, board, config):
     system = board.modules["sys"]
     system.implementation._machine = chips.MACHINES[machine]
     system.platform = "esp32" if "ESP32" in chips.MACHINES[machine] else "rp2"
+    config.write_text(content)
+    if words:
+        command.refused(board.root, "flash", "--config", words=words)
+    else:
+        command.works("flash", "--config")
+        assert board.path("config.py").read_text() == content
 
 
-@pytest.mark.parametrize(("machine", "status"), [("pico", 2), ("pico 2", 2), ("esp32", 0)])
-def test_config_is_checked_for_the_board(machine, status, board, config):
-    pose(board, machine)
-    config.write_text("BUTTON_PIN = 4\n")  # on a Pico pin 4 is the sensor's SDA
-    assert command.run("flash", "--config").status == status
+SETTINGS = ("SENSOR_SDA", "SENSOR_SCL", "LCD_SDA", "LCD_SCL", "BUTTON_PIN")
+# The boards of the table in settings.md, by their names in MicroPython. PICO-D4 and D2WD have their flash on 16 and 17.
+SHOPS = {
+    "Seeed XIAO RP2040, RP2350": "Seeed XIAO RP2350 with RP2350", "Waveshare RP2040-Zero": "RP2040-Zero with RP2040",
+    "Seeed XIAO ESP32C3": "XIAO with ESP32-C3", "Seeed XIAO ESP32C5": "XIAO with ESP32-C5",
+    "Seeed XIAO ESP32C6": "XIAO with ESP32-C6", "Seeed XIAO ESP32S3": "XIAO with ESP32-S3",
+    "M5Stack Atom Lite (ESP32-PICO-D4)": "M5Stack ATOM with ESP32-PICO-D4",
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("machine", ["s3", "c6", "xiao rp2040"])
-def test_a_board_without_usual_pins_needs_them_named(machine, board, config):
-    pose(board, machine)
-    names = "BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL"
-    words = f"{config}: no usual pins are known for this board ({chips.MACHINES[machine]}): set {names}: correct it"
-    command.refused(board.root, "flash", "--config", words=words)
-    pins = zip(names.split(", "), (0, 2, 4, 5, 14), strict=True)
-    config.write_text("".join(f"{name} = {number}\n" for name, number in pins))
-    command.works("flash", "--config")
+def test_pins_for_boards_of_shops_are_accepted(tmp_path):
+    page = (Path(__file__).resolve().parents[2] / "firmware" / "docs" / "settings.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[1:-1] for line in page.splitlines() if line.startswith("| ") and line.count("|") == 7]
+    pins = {row[0].strip(): row for row in rows if row[0].strip() in SHOPS}
+    assert pins.keys() == SHOPS.keys()
+    for board, machine in SHOPS.items():
+        numbers = re.findall(r"\d+", re.sub(r"\([^)]*\)", "", ",".join(pins[board][1:4])))
+        lines = [f"{name} = {number}" for name, number in zip(SETTINGS, numbers, strict=True)]
+        path = tmp_path / "config.py"
+        path.write_text("\n".join(lines + re.findall(r"\w+_I2C = \d", pins[board][4])))
+        assert judge_in_a_process(path, "esp32" if "ESP32" in machine else "rp2", machine).fault is None, board
 
 
-def test_a_pin_of_the_chip_s_own_usb_is_refused(board, config):
-    pose(board, "s3")
-    config.write_text("BUTTON_PIN = 4\nSENSOR_SDA = 8\nSENSOR_SCL = 9\nLCD_SDA = 18\nLCD_SCL = 19\n")
-    words = f"{config}, line 5: LCD_SCL = 19, but it must be a number from 0 to 48, no pin of the chip's own USB"
-    command.refused(board.root, "flash", "--config", words=words)
+@pytest.mark.parametrize(
+    ("machine", "pins"),
+    [("M5Stack ATOM with ESP32-PICO-D4", (16, 17)), ("Generic ESP32 module with ESP32-D2WD", (17, 16)),
+     ("ESP32C5 module with ESP32-C5", (13, 14)), ("Generic ESP32P4 module with ESP32-P4", (24, 25))],
+)  # fmt: skip
+def test_pins_that_the_chip_itself_needs_are_refused(machine, pins, tmp_path):
+    path = tmp_path / "config.py"
+    for number in pins:
+        path.write_text(f"SENSOR_SDA = {number}\nSENSOR_SCL = 21\nLCD_SDA = 22\nLCD_SCL = 19\nBUTTON_PIN = 23\n")
+        assert f"line 1: SENSOR_SDA = {number}, but it must be" in str(judge_in_a_process(path, "esp32", machine).fault)
+    path.write_text('SPEED = "gps"\n')  # the usual pins of a GPS receiver are 16 and 17
+    assert judge_in_a_process(path, "esp32", machine).fault
 
 
 _LOAD = """
@@ -136,22 +149,22 @@ from kickstand_tools.simulated_board.simulator import Board
 Board(lambda t_s: (0, 0, 1, 0, 0, 0)).install()
 sys.path.insert(0, DIRECTORY)
 from kickstand import settings
+from kickstand.console import sentence
 from kickstand.errors import SettingsError
 try:
     settings.load()
 except SettingsError as error:
-    from kickstand.console import sentence
     print(sentence(error))
 """
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("# one\n\nSIDE = = 3\n", "config.py cannot be read (line 3: invalid syntax"),
         ("# one\nSIDE = right\n", "config.py cannot be read (line 2: name 'right' "),
     ],
 )
-def test_board_also_names_the_line(text, said, tmp_path):
+def test_board_also_names_the_line(text, message, tmp_path):
     (tmp_path / "config.py").write_text(text)
-    assert mpy.run_mpy(_LOAD.replace("DIRECTORY", repr(str(tmp_path)))).startswith(said)
+    assert run_mpy(_LOAD.replace("DIRECTORY", repr(str(tmp_path)))).startswith(message)

@@ -97,6 +97,7 @@ def test_machine_code_that_cannot_be_loaded_is_not_used(tmp_path, path, error):
 
 
 @pytest.mark.chip
+@pytest.mark.long
 def test_a_picos_status_reports_wrong_machine_code(tmp_path):
     path = "imu/fifo_frames_viper.py"
     write_broken(path, "add_up", tmp_path / "broken.py")

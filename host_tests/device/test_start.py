@@ -1,211 +1,173 @@
-"""The start by main.py if a module, the settings or the flash is missing or broken."""
+"""The start by main.py: safe mode, wrong settings, incomplete firmware, too little memory."""
 
-import builtins
-import os
 import subprocess
 import sys
 
 import pytest
-from kickstand import errors
+from kickstand.errors import StoreError, report
 from kickstand_tools.common import firmware_path
-from kickstand_tools.simulated_board.simulator import Board
-from kickstand_tools.simulation.scripted import sensor_errors
 from support import mpy
+from support.device_runs import FreshFirmware, take_firmware
+
+INCOMPLETE, NO_MEMORY = ["Incomplete:     ", "flash it again  "], ["No memory for it", "restart it      "]
+RAW = {"lean": [[0, 25]]}
+
+
+class Missing:
+    """An import hook that raises an error instead of importing one module, `times` times."""
+
+    def __init__(self, name, error, times):
+        self.name, self.error, self.times = name, error, times
+
+    def find_spec(self, name, path=None, target=None):
+        if name == self.name and self.times:
+            self.times -= 1
+            raise self.error(f"no module named '{name}'" if self.error is ImportError else "memory allocation failed")
 
 
 @pytest.fixture
-def board(request, tmp_path, monkeypatch):
-    """Return a board with an empty flash. The fixture's parameter has the arguments of Board."""
-    monkeypatch.chdir(tmp_path)
-    fitted = getattr(request, "param", {})
-    made = Board(sensor_errors.resting(sensor_errors.Sensor(), (0, 0, 1)), **fitted)
-    with made:
-        yield made
+def without():
+    """Return without(name, error, times): the firmware is imported anew, and its module of this name raises the
+    error."""
+    hooks = list(sys.meta_path)
+    with FreshFirmware():
+        yield lambda name, error, times=-1: sys.meta_path.insert(0, Missing("kickstand." + name, error, times))
+    sys.meta_path[:] = hooks
 
 
-@pytest.mark.parametrize("module", ["kickstand.app", "kickstand.lean.lean_filter"])
-def test_incomplete_firmware_ends_at_the_prompt_and_says_so(module, board, monkeypatch, capsys):
-    """The board stays at the prompt and does not restart."""
-    from time import sleep_ms  # pyright: ignore[reportAttributeAccessIssue]
-
-    from kickstand import start
-
-    def use_the_console():
-        start.main()
-        sleep_ms(20_000)  # 20 s, in which a running watchdog would reset the board
-
-    monkeypatch.setitem(sys.modules, module, None)
-    board.press(2.0)
-    assert board.run(use_the_console, 60.0) == "returned"
-    assert board.lcd.text() == ["Incomplete:     ", "flash it again  "]
-    assert "Run kickstand flash." in capsys.readouterr().out
+def frames_with(record, lines):
+    return [t_s for t_s, *shown in record.frames if shown == lines]
 
 
 @pytest.mark.parametrize("charge_us", [0, 7_000, 75_000])
-@pytest.mark.parametrize("held", [False, True])
-def test_a_capacitor_at_the_button_is_no_press_at_power_on(held, charge_us, board, capsys):
-    """The pin's pull-up needs time to charge the capacitor. Until then the pin reads as pressed. A button that is held
-    still prevents the start."""
-    from kickstand import start
+@pytest.mark.parametrize(("held_s", "safe"), [(0.0, False), (0.05, False), (0.15, True), (1.0, True)])
+def test_button_held_at_power_on_starts_safe_mode(held_s, safe, charge_us, run):
+    """Until a capacitor at the button is charged, the pin reads as pressed."""
 
-    board.button.charge_us = charge_us
-    if held:
-        board.press(0.0, 1.0)
-    shown = []
-    board.at(1.9, lambda: shown.extend(board.lcd.text()))
-    assert board.run(start.main, 2.0) == ("returned" if held else "off")
-    if held:
-        assert board.lcd.text() == ["Safe mode       ", "Ready for USB   "]
-        assert "safe mode" in capsys.readouterr().out
+    def fit(board):
+        board.button.charge_us = charge_us
+        if held_s:
+            board.press(0.0, held_s)
+
+    record = run({**RAW, "until": 1.9}, fit=fit)
+    assert record.ends == ["returned" if safe else "off"]
+    if safe:
+        assert record.last == ("Safe mode       ", "Ready for USB   ")
+        assert "safe mode" in record.console
     else:
-        assert shown[0].startswith("Raw")
+        assert record.last[0].startswith("Raw")
 
 
-INCOMPLETE, NO_MEMORY = ["Incomplete:     ", "flash it again  "], ["No memory for it", "restart it      "]
-ALIGN, SIX, RECORD = 0, 1, 4  # positions in the menu
-
-
-@pytest.fixture(params=["missing", "no memory"])
-def without(request, monkeypatch):
-    """Return without(end of a module's name), which blocks the import of this module and returns the expected
-    message."""
-
-    def take_away(ending):
-        real = builtins.__import__
-
-        def importing(name, globals=None, locals=None, fromlist=(), level=0):
-            if ending in (name.rpartition(".")[2], *(fromlist or ())):
-                if request.param == "missing":
-                    raise ImportError(f"no module named '{name}'")
-                raise MemoryError("memory allocation failed")
-            return real(name, globals, locals, fromlist, level)
-
-        monkeypatch.setattr(builtins, "__import__", importing)
-        return INCOMPLETE if request.param == "missing" else NO_MEMORY
-
-    return take_away
-
-
-def watch(board):
-    """Return a list that will contain (t_s, lines) of each change of the display."""
-    seen = []
-
-    def look():
-        if not seen or seen[-1][1] != board.lcd.text():
-            seen.append((board.clock.now_us / 1e6, board.lcd.text()))
-
-    board.every(0.1, look)
-    return seen
-
-
-def choose(board, at_s, place):
-    """Return the presses that choose an entry of the menu. The presses take 8 s. place: position of the entry."""
-    for t_s in range(place):
-        board.press(at_s + 2 + t_s)
-    board.press(at_s, 1.2)
-    board.press(at_s + 2 + place, 1.2)
+def test_closed_button_is_told_from_one_that_is_held(run):
+    record = run({**RAW, "presses": [[0.0, 1000.0]], "until": 30})
+    assert record.at(4.0) == ["Safe mode       ", "Ready for USB   "]
+    assert record.last == ("Button is closed", "check its wires ") and record.ends == ["returned"]
+    assert "The button on GPIO 15 stays closed" in record.console
 
 
 @pytest.mark.parametrize(
-    ("module", "place"),
-    [("align_wizard", ALIGN), ("pose_taker", SIX), ("recorder", RECORD)],
+    ("config", "line", "words"),
+    [
+        ("SIDE = 'up'\n", "SIDE", "SIDE = 'up', but it must be one of"),
+        ("\n\n1 / 0\n", "config.py", "config.py cannot be read (line 3: division by zero)"),
+        ("x = 1\n\ny = = 2\n", "config.py", "config.py cannot be read (line 3: invalid syntax"),
+        ("raise ValueError('mine')\n", "config.py", "config.py cannot be read (line 1: mine)"),
+        ("BUTTON_PIN = 47\n", "BUTTON_PIN", "BUTTON_PIN = 47 is not a pin of this board"),
+        ("SPEED = 'gps'\nGPS_RX = 11\n", "GPS_TX / GPS_RX", "do not belong to UART 1"),
+    ],
 )
-def test_a_failed_import_of_the_menu_is_reported(module, place, without, board, capsys):
-    """The display reports the failure each time the rider chooses the entry, and never earlier."""
-    from kickstand import start
-
-    if module == "pose_taker":
-        for name in ("six_wizard", "wizard"):
-            sys.modules.pop("kickstand.ui." + name, None)
-    said, seen = without(module), watch(board)
-    for at_s in (3, 15):
-        choose(board, at_s, place)
-    assert board.run(start.main, 28.0) == "off"
-    shown_s = [t_s for t_s, lines in seen if lines == said]
-    for t_s in shown_s:  # tolerance of 2 s: the message is shown for 2 s, and one sample may be a half-written line
-        assert min(abs(t_s - (at_s + 4 + place)) for at_s in (3, 15)) < 2
-    assert min(shown_s) < 12 < max(shown_s)
-    assert seen[-1][1][0].startswith("Raw")
-    assert ("run kickstand flash" if said is INCOMPLETE else "no memory for that") in capsys.readouterr().out
+def test_wrong_settings_end_at_the_prompt_with_their_line(config, line, words, run, tmp_path):
+    (tmp_path / "config.py").write_text(config)
+    record = run({"config": None, "until": 30, "prompt": 20})
+    assert record.ends == ["returned"] and line in "".join(record.last)
+    assert "Kickstand stopped. config.py" in record.console and words in record.console
 
 
-@pytest.mark.parametrize("module", ["recorder", "card_trial"])
-def test_a_board_that_cannot_record_still_shows_the_lean(module, without, board, monkeypatch):
-    from kickstand import settings, start
-
-    pins = {"SD_SPI": 0, "SD_SCK": 18, "SD_MOSI": 19, "SD_MISO": 16, "SD_CS": 17} if module == "card_trial" else {}
-    monkeypatch.setattr(settings, "load", lambda: settings.Settings(type("Config", (), {"RECORD": True, **pins})))
-    said, seen = without(module), watch(board)
-    assert board.run(start.main, 8.0) == "off"
-    assert [t_s for t_s, lines in seen if lines == said] == [pytest.approx(0.6, abs=0.5)]
-    assert seen[-1][1][0].startswith("Raw")
+@pytest.mark.parametrize("module", ["app", "lean.lean_filter"])
+def test_incomplete_firmware_ends_at_the_prompt(module, without, run):
+    """The watchdog does not restart the board there."""
+    without(module, ImportError)
+    record = run({**RAW, "presses": [[2.0, 0.15]], "until": 60, "prompt": 20})
+    assert record.ends == ["returned"]
+    assert list(record.last) == INCOMPLETE
+    assert "incomplete firmware" in record.console and "Run kickstand flash." in record.console
 
 
-@pytest.mark.parametrize("module", ["radio", "live"])
-@pytest.mark.parametrize("board", [{"machine": "pico w"}], indirect=True)
-def test_without_lives_modules_the_lean_continues(module, without, board, monkeypatch, capsys):
-    """The console reports the missing module once. The board does not restart, and the radio is off."""
-    from kickstand import settings, start
-
-    monkeypatch.setattr(settings, "load", lambda: settings.Settings(type("Config", (), {"LIVE": True})))
-    said, seen = without(module), watch(board)
-    assert board.run(start.main, 30.0) == "off"
-    assert board.boots == 1 and seen[-1][1][0].startswith("Raw")
-    memory = ["No Bluetooth:   ", "no memory       "]
-    assert (memory if said == NO_MEMORY else INCOMPLETE) in [lines for _, lines in seen]
-    words = "LIVE: too little memory (memory allocation" if said == NO_MEMORY else "incomplete firmware (no module"
-    assert capsys.readouterr().out.count(words) == 1
-    assert not board.radio.active
-
-
-@pytest.mark.parametrize("board", [{"display": "ssd1306"}], indirect=True)
-def test_without_its_pictures_an_oled_shows_lines(without, board, monkeypatch, capsys):
-    from kickstand import start
-    from kickstand.board import display
-    from kickstand.ui import page_ring
-
-    shown = []
-    monkeypatch.setattr(display.Display, "show", lambda _, *lines: shown.append(lines))
-    monkeypatch.setattr(page_ring.PageRing, "lines", lambda ring, now_ms: ring._page(page_ring.pages.lean))
-    said = without("glance")
-    assert board.run(start.main, 5.0) == "off"
-    assert board.boots == 1 and ("Lean  --", "not sure yet") in shown
-    words = "no memory for that" if said == NO_MEMORY else "incomplete firmware"
-    assert capsys.readouterr().out.count(words) == 1
-
-
-@pytest.mark.parametrize("board", [{"display": "ssd1306"}], indirect=True)
-def test_a_display_without_its_driver_is_probed_less_often(without, board, monkeypatch, capsys):
-    from kickstand import start
-    from kickstand.board import display
-
-    monkeypatch.setattr(display, "MOST_WAIT_MS", 6_400)
-    said = without("oled")
-    assert board.run(start.main, 31.0) == "off"
-    words = "no memory for that" if said == NO_MEMORY else "incomplete firmware"
-    times = capsys.readouterr().out.count(words)
-    # The pauses between attempts are 0.4, 0.8, 1.6 and 3.2 s, then 6.4 s each
-    assert 8 <= times <= 10 and board.boots == 1
-
-
-@pytest.mark.parametrize("missing", [MemoryError, ImportError])
-def test_settings_that_cannot_be_loaded_end_on_the_display(missing, board, monkeypatch, capsys):
+def test_too_little_memory_for_the_settings_is_shown_before_a_restart(without, run):
     """The display must not keep the lean that it showed before the reset."""
-    from kickstand import settings, start
-
-    def load():
-        raise missing("in setting_table")
-
-    monkeypatch.setattr(settings, "load", load)
-    restarts = missing is MemoryError
-    assert board.run(start.main, 6.0) == ("reset" if restarts else "returned")
-    assert board.lcd.text() == (["Error, restarts ", "MemoryError     "] if restarts else INCOMPLETE)
-    assert "in setting_table" in "".join(capsys.readouterr())
+    without("setting_table", MemoryError, times=1)
+    record = run({**RAW, "until": 6})
+    assert record.ends == ["reset", "off"]
+    assert record.at(3.0) == ["Error, restarts ", "MemoryError     "]
 
 
-def test_a_failed_import_can_be_repeated(tmp_path):
-    """If an import is interrupted, MicroPython keeps the incomplete module. The next import must load the module
-    again."""
+@pytest.mark.parametrize(
+    ("module", "entry", "error"),
+    [
+        ("ui.align_wizard", 0, ImportError),
+        ("calibration.pose_taker", 1, MemoryError),
+        ("rides.recorder", 4, ImportError),
+    ],
+)
+def test_failed_import_of_a_menu_entry_is_shown_each_time(module, entry, error, without, run):
+    """entry: its position in the menu."""
+    without(module, error)
+    presses, chosen_s = [], []
+    for at_s in (3.0, 15.0):
+        presses += [[at_s, 1.2], *([at_s + 2 + k, 0.15] for k in range(entry)), [at_s + 2 + entry, 1.2]]
+        chosen_s.append(at_s + 4 + entry)
+    record = run({**RAW, "presses": presses, "until": 28})
+    shown_s = frames_with(record, INCOMPLETE if error is ImportError else NO_MEMORY)
+    for t_s in shown_s:  # the message is shown for 2 s
+        assert min(abs(t_s - at_s) for at_s in chosen_s) < 2
+    assert min(shown_s) < 12 < max(shown_s)
+    assert record.last[0].startswith("Raw")
+    assert ("run kickstand flash" if error is ImportError else "no memory for that") in record.console
+
+
+CARD = {"SD_SPI": 0, "SD_SCK": 18, "SD_MOSI": 19, "SD_MISO": 16, "SD_CS": 17}
+
+
+@pytest.mark.parametrize(
+    ("module", "error", "config", "lines"),
+    [
+        ("rides.recorder", MemoryError, {"RECORD": True}, NO_MEMORY),
+        ("rides.card_trial", ImportError, {"RECORD": True, **CARD}, INCOMPLETE),
+        ("live.radio", ImportError, {"LIVE": True}, INCOMPLETE),
+        ("live.live", ImportError, {"LIVE": True}, INCOMPLETE),
+        ("live.radio", MemoryError, {"LIVE": True}, ["No Bluetooth:   ", "no memory       "]),
+        ("live.live", MemoryError, {"LIVE": True}, ["No Bluetooth:   ", "no memory       "]),
+    ],
+)
+def test_lean_continues_without_recorder_or_radio(module, error, config, lines, without, run):
+    without(module, error)
+    boards = []
+    record = run({**RAW, "config": config, "board": {"machine": "pico w"}, "until": 8}, fit=boards.append)
+    assert record.ends == ["off"] and record.last[0].startswith("Raw   25°")
+    assert len(frames_with(record, lines)) == 1 and record.first(lines[0]) < 2.0
+    words = "incomplete firmware (no module" if error is ImportError else "memory allocation"
+    assert 1 <= record.console.count(words) <= 2
+    assert not boards[0].radio.active
+
+
+@pytest.mark.parametrize("error", [ImportError, MemoryError])
+@pytest.mark.usefixtures("aligned")
+def test_oled_without_its_pictures_shows_lines(error, without, run):
+    without("ui.glance", error)
+    record = run({**RAW, "board": {"display": "ssd1306"}, "until": 4})
+    assert record.ends == ["off"] and record.last[0].startswith("Lean  25° right")
+    assert record.console.count("incomplete firmware" if error is ImportError else "no memory for that") == 1
+
+
+def test_display_without_its_driver_is_probed_less_often(without, run):
+    """The pauses between attempts are 0.4, 0.8, 1.6, 3.2, 6.4 and 12.8 s."""
+    without("board.oled", ImportError)
+    record = run({**RAW, "board": {"display": "ssd1306"}, "until": 30})
+    assert record.ends == ["off"] and 6 <= record.console.count("incomplete firmware") <= 8
+
+
+def test_failed_import_can_be_repeated(tmp_path):
+    """If an import is interrupted, MicroPython keeps the incomplete module. The next import must load it again."""
     (tmp_path / "outer.py").write_text("import inner\n\n\nclass Outer:\n    inner = inner.Inner\n")
     (tmp_path / "inner.py").write_text("import memory\n\nmemory.take()\n\n\nclass Inner:\n    pass\n")
     (tmp_path / "memory.py").write_text(
@@ -213,36 +175,32 @@ def test_a_failed_import_can_be_repeated(tmp_path):
     )
     script = f"""
 import sys
-sys.path.append({str(tmp_path)!r})
+sys.path[1:1] = [{str(tmp_path)!r}, {firmware_path.search_path()!r}]
 import memory
 from kickstand.errors import attempt
 def use():
     from outer import Outer
-    made.append(Outer())
-made = []
+    objects.append(Outer())
+objects = []
 memory.left.reverse()
 first = attempt(use)
-print(first.code, first.values, made, sorted(name for name in sys.modules if name in ("outer", "inner", "memory")))
-print(attempt(use), len(made))
+print(first.code, first.values, objects, sorted(name for name in sys.modules if name in ("outer", "inner", "memory")))
+print(attempt(use), len(objects))
 """
-    environment = os.environ | {"PYTHONPATH": firmware_path.search_path()}
-    done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True)
-    for said in (done.stdout, mpy.run_mpy(script)):
-        _, first, second = said.splitlines()
-        assert first == "no-memory ('none',) [] ['memory']"
-        assert second == "None 1"
+    cpython = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+    for output in (cpython, mpy.run_mpy(script)):
+        assert output.splitlines()[1:] == ["no-memory ('none',) [] ['memory']", "None 1"]
 
 
-def test_a_report_that_cannot_be_worded_gives_its_code(board, monkeypatch, capsys):
-    """After a failure of flash or heap, the module with the words may not load. The ride continues nevertheless."""
-    errors.report(errors.StoreError("not-written", "EIO"))
-    monkeypatch.setitem(sys.modules, "kickstand.console", None)
-    errors.report(errors.StoreError("not-written", "EIO"))
+def test_report_without_its_words_gives_its_code(without, on_board, capsys):
+    """After a failure of flash or heap, the module with the words may not load."""
+    on_board(lambda *_: report(StoreError("not-written", "EIO")))
+    take_firmware()
+    without("console", ImportError)
+    on_board(lambda *_: report(StoreError("not-written", "EIO")))
     assert capsys.readouterr().out == "calibration not saved: EIO; the old one is kept\nnot-written\n"
 
 
-def test_the_table_of_settings_leaves_the_heap_again(board):
-    from kickstand.settings import load
-
-    assert vars(load())["SAMPLE_HZ"] == 200
+def test_table_of_settings_leaves_the_heap_again(on_board):
+    on_board(lambda board, settings: None)
     assert "kickstand.setting_table" not in sys.modules and not hasattr(sys.modules["kickstand"], "setting_table")

@@ -1,141 +1,206 @@
-"""The firmware calls the owner's code in user.py at the right times. The lean continues, whatever the owner's code
-does."""
+"""The firmware calls the owner's code in user.py at the right times. The lean continues, whatever that code does."""
 
 import re
 import sys
 
 import pytest
-from support import device_plans, engines
+from support import engines
 
-POSES = {"ride": device_plans.RIDE, "presses": device_plans.PRESSES, "until": device_plans.LEFT_S + 0.5}
-# The board is already aligned. The bike turns to the left, and the rider presses through all pages, back to the first.
-PLAN = {"ride": [["upright", 2.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 6.0]], "until": 14.0}
-PLAN["turn_to"] = [[3, "raw"], [7.5, "lean"]]
-WHOLE = """
-import gc
+# An aligned bike turns to the left. The rider presses through all pages, back to the first.
+PLAN = {
+    "ride": [["upright", 2.0], ["accelerate", 15.0, 4.0], ["turn", -30.0, 6.0]],
+    "until": 12.0,
+    "turn_to": [[3, "raw"], [6.5, "lean"]],
+}
+COMPLETE = """
 calls = []
 def setup(app):
     print("setup", app.settings.SIDE)
 def on_lean(lean_deg, trusted, meter):
     calls.append(trusted)
-    if len(calls) in (100, 280):
-        print("lean", len(calls), trusted, round(lean_deg), meter.trusted)
+    if len(calls) in (4, 110):
+        print("lean", len(calls), trusted, round(lean_deg), round(meter.lean_deg))
 def on_press(event):
     print("press", event)
+def page_b(app):
+    return ("Page two", len(calls))
 def page(app):
     return "My page", len(calls)
-def page_two(app):
-    return ("Page two", "")
 """
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch, capsys):
-    """Return run(source of user.py, plan), which returns the Record. By default the run is on MicroPython, to test its
-    exceptions, memory and printing."""
+def run_user(aligned, run):
+    """Return run_user(source of user.py, plan, engine), which returns the Record of an aligned board."""
 
-    def run(source, plan=PLAN, engine="micropython"):
-        if plan["ride"] == PLAN["ride"]:
-            device_plans.align(tmp_path)
-        (tmp_path / "user.py").write_text(source)
-        monkeypatch.syspath_prepend(str(tmp_path))
-        return device_plans.run(engine, tmp_path, plan, capsys)
+    def run_user(source, plan=PLAN, engine="micropython"):
+        (aligned / "user.py").write_text(source)
+        return run(plan, engine)
 
-    return run
+    return run_user
 
 
-def goes_on(record, t_s=13.5):
-    """Return True if the display shows the right lean at the end of the left turn."""
-    lean = record.lean_at(t_s)
+def lean_is_right(record):
+    lean = record.lean_at(PLAN["until"] - 0.5)
     return lean is not None and abs(lean + 30) < 4
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
-def test_each_function_is_called(run, engine):
-    record = run(WHOLE, POSES, engine)
-    console = record.console
-    assert "setup left" in console and console.count("press 1") == 2
-    assert "lean 100 False" in console  # the sensor is not aligned yet
-    assert re.search(r"lean 280 True -\d\d? True", console)
-    assert goes_on(record, device_plans.LEFT_S)
+def test_each_function_is_called(engine, run_user):
+    """The own pages follow the others in alphabetical order."""
+    plan = PLAN | {"turn_to": [[3, "own"]], "presses": [[7.0, 0.15], [8.0, 0.15]]}
+    record = run_user(COMPLETE, plan, engine)
+    assert "setup left" in record.console and record.console.count("press 1") == 7
+    assert re.search(r"lean 4 (True|False)", record.console)
+    ((trusted, lean, meter),) = re.findall(r"lean 110 (\w+) (-?\d+) (-?\d+)", record.console)
+    assert (trusted, lean) == ("True", meter) and abs(int(lean) + 30) < 4
+    assert record.at(6.9)[0].startswith("My page") and record.at(6.9)[1].strip().isdigit()
+    assert record.at(7.9)[0].startswith("Page two")
+    assert lean_is_right(record)
 
 
-def test_its_pages_follow_the_others_and_are_in_the_menu(run):
-    # "Own pages" is the sixth entry of the menu.
+def test_own_pages_are_in_the_menu_without_an_alignment(run, tmp_path):
+    """The menu's sixth entry is "Own pages"."""
+    (tmp_path / "user.py").write_text(COMPLETE)
     presses = [[2, 1.2]] + [[4 + 0.5 * k, 0.15] for k in range(5)] + [[8, 1.2], [10, 0.15], [11, 0.15]]
-    record = run(WHOLE, POSES | {"presses": presses, "until": 13})
-    assert record.at(7.5)[0].startswith("→Own pages"), record.frames
-    assert record.at(9.8)[0].startswith("My page")
-    assert record.at(10.8)[0].startswith("Page two")
-    assert "press" in record.at(12.9)[1] or "Not aligned" in record.at(12.9)[1]
-    presses = [*device_plans.PRESSES, [26, 0.15]]
-    record = run(WHOLE, POSES | {"presses": presses, "turn_to": [[20, "own"]], "until": 28})
-    assert record.at(25.8)[0].startswith("My page") and record.at(25.8)[1].strip().isdigit()
-    assert record.at(27)[0].startswith("Page two")
+    record = run({"lean": [[0, 0]], "presses": presses, "until": 13})
+    assert record.at(7.5)[0].startswith("→Own pages")
+    assert [record.at(t_s)[0].strip() for t_s in (9.8, 10.8)] == ["My page", "Page two"]
+    assert "press" in record.last[1] or "Not aligned" in record.last[1]
 
 
 @pytest.mark.parametrize(
-    ("source", "shown", "said"),
+    ("engine", "source", "shown", "words"),
     [
-        ("1 / 0", "user.py import", "import is left out: ZeroDivisionError"),
-        ("def on_lean(:", "user.py import", "import is left out: SyntaxError"),
-        ("def on_lean(*a):\n    {}['x']", "user.py on_lean", "on_lean is left out: KeyError"),
-        ("def on_lean(*a):\n    raise SystemExit", "user.py on_lean", "on_lean is left out: SystemExit"),
-        ("import time\ndef on_lean(*a):\n    time.sleep_ms(1000)", "user.py on_lean", "on_lean is left out: 10"),
-        ("import time\ndef on_lean(*a):\n    time.sleep_ms(60)", "user.py on_lean", "on_lean is left out: 6"),
-        ("def on_lean(*a):\n    raise MemoryError", "user.py left out", "it leaves too little memory (on_lean)"),
+        ("cpython", "1 / 0", "user.py import", "import is left out: ZeroDivisionError"),
+        ("micropython", "def on_lean(:", "user.py import", "import is left out: SyntaxError"),
+        ("cpython", "def on_lean(*a):\n    {}['x']", "user.py on_lean", "on_lean is left out: KeyError"),
+        ("micropython", "def on_lean(*a):\n    raise SystemExit", "user.py on_lean", "on_lean is left out: SystemExit"),
+        ("cpython", "import time\ndef on_lean(*a):\n    time.sleep_ms(1000)", "user.py on_lean", "left out: 10"),
+        ("cpython", "import time\ndef on_lean(*a):\n    time.sleep_ms(60)", "user.py on_lean", "left out: 6"),
+        ("cpython", "def on_lean(*a):\n    raise MemoryError", "user.py left out", "too little memory (on_lean)"),
+        ("cpython", "def __dir__(*_):\n    raise ValueError('mine')", "user.py import", "left out: ValueError"),
+        ("micropython", "kept = []\ndef on_lean(*a):\n    kept.append(bytearray(40000))", "user.py left out",
+         "it leaves too little memory"),
     ],
-)
-def test_an_error_is_reported_once_and_the_lean_continues(run, source, shown, said):
-    record = run(source)
-    assert record.first(shown) < 12
-    assert record.console.count(said) == 1, record.console
-    assert goes_on(record)
-
-
-def test_a_function_that_is_slow_at_times_is_kept(run):
-    source = "import time\npage_number = 3\ncalls = []\ndef on_lean(*a):\n    calls.append(0)\n"
-    record = run(source + "    if len(calls) % 20 == 0:\n        time.sleep_ms(60)")
-    assert record.console.count("on_lean took 6") == 1 and "on_lean is left out" not in record.console
-    assert goes_on(record)
+)  # fmt: skip
+def test_error_is_reported_once_and_the_lean_continues(engine, source, shown, words, run_user):
+    record = run_user(source, engine=engine)
+    assert record.first(shown) < 11
+    assert record.console.count(words) == 1
+    assert record.ends == ["off"] and lean_is_right(record)
 
 
 @pytest.mark.parametrize(
-    ("display", "body", "said"),
+    ("engine", "display", "body", "words"),
     [
-        ("lcd", "return ('a', 'b', 5)", "page is left out"),
-        ("lcd", "1 / 0", "page is left out"),
-        ("ssd1306", "return 5, 6, (lambda canvas: 1 / 0,)", "picture is left out"),
+        ("cpython", "lcd", "return ('a', 'b', 5)", "page is left out: not two lines"),
+        ("cpython", "lcd", "return None", "page is left out: not two lines"),
+        ("micropython", "lcd", "1 / 0", "page is left out: ZeroDivisionError"),
+        ("cpython", "ssd1306", "return 5, 6, (lambda canvas: 1 / 0,)", "picture is left out: ZeroDivisionError"),
     ],
 )
-def test_an_invalid_page_is_disabled(run, display, body, said):
-    plan = PLAN | {"turn_to": [[3, "own"], [7.5, "lean"]], "board": {"display": display}}
-    record = run(f"def page(app):\n    {body}", plan)
-    assert record.console.count("user.py: page is left out") + record.console.count("picture is left out") == 1
-    assert said in record.console
-    assert goes_on(record)
+def test_invalid_page_is_disabled(engine, display, body, words, run_user):
+    plan = PLAN | {"turn_to": [[3, "own"], [6.5, "lean"]], "board": {"display": display}}
+    record = run_user(f"def page(app):\n    {body}", plan, engine)
+    assert record.console.count("is left out") == record.console.count(words) == 1
+    assert record.first("user.py page") < 8
+    assert lean_is_right(record)
 
 
-def test_user_py_is_disabled_before_memory_runs_out(run):
-    record = run("kept = []\ndef on_lean(*a):\n    kept.append(bytearray(40000))")
-    assert record.first("user.py left out") < 30
-    assert record.console.count("it leaves too little memory") == 1
-    assert goes_on(record)
-
-
-def test_without_a_user_py_its_module_is_not_loaded(run, tmp_path):
+def test_without_a_user_py_its_module_is_not_loaded(run, aligned):
     """The module that runs user.py would use 3 KB of a board's heap."""
-    sys.modules.pop("kickstand.user_code", None)
-    device_plans.run("cpython", tmp_path, PLAN | {"until": 1.0})
-    assert "kickstand.user_code" not in sys.modules
-    run("", PLAN | {"until": 1.0}, "cpython")
-    assert "kickstand.user_code" in sys.modules
-    sys.modules.pop("kickstand.user_code")
+    names = []
+    plan = {"until": 1.0, "board": {"machine": "pico"}}
+    for source in (None, ""):
+        if source is not None:
+            (aligned / "user.py").write_text(source)
+        run(plan, fit=lambda board: board.at(0.9, lambda: names.append("kickstand.user_code" in sys.modules)))
+    assert names == [False, True]
 
 
-@pytest.mark.parametrize("name", ["__dir__", "__getattr__"])
-def test_a_module_that_raises_when_inspected_is_disabled(run, name):
-    """The lean continues, and the board does not restart. The test needs CPython, because MicroPython does not call a
-    module's __dir__()."""
-    record = run(f"def {name}(*_):\n    raise ValueError('mine')\n", engine="cpython")
-    assert goes_on(record)
+@pytest.fixture
+def with_user(tmp_path, with_app):
+    """Return with_user(source, use), which returns use(the UserCode of this user.py)."""
+
+    def with_user(source, use, **fitted):
+        (tmp_path / "user.py").write_text(source)
+        return with_app(lambda board, app: use(app.user), **fitted)
+
+    return with_user
+
+
+def problems(user):
+    """Return the code and the values of each notice that was not shown yet."""
+    notices = iter(user.take_problem, None)
+    return [(notice.code, *notice.values) for notice in notices]
+
+
+def test_pages_are_text_or_numbers_with_a_picture(with_user):
+    source = (
+        "pages = 3\npage_size = 'no function'\ndef page_b(app):\n    return 1.5, b'two'\n"
+        "def draw(canvas, a, b):\n    canvas.append((a, b))\n"
+        "def page(app):\n    return app.settings.SIDE, '', (draw, 4, 5)\n"
+        "def page_a(app):\n    return ['a', 'b', None]\n"
+        "def other(app):\n    1 / 0\n"
+    )
+
+    def use(user):
+        lines = [page()[:2] for page in user.pages]
+        picture, canvas = user.pages[0]()[2], []
+        picture[0](canvas, *picture[1:])
+        return lines, canvas, picture == user.pages[0]()[2], problems(user)
+
+    lines, canvas, unchanged, notices = with_user(source, use)
+    assert lines == [("left", ""), ("a", "b"), ("1.5", b"two")]
+    assert canvas == [(4, 5)] and unchanged and notices == []
+
+
+@pytest.mark.parametrize(
+    ("calls_ms", "notices"),
+    [
+        ([50] * 9, []),
+        ([52] * 4 + [10] + [60] * 4, [("user-slow", 52)]),
+        ([52] * 7, [("user-slow", 52), ("user-failed", "52 ms")]),
+        ([52, 10, 52, 52, 52, 52, 60], [("user-slow", 52), ("user-failed", "60 ms")]),
+        ([300], [("user-slow", 300)]),
+        ([302], [("user-slow", 302), ("user-failed", "302 ms")]),
+    ],
+)
+def test_slow_calls_are_reported_once_and_too_many_disable(calls_ms, notices, with_user):
+    """A call over 50 ms is slow. Five slow calls in a row, or one over 300 ms, disable the function. The import and
+    setup() may take any time."""
+
+    def use(user):
+        for ms in calls_ms:
+            user.press(ms)
+        return problems(user)
+
+    source = "import time\ntime.sleep_ms(900)\ndef setup(app):\n    time.sleep_ms(900)\n"
+    source += "def on_press(ms):\n    time.sleep_ms(ms)\n"
+    assert with_user(source, use) == [(code, "on_press", value) for code, value in notices]
+
+
+def test_memory_error_disables_every_function(with_user):
+    def use(user):
+        user.press(1)
+        user.lean(True)
+        return problems(user), [page() for page in user.pages]
+
+    source = "def on_press(event):\n    raise MemoryError\ndef on_lean(*a):\n    1 / 0\n"
+    notices, pages = with_user(source + "def page(app):\n    return 'a', 'b'\n", use)
+    assert notices == [("user-memory", "on_press")] and pages == [("user.py page", "left out")]
+
+
+@pytest.mark.parametrize(("free", "pages"), [(20_000, [("a", "b", None)]), (19_999, [("user.py page", "left out")])])
+def test_user_py_is_disabled_with_less_than_20_kb_of_heap(free, pages, with_user, monkeypatch):
+    import gc
+
+    def use(user):
+        monkeypatch.setattr(gc, "mem_free", lambda: free)
+        user.check_memory()
+        user.check_memory()
+        return [page() for page in user.pages], problems(user)
+
+    notices = [] if free == 20_000 else [("user-memory", "memory")]
+    assert with_user("def page(app):\n    return 'a', 'b'\n", use) == (pages, notices)

@@ -19,6 +19,7 @@ def command(workflow):
     return shlex.split(re.findall(r"run: python -m (pdoc .*)", (WORKFLOWS / workflow).read_text(encoding="utf-8"))[0])
 
 
+@pytest.mark.long
 def test_the_reference_has_every_public_name(tmp_path):
     pytest.importorskip("pdoc", reason='pdoc is not installed: pip install -e ".[reference]"')
     *what, out = command("site.yml")

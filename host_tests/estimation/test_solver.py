@@ -35,8 +35,8 @@ class Problem:
         """Solve for all states and parameters in one least-squares problem, for hypothesis g.
 
         Returns:
-            found: (n), all states in order of time, then the parameters of each block.
-            covariance: (n, n), the covariance of found.
+            solution: (n), all states in order of time, then the parameters of each block.
+            covariance: (n, n), the covariance of the solution.
             likelihood: -2 log(likelihood), up to a constant.
         """
         blocks, length = self.jacobian.shape[:2]
@@ -62,15 +62,15 @@ class Problem:
             rows.append(row / np.sqrt(variance[b])[:, None])
         a = np.concatenate(rows)
         normal = a[:, :n].T @ a[:, :n]
-        found = -np.linalg.solve(normal, a[:, :n].T @ a[:, n])
-        misfit = np.sum((a[:, :n] @ found + a[:, n]) ** 2)
+        solution = -np.linalg.solve(normal, a[:, :n].T @ a[:, n])
+        misfit = np.sum((a[:, :n] @ solution + a[:, n]) ** 2)
         prior_and_walks = np.linalg.slogdet(prior[:, :M])[1] - np.sum(np.log(variance))
         likelihood = misfit + np.linalg.slogdet(normal)[1] - prior_and_walks
-        return found, np.linalg.inv(normal), likelihood
+        return solution, np.linalg.inv(normal), likelihood
 
 
 @pytest.mark.parametrize(("blocks", "length"), [(1, 1), (1, 5), (2, 1), (4, 3), (3, 7)])
-def test_blocks_give_the_solution_of_the_whole_chain(blocks, length):
+def test_blocks_give_the_solution_of_dense_algebra(blocks, length):
     problem = Problem(blocks, length)
     want, covariance, _ = problem.at_once()
     states, parameters = solve(problem.blocks, problem.walks, np.ones(1))
@@ -81,28 +81,28 @@ def test_blocks_give_the_solution_of_the_whole_chain(blocks, length):
         assert np.allclose(parameters[b], want[own])
         assert np.allclose(joint[b, 2 * S :, 2 * S :], covariance[own, own])
         for k in range(length):
-            both = slice((b * length + k) * S, (b * length + k + 2) * S)
-            assert np.allclose(states[b, k : k + 2].ravel(), want[both])
-            assert np.allclose(spread[b, k, :, : 2 * S], covariance[both, both])
-            assert np.allclose(spread[b, k, :, 2 * S :], covariance[both, own])
+            ends = slice((b * length + k) * S, (b * length + k + 2) * S)
+            assert np.allclose(states[b, k : k + 2].ravel(), want[ends])
+            assert np.allclose(spread[b, k, :, : 2 * S], covariance[ends, ends])
+            assert np.allclose(spread[b, k, :, 2 * S :], covariance[ends, own])
 
 
-def test_the_likelihood_is_that_of_the_parameters_as_a_whole():
+def test_likelihood_is_that_of_dense_algebra():
     problem = Problem(3, 2, ([0.01, 0.1], [0.09, 0.025]))
-    found = minus_two_log_likelihood(problem.blocks, problem.walks)
-    assert found[1] - found[0] == pytest.approx(problem.at_once(1)[2] - problem.at_once(0)[2])
+    likelihood = minus_two_log_likelihood(problem.blocks, problem.walks)
+    assert likelihood[1] - likelihood[0] == pytest.approx(problem.at_once(1)[2] - problem.at_once(0)[2])
 
 
 def test_mean_of_hypotheses_includes_their_difference():
     variances = [0.01, 0.1], [1.0, 10.0]
-    one, two = (Problem(3, 4, (each,)) for each in variances)
+    firm, loose = (Problem(3, 4, (variance,)) for variance in variances)
     both, weight = Problem(3, 4, variances), np.array([0.75, 0.25])
-    (first, _), (second, _) = (solve(each.blocks, each.walks, np.ones(1)) for each in (one, two))
+    (first, _), (second, _) = (solve(each.blocks, each.walks, np.ones(1)) for each in (firm, loose))
     mean, parameters = solve(both.blocks, both.walks, weight)
     assert np.allclose(mean, 0.75 * first + 0.25 * second)
     assert np.allclose(back(both.blocks, mean[:, [0, -1]], parameters), mean)
-    within = [posterior_covariance(each.blocks, each.walks, np.ones(1)) for each in (one, two)]
+    within = [posterior_covariance(each.blocks, each.walks, np.ones(1)) for each in (firm, loose)]
     apart = np.concatenate((second - first)[:, [0, -1]].transpose(1, 0, 2), axis=1)
-    found = posterior_covariance(both.blocks, both.walks, weight)[:, : 2 * S, : 2 * S]
+    joint = posterior_covariance(both.blocks, both.walks, weight)[:, : 2 * S, : 2 * S]
     between = 0.75 * 0.25 * apart[:, :, None] * apart[:, None, :]
-    assert np.allclose(found, 0.75 * within[0][:, : 2 * S, : 2 * S] + 0.25 * within[1][:, : 2 * S, : 2 * S] + between)
+    assert np.allclose(joint, 0.75 * within[0][:, : 2 * S, : 2 * S] + 0.25 * within[1][:, : 2 * S, : 2 * S] + between)

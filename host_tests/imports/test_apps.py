@@ -20,7 +20,7 @@ import pytest
 from kickstand_tools import api
 from kickstand_tools.imports.importing import NAMES
 from support.recordings import app_exports
-from support.recordings.app_exports import PHONE, START_UTC_S, Riding
+from support.recordings.app_exports import PHONE, START_UTC_S, Riding, riding
 
 PAGE = Path(__file__).resolve().parents[2] / "tools" / "docs" / "recordings.md"
 ON_PHONE = api.CalibrationFile(vehicle_from_sensor=PHONE.T, aligned=True)
@@ -62,7 +62,6 @@ EXPORTS = {
     "RaceChrono 2": (one("r.csv", app_exports.racechrono, version=2), 2),
     "RaceBox": (one("r.csv", app_exports.racebox), 8),
     "RaceBox, laps and mph": (one("r.csv", app_exports.racebox, per_mps=1 / 0.44704, laps=True), 8),
-    "RaceBox, m/s": (one("r.csv", app_exports.racebox, per_mps=1.0), 8),
     "VBO": (one("v.vbo", app_exports.vbo), 2),
     "VBO, knots, Windows' letters": (one("v.VBO", app_exports.vbo, "cp1252", speed="knots"), 2),
     "AiM": (one("a.csv", app_exports.aim), 4),
@@ -82,13 +81,11 @@ def test_each_app_has_a_test_and_a_description():
 def test_an_export_replays_as_the_ride_it_was_made_from(tmp_path, name):
     write, every = EXPORTS[name]
     calibration = ON_BIKE if name.startswith(ON_THE_BIKE) else ON_PHONE
-    ride = app_exports.riding().every(every)
-    found = api.import_recording(write(tmp_path, ride))
-    assert name.startswith(found.app)
-    on_bike = name.startswith(ON_THE_BIKE)
-    assert found.vehicle_axes is on_bike, f"{found.app}: vehicle_axes of AppRecording, or ON_THE_BIKE above, is wrong"
-    assert [notice.code for notice in found.notices if notice.code != "import-sign"] == []
-    api.write_imported(tmp_path / "RIDE.csv", found)
+    ride = riding().every(every)
+    imported = api.import_recording(write(tmp_path, ride))
+    assert name.startswith(imported.app) and imported.vehicle_axes is name.startswith(ON_THE_BIKE)
+    assert [notice.code for notice in imported.notices if notice.code != "import-sign"] == []
+    api.write_imported(tmp_path / "RIDE.csv", imported)
     log = api.read_log(tmp_path / "RIDE.csv")
     t_s = log.t_s + log.start_s
     lean = api.replay(log, calibration).lean_deg
@@ -98,24 +95,22 @@ def test_an_export_replays_as_the_ride_it_was_made_from(tmp_path, name):
     for axis in range(3):
         assert np.median(np.abs(force[:, axis] - np.interp(t_s, ride.t_s, ride.force_g[:, axis]))) < 0.01
         assert np.median(np.abs(rates[:, axis] - np.interp(t_s, ride.t_s, ride.rates_dps[:, axis]))) < 0.3
-    there = np.isfinite(log.speed_mps)
-    if found.app not in WITHOUT_SPEED:
-        assert np.count_nonzero(there) >= 27
-        wrong = log.speed_mps[there] - np.interp(t_s[there], ride.t_s, ride.speed_mps)
-        assert np.max(np.abs(wrong)) < 0.05
-        at = np.isfinite(found.log.lat_deg)
-        north_m = (found.log.lat_deg[at] - np.interp(t_s[at], ride.t_s, ride.lat_deg)) * 111_195.0
-        east_m = (found.log.lon_deg[at] - np.interp(t_s[at], ride.t_s, ride.lon_deg)) * 67_700.0
+    if imported.app not in WITHOUT_SPEED:
+        valid, fix = np.isfinite(log.speed_mps), np.isfinite(log.lat_deg)
+        assert np.count_nonzero(valid) >= 27
+        assert log.speed_mps[valid] == pytest.approx(np.interp(t_s[valid], ride.t_s, ride.speed_mps), abs=0.05)
+        north_m = (log.lat_deg[fix] - np.interp(t_s[fix], ride.t_s, ride.lat_deg)) * 111_195.0
+        east_m = (log.lon_deg[fix] - np.interp(t_s[fix], ride.t_s, ride.lon_deg)) * 67_700.0
         assert np.max(np.hypot(north_m, east_m)) < 1.0
-    if found.app not in WITHOUT_DATE:
-        known = np.isfinite(found.log.utc_s)
-        assert np.max(np.abs(found.log.utc_s[known] - START_UTC_S - t_s[known])) < 0.02
+    if imported.app not in WITHOUT_DATE:
+        valid = np.isfinite(log.utc_s)
+        assert log.utc_s[valid] - START_UTC_S == pytest.approx(t_s[valid], abs=0.02)
 
 
-def test_phyphox_file_with_all_sensors_is_read(tmp_path):
+def test_a_phyphox_file_with_all_sensors_is_read(tmp_path):
     """If an experiment combines sensors, "Raw Data.csv" has a column with the time before the columns of each
     sensor."""
-    ride = app_exports.riding().every(2)
+    ride = riding().every(2)
     late = ride.every(2, 1)
     names = ["Time (s)", *[f"Acceleration {axis} (m/s^2)" for axis in "xyz"]]
     names += ["Gyroscope time (s)", *[f"Gyroscope {axis} (rad/s)" for axis in "xyz"]]
@@ -125,59 +120,102 @@ def test_phyphox_file_with_all_sensors_is_read(tmp_path):
         row += [f"{v:.6f}" for v in (late.t_s[k], *late.phone_rad[k])] if k < len(late.t_s) else [""] * 4
         rows.append(row)
     (tmp_path / "Raw Data.csv").write_text(app_exports.lines([f'"{name}"' for name in names], rows))
-    found = api.import_recording(tmp_path / "Raw Data.csv")
-    assert [round(taken.rate_hz) for taken in found.taken] == [100, 50]
-    want = np.interp(found.log.t_s + found.log.start_s, ride.t_s, np.degrees(ride.phone_rad[:, 1]))
-    assert np.max(np.abs(found.log.gyro_dps[:, 1] - want)) < 3.0
+    imported = api.import_recording(tmp_path / "Raw Data.csv")
+    assert [round(taken.rate_hz) for taken in imported.taken] == [100, 50]
+    rates = np.interp(imported.log.t_s + imported.log.start_s, ride.t_s, np.degrees(ride.phone_rad[:, 1]))
+    assert imported.log.gyro_dps[:, 1] == pytest.approx(rates, abs=3.0)
 
 
 def test_a_pause_of_phyphox_is_a_gap(tmp_path):
     """The time of an experiment stops during a pause. The file meta/time.csv shows how long the pause was."""
-    files = app_exports.phyphox(app_exports.riding().every(2))
+    files = app_exports.phyphox(riding().every(2))
     rows = [("START", 0.0, 0.0), ("PAUSE", 12.0, 12.0), ("START", 12.0, 72.0), ("PAUSE", 28.0, 88.0)]
     files["meta/time.csv"] = '"event","experiment time","system time","system time text"\n' + "\n".join(
         f'"{event}",{own:.9E},{START_UTC_S + utc:.15E},""' for event, own, utc in rows
     )
-    found = api.import_recording(app_exports.into(tmp_path / "p.zip", files))
-    assert found.gaps_s == pytest.approx([60.0], abs=0.05)
-    assert found.log.t_s[-1] == pytest.approx(87.9, abs=0.1)
+    imported = api.import_recording(app_exports.into(tmp_path / "p.zip", files))
+    assert imported.gaps_s == pytest.approx([60.0], abs=0.05)
+    assert imported.log.t_s[-1] == pytest.approx(87.9, abs=0.1)
 
 
 @pytest.mark.parametrize("form", ["csv", "parquet", "racechrono"])
 def test_kickstands_own_exports_are_read_back(tmp_path, form):
     if form == "parquet":
         pytest.importorskip("pyarrow")
-    ride = app_exports.riding().every(2)
-    speed = np.where(np.arange(len(ride.t_s)) % 100 == 0, ride.speed_mps, np.nan)
-    each_s = np.where(np.isfinite(speed), 1.0, np.nan)
-    lat, lon, utc_s = each_s * ride.lat_deg, each_s * ride.lon_deg, each_s * ride.t_s + START_UTC_S
-    log = api.Log(ride.t_s, ride.phone_g, ride.rates_dps @ PHONE.T, speed, lat_deg=lat, lon_deg=lon, utc_s=utc_s)
+    ride = riding().every(2)
+    each_s = np.where(np.arange(len(ride.t_s)) % 100 == 0, 1.0, np.nan)
+    track = {
+        "lat_deg": each_s * ride.lat_deg,
+        "lon_deg": each_s * ride.lon_deg,
+        "utc_s": each_s * ride.t_s + START_UTC_S,
+    }
+    log = api.Log(ride.t_s, ride.phone_g, ride.rates_dps @ PHONE.T, each_s * ride.speed_mps, **track)
     out = tmp_path / f"out.{'parquet' if form == 'parquet' else 'csv'}"
     api.export(api.open_ride(log, ON_PHONE), form, out)
-    found = api.import_recording(out)
-    assert found.vehicle_axes
-    assert np.allclose(found.log.accel_g, ride.force_g[: len(found.log.t_s)], atol=1e-3)
-    assert np.allclose(found.log.gyro_dps, ride.rates_dps[: len(found.log.t_s)], atol=2e-3)
-    there = np.isfinite(found.log.speed_mps)
-    assert np.allclose(found.log.speed_mps[there], ride.speed_mps[: len(there)][there], atol=2e-3)
-    t_s = found.log.t_s + found.log.start_s
-    for name in ("lat_deg", "lon_deg"):
-        given = getattr(ride, name)[: len(there)]
-        assert np.allclose(getattr(found.log, name)[there], given[there], rtol=0.0, atol=1e-7)
-    known = np.isfinite(found.log.utc_s)
-    assert np.count_nonzero(known) >= np.count_nonzero(there)
-    assert np.allclose(found.log.utc_s[known] - START_UTC_S, t_s[known], rtol=0.0, atol=2e-3)
+    imported = api.import_recording(out)
+    n = len(imported.log.t_s)
+    assert imported.vehicle_axes and n > len(ride.t_s) - 3
+    assert imported.log.accel_g == pytest.approx(ride.force_g[:n], abs=1e-3)
+    assert imported.log.gyro_dps == pytest.approx(ride.rates_dps[:n], abs=2e-3)
+    row = np.isfinite(imported.log.speed_mps)
+    for name, error in (("speed_mps", 2e-3), ("lat_deg", 1e-7), ("lon_deg", 1e-7)):
+        assert getattr(imported.log, name)[row] == pytest.approx(getattr(ride, name)[:n][row], rel=0, abs=error)
+    valid = np.isfinite(imported.log.utc_s)
+    assert imported.log.utc_s[valid] - START_UTC_S == pytest.approx(ride.t_s[:n][valid], rel=0, abs=2e-3)
 
 
-def test_log_saved_by_a_spreadsheet_is_read_back(tmp_path):
+def test_a_log_saved_by_a_spreadsheet_is_read_back(tmp_path):
     """The file has semicolons, decimal commas, and the columns temp_c, lat_deg and lon_deg."""
-    ride = app_exports.riding().every(8)
+    ride = riding().every(8)
     names = "t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps,speed_mps,temp_c,lat_deg,lon_deg".split(",")
     rows = np.column_stack((ride.t_s, ride.force_g, ride.rates_dps, ride.speed_mps, np.full(len(ride.t_s), 21.5)))
     rows = np.column_stack((rows, ride.lat_deg, ride.lon_deg)).tolist()
     (tmp_path / "log.csv").write_text(app_exports.lines(names, rows, ";", comma=True), encoding="utf-16")
-    found = api.import_recording(tmp_path / "log.csv")
-    assert found.app == "Kickstand"
-    assert np.allclose(found.log.accel_g, ride.force_g, atol=1e-6)
-    assert np.allclose(found.log.temperature_c, 21.5)
-    assert np.count_nonzero(np.isfinite(found.log.lat_deg)) > 500
+    imported = api.import_recording(tmp_path / "log.csv")
+    assert imported.app == "Kickstand" and imported.log.accel_g == pytest.approx(ride.force_g, abs=1e-6)
+    assert imported.log.temperature_c == pytest.approx(21.5) and np.isfinite(imported.log.lat_deg).sum() > 500
+
+
+# The value of each unit in m/s. A mile is 1609.344 m, and a nautical mile 1852 m.
+IN_MPS = {"m/s": 1.0, "km/h": 1000 / 3600, "mph": 1609.344 / 3600, "knots": 1852 / 3600}
+
+
+def labelled(ride, app, label):
+    """Return the files of an export whose speed has another label. Its numbers are unchanged."""
+    if app == "phyphox":
+        files = app_exports.phyphox(ride)
+        return files | {"Location.csv": files["Location.csv"].replace("Velocity (m/s)", label)}
+    if app == "AiM, row of units":
+        return {"a.csv": app_exports.aim(ride).replace('"s","km/h"', f'"s","{label}"')}
+    if app == "AiM, title":
+        return {"a.csv": app_exports.aim(ride).replace('"s","km/h"', '"s",""').replace('Speed"', f'Speed{label}"', 1)}
+    if app == "VBO":
+        return {"v.vbo": app_exports.vbo(ride).replace("velocity kmh", label)}
+    return {"r.csv": app_exports.racebox(ride, per_mps=3.6).replace("Speed,", f"{label},", 1)}
+
+
+@pytest.mark.parametrize(
+    ("app", "label", "per_mps", "unit"),
+    [
+        ("phyphox", "Velocity (mph)", 1.0, "mph"),
+        ("phyphox", "Velocity", 1.0, "m/s"),
+        *[("AiM, row of units", unit, 3.6, unit) for unit in IN_MPS],
+        ("AiM, row of units", "", 3.6, "km/h"),
+        ("AiM, title", " (knots)", 3.6, "knots"),
+        *[("VBO", f"velocity {unit}", 3.6, unit) for unit in ("m/s", "mph", "knots")],
+        ("VBO", "velocity", 3.6, "km/h"),
+        ("VBO", "velocity furlongs", 3.6, "km/h"),
+        ("RaceBox", "Speed (mph)", 3.6, "mph"),
+        ("RaceBox", "KPH", 3.6, "km/h"),
+        ("RaceBox", "Speed", 3.6, "km/h"),  # if the name has no unit, the positions decide
+        ("RaceBox", "Speed (furlongs)", 3.6, "km/h"),
+    ],
+)
+def test_the_speed_has_the_unit_that_the_file_says(tmp_path, app, label, per_mps, unit):
+    ride = riding().every(8)
+    imported = api.import_recording(app_exports.into(tmp_path / "export", labelled(ride, app, label)))
+    row = np.isfinite(imported.log.speed_mps)
+    t_s = (imported.log.t_s + imported.log.start_s)[row]
+    speed = np.interp(t_s, ride.t_s, ride.speed_mps) * per_mps * IN_MPS[unit]
+    assert len(t_s) > 20 and imported.log.speed_mps[row] == pytest.approx(speed, abs=0.1 * per_mps)
+    assert [taken.unit for taken in imported.taken if taken.quantity == "speed"] == [unit]

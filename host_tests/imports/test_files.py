@@ -1,54 +1,196 @@
-"""Tests which files of a recording are read from a file, a folder or a zip."""
+"""Files, folders and zips: which files are read, and input that is too large, endless, damaged or not a recording."""
 
 import gzip
+import os
+import resource
+import subprocess
+import sys
 import zipfile
 
 import pytest
-from kickstand_tools.common.errors import InputError
+from kickstand_tools import api
 from kickstand_tools.imports import files
+from kickstand_tools.imports.files import read_files
+from kickstand_tools.logs import csv_reader
+from support import command
+from support.recordings import app_exports
+from support.recordings.app_exports import riding
 
+MB = 1_000_000
 TABLE = b"t,ax\n0,1\n"
 NAMES = ["ride/A.csv", "ride/b.CSV.gz", "__MACOSX/._A.csv", "ride/.hidden.csv", "ride/photo.jpg"]
 
 
-def content(name):
-    return gzip.compress(TABLE) if name.endswith(".gz") else TABLE
+def pack(path, contents):
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in contents.items():
+            archive.writestr(name, content)
+    return path
 
 
-def names(source):
-    return sorted(file.name for file in files.read_files(source))
+def refused(directory, source, words, *more):
+    return command.refused(directory, "import", source, "--out", directory / "RIDE.csv", *more, words=words)
 
 
-def test_of_a_zip_only_tables_that_are_not_hidden_are_read(tmp_path):
-    """A folder whose name ends in .csv is not read as a table."""
-    with zipfile.ZipFile(tmp_path / "r.zip", "w") as archive:
-        archive.writestr("folder.csv/", b"")
-        for name in NAMES:
-            archive.writestr(name, content(name))
-    assert names(tmp_path / "r.zip") == ["ride/A.csv", "ride/b.CSV.gz"]
+def test_only_tables_that_are_not_hidden_are_read(tmp_path):
+    """A folder is read as a zip of it. A folder whose name ends in .csv is not read as a table."""
+    contents = {name: gzip.compress(TABLE) if name.endswith(".gz") else TABLE for name in NAMES}
+    archive = pack(tmp_path / "r.zip", {"folder.csv/": b""} | contents)
+    (tmp_path / "in" / "folder.csv").mkdir(parents=True)
+    for name, content in contents.items():
+        (tmp_path / "in" / name).parent.mkdir(exist_ok=True)
+        (tmp_path / "in" / name).write_bytes(content)
+    for source in (archive, tmp_path / "in"):
+        tables = sorted(read_files(source), key=lambda file: file.name)
+        assert [(file.name, file.text) for file in tables] == [(name, TABLE.decode()) for name in NAMES[:2]]
+        assert [(file.folder, file.stem) for file in tables] == [("ride", "a"), ("ride", "b")]
+    (tmp_path / "export").mkdir()
+    (tmp_path / "export" / "a.csv").symlink_to(archive)  # links out of a folder are not followed
+    refused(tmp_path, tmp_path / "export", "contains no recording")
 
 
-def test_a_folder_is_read_as_a_zip_of_it(tmp_path):
-    for name in NAMES:
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_bytes(content(name))
-    found = files.read_files(tmp_path)
-    assert [(file.name, file.text, file.folder) for file in found if file.name == "ride/A.csv"] == [
-        ("ride/A.csv", TABLE.decode(), "ride")
-    ]
-    assert names(tmp_path) == ["ride/A.csv", "ride/b.CSV.gz"]
+@pytest.mark.parametrize(
+    ("content", "text"),
+    [
+        *[("t,°\n1,2\n".encode(f"utf-{kind}"), "t,°\n1,2\n") for kind in ("8", "8-sig", "16", "16-le", "16-be")],
+        (b"\xfe\xff\x00t", "t"), ("t,°\n".encode("cp1252"), "t,°\n"),
+        (b"a\tb\r\nc\rd\r\r\r", "a\tb\nc\nd\n\n\n"),
+        (b"\x00\x01\x02,1,2,3,4,5,6,7,8,9\n", "\0\1\2,1,2,3,4,5,6,7,8,9\n"),
+    ],
+)  # fmt: skip
+def test_bytes_are_decoded_by_their_mark_or_their_zeros(tmp_path, content, text):
+    (tmp_path / "a.csv").write_bytes(content)
+    (file,) = read_files(tmp_path / "a.csv")
+    assert file.text == text and file.first_lines(1) == [text.split("\n")[0]]
 
 
-def test_the_stem_of_a_name_has_no_folders_and_small_letters():
-    assert files.RecordingFile("ride/Ride.CSV.gz", b"", "").stem == "ride"
-    assert files.RecordingFile("Ride.csv", b"", "").folder == ""
+def damaged_zip(way):
+    def write(directory):
+        source = app_exports.into(directory / "p.zip", app_exports.phyphox(riding().every(8)))
+        source.write_bytes(way(source.read_bytes()))
+
+    return write
 
 
-def test_one_zip_in_a_folder_is_read_and_two_are_refused(tmp_path):
-    for name in ("one.zip", "two.zip"):
-        with zipfile.ZipFile(tmp_path / name, "w") as archive:
-            archive.writestr("A.csv", TABLE)
-        if name == "one.zip":
-            assert names(tmp_path) == ["A.csv"]
-    with pytest.raises(InputError, match=r"holds 2 zip files: give one of them, such as .*one\.zip"):
-        names(tmp_path)
+def locked(directory):
+    content = bytearray(pack(directory / "p.zip", {"a.csv": TABLE}).read_bytes())
+    for mark, place in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+        content[content.index(mark) + place] |= 1  # set the flag of an encrypted entry
+    (directory / "p.zip").write_bytes(content)
+
+
+def squeezed(directory):
+    with zipfile.ZipFile(directory / "p.zip", "w", zipfile.ZIP_BZIP2) as archive:
+        archive.writestr("a.csv", TABLE)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("none.zip", None, "there is no such file"),
+        ("p.zip", damaged_zip(lambda content: content[: len(content) // 10]), "p.zip is damaged or cut short: copy it"),
+        ("p.zip", damaged_zip(lambda content: content[:-30]), "p.zip is damaged or cut short: copy it again"),
+        ("p.zip", damaged_zip(lambda content: content[:2000] + bytes(50) + content[2050:]), "is damaged or cut"),
+        ("p.zip", locked, "is packed with a password, or in another way: unpack it first"),
+        ("p.zip", squeezed, "is packed with a password, or in another way: unpack it first"),
+        ("p.zip", lambda folder: pack(folder / "p.zip", {"[Content_Types].xml": "x"}), "a table of Excel: export it"),
+        ("a.csv.gz", b"\x1f\x8b\x08\x00\x00\x00\x00\x00", "a.csv.gz is damaged or cut short"),
+        ("a.png", bytes(range(256)) * 4, "not text: give what an app has exported as CSV or VBO"),
+        ("a.csv", b"\x01\x01\x01\x01,1,2,3,4,5,6,7,8,9\n", "not text"),
+        ("a.csv", b"", "contains no recording: give the file, the folder or the zip that an app"),
+        ("b.csv", b"Record,Time,Speed,GForceX,GForceY,GForceZ,GyroX,GyroY,GyroZ\n", "no rows under the names of the"),
+        ("mk.py", b"import os\nprint('x')\n", "no table of sensors ('import os')"),
+        ("old.xls", b"\xd0\xcf\x11\xe0" + bytes(600), "a table of Excel: export it as CSV"),
+        ("a.csv", b"x" * 1_000_001, "a.csv: a line of over 1,000,000 characters"),
+    ],
+)  # fmt: skip
+def test_a_file_that_is_not_a_recording_is_refused(tmp_path, name, content, words):
+    if callable(content):
+        content(tmp_path)
+    elif content is not None:
+        (tmp_path / name).write_bytes(content)
+    refused(tmp_path, tmp_path / name, words)
+
+
+def test_two_recordings_in_one_folder_are_refused(tmp_path):
+    """One app in two folders, two apps in one folder, one app with two names, and two zips."""
+    ride = riding().every(8)
+    monday = app_exports.into(tmp_path / "all" / "monday", app_exports.phyphox(ride))
+    app_exports.into(tmp_path / "all" / "tuesday", app_exports.phyphox(ride))
+    refused(tmp_path, tmp_path / "all", "holds 2 recordings (monday, tuesday): give one of them")
+    assert api.import_recording(monday).app == "phyphox"
+    folder = app_exports.into(tmp_path / "in", {"a.csv": app_exports.racebox(ride), "b.vbo": app_exports.vbo(ride)})
+    refused(tmp_path, folder, "holds 2 recordings (b.vbo, a.csv): give one of them")
+    kinetics = app_exports.sensor_kinetics(ride)
+    kinetics |= {name.replace("Ride", "Home"): text for name, text in kinetics.items()}
+    refused(tmp_path, app_exports.into(tmp_path / "k", kinetics), "holds 2 recordings")
+    (tmp_path / "zips").mkdir()
+    app_exports.into(tmp_path / "zips" / "a.zip", app_exports.phyphox(ride))
+    assert api.import_recording(tmp_path / "zips").app == "phyphox"
+    app_exports.into(tmp_path / "zips" / "b.zip", app_exports.phyphox(ride))
+    refused(tmp_path, tmp_path / "zips", "holds 2 zip files: give one of them, such as")
+
+
+def test_other_files_in_the_folder_do_not_matter(tmp_path):
+    contents = app_exports.phyphox(riding().every(8))
+    contents |= {"notes.txt": "it rained", "__MACOSX/._Gyroscope.csv": "x", "Camera/list.csv": "a,b\n"}
+    folder = app_exports.into(tmp_path / "in", contents)
+    (folder / "strange.csv").write_bytes(bytes(range(256)))
+    assert api.import_recording(folder).app == "phyphox"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is limited as on Linux")
+@pytest.mark.parametrize("name", ["b.csv.gz", pytest.param("b.zip", marks=pytest.mark.long)])
+def test_a_zip_bomb_is_refused_within_1_gb_of_memory(tmp_path, name):
+    part, parts = b"1,2,3\n" * MB, 48
+    if name.endswith(".gz"):
+        (tmp_path / name).write_bytes(gzip.compress(part, 9) * parts)
+    else:
+        with zipfile.ZipFile(tmp_path / name, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("a.csv", "w") as file:
+            for _ in range(parts):
+                file.write(part)
+    code = "from kickstand_tools.cli.main import main; main()"
+    result = subprocess.run(
+        [sys.executable, "-c", code, "import", str(tmp_path / name), "--out", str(tmp_path / "x.csv")],
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_DATA, (1000 * MB, 1000 * MB)),
+        check=False,
+    )
+    assert result.returncode == 2 and "too large: over 250 MB" in result.stderr
+
+
+def test_too_many_files_or_cells_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "MOST_FILES", 20)
+    refused(tmp_path, pack(tmp_path / "many.zip", {f"{k}.csv": "a" for k in range(400)}), "over 20 files")
+    (tmp_path / "in").mkdir()
+    for k in range(21):
+        (tmp_path / "in" / f"{k}.csv").touch()
+    refused(tmp_path, tmp_path / "in", "over 20 files")
+    monkeypatch.setattr(csv_reader, "MOST_CELLS", 5_000)
+    (tmp_path / "log.csv").write_text(app_exports.any_table(riding().every(4)))
+    refused(tmp_path, tmp_path / "log.csv", "the table is too large")
+
+
+@pytest.mark.parametrize("name", ["log.csv", "log.csv.gz", "CAL.json", "t.gpx", "x.zip", "v.mp4"])
+def test_a_pipe_is_not_waited_for(tmp_path, name):
+    pipe, out = tmp_path / name, tmp_path / "x.csv"
+    os.mkfifo(pipe)
+    log = command.still(tmp_path / "good.csv", (0, 1, 0))
+    uses = {
+        ".csv": ("calibrate", "ride", pipe, "--out", out),
+        ".gz": ("cut", pipe, "--from", 1, "--out", out),
+        ".json": ("replay", log, "--calibration", pipe, "--out", out),
+        ".gpx": ("join", log, pipe, "--out", out),
+        ".zip": ("import", pipe, "--out", out),
+        ".mp4": ("overlay", log, "--video", pipe, "--offset", 0, "--out", tmp_path / "o.mp4"),
+    }
+    result = command.run(*uses[pipe.suffix])
+    assert result.status == 2 and result.err.count("\n") == 1 and "unexpected" not in result.err
+
+
+def test_an_oversized_calibration_is_refused(tmp_path):
+    (tmp_path / "CAL.json").write_bytes(b"[" + b"1," * MB + b"1]")
+    log = command.still(tmp_path / "log.csv", (0, 1, 0))
+    arguments = "replay", log, "--calibration", tmp_path / "CAL.json", "--out", tmp_path / "x"
+    command.refused(tmp_path, *arguments, words="too large for a calibration")

@@ -1,4 +1,5 @@
-"""In a log from any app, the axis that points up reads +1 g at rest, and gravity is never missing."""
+"""In a log from any app, the axis that points up reads +1 g at rest, and gravity is never missing. Rows written by hand
+show the axes of apps that record along the bike."""
 
 import numpy as np
 import pytest
@@ -8,13 +9,43 @@ from support import command
 from support.recordings import app_exports
 from support.recordings.app_exports import PHONE, riding
 
-
-def up_at_rest(found: api.Imported) -> np.ndarray:
-    """Return the mean force in the first second, while the motorcycle stands upright."""
-    return found.log.accel_g[found.log.t_s < 1.0].mean(axis=0)
-
-
 UP = PHONE @ [0.0, 1.0, 0.0]
+
+
+def up_at_rest(imported: api.Imported) -> np.ndarray:
+    """Return the mean force in the first second, while the motorcycle stands upright."""
+    return imported.log.accel_g[imported.log.t_s < 1.0].mean(axis=0)
+
+
+AIM = "AiM CSV File\nTime,LateralAcc,VerticalAcc,InlineAcc,PitchRate,YawRate,RollRate,GPS Speed\n"
+AIM += "s,g,g,g,deg/s,deg/s,deg/s,mph\n"
+VBO = "File created on 02/01/1970 @ 00:00\n[header]\n[column names]\n"
+VBO += "time lat long velocity Y_Accel Z_Accel X_Accel PitchRate YawRate RollRate\n[data]\n"
+OWN = "t_s,left_g,up_g,forward_g,pitch_rate_dps,yaw_rate_dps,roll_rate_dps,speed_mps\n"
+BOX = "Lap,1\n\nTime,GForceX,GForceY,GForceZ,GyroX,GyroY,GyroZ,KPH\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "row", "force", "rates", "speed"),
+    [
+        ("aim.csv", AIM, "{0:.2f},0.1,-1,0.2,1,2,3,10", (-0.1, 1.0, 0.2), (-1, -2, 3), 4.4704),
+        ("aim.csv", AIM, "{0:.2f},0.1,1,0.2,1,2,3,10", (-0.1, 1.0, 0.2), (-1, -2, 3), 4.4704),
+        ("own.csv", OWN, "{0:.2f},0.1,1,0.2,1,2,3,10", (0.1, 1.0, 0.2), (-1, 2, 3), 10.0),
+        ("a.vbo", VBO, "0000{0:05.2f} +60 -120 36 0.1 1 0.2 1 2 3", (0.1, 1.0, 0.2), (-1, -2, 3), 10.0),
+        ("box.csv", BOX, "{0:.2f},0.2,0.1,1,3,1,2,36", (0.1, 1.0, 0.2), (1, 2, 3), 10.0),
+    ],
+)
+def test_axes_of_the_bike_are_left_up_and_forward(tmp_path, name, head, row, force, rates, speed):
+    """AiM has the axes forward, right and down; its vertical may also point up. VBO's yaw is clockwise, and its pitch
+    nose up, as in Kickstand's own exports. RaceBox has x forward, y left, z up."""
+    (tmp_path / name).write_text(head + "\n".join(row.format(k / 20.0) for k in range(60)) + "\n")
+    imported = api.import_recording(tmp_path / name)
+    assert imported.vehicle_axes
+    assert imported.log.accel_g[5] == pytest.approx(force) and imported.log.gyro_dps[5] == pytest.approx(rates)
+    assert np.nanmax(imported.log.speed_mps) == pytest.approx(speed)
+    if name == "a.vbo":  # minutes, west positive, on the day of the file
+        assert (np.nanmax(imported.log.lat_deg), np.nanmax(imported.log.lon_deg)) == pytest.approx((1.0, 2.0))
+        assert np.nanmin(imported.log.utc_s) == pytest.approx(86_400.0)
 
 
 def test_sensor_loggers_raw_accelerometer_is_in_g_on_an_iphone(tmp_path):
@@ -25,8 +56,7 @@ def test_sensor_loggers_raw_accelerometer_is_in_g_on_an_iphone(tmp_path):
     ]
     files["AccelerometerUncalibrated.csv"] = app_exports.lines(["time", "seconds_elapsed", "z", "y", "x"], rows)
     del files["Gravity.csv"]
-    found = api.import_recording(app_exports.into(tmp_path / "s", files))
-    assert up_at_rest(found) == pytest.approx(UP, abs=0.02)
+    assert up_at_rest(api.import_recording(app_exports.into(tmp_path / "s", files))) == pytest.approx(UP, abs=0.02)
 
 
 def test_without_the_platform_sensor_logger_is_refused(tmp_path):
@@ -40,85 +70,59 @@ def test_without_the_platform_sensor_logger_is_refused(tmp_path):
 def test_acceleration_without_gravity_is_completed_or_refused(tmp_path, app):
     ride = riding().every(4)
     if app == "sensorlog":
-        whole = app_exports.sensorlog(ride, accelerometer=False)
-        files = [{"s.csv": whole}, {"s.csv": whole.replace("motionGravity", "motionHeading")}]
+        text = app_exports.sensorlog(ride, accelerometer=False)
+        complete, linear = {"s.csv": text}, {"s.csv": text.replace("motionGravity", "motionHeading")}
     else:
-        exported = getattr(app_exports, app)(ride, **({"platform": "ios"} if app == "sensor_logger" else {}))
-        exported.pop("Accelerometer.csv" if app == "phyphox" else "Ride_accm.csv", None)
+        complete = getattr(app_exports, app)(ride, **({"platform": "ios"} if app == "sensor_logger" else {}))
+        complete.pop("Accelerometer.csv" if app == "phyphox" else "Ride_accm.csv", None)
         if app == "phyphox":
-            exported["Gravity.csv"] = app_exports.lines(
-                ["Time (s)", *[f"Gravity {axis} (m/s^2)" for axis in "XYZ"]],
-                np.column_stack((ride.t_s, 9.81 * ride.gravity_g)).tolist(),
-            )
-        gone = [name for name in exported if name in ("Gravity.csv", "Ride_grvm.csv")]
-        files = [exported, {name: text for name, text in exported.items() if name not in gone}]
-    found = api.import_recording(app_exports.into(tmp_path / "both", files[0]))
-    assert up_at_rest(found) == pytest.approx(UP, abs=0.02)
-    assert "gravity added" in found.taken[0].sign
-    out = tmp_path / "RIDE.csv"
-    linear = app_exports.into(tmp_path / "linear", files[1])
-    words = "gravity has been taken off its"
-    assert "without it there is no lean: " in command.refused(tmp_path, "import", linear, "--out", out, words=words)
-
-
-def test_a_table_without_gravity_is_refused(tmp_path):
-    """The column names do not say whether gravity is included. The size of the accelerations shows that gravity is
-    missing."""
-    ride = riding().every(4)
-    rows = np.column_stack((ride.t_s, ride.phone_g - ride.gravity_g, ride.phone_rad)).tolist()
-    (tmp_path / "log.csv").write_text(app_exports.lines(list("tabcpqr"), rows))
-    columns = {"t": "t", "ax": "a", "ay": "b", "az": "c", "gx": "p", "gy": "q", "gz": "r"}
-    with pytest.raises(api.InputError, match="gravity has been taken off, and without it there is no lean"):
-        api.import_recording(tmp_path / "log.csv", columns, {"a": "g", "g": "rad/s"})
-
-
-def test_wrong_unit_is_noticed(tmp_path):
-    (tmp_path / "log.csv").write_text(app_exports.any_table(riding().every(4)))
-    with pytest.raises(api.InputError, match=r"usually 1\d\.\d\d g, where gravity makes it 1: they look like m/s2"):
-        api.import_recording(tmp_path / "log.csv", app_exports.ANY_NAMES, {"a": "g", "g": "rad/s", "speed": "km/h"})
+            names = ["Time (s)", *[f"Gravity {axis} (m/s^2)" for axis in "XYZ"]]
+            rows = np.column_stack((ride.t_s, 9.81 * ride.gravity_g)).tolist()
+            complete["Gravity.csv"] = app_exports.lines(names, rows)
+        linear = {name: text for name, text in complete.items() if name not in ("Gravity.csv", "Ride_grvm.csv")}
+    imported = api.import_recording(app_exports.into(tmp_path / "both", complete))
+    assert up_at_rest(imported) == pytest.approx(UP, abs=0.02) and "gravity added" in imported.taken[0].sign
+    words = "gravity has been taken off its .*, and without it there is no lean: "
+    with pytest.raises(api.InputError, match=words):
+        api.import_recording(app_exports.into(tmp_path / "linear", linear))
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_turns_of_the_track_show_an_unknown_sign(tmp_path, sign):
     (tmp_path / "r.csv").write_text(app_exports.racechrono(riding().every(2), sign))
-    found = api.import_recording(tmp_path / "r.csv")
-    assert up_at_rest(found) == pytest.approx(UP, abs=0.02)
-    assert found.taken[0].sign.startswith(f"{sign:+.0f} g up, by the turns of the track")
-    assert not found.notices
-
-
-def test_mirrored_export_of_a_known_app_gives_a_remark(tmp_path):
-    """The sign of this app is known, so something else reversed the accelerations. The import changes no sign and makes
-    a remark."""
-    ride = riding().every(2)
-    ride.force_g = -ride.force_g
-    found = api.import_recording(app_exports.into(tmp_path / "p.zip", app_exports.phyphox(ride)))
-    assert [notice.code for notice in found.notices] == ["mirrored"]
-    assert "left and right are exchanged" in api.sentence(found.notices[0])
-    assert up_at_rest(found) == pytest.approx(-UP, abs=0.02)
-
-
-def test_uncertain_sign_is_reported_and_can_be_turned(tmp_path):
-    ride = riding().every(2)
-    ride.force_g = -ride.force_g  # an iPhone might give this sign
-    folder = app_exports.into(tmp_path / "k", app_exports.sensor_kinetics(ride))
-    result = command.works("import", folder, "--out", tmp_path / "RIDE.csv")
-    assert "warning: " in result.err
-    assert "--units a=-g or a=-m/s2 puts it right" in result.err
-    found = api.import_recording(folder, units={"a": "-m/s2"})
-    assert up_at_rest(found) == pytest.approx(UP, abs=0.02)
-    assert not found.notices
+    imported = api.import_recording(tmp_path / "r.csv")
+    assert up_at_rest(imported) == pytest.approx(UP, abs=0.02) and not imported.notices
+    assert imported.taken[0].sign.startswith(f"{sign:+.0f} g up, by the turns of the track")
 
 
 def test_no_turns_show_no_sign(tmp_path):
-    """A ride without turns gives the same warning as a ride without a track."""
     ride = riding().every(2)
     ride.lat_deg, ride.lon_deg = 52.5 + 1e-5 * ride.t_s, np.full(len(ride.t_s), 13.4)
     (tmp_path / "r.csv").write_text(app_exports.racechrono(ride))
     assert [notice.code for notice in api.import_recording(tmp_path / "r.csv").notices] == ["import-sign"]
 
 
-@pytest.mark.parametrize("late_s", [0.0, 1.0, 1.5, 2.0])
+def test_mirrored_export_of_a_known_app_gives_a_remark(tmp_path):
+    """The sign of this app is known, so something else reversed the accelerations. The import changes no sign."""
+    ride = riding().every(2)
+    ride.force_g = -ride.force_g
+    imported = api.import_recording(app_exports.into(tmp_path / "p.zip", app_exports.phyphox(ride)))
+    assert [notice.code for notice in imported.notices] == ["mirrored"]
+    assert "left and right are exchanged" in api.sentence(imported.notices[0])
+    assert up_at_rest(imported) == pytest.approx(-UP, abs=0.02)
+
+
+def test_uncertain_sign_is_reported_and_can_be_turned(tmp_path):
+    ride = riding().every(2)
+    ride.force_g = -ride.force_g  # an iPhone might give this sign
+    folder = app_exports.into(tmp_path / "k", app_exports.sensor_kinetics(ride))
+    warning = command.works("import", folder, "--out", tmp_path / "RIDE.csv").err
+    assert warning.startswith("warning: ") and "--units a=-g or a=-m/s2 puts it right" in warning
+    imported = api.import_recording(folder, units={"a": "-m/s2"})
+    assert up_at_rest(imported) == pytest.approx(UP, abs=0.02) and not imported.notices
+
+
+@pytest.mark.parametrize("late_s", [0.0, 1.0, 2.0])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_late_swerves_are_not_mistaken_for_opposite_ones(sign, late_s):
     """The bike swerves to the left and to the right with a period of four seconds. In a track that is 2 s late, the
@@ -126,8 +130,7 @@ def test_late_swerves_are_not_mistaken_for_opposite_ones(sign, late_s):
     t_s = np.arange(0.0, 60.0, 0.02)
     yaw_dps = 20.0 * np.sin(2 * np.pi * t_s / 4.0 + np.sin(t_s / 7.0))
     course = np.cumsum(np.radians(yaw_dps)) * 0.02
-    east, north = (np.cumsum(10.0 * wave(course)) * 0.02 for wave in (np.cos, np.sin))
-    places = 1e-5 * north, 1e-5 * east
-    lat, lon = (np.where(np.arange(3000) % 50 == 0, np.interp(t_s - late_s, t_s, place), np.nan) for place in places)
+    north, east = (1e-5 * np.cumsum(10.0 * component(course)) * 0.02 for component in (np.sin, np.cos))
+    lat, lon = (np.where(np.arange(3000) % 50 == 0, np.interp(t_s - late_s, t_s, way), np.nan) for way in (north, east))
     rates = np.column_stack((0 * t_s, yaw_dps, 0 * t_s))
     assert log_agrees(t_s, np.tile([0.0, sign, 0.0], (3000, 1)), rates, lat, lon) is (sign > 0)

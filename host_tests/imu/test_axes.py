@@ -1,14 +1,44 @@
-"""The driver finds faulty axes by their counts. A good axis is never reported."""
+"""The driver finds faulty axes by their counts, and never reports a good axis. A look is 0.4 s of samples."""
 
+import sys
 from array import array
 
 import numpy as np
 import pytest
-from kickstand.imu.fifo_frames import DUE, AxisWatch, add_up
+from kickstand.imu.fifo_frames import DUE, LOOK_MS, AxisWatch, add_up
 
 RATE_HZ = 200
+LOOK = RATE_HZ * LOOK_MS // 1000  # samples
+COLUMNS = (0, 1, 2, 4, 5, 6)
 REST = (0, 0, 4096, -3920, 10, -500, 300)  # counts of a chip at rest, in the ranges of 8 g and 500 deg/s
 NOISE = (13, 13, 13, 3, 2.66, 2.66, 2.66)  # rms of the noise in counts, by the data sheet at DLPF 3
+
+
+class Judged:
+    """An AxisWatch that is fed with samples, and what it says after each look."""
+
+    def __init__(self, gyro_range=1, dlpf=3, accel_range=3):
+        self.watch = AxisWatch(RATE_HZ, accel_range, gyro_range, dlpf, 20)
+        self.looks = []  # (fault, notice, True if the chip should be set up), each text or None
+        self._sums = array("i", [0] * 7)
+
+    def feed(self, samples):
+        for sample in np.clip(np.round(samples), -32768, 32767).astype(">i2"):
+            add_up(bytearray(sample.tobytes()), 1, self._sums, self.watch.notes)
+            if self.watch.notes[DUE] <= 0:
+                setup = self.watch.look()
+                self.looks.append((words(self.watch.fault), words(self.watch.notice), setup))
+                self.watch.notice = None
+        return self
+
+    def changes(self):
+        """Return (time in s, fault) of each change of the fault."""
+        faults = [None, *(fault for fault, _, _ in self.looks)]
+        return [(k * LOOK / RATE_HZ, faults[k]) for k in range(1, len(faults)) if faults[k] != faults[k - 1]]
+
+
+def words(notice):
+    return notice and " ".join(notice.values)
 
 
 def filtered(rng, count, bandwidth_hz):
@@ -21,138 +51,208 @@ def filtered(rng, count, bandwidth_hz):
     return out[50:]
 
 
-def counts(seconds, seed=0, noise=NOISE, bandwidth_hz=42, rest=REST):
+def at_rest(seconds, seed=0, noise=NOISE, bandwidth_hz=42, rest=REST):
     """Return samples of a chip at rest in counts, shape (n, 7)."""
     rng = np.random.default_rng(seed)
     n = int(seconds * RATE_HZ)
-    return np.stack([at + of * filtered(rng, n, bandwidth_hz) for at, of in zip(rest, noise, strict=True)], axis=1)
+    return np.stack([mean + rms * filtered(rng, n, bandwidth_hz) for mean, rms in zip(rest, noise)], axis=1)
 
 
 def ride(seconds, seed=0):
     """Return samples of a ride with leans, engine vibration and bumps."""
     t = np.arange(int(seconds * RATE_HZ)) / RATE_HZ
     rng = np.random.default_rng(seed)
-    samples = counts(seconds, seed)
+    samples = at_rest(seconds, seed)
     for column, size in ((0, 400), (1, 300), (2, 900), (4, 1200), (5, 800), (6, 300)):
         samples[:, column] += size * np.sin(t * rng.uniform(0.5, 2.0) + column) + 0.1 * size * np.sin(t * 210 + column)
     return samples
 
 
-def judged(samples, gyro_range=1, dlpf=3, accel_range=3):
-    """Return the changes of the notice. Each change is a pair of its time in s and the new notice or None."""
-    axes = AxisWatch(RATE_HZ, accel_range, gyro_range, dlpf, 20)
-    sums = array("i", [0] * 7)
-    said: list[tuple[float, str | None]] = [(0.0, None)]
-    for k, sample in enumerate(np.clip(np.round(samples), -32768, 32767).astype(">i2")):
-        frame = bytearray(sample.tobytes())
-        add_up(frame, 1, sums, axes.notes)
-        if axes.notes[DUE] <= 0:
-            axes.look()
-            words = axes.fault and " ".join(axes.fault.values)
-            if words != said[-1][1]:
-                said.append(((k + 1) / RATE_HZ, words))
-    return said[1:]
+@pytest.mark.parametrize(
+    ("fault", "columns", "spoil"),
+    [
+        ("Gyro x dead", 4, lambda counts: 0 * counts),
+        ("Gyro y dead", 5, lambda counts: 0 * counts - 1),
+        ("Gyro xyz dead", slice(4, 7), lambda counts: 0 * counts + 9),
+        ("Accel z stuck", 2, lambda counts: 0 * counts + 4096),
+        ("Accel xyz stuck", slice(0, 3), lambda counts: 0 * counts + 55),
+        ("Gyro z dead", [2, 6], lambda counts: 0 * counts + 4),  # the gyro is named before the accelerometer
+        ("Gyro y dead", 5, lambda counts: np.where(np.arange(len(counts)) % 3 == 0, -700, 900)),
+        ("Gyro z dead", 6, lambda counts: counts & ~0xFF | 0x40),  # the low byte is stuck
+        ("Gyro x dead", 4, lambda counts: counts & ~1),  # the lowest bit is stuck
+        ("Gyro x dead", 4, lambda counts: counts | 1),
+        ("Gyro x dead", 4, lambda counts: counts & 0xFF),  # the high byte is stuck
+        ("Accel y stuck", 1, lambda counts: (counts & 0xFF) - 256),
+        ("Gyro xy equal", slice(4, 6), lambda counts: counts[:, [1, 1]]),
+        ("Gyro xz equal", [4, 6], lambda counts: counts[:, [0, 0]]),
+        ("Accel yz equal", slice(1, 3), lambda counts: counts[:, [1, 1]]),
+        ("Accel xz equal", [0, 2], lambda counts: counts[:, [1, 1]]),
+    ],
+)
+def test_a_faulty_axis_is_reported_within_1_2_s_and_recovers(fault, columns, spoil):
+    """The fault lasts from 2 to 5 s. A stuck high byte may take longer, because it shows only when the counts leave its
+    range."""
+    samples = np.round(ride(8)).astype(int)
+    samples[2 * RATE_HZ : 5 * RATE_HZ, columns] = spoil(samples[2 * RATE_HZ : 5 * RATE_HZ, columns])
+    (begin_s, words), (end_s, last) = Judged().feed(samples).changes()
+    assert (words, last) == (fault, None)
+    assert 2.3 < begin_s <= 3.7 and 5.3 < end_s <= 6.5
 
 
-def stuck(column, value):
-    """Return a fault of one column from second 2 to 5. value: a function from the column's samples to the faulty
-    readings."""
-
-    def spoil(samples):
-        part = samples[2 * RATE_HZ : 5 * RATE_HZ]
-        part[:, column] = value(np.round(part[:, column]).astype(int))
-        return samples
-
-    return spoil
-
-
-def copied(column, other):
-    def spoil(samples):
-        part = samples[2 * RATE_HZ : 5 * RATE_HZ]
-        part[:, column] = part[:, other]
-        return samples
-
-    return spoil
-
-
-def toggled(low, high):
-    return lambda column: np.where(np.arange(len(column)) % 3 == 0, low, high)
-
-
-ILL = [  # for each fault: the text of its notice, and the fault
-    ("Gyro x dead", stuck(4, lambda column: 0 * column)),
-    ("Gyro y dead", stuck(5, lambda column: 0 * column - 1)),
-    ("Gyro z dead", stuck(6, lambda column: 0 * column + 317)),
-    ("Gyro xyz dead", stuck(slice(4, 7), lambda columns: 0 * columns + 9)),
-    ("Accel z stuck", stuck(2, lambda column: 0 * column + 4096)),
-    ("Accel xyz stuck", stuck(slice(0, 3), lambda columns: 0 * columns + 55)),
-    ("Gyro x dead", stuck(4, toggled(0, -1))),
-    ("Gyro y dead", stuck(5, toggled(-700, 900))),
-    ("Gyro z dead", stuck(6, lambda column: column & ~0xFF | 0x40)),  # the low byte of gyro z is stuck
-    ("Gyro x dead", stuck(4, lambda column: column & ~1)),  # the lowest bit of gyro x is stuck
-    ("Gyro xy equal", copied(4, 5)),
-    ("Gyro xz equal", copied(6, 4)),
-    ("Accel yz equal", copied(1, 2)),
-]
-
-
-HIGH_BYTE = [
-    ("Gyro x dead", stuck(4, lambda column: column & 0xFF)),
-    ("Accel y stuck", stuck(1, lambda column: (column & 0xFF) - 256)),
-]
-
-
-@pytest.mark.parametrize(("words", "spoil"), ILL + HIGH_BYTE)
-def test_a_faulty_axis_is_reported_at_once_and_recovers(words, spoil):
-    """A fault is reported within 1.2 s. A stuck high byte may take longer, because it shows only when the counts leave
-    its range."""
-    said = judged(spoil(ride(8)))
-    assert [what for _, what in said] == [words, None]
-    assert 2.3 < said[0][0] <= (3.7 if (words, spoil) in HIGH_BYTE else 3.2)
-    assert 5.3 < said[1][0] <= 6.5
-
-
-@pytest.mark.parametrize("gyro_range", range(4))
-@pytest.mark.parametrize("dlpf", [1, 2, 3, 4, 5, 6])
-def test_the_quietest_chip_at_rest_is_not_faulty(gyro_range, dlpf):
+@pytest.mark.parametrize("gyro_range", [0, 3])
+@pytest.mark.parametrize(("dlpf", "bandwidth_hz"), [(1, 188), (2, 98), (3, 42), (4, 20), (5, 10), (6, 5)])
+def test_the_quietest_chip_at_rest_is_not_faulty(gyro_range, dlpf, bandwidth_hz):
     """The chip has little noise, 100 ug/sqrt(Hz) and 0.004 deg/s/sqrt(Hz), and the accelerometer's range is 16 g. The
     counts then change as little as they can."""
-    bandwidth = (None, 188, 98, 42, 20, 10, 5)[dlpf]
-    per_g, per_dps = 2048, (131, 65.5, 32.8, 16.4)[gyro_range]
-    root = np.sqrt(np.pi / 2 * bandwidth)
-    noise = [100e-6 * root * per_g] * 3 + [3] + [0.004 * root * per_dps] * 3
+    root = np.sqrt(np.pi / 2 * bandwidth_hz)
+    noise = [100e-6 * root * 2048] * 3 + [3] + [0.004 * root * (131, 65.5, 32.8, 16.4)[gyro_range]] * 3
     rest = (0.0, 0.5, 2048.5, -3920, 0.0, -500.5, 0.5)
-    assert judged(counts(20, dlpf, noise, bandwidth, rest), gyro_range, dlpf) == []
+    assert Judged(gyro_range, dlpf).feed(at_rest(10, dlpf, noise, bandwidth_hz, rest)).changes() == []
 
 
-def test_no_axis_is_faulty_in_a_ride(monkeypatch):
-    """In a ride the axes look so good that the driver does not import the module that judges them. The missing import
-    saves 2 KB of heap."""
-    monkeypatch.setattr(AxisWatch, "_load", lambda watch: pytest.fail("not well"))
+def test_in_a_ride_the_judge_is_not_even_imported(monkeypatch):
+    """The missing import saves 2 KB of heap."""
+    monkeypatch.delitem(sys.modules, "kickstand.imu.axis_judge", raising=False)
     for seed in range(4):
-        assert judged(ride(20, seed)) == []
-
-
-@pytest.mark.parametrize(("column", "value", "words"), [(4, 32767, "Gyro"), (6, -32768, "Gyro"), (1, 32767, "Accel")])
-def test_seconds_at_the_end_of_the_range_make_an_axis_faulty(column, value, words):
-    samples = ride(10)
-    samples[400:1200, column] = value
-    (first_s, first), (second_s, second), (_, last) = judged(samples)
-    assert (first, last) == (words, None)
-    assert second == f"{words} {'xyz'[column % 4]} {'dead' if words == 'Gyro' else 'stuck'}"
-    assert first_s <= 2.9 and second_s <= 4.5
+        assert Judged().feed(ride(20, seed)).changes() == []
+    assert "kickstand.imu.axis_judge" not in sys.modules
 
 
 def test_single_samples_at_the_end_of_the_range_are_no_fault():
     samples = ride(20)
     samples[np.random.default_rng(1).random(len(samples)) < 0.05, 1] = 32767
-    assert judged(samples) == []
+    judged = Judged().feed(samples)
+    assert judged.changes() == [] and 150 < judged.watch.clipped < 250
 
 
-@pytest.mark.parametrize(("accel_range", "said"), [(0, 0), (1, 0), (2, 2), (3, 2)])
-def test_hard_vibration_clips_unless_the_range_is_small(accel_range, said):
+@pytest.mark.parametrize(("accel_range", "faults"), [(0, []), (1, []), (2, ["Accel", None]), (3, ["Accel", None])])
+def test_hard_vibration_clips_unless_the_range_is_small(accel_range, faults):
     """For three seconds the vibration reaches half of the range, even after the low-pass. In a range of 8 or 16 g, such
     a vibration clips before the low-pass. In smaller ranges bends may clip too, so no fault is reported."""
     samples = ride(8)
     samples[400:1000, 1] += 17000 * np.sin(np.arange(600) * 2.2)
-    assert [words for _, words in judged(samples, accel_range=accel_range)] == ["Accel", None][:said]
+    judged = Judged(accel_range=accel_range).feed(samples)
+    assert [fault for _, fault in judged.changes()] == faults
+    peaks, share = judged.watch.shaken()
+    assert peaks[1] > 16500 and share == 0
+
+
+def one_look(column=None, values=(), clipped=0, gyro_clipped=0, end=(1,), shaken=0):
+    """Return the samples of one look. Each good axis has many values, changes its high byte, and differs from the
+    others. `values` replace those of a column in turn. The first `clipped` samples are at the end of the range on the
+    axes `end`, the first gyro_clipped also on gyro y, and `shaken` samples reach half of the range."""
+    k = np.arange(LOOK)
+    samples = np.stack([(37 + 10 * i) * ((k + 3 * i) % 17) - 255 for i in range(7)], axis=1)
+    if column is not None:
+        samples[:, column] = np.resize(values, LOOK)
+    for axis in end:
+        samples[:clipped, axis] = 32767
+    samples[:gyro_clipped, 5] = -32768
+    samples[LOOK - shaken :, 0] = 16384 + k[:shaken] % 9
+    return samples
+
+
+@pytest.mark.parametrize(
+    ("gyro_range", "dlpf", "column", "looks", "fault"),
+    [
+        (1, 3, 0, 1, "Accel x stuck"),
+        (1, 4, 0, 4, "Accel x stuck"),
+        (1, 5, 1, 15, "Accel y stuck"),
+        (1, 6, 2, 80, "Accel z stuck"),
+        (1, 3, 6, 1, "Gyro z dead"),
+        (0, 4, 6, 3, "Gyro z dead"),
+        (0, 6, 4, 11, "Gyro x dead"),
+        (2, 4, 5, 10, "Gyro y dead"),
+        (3, 3, 4, 14, "Gyro x dead"),
+        (2, 5, 4, 62, "Gyro x dead"),
+        (2, 6, 6, None, None),  # the noise is too small to judge
+        (3, 4, 5, None, None),
+    ],
+)
+def test_an_axis_without_noise_is_ill_after_its_looks(gyro_range, dlpf, column, looks, fault):
+    """The limits are for the noise of the quietest chip. The counts have two values."""
+    judged = Judged(gyro_range, dlpf)
+    for _ in range(looks or 90):
+        judged.feed(one_look(column, (3, 4)))
+    assert [words for words, _, _ in judged.looks] == [None] * ((looks or 91) - 1) + ([fault] if fault else [])
+
+
+@pytest.mark.parametrize(
+    ("values", "ill"),
+    [([8], True), ([8, 9], True), ([8, 9, 10], False), ([8, 10, 12], True), ([9, 11, 13], True), ([8, 9, 11], False)],
+)
+def test_a_working_axis_has_three_values_even_and_odd(values, ill):
+    """The axis also changes its high byte, in a look with a neighbour at the end of the range."""
+    look = one_look(0, [value + 16 * (k % 40) for k in range(LOOK) for value in values], clipped=1)
+    assert (Judged().feed(look).looks[0][0] == "Accel x stuck") is ill
+
+
+def test_a_stuck_high_byte_wraps_in_two_looks():
+    """A look with a change of the high byte starts the count again."""
+    wrapped = one_look(2, (2, 3, 4, 250, 251, 249))
+    assert [fault for fault, _, _ in Judged().feed(np.vstack([wrapped] * 2)).looks] == [None, "Accel z stuck"]
+    mixed = Judged().feed(np.vstack([wrapped, one_look(clipped=1), wrapped, wrapped, wrapped]))
+    assert [fault for fault, _, _ in mixed.looks] == [None] * 4 + ["Accel z stuck"]
+
+
+def test_equal_axes_are_not_judged_with_a_slow_low_pass():
+    equal = one_look(6, one_look()[:, 5])
+    for dlpf, fault in ((3, "Gyro yz equal"), (6, None)):
+        assert Judged(1, dlpf).feed(equal).looks[0][0] == fault
+
+
+@pytest.mark.parametrize(
+    ("share", "notice", "fault"),
+    [
+        ({"clipped": 7}, None, None),
+        ({"clipped": 8}, "Accel", None),
+        ({"clipped": 8, "gyro_clipped": 4}, "Gyro", None),
+        ({"clipped": 8, "gyro_clipped": 3}, "Accel", None),
+        ({"clipped": 39}, "Accel", None),
+        ({"clipped": 40}, "Accel", "Accel"),
+        ({"shaken": 7}, None, None),
+        ({"shaken": 8}, "Accel", "Accel"),
+    ],
+)
+def test_samples_at_the_end_of_the_range_clip(share, notice, fault):
+    """A notice appears if a tenth of the samples clip. A fault is reported if half of the samples clip in two looks, or
+    if the sensor is shaken in two looks. In a range of 4 g nothing counts as shaken."""
+    judged = Judged(accel_range=3 if "shaken" in share else 1).feed(np.vstack([one_look(**share)] * 2))
+    assert judged.looks == [(None, notice, False), (fault, None, False)]
+    assert judged.watch.clipped == 2 * share.get("clipped", 0)
+
+
+@pytest.mark.parametrize(
+    ("clips", "faults"),
+    [
+        ((40, 19, 40), (None, None, None)),  # less than a quarter ends the count
+        ((40, 20, 40), (None, None, "Accel")),
+        ((80,) * 5, (None, "Accel", "Accel", "Accel", "Accel y stuck")),  # all samples of five looks
+        ((79,) * 5, (None,) + ("Accel",) * 4),
+        ((40, 40, 0, 40, 0), (None, "Accel", "Accel", "Accel", None)),  # two good looks end a fault
+    ],
+)
+def test_looks_in_a_row_decide(clips, faults):
+    judged = Judged(accel_range=1)
+    for clipped in clips:
+        judged.feed(one_look(clipped=clipped))
+    assert tuple(fault for fault, _, _ in judged.looks) == faults
+
+
+def test_set_ups_every_10_s_and_notices_every_minute():
+    judged = Judged().feed(np.vstack([one_look(0, (8,))] * 152))
+    assert [k for k, look in enumerate(judged.looks) if look[2]] == [*range(0, 152, 25)]
+    assert [k for k, look in enumerate(judged.looks) if look[1]] == [0, 150]
+
+
+def test_a_set_up_begins_a_new_look_and_a_row_of_0_1_s_clips():
+    judged = Judged().feed(one_look(clipped=19)[:19])
+    assert judged.watch.clips() is None
+    judged.feed(one_look(clipped=1)[:1])
+    assert words(judged.watch.clips()) == "Accel"
+    judged.feed(one_look(gyro_clipped=1)[:1])
+    assert words(judged.watch.clips()) == "Gyro"
+    judged.watch.restart()
+    assert judged.watch.clips() is None
+    judged.feed(one_look()[:-1])
+    assert judged.looks == []

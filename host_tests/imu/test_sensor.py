@@ -1,332 +1,259 @@
-"""The class Sensor keeps the chip working. A class that the test controls replaces the chip."""
+"""The class Sensor keeps the chip working, through faults of the simulated board. Also the bus, and Ctrl-C."""
+
+import math
+import re
+import textwrap
+from typing import Any
 
 import pytest
+from kickstand.errors import Notice
 from kickstand_tools.simulated_board.simulator import Board
+from support.board_access import level, on_board, write
+
+SENSOR = 0x68
 
 
-@pytest.fixture(autouse=True)
-def board():
-    with Board(lambda t_s: (0, 0, 1, 0, 0, 0)) as made:
-        yield made
+def moving(t_s):
+    """Return readings in which no two samples are equal."""
+    waves = [math.sin(rate * t_s) for rate in (40, 77, 91, 60, 33, 51)]
+    return 0.1 * waves[0], 0.02 * waves[1], 1 + 0.01 * waves[2], 5 * waves[3], 3 * waves[4], 4 * waves[5], 30.0
 
 
-class Chip:
-    """A chip that the test controls.
+class Run:
+    """The firmware's Sensor, read every 10 ms on a board.
 
-    waiting: results of the next fetches, each a number of samples or an exception. Later fetches return one sample.
-    bad: number of spoilt samples.
-    setups: for each set-up the exception that its last step raises, or None.
-    calls: list of the calls up to now.
+    changes: (time in s, code of the fault or None, restarts) at each change.
+    samples: (time in s, number of samples) of each pass with samples.
     """
 
-    def __init__(self):
-        from kickstand.imu.fifo_frames import AxisWatch
+    def __init__(self, fault, until_s=3.0, explain=None, check_ms=0, prepare_s=0.0, **board):
+        self.changes, self.samples = [], []
+        self.sensor: Any = None
+        self.board = Board(moving, **board)
 
-        self.axes = AxisWatch(200, 3, 1, 3, 20)
-        self.axes.notes[9] = 1 << 29  # let the next check of the axes never come
-        self.waiting, self.setups, self.states = [], [], []
-        self.bad = 0
-        self.overflows = self.frames_left = 0
-        self.calls = []
+        def firmware():
+            from time import sleep_us, ticks_ms  # type: ignore[attr-defined]
 
-    def connect(self, i2c):
-        self.calls.append(("connect", i2c))
+            from kickstand.board import i2c_bus
+            from kickstand.imu.mpu6050 import Mpu6050
+            from kickstand.imu.sensor import Sensor
 
-    def configure(self):
-        self.calls.append("configure")
-        yield 100
-        yield 60
-        error = self.setups.pop(0) if self.setups else None
-        if error:
-            raise error
-        yield 20
+            sensor = Sensor(Mpu6050(None), lambda: i2c_bus.open_i2c(0, 4, 5, 400_000), explain)
+            self.sensor = sensor
+            fault(self.board)
+            while True:
+                now_s = self.board.clock.now_us / 1e6
+                if now_s < prepare_s:
+                    sensor.prepare(ticks_ms())
+                else:
+                    samples = sensor.fetch(ticks_ms())
+                    if samples:
+                        self.samples.append((now_s, samples))
+                if check_ms and round(1000 * now_s) % check_ms == 0:
+                    sensor.check(ticks_ms())
+                change = sensor.fault and sensor.fault.code, sensor.restarts
+                if not self.changes or change != self.changes[-1][1:]:
+                    self.changes.append((self.board.clock.now_us / 1e6, *change))
+                sleep_us(10_000 - self.board.clock.now_us % 10_000)
 
-    def start(self):
-        self.calls.append("start")
+        with self.board:
+            assert self.board.run(firmware, until_s) == "off"
 
-    def fetch(self):
-        self.calls.append("fetch")
-        return raised_or(self.waiting.pop(0)) if self.waiting else 1
+    def codes(self):
+        """Return the codes of the fault one after another."""
+        codes = [code for _, code, _ in self.changes]
+        return [code for k, code in enumerate(codes) if k == 0 or code != codes[k - 1]]
 
-    def add_up(self, n):
-        return n - self.bad
-
-    def restart_fifo(self):
-        self.calls.append("restart_fifo")
-
-    def configured(self):
-        self.calls.append("configured")
-        return raised_or(self.states.pop(0)) if self.states else True
-
-
-def raised_or(value):
-    if isinstance(value, Exception):
-        raise value
-    return value
+    def since(self, code):
+        return next(time_s for time_s, other, _ in self.changes if other == code)
 
 
-def made(board, explain=None):
-    from kickstand.imu.sensor import Sensor
-
-    chip = Chip()
-    return Sensor(chip, lambda: "bus", explain), chip
+STARTED = ["starting", None]
 
 
-def set_up(sensor, now_ms):
-    """Run loop passes of 10 ms from now_ms on until the chip is set up. Return the time of the last pass."""
-    for _ in range(19):
-        assert sensor.fetch(now_ms) == 0
-        now_ms += 10
-    return now_ms - 10
+def asleep(board):
+    board.at(1.0, lambda: write(board.sensor, 0x6B, 0x41))
 
 
-def running(board, explain=None):
-    """Return a Sensor, its chip, which is running, and the time of the first sample in ms."""
-    sensor, chip = made(board, explain)
-    now_ms = set_up(sensor, 0)
-    assert sensor.fetch(now_ms) == 1
-    assert sensor.fault is None
-    del chip.calls[:]
-    return sensor, chip, now_ms
+@pytest.mark.parametrize(
+    ("fault", "codes", "delay_s", "well_s"),
+    [
+        (lambda board: board.faults.nack_for(SENSOR, 0.995, 0.02), [], 0, 0),  # two failed transfers are tolerated
+        (lambda board: board.faults.nack_for(SENSOR, 0.995, 0.03), ["sensor-lost"], 0.03, 1.3),
+        (lambda board: board.faults.stuck_sda(0.995), ["sensor-lost"], 0.06, 1.3),
+        (lambda board: board.faults.unplug_sensor(0.995, 1.0), ["sensor-lost", "no-sensor"], 0.03, 2.25),
+        (lambda board: board.faults.all_zero(0.995, 1.0), ["sensor-frozen"], 0.02, 2.25),
+        (lambda board: board.faults.all_ones(0.995, 1.0), ["sensor-frozen"], 0.02, 2.25),
+        (asleep, ["sensor-silent"], 0.12, 1.35),
+        (lambda board: board.faults.freeze(1.0, 1.0), ["sensor-silent"], 0.12, 2.3),
+        (lambda board: board.faults.busy(1.0, 0.45), [], 0, 0),
+        (lambda board: board.faults.busy(1.0, 0.6), ["readings-lost"], 0.61, 1.62),
+    ],
+)
+def test_each_fault_is_reported_in_time_and_ends(fault, codes, delay_s, well_s):
+    """At 1 s a fault begins. delay_s: the longest time until it is reported. well_s: the latest time of a sample."""
+    run = Run(fault)
+    assert run.codes() == STARTED + (codes and [*codes, None])
+    if codes:
+        assert 1.0 <= run.since(codes[0]) <= 1.0 + delay_s and run.changes[-1][0] <= well_s
+        late = [time_s for time_s, _ in run.samples if time_s > run.since(codes[0])]
+        assert late[0] == pytest.approx(run.changes[-1][0], abs=0.01)
+    assert (run.changes[-1][2] >= 2) == bool(codes)
+    assert run.samples[-1][0] > 2.98
 
 
-def code(sensor):
-    return sensor.fault and sensor.fault.code
+@pytest.mark.parametrize("leaves", ["asleep", "frozen", "default_ranges", "torn"])
+def test_a_chip_that_has_reset_itself_is_set_up_again(leaves):
+    """check() finds it at once. After a lost transfer it finds nothing, because a restart may be incomplete."""
+    run = Run(lambda board: board.faults.supply_dip(0.995, leaves), check_ms=100)
+    assert run.codes() == [*STARTED, "sensor-reset", None]
+    assert run.since("sensor-reset") == pytest.approx(1.0, abs=0.002) and run.changes[-1][0] < 1.25
 
 
-def test_a_new_chip_is_at_fault_until_its_first_sample(board):
-    sensor, chip = made(board)
-    assert code(sensor) == "starting"
-    for now_ms in (0, 99, 100, 159, 160, 179):
-        assert sensor.fetch(now_ms) == 0
-        assert chip.calls == [("connect", "bus"), "configure"]
-    assert sensor.fetch(180) == 0
-    assert chip.calls == [("connect", "bus"), "configure", "start"]
-    assert (sensor.restarts, code(sensor)) == (1, "starting")
-    assert sensor.fetch(200) == 1
-    assert code(sensor) is None
+@pytest.mark.parametrize(("count", "codes"), [(4, []), (6, ["sensor-lost", None])])
+def test_a_check_that_is_lost_counts_as_a_lost_transfer(count, codes):
+    """A pass has two transfers of samples, then the check, which is tried twice. Each later pass restarts the FIFO."""
+    run = Run(lambda board: board.at(0.995, lambda: board.faults.nack(SENSOR, 3, count)), check_ms=10)
+    assert run.codes() == [*STARTED, *codes]
 
 
-def test_a_chip_that_is_prepared_starts_with_the_first_fetch(board):
-    """The chip was prepared earlier, but its FIFO starts only with the first fetch. So the FIFO never contains samples
-    that are older than the first fetch."""
-    sensor, chip = made(board)
-    for now_ms in range(0, 1000, 15):
-        sensor.prepare(now_ms)
-    assert chip.calls == [("connect", "bus"), "configure"]
-    assert sensor.fetch(1000) == 0
-    assert chip.calls == [("connect", "bus"), "configure", "start"]
-    assert sensor.fetch(1100) == 1
+def test_a_start_takes_0_2_s_and_a_prepared_chip_has_no_old_samples():
+    run = Run(lambda board: None, until_s=1.0)
+    assert [change[1:] for change in run.changes] == [("starting", 0), ("starting", 1), (None, 1)]
+    assert 0.18 <= run.changes[2][0] < 0.2 and run.samples[0][1] <= 2
+    assert {count for _, count in run.samples[1:]} <= {1, 2, 3}
+    prepared = Run(lambda board: None, until_s=2.0, prepare_s=1.0)
+    assert prepared.samples[0] == (pytest.approx(1.01), pytest.approx(2, abs=1)) and prepared.changes[-1][2] == 1
 
 
-def test_a_failed_set_up_is_repeated_after_50_ms(board):
-    from kickstand.imu.mpu6050 import UnknownChip
+@pytest.mark.parametrize(
+    ("board", "code"), [({"sensor_address": None}, "no-sensor"), ({"who_am_i": 0x55}, "unknown-chip")]
+)
+def test_a_missing_or_unknown_chip_is_looked_for_every_50_ms(board, code):
+    """The fault stays until the first sample of a chip that is fitted later."""
 
-    sensor, chip = made(board)
-    chip.setups = [OSError(5), UnknownChip(0x55), None]
-    for now_ms in (0, 100, 160):
-        sensor.fetch(now_ms)
-    assert (code(sensor), sensor.restarts) == ("no-sensor", 0)
-    sensor.fetch(209)
-    assert chip.calls.count("configure") == 1
-    for now_ms in (210, 310, 370):
-        sensor.fetch(now_ms)
-    assert sensor.fault and (sensor.fault.code, sensor.fault.values) == ("unknown-chip", (0x55,))
-    for now_ms in (420, 520, 580, 600):
-        sensor.fetch(now_ms)
-    assert (chip.calls.count("configure"), sensor.restarts) == (3, 1)
-    assert code(sensor) == "unknown-chip"  # the fault stays until the first sample
-    sensor.fetch(605)
-    assert code(sensor) is None
+    def fit(board):
+        def exchange():
+            vars(board.sensor).update(who_am_i=0x68)
+            board.fit_sensor()
+
+        board.at(1.02, exchange)
+
+    run = Run(fit, **board)
+    assert [code for code in run.codes() if code != "starting"] == [code, None] and run.changes[0][0] < 0.01
+    assert 1.2 < run.changes[-1][0] < 1.29 and run.changes[-1][2] == 1
 
 
-def test_silence_is_a_fault_after_100_ms(board):
-    sensor, chip, now_ms = running(board)
-    chip.waiting = [0, 0, 3, 0, 0, 0]
-    for after_ms, samples, said in ((5, 0, None), (100, 0, None), (100, 3, None), (105, 0, None), (200, 0, None)):
-        assert sensor.fetch(now_ms + after_ms) == samples
-        assert code(sensor) == said
-    assert sensor.fetch(now_ms + 201) == 0
-    assert code(sensor) == "sensor-silent"
-
-
-def test_an_overflow_is_no_silence(board):
-    """After an overflow the driver empties the FIFO, so there are no samples for a moment. The sensor is not reported
-    as silent, even if the loop read the time before the overflow."""
-    sensor, chip, now_ms = running(board)
-    board.clock.advance(now_ms * 1000 + 400_000)
-    chip.waiting = [0, 0, 0]
-    chip.overflows = 1
-    assert sensor.fetch(now_ms + 390) == 0
-    assert code(sensor) is None
-    assert sensor.fetch(now_ms + 500) == 0
-    assert code(sensor) is None
-    assert sensor.fetch(now_ms + 502) == 0
-    assert code(sensor) == "sensor-silent"
-
-
-def test_half_a_second_of_lost_readings_is_a_fault(board):
-    """The FIFO overflows again and again, because the board has no time to read it."""
-    sensor, chip, now_ms = running(board)
-    for after_ms, said in ((300, None), (500, None), (502, "readings-lost")):
-        board.clock.advance(max(0, (now_ms + after_ms) * 1000 - board.clock.now_us))
-        chip.waiting, chip.overflows = [0], chip.overflows + 1
-        assert sensor.fetch(now_ms + after_ms) == 0
-        assert code(sensor) == said
-    assert sensor.restarts == 2  # the lost readings are a gap, which counts as a restart
-    assert sensor.fetch(now_ms + 510) == 1
-    assert code(sensor) is None
-
-
-def test_two_lost_transfers_are_tolerated_and_three_are_a_fault(board):
-    sensor, chip, now_ms = running(board)
-    lost = OSError(5)
-    chip.waiting = [lost, lost, 1, lost, lost, lost]
-    said = []
-    for k in range(6):
-        samples = sensor.fetch(now_ms + 10 * k)
-        assert samples == (1 if k == 2 else 0)
-        said.append(code(sensor))
-    assert said == [None] * 5 + ["sensor-lost"]
-
-
-def test_the_fifo_is_emptied_after_a_failed_transfer(board):
-    """The failed transfer may have read only a part of a frame. The FIFO is therefore emptied, but only once."""
-    sensor, chip, now_ms = running(board)
-    chip.waiting = [OSError(110), 1, 1]
-    for k in range(3):
-        sensor.fetch(now_ms + 10 * k)
-    assert chip.calls == ["fetch", "restart_fifo", "fetch", "fetch"]
-
-
-def test_a_chip_at_fault_is_set_up_at_once(board):
-    sensor, chip, now_ms = running(board)
-    chip.bad = 1
-    sensor.fetch(now_ms + 50)
-    assert code(sensor) == "sensor-frozen"
-    chip.bad = 0
-    assert set_up(sensor, now_ms + 50) == now_ms + 230
-    assert chip.calls[-3:] == [("connect", "bus"), "configure", "start"]
-    assert (sensor.restarts, code(sensor)) == (2, "sensor-frozen")
-    assert sensor.fetch(now_ms + 300) == 1
-    assert code(sensor) is None
-
-
-def test_a_chip_that_has_reset_itself_is_set_up_again(board):
-    sensor, chip, now_ms = running(board)
-    chip.states = [True, False]
-    sensor.check(now_ms + 100)
-    assert code(sensor) is None
-    sensor.check(now_ms + 200)
-    assert code(sensor) == "sensor-reset"
-    assert "configure" not in chip.calls
-    assert sensor.fetch(now_ms + 200) == 0
-    assert "configure" in chip.calls
-
-
-def test_a_check_that_is_lost_counts_as_a_lost_transfer(board):
-    sensor, chip, now_ms = running(board)
-    chip.states = [OSError(5)]
-    chip.waiting = [OSError(5)] * 2
-    sensor.check(now_ms + 100)
-    for k in (1, 2):
-        assert code(sensor) is None
-        sensor.fetch(now_ms + 100 + 10 * k)
-    assert code(sensor) == "sensor-lost"
-
-
-def test_nothing_is_judged_after_a_lost_transfer(board):
-    """After a lost transfer the restart of the FIFO may be incomplete. The restart is completed after the next
-    successful transfer, and only then is the chip judged again."""
-    sensor, chip, now_ms = running(board)
-    chip.waiting, chip.states = [OSError(5)], [False, False]
-    sensor.fetch(now_ms + 10)
-    sensor.check(now_ms + 10)
-    assert (code(sensor), chip.states) == (None, [False, False])
-    sensor.fetch(now_ms + 20)
-    sensor.check(now_ms + 20)
-    assert code(sensor) == "sensor-reset"
-
-
-def until_failed(sensor, chip, now_ms, since_ms):
-    """Let a running chip give no samples for since_ms. Return the time of the fault."""
-    chip.waiting = [0] * 20
-    sensor.fetch(now_ms + since_ms)
-    return now_ms + since_ms
-
-
-def test_the_fifo_is_tested_if_set_ups_do_not_help(board):
-    """The test of the FIFO runs at the third fault in a row, if each fault comes soon after a set-up."""
-    from kickstand.errors import Notice
-
-    asked = []
-    notice = Notice("sensor-fifo", "stays empty")
-    sensor, chip, now_ms = running(board, lambda chip, error: asked.append(error) or (notice, []))
-    said = []
-    for _ in range(4):
-        now_ms = until_failed(sensor, chip, now_ms, 150)
-        said.append(code(sensor))
-        now_ms = set_up(sensor, now_ms)
-    assert said == ["sensor-silent", "sensor-silent", "sensor-fifo", "sensor-fifo"]
-    assert asked == [None]  # the test of the FIFO runs only once, because it takes 0.3 s
-    chip.waiting = []
-    sensor.fetch(now_ms + 5)
-    assert code(sensor) is None
-
-
-def test_faults_far_apart_do_not_question_the_fifo(board):
-    sensor, chip, now_ms = running(board, lambda chip, error: 1 / 0)
-    for _ in range(5):
-        now_ms = until_failed(sensor, chip, now_ms, 1500)
-        assert code(sensor) == "sensor-silent"
-        now_ms = set_up(sensor, now_ms)
-
-
-def test_a_broken_fifo_explains_lost_readings(board):
-    from kickstand.errors import Notice
-
-    sensor, chip, now_ms = running(board, lambda chip, error: (Notice("sensor-fifo", "stays full"), []))
-    board.clock.advance((now_ms + 600) * 1000 - board.clock.now_us)
-    chip.waiting, chip.overflows = [0], 1
-    sensor.fetch(now_ms + 600)
-    assert code(sensor) == "sensor-fifo"
-
-
-def test_failed_set_ups_are_explained_about_once_a_second(board):
-    from kickstand.errors import Notice
-    from kickstand.imu.sensor import Sensor
-
-    chip, asked = Chip(), []
-    chip.setups = [OSError(5)] * 60
+def test_failed_set_ups_are_explained_about_once_a_second():
+    times_s = []
 
     def explain(chip, error):
-        asked.append(now_ms)
+        assert isinstance(error, OSError)
+        times_s.append(run_board[0].clock.now_us / 1e6)
         return Notice("exchanged", 4, 5), [0x3C]
 
-    sensor = Sensor(chip, lambda: "bus", explain)
-    chip.configure = lambda: iter_failing()
-    for now_ms in range(0, 3000, 10):
-        sensor.fetch(now_ms)
-        assert code(sensor) == ("exchanged" if asked else "starting")
-    assert asked == [100, 1100, 2100]
-    assert sensor.found == [0x3C]
+    run_board = []
+    run = Run(run_board.append, explain=explain, sensor_address=None)
+    assert times_s == pytest.approx([0.1, 1.1, 2.1], abs=0.02)
+    assert run.codes() == ["starting", "exchanged"] and run.sensor.found == [0x3C]
 
 
-def iter_failing():
-    raise OSError(5)
+def test_the_fifo_is_tested_if_set_ups_do_not_help():
+    """The test runs at the third fault in a row, if each fault comes soon after a set-up. It runs only once, because it
+    takes 0.3 s. A sample ends the fault."""
+    calls = []
+
+    def explain(chip, error):
+        calls.append(error)
+        return Notice("sensor-fifo", "stays empty"), []
+
+    def dead_fifo(board):
+        push = board.sensor.fifo.push
+        board.at(1.0, lambda: vars(board.sensor.fifo).update(push=lambda *data, **kind: True))
+        board.at(2.5, lambda: vars(board.sensor.fifo).update(push=push))
+
+    run = Run(dead_fifo, explain=explain)
+    assert run.codes() == [*STARTED, "sensor-silent", "sensor-fifo", None] and calls == [None]
+    assert [restarts for time_s, _, restarts in run.changes if time_s < run.since("sensor-fifo")][-1] == 3
+
+    def slow(board):
+        for k in range(5):
+            board.at(1.0 + 1.5 * k, lambda: write(board.sensor, 0x6B, 0x41))
+
+    assert Run(slow, 9.0, lambda chip, error: 1 / 0).codes() == STARTED + ["sensor-silent", None] * 5
 
 
-def test_a_fifo_that_does_not_start_is_tried_again_with_the_bus(board):
-    sensor, chip = made(board)
-    broken = [OSError(5)]
+def test_a_broken_fifo_explains_lost_readings():
+    run = Run(lambda board: board.faults.busy(1.0, 0.6), explain=lambda *_: (Notice("sensor-fifo", "stays full"), []))
+    assert run.codes() == [*STARTED, "sensor-fifo", None]
 
-    def start():
-        if broken:
-            raise broken.pop()
 
-    chip.start = start
-    for now_ms in (0, 100, 160, 180):
-        assert sensor.fetch(now_ms) == 0
-    assert (code(sensor), sensor.restarts) == ("no-sensor", 0)
-    sensor.fetch(230)
-    assert chip.calls == [("connect", "bus"), "configure"] * 2
+def test_clipped_samples_are_skipped_and_a_faulty_axis_gives_none():
+    def overdriven(board):
+        def world(t_s):
+            return (*moving(t_s)[:4], 900.0, *moving(t_s)[5:]) if 1.0 <= t_s < 4.0 else moving(t_s)
+
+        vars(board.sensor).update(world=world)
+
+    run = Run(overdriven, 8.0)
+    assert run.codes() == [*STARTED, "clips", "axis-ill", None] and 500 < run.sensor.clipped < 620
+    assert not [time_s for time_s, _ in run.samples if 1.02 < time_s < 4.0]
+    assert run.changes[-1][2] - run.changes[1][2] >= 1  # a faulty axis is a gap
+
+
+def test_the_example_in_the_drivers_docstring_runs(capsys):
+    """The example runs for a second. It prints the chip's name and temperature, then about 200 samples."""
+    from kickstand.imu import mpu6050
+
+    example = re.search(r"\n\n((?:    .*\n|\n)+)", mpu6050.__doc__ or "")
+    assert example
+    with Board(lambda t_s: (0.25, -0.5, 1.0, 10.0, -20.0, 30.0, 30.0)) as board:
+        assert board.run(lambda: exec(textwrap.dedent(example[1]), {}), 1.3) == "off"
+    first, *samples = capsys.readouterr().out.splitlines()
+    assert first.startswith("MPU6050 30.") and 190 < len(samples) < 260 and samples[-1] == "[0.25, -0.5, 1.0] g"
+
+
+def test_a_stuck_bus_is_freed_and_a_dead_one_is_reported():
+    """A device that stopped in the middle of a byte needs up to nine clock pulses (NXP UM10204, 3.1.16)."""
+
+    def program(board):
+        from kickstand.board import i2c_bus
+
+        for bits, freed in ((1, True), (8, True), (9, True), (1000, False)):
+            board.sensor_bus.hang(bits)
+            assert i2c_bus.free(4, 5) == freed, bits
+        with pytest.raises(OSError, match="SDA is held low"):
+            i2c_bus.open_i2c(0, 4, 5, 400_000)
+
+    assert on_board(program)[0] == "returned"
+
+
+@pytest.mark.parametrize("gap_us", [None, 1, 300, 5000, 40_000])
+def test_the_watchdog_stops_after_ctrl_c(gap_us, monkeypatch, tmp_path):
+    """A watchdog that keeps running could reset the board while files are being copied, and the installation would be
+    incomplete. A second Ctrl-C may come while a recording is being ended."""
+    monkeypatch.chdir(tmp_path)
+
+    def interrupt():
+        raise KeyboardInterrupt
+
+    def program(board):
+        from time import sleep_ms  # type: ignore[attr-defined]
+
+        from kickstand import app, devices
+        from kickstand.settings import Settings
+
+        settings = Settings(type("Config", (), {"RECORD": True}))
+        board.at(4.0, interrupt)
+        if gap_us:
+            board.clock.at(4_000_000 + gap_us, interrupt)
+        try:
+            app.App(settings, devices.open_lcd(settings), devices.open_sensor(settings)).run()
+        except KeyboardInterrupt:
+            pass
+        try:
+            sleep_ms(20_000)
+        except KeyboardInterrupt:
+            sleep_ms(20_000)
+
+    assert on_board(program, 100, world=level)[0] == "returned"

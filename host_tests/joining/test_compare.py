@@ -1,123 +1,141 @@
-"""Tests `kickstand compare`. The command puts the logs of two devices on one clock and compares their leans."""
+"""`kickstand compare`: the leans of two devices on one clock. Differences that were put in are found, with their
+signs."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from joining.known_roads import another_device, turned
 from kickstand_tools import api
 from kickstand_tools.calibration.file import write_calibration
 from kickstand_tools.joining import agreement
+from kickstand_tools.joining.clocks import Clocks
 from support import command
 from support.recordings.drawn_rides import drawn_ride
 
-LATER_S, SLOW = 7.3, 80e-6
-
-
-def shifted(log, later_s, drift):
-    """Return the log of a second device. The device starts later_s after the first, and its clock is slow by the share
-    `drift`."""
-    kept = log.t_s >= later_s
-    t_s = (log.t_s[kept] - later_s) * (1.0 - drift)
-    return api.Log(t_s, log.accel_g[kept], log.gyro_dps[kept])
+LATER_S, SLOW, DELAY_S = 7.3, 80e-6, 0.04
 
 
 @pytest.fixture(scope="module")
-def ride():
-    return drawn_ride(1, 130.0, ["firm", "firm"], "street")
+def pair():
+    """Device B starts later, its clock is slow, it shows the lean late, and its mount is turned by 2 degrees."""
+    ride = drawn_ride(1, 100.0, ["firm"], "street")
+    log, a = ride.logs[0], ride.calibrations[0]
+    log = api.Log(log.t_s[::2], log.accel_g[::2], log.gyro_dps[::2])
+    axes = turned(2.0, (0.0, 0.0, 1.0)) @ a.vehicle_from_sensor
+    b = replace(a, vehicle_from_sensor=axes, gyro_delay_s=-DELAY_S)
+    return (log, another_device(log, LATER_S, drift=SLOW)), (a, b)
 
 
 @pytest.fixture(scope="module")
-def found(ride):
-    return api.compare_rides(ride.logs[0], shifted(ride.logs[1], LATER_S, SLOW), *ride.calibrations)
+def comparison(pair):
+    return api.compare_rides(*pair[0], *pair[1])
 
 
-@pytest.fixture(scope="module")
-def files(ride, tmp_path_factory):
-    directory = tmp_path_factory.mktemp("pair")
-    for name, log, calibration in zip("AB", ride.logs, ride.calibrations):
-        api.write_log(directory / f"{name}.csv", log)
-        write_calibration(directory / f"{name}.cal.json", calibration)
-    return directory
+def test_shift_drift_and_delay_are_found(comparison):
+    """A slow clock has a positive drift, and a late lean a positive delay."""
+    clocks = comparison.clocks
+    assert clocks.later_s == pytest.approx(LATER_S, abs=0.01)
+    assert clocks.drift == pytest.approx(SLOW, abs=60e-6)
+    assert clocks.correlation > 0.99 and clocks.apart_deg == pytest.approx(2.0, abs=0.2)
+    assert comparison.smoothed.delay_s == pytest.approx(DELAY_S, abs=0.015)
+    assert comparison.smoothed.slope == pytest.approx(1.0, abs=0.03)
+    first, *_ = agreement.words(comparison)
+    assert f"B begins {LATER_S:.1f}" in first and "s after A" in first and "ppm slow" in first
 
 
-def test_the_clocks_are_found(found, ride):
-    assert found.clocks.later_s == pytest.approx(LATER_S + 0.5 / 200.0, abs=0.01)
-    assert found.clocks.drift == pytest.approx(SLOW, abs=60e-6)
-    at_s = np.array([100.0])
-    assert found.clocks.of_b(at_s) == pytest.approx((at_s - LATER_S) * (1.0 - SLOW), abs=0.015)
-    assert found.clocks.correlation > 0.9
+def test_a_difference_is_that_of_the_leans(comparison):
+    """The figures are computed again by numpy, from B's lean minus A's lean while both are known."""
+    for kind, difference in (("live", comparison.live), ("smoothed", comparison.smoothed)):
+        change = comparison.leans[f"{kind} B"] - comparison.leans[f"{kind} A"]
+        change = change[np.isfinite(change)]
+        rest = np.abs(change - change.mean())
+        assert difference is not None
+        assert difference.seconds == pytest.approx(0.02 * len(change)) and difference.seconds > 40.0
+        assert difference.constant_deg == pytest.approx(change.mean())
+        assert difference.rms_deg == pytest.approx(np.hypot(change.mean(), change.std()))
+        assert difference.moving_deg == pytest.approx(change.std())
+        assert (difference.p95_deg, difference.worst_deg) == pytest.approx((np.percentile(rest, 95.0), rest.max()))
+        assert difference.expected_deg > 0.0 and 0.0 <= difference.within_1 <= difference.within_2 <= 1.0
 
 
-def test_the_difference_is_that_of_both_errors(found, ride):
-    """The difference between the leans of the two devices equals the difference between their errors."""
-    for kind, seen in (("live", found.live), ("smoothed", found.smoothed)):
-        leans = [found.leans[f"{kind} {name}"] for name in "AB"]
-        riding = ~np.isnan(leans[0] + leans[1])
-        off = [lean[riding] for lean in leans]
-        true = np.interp(found.t_s[riding] + ride.logs[0].t_s[0], ride.time_s, ride.lean_deg)
-        errors = [np.sqrt(np.mean((lean - true) ** 2)) for lean in off]
-        assert seen.rms_deg <= sum(errors) + 0.01
-        assert seen.rms_deg == pytest.approx(np.hypot(seen.constant_deg, seen.moving_deg), abs=1e-6)
-        assert abs(seen.delay_s) < 0.02
-        assert seen.slope == pytest.approx(1.0, abs=0.05)
-    assert found.smoothed.moving_deg < found.live.moving_deg
-
-
-def test_constant_slope_and_delay_are_separated():
-    """The lean of device B differs in three ways: it is 1.5 degrees further left, 3 % larger and 0.1 s late."""
-    t_s = np.arange(0.0, 60.0, agreement.STEP_S)
-    sigma = np.ones(len(t_s))
-    one, late = 20.0 * np.sin(t_s), 20.0 * np.sin(t_s - 0.1)
-    seen = agreement._difference((one, sigma), (1.03 * late - 1.5, sigma))
-    assert seen is not None and seen.constant_deg == pytest.approx(-1.5, abs=0.1)
-    assert seen.slope == pytest.approx(1.03, abs=0.005)
-    assert seen.delay_s == pytest.approx(0.1, abs=0.01)
-    assert seen.expected_deg == pytest.approx(np.sqrt(2.0))
-    same = agreement._difference((one, sigma), (one, sigma))
-    assert same is not None and (same.rms_deg, same.within_1) == (0.0, 1.0)
-    assert agreement._difference((one[:500], sigma[:500]), (one[:500], sigma[:500])) is None
-
-
-def test_late_lean_is_reported(ride):
-    log, (first, _) = ride.logs[0], ride.calibrations
-    late = api.CalibrationFile(
-        vehicle_from_sensor=first.vehicle_from_sensor, aligned=True, six_done=True, gyro_delay_s=-0.04
-    )
-    seen = api.compare_rides(log, log, first, late)
-    assert seen.smoothed.delay_s == pytest.approx(0.04, abs=0.01)
-
-
-def test_words_json_and_a_picture(files, found, monkeypatch):
-    said = command.works("compare", files / "A.csv", files / "B.csv", "--plot", files / "C.png").out
-    assert "B begins 0.0" in said and "smoothed: they differ by" in said and "live: they differ by" in said
-    assert (files / "C.png").read_bytes().startswith(b"\x89PNG")
-    monkeypatch.setattr(agreement, "compare_rides", lambda *_: found)
-    data = json.loads(command.works("compare", files / "A.csv", files / "B.csv", "--json").out)
+def test_output_in_words_json_and_a_picture(tmp_path, pair, comparison, monkeypatch):
+    """The command prints words, or JSON, and draws a PNG."""
+    pytest.importorskip("matplotlib")
+    monkeypatch.setattr(agreement, "compare_rides", lambda *_: comparison)
+    for name, log, calibration in zip("AB", *pair):
+        api.write_log(tmp_path / f"{name}.csv", log)
+        write_calibration(tmp_path / f"{name}.cal.json", calibration)
+    files = tmp_path / "A.csv", tmp_path / "B.csv"
+    words = command.works("compare", *files, "--plot", tmp_path / "C.png").out
+    assert "B begins 7.3" in words and "smoothed: they differ by" in words and "live: they differ by" in words
+    assert (tmp_path / "C.png").read_bytes().startswith(b"\x89PNG")
+    data = json.loads(command.works("compare", *files, "--json").out)
     assert set(data) == {"clocks", "live", "smoothed", "remarks"}
-    assert 0.0 < data["smoothed"]["moving_deg"] < 2.0
+    assert data["smoothed"]["delay_s"] == comparison.smoothed.delay_s
+    command.refused(tmp_path, "compare", *files, "--plot", tmp_path / "C.jpg", words="must end in .png")
 
 
-def test_remark_appears_once(ride):
-    log, calibration = ride.logs[0], ride.calibrations[0]
-    stuck = np.where(np.abs(log.t_s - 80.0) < 3.0, np.argmax(log.t_s > 80.0), np.arange(len(log.t_s)))
-    frozen = api.Log(log.t_s, log.accel_g[stuck], log.gyro_dps[stuck])
-    for said in api.compare_rides(frozen, frozen, calibration, calibration).notices.values():
-        (line,) = [one.line() for one in said]  # the log is read in two ways, and each way finds the frozen readings
-        assert line.startswith("the readings froze from 77.0 to 83.0 s")
+def test_another_ride_or_a_missing_calibration_is_refused(tmp_path, pair):
+    other = api.simulate_ride("city", seed=7, seconds=70.0)
+    logs = pair[0][0], api.Log.from_readings(other.readings[::4], other.rate_hz / 4)
+    for name, log in zip("AO", logs):
+        api.write_log(tmp_path / f"{name}.csv", log)
+    write_calibration(tmp_path / "A.cal.json", pair[1][0])
+    files = tmp_path / "A.csv", tmp_path / "O.csv"
+    command.refused(tmp_path, "compare", *files, words="no calibration")
+    calibration_b = "--calibration-b", tmp_path / "A.cal.json"
+    command.refused(tmp_path, "compare", *files, *calibration_b, words="at no time do they turn alike")
 
 
-def test_another_ride_is_refused_in_one_line(files, ride):
-    other = drawn_ride(7, 120.0, ["firm"], "city")
-    api.write_log(files / "O.csv", other.logs[0])
-    write_calibration(files / "O.cal.json", other.calibrations[0])
-    command.refused(files, "compare", files / "A.csv", files / "O.csv", words="at no time do they turn alike")
+@pytest.mark.long
+def test_the_difference_is_that_of_both_errors():
+    """The difference of two leans is at most the sum of their errors."""
+    ride = drawn_ride(1, 130.0, ["firm", "firm"], "street")
+    comparison = api.compare_rides(*ride.logs, *ride.calibrations)
+    for kind, difference in (("live", comparison.live), ("smoothed", comparison.smoothed)):
+        leans = [comparison.leans[f"{kind} {name}"] for name in "AB"]
+        riding = ~np.isnan(leans[0] + leans[1])
+        true = np.interp(comparison.t_s[riding] + ride.logs[0].t_s[0], ride.time_s, ride.lean_deg)
+        errors = [np.sqrt(np.mean((lean[riding] - true) ** 2)) for lean in leans]
+        assert difference is not None and difference.rms_deg <= sum(errors) + 0.01
+        assert difference.slope == pytest.approx(1.0, abs=0.05)
+        assert difference.delay_s == pytest.approx(0.0, abs=0.02)
 
 
-def test_calibration_of_this_mount_is_required(files, ride, tmp_path):
-    api.write_log(tmp_path / "B.csv", ride.logs[1])
-    command.refused(tmp_path, "compare", files / "A.csv", tmp_path / "B.csv", words="no calibration")
-    command.refused(
-        files,
-        *("compare", files / "A.csv", files / "B.csv", "--calibration-b", files / "A.cal.json"),
-        words="degrees apart",
+def test_words_name_each_side():
+    for sign, side, side_of_lean, delay, pace in (
+        (1.0, "after A", "to the right", "later", "slow"),
+        (-1.0, "before A", "to the left", "earlier", "fast"),
+    ):
+        difference = agreement.Difference(90.0, 2.0, sign * 1.5, 1.0, 1.9, 3.0, 1.03, sign * 0.04, 1.2, 0.5, 0.9)
+        clocks = Clocks(sign * 7.25, sign * 80e-6, 0.95, 150.0)
+        first, live, *rest = agreement.words(agreement.Agreement(clocks, None, difference, np.zeros(1), {}))
+        assert "7.25 s " + side in first and "2.5 minutes" in first and "80 ppm " + pace in first
+        assert "hardly anywhere" in live and "1.50 more " + side_of_lean in rest[0]
+        assert rest[1].endswith("1.030 times A's, and 40 ms " + delay)
+        assert "2.00 degrees rms over 1.5 minutes" in rest[0] and "50 %" in rest[2] and "90 %" in rest[2]
+
+
+def test_a_picture_shows_both_leans_and_their_difference(tmp_path, monkeypatch):
+    """matplotlib would show text between two dollar signs as a formula, so names are not parsed."""
+    figures = []
+    figure_class = pytest.importorskip("matplotlib.figure").Figure
+    monkeypatch.setattr(figure_class, "savefig", lambda figure, path, dpi: figures.append((figure, path)))
+    names = ("live A", "live B", "smoothed A", "smoothed B")
+    leans = {name: np.full(3, value) for name, value in zip(names, (1.0, 3.0, 10.0, 17.0))}
+    difference = agreement.Difference(90.0, 2.0, 1.5, 1.0, 1.9, 3.0, 1.03, 0.04, 1.2, 0.5, 0.9)
+    comparison = agreement.Agreement(
+        Clocks(0.0, 0.0, 0.9, 9.0), None, difference, np.array([0.0, 60.0, 120.0]), leans, {}, ("x/$A$.csv", "B.csv")
     )
+    agreement.draw(tmp_path / "c.png", comparison)
+    (figure, _) = figures[0]
+    above, below = figure.axes
+    lines = [(line.get_label(), line.get_ydata()[0]) for line in (*above.lines, *below.lines)]
+    assert lines == [
+        ("smoothed A: $A$.csv", 10.0), ("smoothed B: B.csv", 17.0), ("live, B less A", 2.0),
+        ("smoothed, B less A", 7.0),
+    ]  # fmt: skip
+    assert above.get_xlim() == (0.0, 120.0) and below.xaxis.get_major_formatter()(60.0, 0) == "1:00"
+    assert not any(text.get_parse_math() for axis in figure.axes for text in axis.get_legend().get_texts())

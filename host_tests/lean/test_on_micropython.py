@@ -5,17 +5,10 @@ from pathlib import Path
 import pytest
 from support.mpy import run_tests
 
-MODULES = (
-    "test_meter",
-    "test_filter_states",
-    "test_rest",
-    "test_upright_trim",
-    "test_dive",
-    "test_consistency",
-    "test_known_ride",
-)
+MODULES = "test_known_ride", "test_meter"
+LONG = "test_filter_states", "test_consistency"
 
 
-@pytest.mark.parametrize("module", MODULES)
+@pytest.mark.parametrize("module", [*MODULES, *(pytest.param(module, marks=pytest.mark.long) for module in LONG)])
 def test_under_micropython(module):
     run_tests(Path(__file__).with_name(module))

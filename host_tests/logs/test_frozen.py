@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from kickstand_tools.analysis import report
 from kickstand_tools.api import Log, open_ride, overview, replay
-from kickstand_tools.calibration import drive
 from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.common import unix_port
 from kickstand_tools.common.messages import sentence
-from kickstand_tools.logs import reader
 from kickstand_tools.logs.frozen import FrozenFinder, without_frozen
 from kickstand_tools.logs.reader import read_blocks
 from support import command
@@ -21,53 +20,60 @@ def log_of(readings, hz=HZ) -> Log:
     return Log(np.arange(len(readings)) / hz, readings[:, :3], readings[:, 3:])
 
 
-def frozen(log: Log) -> np.ndarray:
-    return np.concatenate([block.frozen for block in read_blocks(log)])
+def frozen(log: Log):
+    """Return the rows that are frozen, and the notices about them."""
+    notices = []
+    blocks = list(read_blocks(log, notices=notices, axes=False))
+    rows = np.flatnonzero(np.concatenate([block.frozen for block in blocks])).tolist()
+    return rows, [sentence(notice) for notice in notices if notice.code == "frozen-readings"]
 
 
 def riding(seconds, seed=0, digits=5):
     """Return readings with vibration and bends. digits: number of decimals."""
-    chance = np.random.default_rng(seed)
-    n = round(seconds * HZ)
-    values = REST + chance.normal(scale=[0.1, 0.1, 0.1, 4.0, 4.0, 4.0], size=(n, 6))
+    random, n = np.random.default_rng(seed), round(seconds * HZ)
+    values = REST + random.normal(scale=[0.1, 0.1, 0.1, 4.0, 4.0, 4.0], size=(n, 6))
     return np.round(values + 0.2 * np.sin(np.arange(n) / HZ)[:, None], digits)
 
 
 def resting(seconds, seed=0, noise=1.0, digits=5):
-    """Return readings at rest.
-
-    noise: factor on the noise of a phone's sensor, 1 mg and 0.03 deg/s.
-    digits: number of decimals.
-    """
-    chance = np.random.default_rng(seed)
-    return np.round(REST + noise * chance.normal(scale=[0.001] * 3 + [0.03] * 3, size=(round(seconds * HZ), 6)), digits)
+    """Return readings at rest. noise: factor on the noise of a phone's sensor, 1 mg and 0.03 deg/s."""
+    scale = noise * np.array([0.001] * 3 + [0.03] * 3)
+    return np.round(REST + np.random.default_rng(seed).normal(0.0, scale, (round(seconds * HZ), 6)), digits)
 
 
-@pytest.mark.parametrize("blocks_of", [60_000, 130, 7])
-def test_a_freeze_is_marked_to_the_sample(monkeypatch, blocks_of):
-    monkeypatch.setattr(reader, "BLOCK_SAMPLES", blocks_of)
+@pytest.mark.parametrize("size", [60_000, 130, 7])
+def test_a_freeze_is_marked_to_the_sample(small_blocks, size):
+    """At the end of a block, the first frozen samples may count as normal readings."""
+    small_blocks(100, samples=size)
     readings = riding(8)
-    readings[300:500] = readings[300]
-    found = np.flatnonzero(frozen(log_of(readings)))
-    # At the end of a block, the first frozen samples may count as normal readings.
-    first = 301 if blocks_of == 60_000 else found[0]
-    assert found.tolist() == list(range(first, 500))
-    assert first < 360
-    notices = []
-    list(read_blocks(log_of(readings), notices=notices))
-    (notice,) = notices
-    assert sentence(notice).startswith("the readings froze from 3.")
-    assert sentence(notice).endswith("to 5.0 s: they are left out, and the lean filter restarts after each")
+    readings[21], readings[300:500] = readings[20], readings[300]
+    rows, (notice,) = frozen(log_of(readings))
+    first = 301 if size == 60_000 else rows[0]
+    assert rows == list(range(first, 500)) and 301 <= first < 360
+    assert notice.startswith("the readings froze from 3.")
+    assert notice.endswith("to 5.0 s: they are left out, and the lean filter restarts after each")
 
 
 def test_freezes_at_each_end_and_twice_are_marked():
     readings = riding(10)
     readings[:200], readings[400:500], readings[900:] = readings[0], readings[400], readings[900]
-    found = np.flatnonzero(frozen(log_of(readings)))
-    assert found.tolist() == [*range(1, 200), *range(401, 500), *range(901, 1000)]
-    notices = []
-    list(read_blocks(log_of(readings), notices=notices))
-    assert "from 0.0 to 2.0 s and 2 times more, 4.0 s in all" in sentence(notices[0])
+    rows, (notice,) = frozen(log_of(readings))
+    assert rows == [*range(1, 200), *range(401, 500), *range(901, 1000)]
+    assert "from 0.0 to 2.0 s and 2 times more, 4.0 s in all" in notice
+
+
+@pytest.mark.parametrize(("count", "hz", "marked"), [(50, 100, False), (51, 100, True), (9, 10, False), (10, 10, True)])
+def test_half_a_second_and_ten_samples_are_frozen(count, hz, marked):
+    readings = riding(2)
+    readings[50 : 50 + count] = readings[50]
+    assert frozen(log_of(readings, hz))[0] == (list(range(51, 50 + count)) if marked else [])
+
+
+def test_even_the_smallest_change_counts():
+    readings = riding(4)
+    readings[100:180] = readings[100]
+    readings[140, 5] += 1e-10
+    assert frozen(log_of(readings))[0] == []
 
 
 @pytest.mark.parametrize("digits", [5, 3, 1])
@@ -76,26 +82,77 @@ def test_a_vehicle_at_rest_is_not_frozen(digits, noise):
     """The sensor is quiet and the engine is off. With only one decimal, most readings are the same."""
     idling = resting(1, 5, 30.0, digits)  # a running engine shakes the sensor
     readings = np.vstack((riding(5, 1, digits), idling, resting(20, 2, noise, digits), idling, riding(5, 3, digits)))
-    same = np.all(np.diff(readings[600:2600], axis=0) == 0.0, axis=1)
-    assert not np.any(frozen(log_of(readings)))
-    if digits == 1 and noise < 1.0:
-        assert np.all(same)
+    assert frozen(log_of(readings)) == ([], [])
+    assert digits != 1 or noise == 1.0 or not np.any(np.diff(readings[600:2600], axis=0))
 
 
-def test_constant_log_is_not_marked_as_frozen():
-    """A completely frozen log has no normal readings to compare with. test_still_pose.py shows that such a pose is
-    refused."""
-    assert not np.any(frozen(log_of(np.tile(REST, (500, 1)))))
+def test_a_constant_log_is_not_frozen():
+    """A completely frozen log has no normal readings to compare with."""
+    assert frozen(log_of(np.tile(REST, (500, 1)))) == ([], [])
 
 
-def test_log_without_frozen_readings_has_gaps():
+@pytest.mark.parametrize("digits", [5, 1])
+def test_a_freeze_between_bends_is_found_at_any_digits(digits):
+    readings = riding(30, 4, digits)
+    readings[1000:2000] = readings[1000]
+    assert len(frozen(log_of(readings))[0]) == 999
+
+
+def coarse(digit_g, digit_dps, jump_g=0.0, jump_dps=0.0, beyond_s=0.0):
+    """Return readings in steps of these digits. They change, are equal for 0.8 s, and change again around the same
+    values. Farther than beyond_s from the equal readings, they jump."""
+    random, n = np.random.default_rng(1), 280
+    readings = np.hstack((digit_g * random.integers(-2, 3, (n, 3)), digit_dps * random.integers(-2, 3, (n, 3))))
+    readings[100:180] = 0.0
+    distance_s = np.maximum(100 - np.arange(n), np.arange(n) - 179) * 0.01
+    readings[:, 0] += np.where(distance_s > beyond_s, jump_g, 0.0)
+    readings[:, 4] += np.where(distance_s > beyond_s, jump_dps, 0.0)
+    return readings
+
+
+def marks(readings, size):
+    """Return the rows that are frozen, and the notices, for readings in blocks of this size."""
+    finder, n = FrozenFinder(), len(readings)
+    values = np.insert(readings, 3, np.arange(n), axis=1)  # the temperature does not count
+    parts = [slice(begin, begin + size) for begin in range(0, n, size)]
+    found = [finder.mark(10_000 * np.arange(n)[part], values[part]) for part in parts]
+    return np.flatnonzero(np.concatenate(found)).tolist(), [notice.line() for notice in finder.notices()]
+
+
+@pytest.mark.parametrize(
+    ("changes", "marked"),
+    [
+        ((0.0019, 0.06), True), ((0.0021, 0.049), True), ((0.0021, 0.051), False),
+        ((0.0021, 0.051, 0.019), False), ((0.0021, 0.051, 0.025), True),
+        ((0.0021, 0.051, 0.0, 0.49), False), ((0.0021, 0.051, 0.0, 0.56), True),
+        ((0.0021, 0.051, 1.0, 0.0, 0.55), False), ((0.0021, 0.051, 1.0, 0.0, 0.3), True),
+    ],
+)  # fmt: skip
+def test_rounding_hides_the_noise_of_a_bike_at_rest(changes, marked):
+    """Steps of 0.002 g and 0.05 deg/s are coarse. Then the readings within half a second decide: near 0.02 g and 0.5
+    deg/s the bike was at rest."""
+    assert marks(coarse(*changes), 280)[0] == (list(range(101, 180)) if marked else [])
+
+
+@pytest.mark.parametrize("size", [160, 170])
+def test_a_freeze_continues_in_the_next_block(size):
+    """Readings after the freeze do not decide any more, if the first block has found it."""
+    readings = coarse(0.0021, 0.051)
+    readings[:100, 0] += 0.025
+    rows, (notice,) = marks(readings, size)
+    assert rows == list(range(101, 180)) and notice.startswith("the readings froze from 1.0 to 1.8 s:")
+
+
+def test_a_log_without_frozen_readings_has_gaps():
     readings = riding(8)
     whole = log_of(readings)
     assert without_frozen(whole) is whole
     readings[300:500] = readings[300]
-    left = without_frozen(log_of(readings))
-    assert len(left.t_s) == 601
-    assert np.max(np.diff(left.t_s)) == pytest.approx(2.0)
+    log = log_of(readings)
+    rest = without_frozen(log)
+    assert len(rest.t_s) == 601 and np.max(np.diff(rest.t_s)) == pytest.approx(2.0)
+    (block,) = read_blocks(log)
+    assert block.measured.time_us.tolist() == rest.time_us.tolist()
 
 
 def test_commands_report_frozen_readings(tmp_path):
@@ -109,83 +166,29 @@ def test_commands_report_frozen_readings(tmp_path):
     assert words in command.works("replay", ride, "--out", out).err
     lean = analysis_rides.table(out)
     assert np.flatnonzero(np.isnan(lean["lean_deg"])).tolist() == list(range(1301, 1500))
-    said = command.works("report", ride)
-    assert words in said.err and "Readings frozen" in said.out
+    page = command.works("report", ride)
+    assert words in page.err and "Readings frozen" in page.out
     data = report.as_data(overview(open_ride(ride)))
     assert (data["frozen_s"], data["missing_s"]) == (pytest.approx(2.0, abs=0.05), pytest.approx(0.0, abs=0.05))
-    assert words in command.works("export", ride, "--to", "csv", "--out", out).err
+    command.works("export", ride, "--to", "csv", "--out", out)
     assert len(analysis_rides.table(out)) == len(rows) - 199
     command.refused(tmp_path, "report", ride, "--from", "13.5", "--to", "14.5", words="all readings are frozen")
 
 
 @pytest.mark.parametrize("engine", ["cpython", "micropython"])
 def test_every_engine_gets_frozen_readings_as_a_gap(engine):
-    from kickstand_tools.common import unix_port
-
     if engine == "micropython" and not unix_port.available():
         pytest.skip("no MicroPython for this system")
     readings = riding(6)
     readings[200:400] = readings[200]
-    found = replay(log_of(readings), CalibrationFile(aligned=True), engine)
-    assert np.flatnonzero(np.isnan(found.lean_deg)).tolist() == list(range(201, 400))
-    gap = replay(without_frozen(log_of(readings)), CalibrationFile(aligned=True))
-    # MicroPython computes the covariance with 32 bits, CPython with 64.
-    assert np.max(np.abs(found.lean_deg[400:] - gap.lean_deg[201:])) < 0.02
+    lean = replay(log_of(readings), CalibrationFile(aligned=True), engine).lean_deg
+    assert np.flatnonzero(np.isnan(lean)).tolist() == list(range(201, 400))
+    gap = replay(without_frozen(log_of(readings)), CalibrationFile(aligned=True)).lean_deg
+    assert np.max(np.abs(lean[400:] - gap[201:])) < 0.02  # MicroPython computes with 32 bits, CPython with 64
 
 
-def test_calibrate_drive_does_not_use_a_freeze_as_a_stop():
-    readings = riding(60)
-    readings[2000:4000] = readings[2000]
-    log = log_of(readings)
-    log.speed_mps[::100] = 12.0
-    assert len(drive.usable(log, False).t_s) == 4001
-
-
-def test_no_real_log_is_frozen_and_a_freeze_in_one_is_found(shared_data):
-    for path in sorted(shared_data.glob("*.csv.gz")):
-        log = reader.read_log(path)
-        assert log.notices == []
-        assert without_frozen(log) is log
-    log = reader.read_log(shared_data / "motorcycle-ride.csv.gz")
-    begin, end = np.searchsorted(log.t_s, [40.0, 60.0])
-    log.accel_g[begin:end], log.gyro_dps[begin:end] = log.accel_g[begin], log.gyro_dps[begin]
-    assert np.flatnonzero(frozen(log)).tolist() == list(range(begin + 1, end))
-
-
-@pytest.mark.parametrize("digits", [5, 1])
-def test_quiet_phone_in_a_ride_is_not_frozen(digits):
-    readings = riding(30, 4, digits)
-    readings[1000:2000] = readings[1000]
-    assert np.count_nonzero(frozen(log_of(readings))) == 999
-
-
-@pytest.mark.parametrize(("count", "marked"), [(9, 0), (10, 9), (11, 10)])
-@pytest.mark.parametrize("block", [6, 24])
-def test_ten_equal_readings_are_frozen_across_blocks(count, marked, block):
-    """At two readings per second, ten equal readings count as frozen. If a freeze begins in an earlier block, only its
-    readings in later blocks are marked."""
-    readings = np.insert(riding(24 / HZ), 3, 20.0, axis=1)
-    readings[4 : 4 + count] = readings[4]
-    finder, found = FrozenFinder(), []
-    for begin in range(0, 24, block):
-        time_us = 500_000 * np.arange(begin, begin + block)
-        found.append(finder.mark(time_us, readings[begin : begin + block]))
-    where = np.flatnonzero(np.concatenate(found)).tolist()
-    if block == 24:
-        assert where == list(range(5, 5 + marked))
-    else:
-        assert where == (list(range(12, 4 + count)) if marked else [])
-
-
-@pytest.mark.parametrize(("near_s", "marked"), [(0.2, True), (0.4, False)])
-def test_the_adjacent_half_second_shows_if_rounding_hid_noise(near_s, marked):
-    """Readings are rounded to 0.01 g. A mean within 0.025 g of the equal readings counts as near. In the half second
-    before the equal readings, some readings are 0.1 g off, so the mean of this half second is 0.06 g or 0.02 g off."""
-    readings = np.round(np.tile(REST, (400, 1)), 2)
-    readings[:, 3:] = 0.0
-    readings[:100, 0] += 0.1
-    readings[100 - round(near_s * HZ) : 100, 0] -= 0.1
-    readings[:100:2, 3] = 0.1
-    readings[200:, 0] += 0.1
-    readings[200::2, 0] += 0.01
-    assert np.any(frozen(log_of(readings))) == marked
+def test_a_freeze_in_a_real_ride_is_found(shared_data):
+    log = next(read_blocks(shared_data / "motorcycle-ride.csv.gz"))
+    assert not log.frozen.any()
+    log.readings[2000:3000] = log.readings[2000]
+    assert np.flatnonzero(FrozenFinder().mark(log.time_us, log.readings)).tolist() == list(range(2001, 3000))

@@ -1,17 +1,16 @@
-"""A log in memory and its blocks: times, the order of columns, and arrays of wrong shapes."""
+"""A log in memory: shapes and times that are refused, the order of columns, blocks, stretches, names."""
 
 import io
-import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from kickstand_tools.api import Log, Stretch
 from kickstand_tools.calibration.file import calibration_path
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import reader
-from kickstand_tools.logs.log import Log
-from kickstand_tools.logs.reader import is_log, read_blocks, read_log, read_twice
+from kickstand_tools.logs.csv_lines import write_log
+from kickstand_tools.logs.reader import read_blocks, read_log, read_twice, split_stretch
 from kickstand_tools.logs.source import log_stem, name_of, total_bytes
 from support import command
 
@@ -24,13 +23,10 @@ def log_of(n: int, start_s: float = 0.0, **more: Any) -> Log:
 
 def test_times_count_from_the_first_sample():
     log = log_of(3, 1_700_000_000.25)
-    assert log.t_s == pytest.approx([0.0, 0.01, 0.02], abs=1e-6)
-    assert log.start_s == 1_700_000_000.25
-    assert log.time_us.tolist() == [0, 10_000, 20_000]
-    again = log_of(3, 5.0)
-    again = Log(again.t_s, again.accel_g, again.gyro_dps, start_s=again.start_s)
-    assert again.start_s == 5.0
-    assert Log(np.array([2.0, 3.0]), log.accel_g[:2], log.gyro_dps[:2], start_s=10.0).start_s == 12.0
+    assert (log.start_s, log.time_us.tolist()) == (1_700_000_000.25, [0, 10_000, 20_000])
+    later = Log(np.array([2.0, 3.0]), log.accel_g[:2], log.gyro_dps[:2], start_s=10.0)
+    assert (later.start_s, later.t_s.tolist()) == (12.0, [0.0, 1.0])
+    assert (log_of(2, utc_s=[np.nan, 1000.5]).start_utc_s, log.start_utc_s) == (pytest.approx(1000.49), None)
 
 
 def test_the_chips_order_and_the_names_of_the_columns():
@@ -40,110 +36,112 @@ def test_the_chips_order_and_the_names_of_the_columns():
     names = [*command.HEADER.split(","), "speed_mps", "lat_deg", "lon_deg", "utc_s", "temp_c"]
     first = {name: values[0] for name, values in log.columns().items()}
     assert first == dict(zip(names, [0.0, *FORCE, *RATE, 5.0, 52.1, -0.5, 1.7e9, 20.0], strict=True))
-    again = Log.from_readings(log.readings, 50.0, "mine")
-    assert again.t_s.tolist() == [0.0, 0.02]
-    assert again.name == "mine"
-    assert again.readings.tolist() == log.readings.tolist()
-    assert np.isnan(again.speed_mps).all()
-    assert np.isnan(log_of(2).temperature_c).all()
+    copy = Log.from_readings(log.readings, 50.0, "mine")
+    assert (copy.t_s.tolist(), copy.name) == ([0.0, 0.02], "mine")
+    assert copy.readings.tolist() == log.readings.tolist() and np.isnan(copy.speed_mps).all()
+
+
+def test_a_row_without_a_temperature_gets_25_degrees():
+    """The firmware's modules need a temperature."""
+    log = log_of(3, temperature_c=[np.nan, 31.5, np.nan], speed_mps=[np.nan, 4.0, np.nan])
+    rows = list(log.rows())
+    assert [row[1][3] for row in rows] == [25.0, 31.5, 25.0]
+    assert rows[1] == (10_000, [0.1, 0.2, 0.9, 31.5, 1.0, 2.0, 3.0], 4.0)
+    (block,) = read_blocks(log)
+    assert repr(list(block.rows())) == repr(rows)
 
 
 @pytest.mark.parametrize(
-    ("changed", "words"),
+    ("arrays", "words"),
     [
         ({"t_s": [[0.0], [1.0]]}, r"t_s has the shape \(2, 1\), it must be \(2,\)"),
         ({"accel_g": [[0.0, 1.0]] * 2}, r"accel_g has the shape \(2, 2\), it must be \(2, 3\)"),
         ({"gyro_dps": [RATE]}, r"gyro_dps has the shape \(1, 3\), it must be \(2, 3\)"),
         ({"lat_deg": [1.0]}, r"lat_deg has the shape \(1,\), it must be \(2,\)"),
-        ({"speed_mps": [1.0]}, r"speed_mps has the shape \(1,\), it must be \(2,\)"),
         ({"t_s": [0.0, 0.0]}, "must increase"),
         ({"t_s": [1.0, 0.5]}, "must increase"),
         ({"t_s": [0.0, 4e-7]}, "must increase"),  # both times round to the same microsecond
     ],
 )
-def test_arrays_that_do_not_fit_are_refused(changed, words):
+def test_arrays_that_do_not_fit_are_refused(arrays, words):
     with pytest.raises(InputError, match="the log: .*" + words):
-        Log(**({"t_s": [0.0, 1.0], "accel_g": [FORCE] * 2, "gyro_dps": [RATE] * 2} | changed))
+        Log(**({"t_s": [0.0, 1.0], "accel_g": [FORCE] * 2, "gyro_dps": [RATE] * 2} | arrays))
 
 
-def test_a_log_in_memory_comes_in_blocks(monkeypatch):
-    monkeypatch.setattr(reader, "BLOCK_SAMPLES", 4)
-    done = []
+def test_a_log_in_memory_comes_in_blocks(small_blocks):
+    small_blocks(100, samples=4)
+    progress = []
     log = log_of(10, 7.0, speed_mps=[5.0, *[np.nan] * 9])
-    blocks = list(read_blocks(log, progress=lambda *both: done.append(both)))
-    assert done == [(4, 10), (8, 10), (10, 10)]
-    assert [len(block.time_us) for block in blocks] == [4, 4, 2]
+    blocks = list(read_blocks(log, progress=lambda *done: progress.append(done)))
+    assert progress == [(4, 10), (8, 10), (10, 10)] and [len(block.time_us) for block in blocks] == [4, 4, 2]
     assert np.concatenate([block.time_us for block in blocks]).tolist() == log.time_us.tolist()
-    assert not any(block.has_temp for block in blocks)
-    assert np.concatenate([block.speed_mps for block in blocks])[0] == 5.0
-    assert [block.start_s for block in blocks] == [7.0] * 3
+    assert [block.start_s for block in blocks] == [7.0] * 3 and not blocks[0].has_temp
+    assert blocks[0].speed_mps[0] == 5.0 and blocks[1].t_s == pytest.approx([0.04, 0.05, 0.06, 0.07])
     assert blocks[1].time_text == ["7.040000", "7.050000", "7.060000", "7.070000"]
-    assert blocks[1].t_s == pytest.approx([0.04, 0.05, 0.06, 0.07])
 
 
-def text_of(n: int, header: str = command.HEADER, row: str = "{t:.2f},0.1,0.2,0.9,1,2,3") -> str:
-    return "\n".join([header, *[row.format(t=k / 100) for k in range(n)]]) + "\n"
+@pytest.mark.parametrize(
+    ("from_s", "to_s", "first", "last"),
+    [(0.2, 0.5, 20, 50), (-0.5, None, 50, 100), (None, -0.9, 0, 10), (0.0, 9.0, 0, 100), (-0.5, -0.4, 50, 60)],
+)
+def test_a_stretch_holds_both_of_its_ends(from_s, to_s, first, last):
+    stretch = Stretch(log_of(101, 7.0), from_s, to_s)
+    log = read_log(stretch)
+    assert log.start_s == pytest.approx(7.0 + first / 100.0)
+    assert log.time_us.tolist() == [10_000 * k for k in range(last - first + 1)]
+    whole, same = split_stretch(stretch)
+    assert whole is stretch.source and same is not None
+    assert same.from_s == (None if from_s is None else pytest.approx(first / 100.0))
 
 
-def test_time_may_be_in_any_column():
-    text = text_of(3, "note,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps,t_s", '"a, b",0.1,0.2,0.9,1,2,3, {t:.3f} ')
-    (block,) = read_blocks(io.StringIO(text))
-    assert block.time_text == ["0.000", "0.010", "0.020"]
-    assert block.time_us.tolist() == [0, 10_000, 20_000]
+@pytest.mark.parametrize(
+    ("from_s", "to_s", "words"),
+    [
+        (0.5, 0.5, "the stretch ends before it begins"),
+        (None, -20.0, "the stretch ends before it begins"),
+        (1.5, None, r"no samples in this stretch: the log is 1\.0 s long"),
+        (0.2, 0.205, "too short: 1 samples, at least 2 are needed"),
+    ],
+)
+def test_a_stretch_without_samples_is_refused(from_s, to_s, words):
+    with pytest.raises(InputError, match=words):
+        read_log(Stretch(log_of(101), from_s, to_s))
 
 
-def test_optional_columns_may_be_empty_anywhere():
-    header = "t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps,speed_mps,temp_c"
-    text = header + "\n0,0,1,0,0,0,0,,\n1,0,1,0,0,0,0,5,\n2,0,1,0,0,0,0,,20.5\n3,0,1,0,0,0,0,6,21\n"
-    log = read_log(io.BytesIO(text.encode()))
-    assert log.speed_mps == pytest.approx([np.nan, 5.0, np.nan, 6.0], nan_ok=True)
-    assert log.temperature_c == pytest.approx([np.nan, np.nan, 20.5, 21.0], nan_ok=True)
+def test_an_open_file_is_read_once_and_kept(text_log):
+    rows = [f"{k / 4},0,1,0,0,0,{k}" for k in range(9)]
+    for source in (text_log(*rows), Stretch(text_log(*rows), 0.5, 1.5)):
+        twice = read_twice(source)
+        assert [len(read_log(twice).t_s) for _ in range(2)] == [5 if isinstance(twice, Stretch) else 9] * 2
+    log = log_of(5)
+    assert read_twice(log) is log and read_twice("log.csv") == "log.csv" and split_stretch(log) == (log, None)
 
 
-def test_minimum_number_of_samples_is_required():
-    assert len(read_log(log_of(300), 300).t_s) == 300
+def test_the_least_number_of_samples_is_checked():
+    assert len(read_log(log_of(300), 300).t_s) == 300 and len(read_log(log_of(1), minimum=1).t_s) == 1
     with pytest.raises(InputError, match="the log is too short: 299 samples, at least 300 are needed"):
         read_log(log_of(299), 300)
+    with pytest.raises(InputError, match="too short: 1 samples, at least 2 are needed"):
+        list(read_blocks(log_of(1)))
 
 
-def test_an_open_file_is_read_once_and_kept():
-    source = io.StringIO(text_of(5))
-    kept = read_twice(source)
-    assert isinstance(kept, Log)
-    assert len(kept.t_s) == 5
-    assert read_twice(kept) is kept
-    assert read_twice("log.csv") == "log.csv"
+def test_a_log_has_a_largest_number_of_samples(monkeypatch):
+    monkeypatch.setattr(reader, "MOST_SAMPLES", 100)
+    assert len(read_log(log_of(100)).t_s) == 100
+    with pytest.raises(InputError, match="million samples: kickstand cut writes a part of it"):
+        read_log(log_of(101))
 
 
-def test_sources_have_the_expected_names():
-    assert log_stem("rides/monday.csv.gz") == "monday"
-    for name in ("monday.csv", "monday", "monday.zip", "monday.VBO", "monday.txt.gz", "monday.parquet"):
+def test_sources_have_their_names(tmp_path, monkeypatch):
+    for name in ("monday.csv", "monday", "monday.zip", "monday.VBO", "monday.txt.gz", "rides/monday.parquet"):
         assert log_stem(name) == "monday", name
-    assert name_of(io.StringIO()) == "the log"
-    assert name_of(log_of(2, name="mine")) == "mine"
+    assert log_stem("b.c.zip") == "b.c" and log_stem("b.json") == "b.json"
+    assert name_of(io.StringIO()) == "the log" and name_of(log_of(2, name="mine")) == "mine"
+    write_log(tmp_path / "a.csv", log_of(2))
+    assert total_bytes(tmp_path / "a.csv") == (tmp_path / "a.csv").stat().st_size
     assert total_bytes(io.StringIO("abc")) == total_bytes("there is none") == 0
-
-
-def test_stem_of_the_current_folder_is_its_name(tmp_path, monkeypatch):
     (tmp_path / "EXPORT" / "in").mkdir(parents=True)
     monkeypatch.chdir(tmp_path / "EXPORT" / "in")
     assert log_stem(".") == "in" and log_stem("..") == "EXPORT"
-    assert calibration_path(Path(".")) == tmp_path / "EXPORT" / "in.cal.json"
-    assert calibration_path(Path("..")) == tmp_path / "EXPORT.cal.json"
-    assert calibration_path(Path("RIDE.csv")) == Path("RIDE.cal.json")
-
-
-def test_long_line_is_refused_quickly(tmp_path):
-    """The line has 1 MB. A reader that searches its end again after each byte would take minutes."""
-    (tmp_path / "long.csv").write_text("[" + "0.12345," * 125_000)
-    begin_s = time.process_time()
-    assert not is_log(tmp_path / "long.csv")
-    assert time.process_time() - begin_s < 1.0
-
-
-@pytest.mark.parametrize(("blank", "rows"), [("\n", 2), ("\n" * 2_000_000, 2), ("\n", 0), ("\n" * 2_000_000, 0)])
-def test_blank_lines_below_the_header_are_skipped(tmp_path, blank, rows):
-    """The blank lines may fill more than one block."""
-    header, *given = text_of(2).splitlines(keepends=True)
-    (tmp_path / "log.csv").write_text(header + blank + "".join(given[:rows]))
-    assert is_log(tmp_path / "log.csv") == (rows > 0)
+    for folder, file in ((".", tmp_path / "EXPORT" / "in.cal.json"), ("..", tmp_path / "EXPORT.cal.json")):
+        assert calibration_path(type(tmp_path)(folder)) == file

@@ -1,127 +1,174 @@
-"""The pixels of the gauge: the side of the lean, the maxima, unknown values, transparency. Also tests the values that
-the gauge gets."""
+"""The gauge's pictures: sides, sizes, transparency, words, numbers, and unknown values.
+
+The places of the words are design, so a word is searched for in the whole picture.
+"""
 
 import math
 
 import numpy as np
 import pytest
-
-pytest.importorskip("PIL")
-
+from kickstand_tools.overlay import parts
 from kickstand_tools.overlay.gauge import Gauge
-from kickstand_tools.overlay.parts import ACCENT
-from kickstand_tools.overlay.shown import Shown
+from kickstand_tools.overlay.parts import ACCENT, DIM, WHITE
 
 NAN = math.nan
-KNOWN = {"forward_g": 0.0, "left_g": 0.0, "speed_mps": 20.0, "left_deg": 0.0, "right_deg": 0.0}
+HEIGHT = 480  # height of a video in pixels
+SIZES = 27.0, 24.0, 8.0, 7.5, 7.0, 6.5  # heights of the gauge's texts in percent of its height
+VALUES = {"lean_deg": 0.0, "forward_g": 0.0, "left_g": 0.0, "speed_mps": 20.0, "left_deg": 0.0, "right_deg": 0.0}
 
 
 @pytest.fixture(scope="module")
 def gauge() -> Gauge:
-    return Gauge(720)
+    return Gauge(HEIGHT)
 
 
-def amber(gauge: Gauge, **values: float) -> np.ndarray:
+def drawn(gauge, **values) -> np.ndarray:
+    return np.asarray(gauge.picture(**(VALUES | values)), dtype=int)
+
+
+def amber(gauge, **values) -> np.ndarray:
     """Return True for each pixel in the colour of the lean, shape (height, width)."""
-    picture = np.asarray(gauge.picture(**(KNOWN | values)), dtype=int)
-    return np.abs(picture[..., :3] - ACCENT[:3]).max(axis=2) < 12
+    return np.abs(drawn(gauge, **values)[..., :3] - ACCENT[:3]).max(axis=2) < 12
 
 
-def on_dial(gauge: Gauge, found: np.ndarray) -> tuple[int, int]:
-    """Count the pixels of the dial above its ends. Return (number left of the middle, number right of it)."""
-    middle, end = round(0.6 * gauge.height), round(0.62 * gauge.height)
-    return int(found[:end, :middle].sum()), int(found[:end, middle : round(1.15 * gauge.height)].sum())
+def dial_sides(gauge, found) -> list[int]:
+    """Count the pixels above the dial's ends, on the left and on the right of its middle."""
+    middle = round(0.6 * gauge.height)
+    dial = found[: round(0.62 * gauge.height), : 2 * middle]
+    return [int(dial[:, :middle].sum()), int(dial[:, middle:].sum())]
+
+
+def contains(picture, part) -> bool:
+    """Return True if a part is somewhere in the picture. A neighbour may cover a little of its edge."""
+    part = np.asarray(part, dtype=int)
+    opaque = np.argwhere(part[..., 3] == 255)
+    opaque = opaque[:: max(1, len(opaque) // 80)]
+    picture, colours = (values[..., :3] @ [1, 256, 65536] for values in (picture, part))
+    height, width = (size - largest for size, largest in zip(picture.shape, opaque.max(axis=0)))
+    same = np.zeros((height, width), dtype=int)
+    for row, column in opaque:
+        same += picture[row : row + height, column : column + width] == colours[row, column]
+    return bool(same.max() > 0.93 * len(opaque))
+
+
+def says(picture, words, colour=WHITE) -> bool:
+    """Return True if the picture contains these words in one of the gauge's sizes."""
+    unit = Gauge(HEIGHT).height / 100.0
+    return any(contains(picture, parts.text(words, round(size * unit, 1), colour)) for size in SIZES)
 
 
 @pytest.mark.parametrize("lean", [3.0, 20.0, 45.0, 60.0, 80.0])
 def test_lean_fills_its_side_of_the_dial(gauge, lean):
-    left, right = on_dial(gauge, amber(gauge, lean_deg=lean))
-    other = on_dial(gauge, amber(gauge, lean_deg=-lean))
-    assert left < 20 < right
-    assert other[1] < 20 < other[0]
-    whole = on_dial(gauge, amber(gauge, lean_deg=60.0))[1]
-    assert right == pytest.approx(whole * min(lean, 60.0) / 60.0, rel=0.1, abs=40)
+    left, right = dial_sides(gauge, amber(gauge, lean_deg=lean))
+    assert left <= 3 < right and dial_sides(gauge, amber(gauge, lean_deg=-lean)) == pytest.approx([right, left], abs=40)
+    full = dial_sides(gauge, amber(gauge, lean_deg=60.0))[1]
+    assert right == pytest.approx(full * min(lean, 60.0) / 60.0, rel=0.1, abs=40)
 
 
-def test_the_bike_leans_to_that_side(gauge):
-    """The rider's head is on the side of the lean. The test finds the head by the white pixels between the tyre and the
-    dial."""
+def test_the_bike_leans_to_that_side_up_to_75_degrees(gauge):
+    """The rider's head is on the side of the lean: white pixels between the tyre and the dial."""
     rows, middle = slice(round(0.25 * gauge.height), round(0.5 * gauge.height)), round(0.6 * gauge.height)
+
+    def bike(lean_deg):
+        changed = np.abs(drawn(gauge, lean_deg=lean_deg) - drawn(gauge, lean_deg=NAN)).max(axis=2) > 100
+        return np.argwhere((changed & (drawn(gauge, lean_deg=lean_deg)[..., :3].min(axis=2) > 240))[rows])
+
     for lean in (-35.0, 35.0):
-        picture, still = (np.asarray(gauge.picture(**(KNOWN | {"lean_deg": d})), dtype=int) for d in (lean, math.nan))
-        changed = np.abs(picture - still).max(axis=2) > 100
-        changed &= picture[..., :3].min(axis=2) > 240
-        columns = np.argwhere(changed[rows])[:, 1]
-        assert len(columns) > 200
-        assert np.sign(columns.mean() - middle) == np.sign(lean)
+        assert np.sign(bike(lean)[:, 1].mean() - middle) == np.sign(lean)
+    assert np.array_equal(bike(75.0), bike(90.0)) and not np.array_equal(bike(75.0), bike(60.0))
 
 
-def test_name_of_the_side_is_lit(gauge):
-    below = slice(round(0.75 * gauge.height), None)
-    for lean, side in ((-25.0, 0), (25.0, 1)):
-        found = amber(gauge, lean_deg=lean)[below, : round(1.2 * gauge.height)]
-        halves = np.array_split(found, 2, axis=1)
-        assert halves[side].sum() > 100
-        assert halves[1 - side].sum() == 0
-
-
-def test_unknown_values_are_not_drawn(gauge):
-    unknown = gauge.picture(NAN, NAN, NAN, NAN, 0.0, 0.0)
-    assert not amber(gauge, lean_deg=NAN, forward_g=NAN, left_g=NAN, speed_mps=NAN).any()
-    zero = gauge.picture(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    assert np.any(np.asarray(unknown) != np.asarray(zero))
-    assert np.array_equal(np.asarray(unknown), np.asarray(gauge.picture(NAN, NAN, 0.5, NAN, 0.0, 0.0)))
-
-
-def test_spot_moves_in_the_direction_of_the_acceleration(gauge):
-    """The dot moves up when the bike speeds up, down when it brakes, and to the left in a left turn."""
+def test_spot_moves_as_a_passenger_feels_the_forces(gauge):
+    """The spot is up when the bike accelerates, and left for a force to the left. It stays within 1.2 g."""
     side = round(1.2 * gauge.height)
 
-    def spot(**forces: float) -> np.ndarray:
-        return np.argwhere(amber(gauge, lean_deg=0.0, **forces)[:, side:]).mean(axis=0)
+    def spot(forward_g=0.0, left_g=0.0):
+        return np.argwhere(amber(gauge, forward_g=forward_g, left_g=left_g)[:, side:]).mean(axis=0)
 
-    (down, along), (braked, _), (_, left), (far, _) = (
-        spot(),
-        spot(forward_g=-0.8),
-        spot(left_g=0.8),
-        spot(forward_g=-7.0),
-    )
-    assert braked > down + 20
-    assert left < along - 20
-    assert far == pytest.approx(spot(forward_g=-1.2)[0], abs=1)
-    assert spot(forward_g=0.5)[0] < down - 10
-
-
-def test_maxima_have_their_marks(gauge):
-    plain, marked = (
-        np.asarray(gauge.picture(0.0, 0.0, 0.0, 20.0, *maxima), dtype=int) for maxima in ((0.0, 0.0), (0.0, 44.0))
-    )
-    changed = np.argwhere(np.abs(plain - marked).max(axis=2) > 100)
-    assert len(changed) > 20
-    assert np.all(changed[:, 1] > 0.6 * gauge.height)
+    at_rest, g = spot(), (spot(forward_g=-0.6) - spot())[0] / 0.6
+    assert g > 8.0  # one g in pixels
+    for forward_g, left_g, seen_g in [
+        (0.6, 0.0, (0.6, 0.0)),
+        (0.0, 0.6, (0.0, 0.6)),
+        (0.0, -0.6, (0.0, -0.6)),
+        (-5.0, 0.0, (-1.2, 0.0)),
+        (3.0, -4.0, (0.72, -0.96)),
+    ]:
+        assert spot(forward_g, left_g) - at_rest == pytest.approx(-g * np.array(seen_g), abs=1.7), (forward_g, left_g)
+    for unknown in ({"forward_g": NAN}, {"left_g": NAN}):
+        assert not amber(gauge, **unknown)[:, side:].any()
 
 
-@pytest.mark.parametrize("height, pixels", [(240, 108), (480, 216), (720, 216), (1080, 324), (2160, 648)])
-def test_gauge_scales_with_the_video_and_has_clear_corners(height, pixels):
-    gauge = Gauge(height, has_speed=height != 480, mph=True)
-    picture = np.asarray(gauge.picture(30.0, -0.2, 0.5, 20.0, 12.0, 31.0))
-    assert picture.shape == (gauge.height, gauge.width, 4)
-    assert gauge.height == pixels
-    assert gauge.width % 2 == gauge.height % 2 == 0
-    assert picture[0, 0, 3] == picture[-1, -1, 3] == 0
+@pytest.mark.parametrize(
+    ("values", "white", "amber_words", "grey"),
+    [
+        (
+            {"lean_deg": 31.4, "forward_g": 0.25, "left_g": -0.5, "left_deg": 12.4, "right_deg": 44.6},
+            ["60", "30", "km/h", "31", "max 12°", "max 45°", "72", "ACCEL 0.25 g", "RIGHT 0.50 g"],
+            ["RIGHT"],
+            ["LEFT"],
+        ),
+        (
+            {"lean_deg": -5.0, "forward_g": -0.9, "left_deg": 0.51},
+            ["5", "max --", "max 1°", "BRAKE 0.90 g", "SIDE 0.00 g"],
+            ["LEFT"],
+            ["RIGHT"],
+        ),
+        ({"lean_deg": 0.5, "left_g": 0.006, "right_deg": 0.5}, ["max --", "LEFT 0.01 g"], [], ["LEFT", "RIGHT"]),
+        ({"left_g": 0.004}, ["SIDE 0.00 g"], [], ["LEFT", "RIGHT"]),
+        ({"lean_deg": NAN, "left_g": NAN, "speed_mps": NAN}, ["--", "-- g"], [], ["LEFT", "RIGHT"]),
+    ],
+)
+def test_words_and_numbers(gauge, values, white, amber_words, grey):
+    picture = drawn(gauge, **values)
+    for words, colour in ((white, WHITE), (amber_words, ACCENT), (grey, DIM)):
+        assert [text for text in words if not says(picture, text, colour)] == []
+    assert not any(says(picture, text, ACCENT) for text in {"LEFT", "RIGHT"} - set(amber_words))
+    unit = gauge.height / 100.0
+    arrows = [side for side in (False, True) if contains(picture, parts.arrow(8.0 * unit, side, ACCENT))]
+    assert arrows == [side == "RIGHT" for side in amber_words]
+
+
+def test_speed_has_its_unit_and_may_be_missing():
+    in_miles = drawn(Gauge(HEIGHT, mph=True), speed_mps=44.704)
+    assert says(in_miles, "100") and says(in_miles, "mph") and not says(in_miles, "km/h")
+    without = drawn(Gauge(HEIGHT, has_speed=False), speed_mps=20.0)
+    assert not says(without, "72") and not says(without, "km/h")
+
+
+def test_unknown_values_draw_nothing(gauge):
+    unknown = dict.fromkeys(("lean_deg", "forward_g", "left_g", "speed_mps"), NAN)
+    assert not amber(gauge, **unknown).any()
+    assert np.array_equal(drawn(gauge, **unknown), drawn(gauge, **(unknown | {"left_g": 0.5})))
+
+
+def test_maxima_have_a_mark_on_their_side(gauge):
+    middle = 0.6 * gauge.height
+    for side, name in ((-1, "left_deg"), (1, "right_deg")):
+        changed = np.argwhere(np.abs(drawn(gauge) - drawn(gauge, **{name: 44.0})).max(axis=2) > 100)
+        on_dial = changed[changed[:, 0] < 0.5 * gauge.height]
+        assert len(on_dial) > 5 and (np.sign(on_dial[:, 1] - middle) == side).all()
+
+
+@pytest.mark.parametrize(
+    ("video_height", "height"), [(200, 90), (240, 108), (480, 216), (600, 216), (720, 216), (1080, 324)]
+)
+def test_gauge_scales_with_the_video_and_has_clear_corners(video_height, height):
+    """It has 30 % of the video's height, but is at least 216 pixels high while that is at most 45 %."""
+    gauge = Gauge(video_height, mph=True)
+    picture = drawn(gauge, lean_deg=30.0)
+    assert (gauge.height, *picture.shape) == (height, height, gauge.width, 4) and gauge.width % 2 == height % 2 == 0
+    assert picture[0, 0, 3] == picture[-1, -1, 3] == 0 and picture[..., 3].max() == 255
     assert 50 < picture[gauge.height // 2, 2, 3] < 200  # the panel is partly transparent
-    assert picture[..., 3].max() == 255
 
 
-def test_values_are_interpolated_but_not_across_gaps():
-    t_s = np.array([0.0, 0.1, 0.2, 1.0, 1.1])
-    none = np.full(5, NAN)
-    speed = np.array([10.0, NAN, NAN, 12.0, NAN])
-    lean = np.array([0.0, 10.0, NAN, 20.0, 30.0])
-    seen = Shown(t_s, lean, none, none, speed, np.zeros(5), np.array([0.0, 10.0, 10.0, 20.0, 30.0]))
-    at = seen.at(np.array([-1.0, 0.05, 0.15, 0.6, 1.05, 5.0]))
-    assert np.allclose(at.lean_deg, [NAN, 5.0, NAN, NAN, 25.0, NAN], equal_nan=True)
-    assert at.speed_mps[1] == pytest.approx(10.1)
-    assert np.isnan(at.speed_mps[[0, 5]]).all()
-    # The largest lean to the right so far, at each sample
-    assert at.right_deg.tolist() == [0.0, 0.0, 10.0, 10.0, 20.0, 30.0]
+def test_parts_are_drawn_completely_and_symmetrically():
+    for words in ("31", "km/h", "max 45°", "BRAKE 0.90 g"):
+        alpha = np.asarray(parts.text(words, 20.0, WHITE))[..., 3]
+        edges = alpha[0].max(), alpha[-1].max(), alpha[:, 0].max(), alpha[:, -1].max()
+        assert max(edges) < 255 and alpha.max() == 255, words  # no letter is cut off
+    spot, bike = np.asarray(parts.spot(20, ACCENT)), np.asarray(parts.bike(100.0))
+    assert np.array_equal(spot, spot[::-1]) and np.array_equal(spot, spot[:, ::-1])
+    assert np.abs(bike.astype(int) - bike[:, ::-1]).mean() < 3.0
+    rows = np.flatnonzero(bike[..., 3].max(axis=1) == 255)
+    assert rows[-1] == pytest.approx(len(bike) / 2, abs=3)  # the tyre touches the ground in the middle

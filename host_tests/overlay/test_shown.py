@@ -1,96 +1,104 @@
-"""The values of a ride that the gauge shows."""
+"""The values of a ride that the gauge shows at each moment: interpolation, gaps, maxima, trust."""
 
-from dataclasses import replace
+import math
+from dataclasses import fields
 
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.analysis.summary import HELD_S
-from kickstand_tools.joining.motion import STEP_S, CellMotion
-from kickstand_tools.overlay.camera_match import camera_offset_s
-from kickstand_tools.overlay.gpmf import Telemetry
-from kickstand_tools.overlay.shown import _maximum, shown
-from support.recordings import analysis_rides
+from kickstand_tools.analysis.channels import Channels
+from kickstand_tools.analysis.ride import Ride
+from kickstand_tools.overlay.shown import Shown, shown
+
+NAN = math.nan
 
 
-@pytest.fixture(scope="module")
-def ride(tmp_path_factory):
-    return analysis_rides.short(tmp_path_factory.mktemp("ride"), rate_hz=100, speed_hz=1)
+class KnownRide(Ride):
+    """A ride whose channels are known: 100 samples per second. Other channels are 0."""
+
+    def __init__(self, **columns):
+        count = len(next(iter(columns.values())))
+        named = {field.name: columns.get(field.name, np.zeros(count)) for field in fields(Channels)}
+        self.known = Channels(**(named | {"t_s": np.arange(count) / 100.0}))
+
+    def blocks(self, progress=None, notices=None):
+        yield self.known
+
+
+def values_at(times_s, at_s, **columns) -> Shown:
+    """Return the values at at_s of a ride with these times and columns. Missing columns are unknown."""
+    unknown = np.full(len(times_s), NAN)
+    names = ("lean_deg", "forward_g", "left_g", "speed_mps", "left_deg", "right_deg")
+    given = {name: np.array(columns.get(name, unknown), dtype=float) for name in names}
+    return Shown(np.array(times_s, dtype=float), **given).at(np.array(at_s, dtype=float))
+
+
+def test_a_lean_is_shown_up_to_a_gap_of_200_ms():
+    values = values_at(
+        [0.0, 0.2, 0.41, 0.5],
+        [-0.11, -0.09, 0.1, 0.3, 0.5, 0.54, 0.56],
+        lean_deg=[0.0, 2.0, 4.0, 5.0],
+        left_g=[0.0, 0.2, 0.4, 0.5],
+        left_deg=[1.0, 2.0, 3.0, 4.0],
+    )
+    assert values.lean_deg == pytest.approx([NAN, -0.9, 1.0, NAN, 5.0, 5.0 + 4 / 9, NAN], nan_ok=True)
+    assert values.left_g == pytest.approx(values.lean_deg / 10.0, nan_ok=True)
+    assert values.left_deg.tolist() == [0.0, 0.0, 1.0, 2.0, 4.0, 4.0, 4.0]  # the largest so far
+    assert not values.has_speed
+
+
+def test_a_speed_is_shown_between_speeds_up_to_3_s_apart():
+    """The speeds are at 0, 3 and 6.5 s. Half a step after the last speed, nothing is shown."""
+    times_s, speed = np.arange(0.0, 8.0, 0.5), np.full(16, NAN)
+    speed[[0, 6, 13]] = 10.0, 16.0, 20.0
+    at_s = [-1.6, -1.4, 0.0, 1.5, 3.0, 5.0]
+    assert values_at(times_s, at_s, speed_mps=speed).speed_mps == pytest.approx(
+        [NAN, 7.2, 10.0, 13.0, NAN, NAN], nan_ok=True
+    )
+    speed[3:] = NAN
+    assert np.isnan(values_at(times_s, times_s, speed_mps=speed).speed_mps).all()  # one speed has no neighbour
+
+
+def test_values_are_in_the_order_of_the_gauge():
+    names = ("lean_deg", "forward_g", "left_g", "speed_mps", "left_deg", "right_deg")
+    moments = values_at([0.0, 0.1], [0.05], **{name: [k, k] for k, name in enumerate(names)})
+    assert [value[0] for value in moments.values] == pytest.approx([0, 1, 2, 3, 4, 5])
+
+
+def test_a_maximum_must_last_and_be_trusted():
+    """At 100 samples per second a maximum needs sixteen samples in a row, which last 0.15 s."""
+    lean = np.full(200, 5.0)
+    lean[20:35], lean[50:66], lean[80:120], lean[150:166] = 40.0, 30.0, 60.0, -20.0
+    sure = np.ones(200)
+    sure[80:120] = 0.0
+    values = shown(KnownRide(lean_deg=lean, sure=sure))
+    assert values.right_deg[[14, 15, 34, 64, 65, 199]].tolist() == [0.0, 5.0, 5.0, 5.0, 30.0, 30.0]
+    assert values.left_deg[[164, 165]].tolist() == [0.0, 20.0]
+    assert np.isnan(values.lean_deg[80:120]).all() and values.lean_deg[120] == 5.0
+
+
+def test_forces_are_means_over_300_ms():
+    force = np.where(np.arange(200) < 100, 0.0, 0.6)
+    values = shown(KnownRide(forward_g=force, lateral_g=-force, sure=np.ones(200)))
+    assert values.forward_g[[80, 100, 120]] == pytest.approx([0.0, 0.3, 0.6], abs=0.02)
+    assert 0.0 < values.forward_g[95] < 0.3 and values.left_g == pytest.approx(-values.forward_g)
 
 
 def test_shown_values_are_those_of_the_display(ride):
-    seen, lean = shown(api.open_ride(ride)), api.vehicle_channels(ride)
-    sure = lean.trusted
-    assert np.array_equal(seen.t_s, lean.t_s)
-    assert np.array_equal(seen.lean_deg[sure], lean.lean_deg[sure])
-    assert np.all(np.isnan(seen.lean_deg[~sure]))
-    assert seen.right_deg[-1] == pytest.approx(np.nanmax(seen.lean_deg), abs=0.5)
-    assert seen.left_deg[-1] == pytest.approx(-np.nanmin(seen.lean_deg), abs=0.5)
-    assert seen.has_speed
-    braking = seen.at(np.array([seen.t_s[-1] - 6.0]))
-    assert braking.forward_g[0] < -0.2
-    turning = np.abs(seen.lean_deg) > 25.0
-    # In a right turn the force is to the right
-    assert np.all(np.sign(seen.left_g[turning]) == -np.sign(seen.lean_deg[turning]))
+    values, lean = shown(api.open_ride(ride)), api.vehicle_channels(ride)
+    assert np.array_equal(values.t_s, lean.t_s) and values.has_speed
+    assert np.array_equal(values.lean_deg, np.where(lean.trusted, lean.lean_deg, NAN), equal_nan=True)
+    assert values.right_deg[-1] == pytest.approx(np.nanmax(values.lean_deg), abs=0.5)
+    assert values.at(values.t_s[-1:] - 6.0).forward_g[0] < -0.2  # it brakes
+    turning = np.abs(values.lean_deg) > 25.0
+    assert np.all(np.sign(values.left_g[turning]) == -np.sign(values.lean_deg[turning]))
+    smoothed = shown(api.open_ride(ride, smoothed=True))
+    assert np.nanmax(np.abs(smoothed.lean_deg - values.lean_deg)) > 0.5  # only smoothing uses later readings
 
 
-def test_brief_or_untrusted_lean_is_no_maximum(ride, monkeypatch):
-    opened = api.open_ride(ride)
-    blocks = list(opened.blocks())
-
-    def changed():
-        for block in blocks:
-            at = np.searchsorted(block.t_s, 2.0)
-            block.lean_deg[at : at + 10] = 64.0  # 0.1 s
-            block.lean_deg[at + 100 : at + 150] = -64.0
-            block.sure[at + 100 : at + 150] = 0.0
-            yield block
-
-    monkeypatch.setattr(type(opened), "blocks", lambda self, progress=None, notices=None, mount=None: changed())
-    seen = shown(opened)
-    early = seen.t_s < 4.0
-    assert seen.right_deg[early].max() < 5.0
-    assert seen.left_deg[early].max() < 5.0
-    assert np.isnan(seen.at(np.array([3.2])).lean_deg[0])
-
-
-def test_contradicted_calibration_is_reported_by_overlay(ride):
-    """Like every command with a calibration, `overlay` reports a contradicted calibration."""
-    calibration = api.read_calibration(ride.with_name("RIDE.cal.json"))
-    backward = replace(calibration, vehicle_from_sensor=np.diag([-1.0, 1.0, -1.0]))
-    for given, codes in ((calibration, []), (backward, ["forward-exchanged"])):
+def test_contradicted_calibration_is_noticed(ride):
+    turned_deg = api.CalibrationFile(vehicle_from_sensor=np.diag([-1.0, 1.0, -1.0]), aligned=True)
+    for calibration, codes in ((api.CalibrationFile(aligned=True), []), (turned_deg, ["forward-exchanged"])):
         notices: list[api.Message] = []
-        shown(api.open_ride(ride, given), notices=notices)
+        shown(api.open_ride(ride, calibration), notices=notices)
         assert [notice.code for notice in notices] == codes
-
-
-def test_a_maximum_must_last_and_unknown_leans_count_as_none():
-    """At 100 samples per second and HELD_S = 0.15 s, a maximum needs sixteen samples in a row. The first lean has only
-    fifteen."""
-    t_s = np.arange(60) / 100.0
-    lean = np.full(60, np.nan)
-    assert _maximum(t_s, lean).tolist() == [0.0] * 60
-    assert HELD_S == 0.15
-    lean[5:20], lean[30:46] = 30.0, 20.0  # the first lean lasts 15 samples, the second 16
-    lean[50:] = -5.0
-    found = _maximum(t_s, lean)
-    assert found.tolist() == [0.0] * 45 + [20.0] * 15
-
-
-def test_a_camera_with_uneven_times_is_found_in_the_ride():
-    """Each cell of 50 ms contains one to four of the camera's readings. The ride began 12 s before the video."""
-    chance = np.random.default_rng(4)
-    knots_s = np.arange(0.0, 62.0, 0.7)
-    knots = chance.normal(scale=30.0, size=(len(knots_s), 3))
-
-    def rates(t_s):
-        return np.column_stack([np.interp(t_s, knots_s, axis) for axis in knots.T])
-
-    cells_s = STEP_S * (np.arange(1200) + 0.5)
-    still = np.zeros((1200, 3))
-    ride = CellMotion(still, rates(cells_s), np.ones(1200, dtype=bool), False, False)
-    t_s = np.cumsum(chance.choice([0.0125, 0.025, 0.05], size=1200))
-    camera = Telemetry(t_s, rates(t_s + 12.0)[:, [2, 0, 1]] + [1.0, -2.0, 0.5])
-    offset_s, correlation = camera_offset_s(ride, camera)
-    assert offset_s == pytest.approx(12.0, abs=0.03)
-    assert correlation > 0.95

@@ -1,31 +1,37 @@
-"""A simulated clock, and a directory that simulates the flash, for tests of the modules in kickstand/rides."""
+"""A simulated clock and the flash of a board, for tests of the modules in kickstand/rides."""
 
 import types
 
 import pytest
-from kickstand.rides import flash_ring, ride_paths
+from kickstand.rides import ride_paths
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.fakes import fake_os, fake_time
-from rings import FLASH, KB_4
+from rings import FLASH, KB_4, opened
 
 
 @pytest.fixture
 def clock(monkeypatch):
+    """Return the clock of the board. Power-on was 3 s ago."""
     clock = Clock()
     fake_time.use(clock, 0)
     for name in fake_time.ADDED:
         monkeypatch.setattr("time." + name, getattr(fake_time, name), raising=False)
-    clock.advance(3_000_000)  # power-on was 3 s ago
+    clock.advance(3_000_000)
     return clock
 
 
 @pytest.fixture
 def root(tmp_path, monkeypatch):
-    """Return a directory that simulates the flash. space.free bytes of space.all are free."""
+    """Yield the flash and the card of a board: space.free bytes of space.all are free."""
     space = types.SimpleNamespace(free=400 * KB_4, all=500 * KB_4, path=tmp_path)
+
+    def statvfs(_path):
+        return 512, KB_4, space.all // KB_4, space.free // KB_4, 0, 0, 0, 0, 0, 255
+
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(flash_ring, "free_bytes", lambda _path: space.free)
-    monkeypatch.setattr(flash_ring, "all_bytes", lambda _path: space.all)
+    monkeypatch.setattr("os.statvfs", statvfs, raising=False)
     monkeypatch.setattr("os.ilistdir", fake_os.ilistdir, raising=False)
     monkeypatch.setattr(ride_paths, "directory", lambda settings: "rides" if settings is FLASH else "card")
-    return space
+    yield space
+    while opened:
+        opened.pop().abandon()

@@ -3,13 +3,21 @@
 import types
 
 from kickstand.rides import ride_paths
+from kickstand.rides.flash_ring import RideRing
 
 FLASH = types.SimpleNamespace(SD_SPI=None)
 CARD = types.SimpleNamespace(SD_SPI=1)
 KB_4 = 4096
+opened: list[RideRing] = []  # the rings of this test, whose files are closed at its end
+
+
+def ride_ring(settings):
+    opened.append(RideRing(settings))
+    return opened[-1]
 
 
 def write_block(ring, size=100):
+    """Write a block of a ride. Return the number of steps until the ring was ready."""
     steps = 0
     while not ring.ready():
         steps += 1

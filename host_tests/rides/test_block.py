@@ -1,53 +1,86 @@
-"""Tests that everything fits into a ride's block even in the worst case, and that the format of the blocks stays the
-same."""
+"""The format of a recorded ride: what the firmware writes comes back exactly, and everything fits in the worst case."""
 
 import types
-from binascii import crc32
 
 import pytest
+from hypothesis import given, settings, strategies
+from kickstand import __version__
 from kickstand.rides import block as block_format
 from kickstand.rides.block import RideBlock, block_length
+from kickstand_tools.rides import block_reader
+from support.mpy import run_mpy
 from support.recordings import ride_writer
+from support.recordings.ride_writer import CHIP
+
+MIDNIGHT_S = 1_798_761_600.0  # 1 January 2027 in Unix time
+DEGREE = 6_000_000  # one degree in units of 0.00001 minutes
 
 
-def some_turns(count):
-    """Return passes of the loop that are the same in every version of Python."""
-    for i in range(count):
-        n = (2, 2, 3, 1, 8, 2)[i % 6]
-        yield [n * (i * k * 7919 % 4001 - 2000) for k in range(1, 8)], n, n * 5000 + i * 37 % 400 - 200
+def passes(blocks):
+    """Return (six sums, number of samples, duration) of each pass of the loop in these blocks."""
+    times = [blocks[0].time_us, *(turn.time_us for block in blocks for turn in block.turns)]
+    turns = [turn for block in blocks for turn in block.turns]
+    return [(turn.sums, turn.n, turn.time_us - before) for turn, before in zip(turns, times)]
 
 
-FORMAT_1 = 1672459265  # check sum of the bytes that the next test writes
+def places(blocks):
+    turns = [turn for block in blocks for turn in block.turns]
+    return [(i, (turn.place.lat_deg, turn.place.lon_deg, turn.place.utc_s))
+            for i, turn in enumerate(turns) if turn.place]  # fmt: skip
 
 
-def test_the_bytes_of_a_block_are_those_of_format_1(monkeypatch):
-    """Rides of older firmware must stay readable. If you change the bytes that are written, change the format's number
-    and keep the reader of the old format."""
-    monkeypatch.setattr(block_format, "__version__", "0.0.0")
+COUNT = strategies.integers(-32768, 32767)
+PASS = strategies.integers(1, 8).flatmap(
+    lambda n: strategies.tuples(
+        strategies.lists(COUNT.map(lambda count: n * count), min_size=7, max_size=7),
+        strategies.just(n),
+        strategies.integers(0, 100_000) | strategies.just(block_format.MAX_DT_US),
+    )
+)
+
+
+@given(strategies.lists(PASS, min_size=1, max_size=40))
+@settings(max_examples=50)
+def test_every_pass_comes_back_exactly(written):
     block = RideBlock(5000)
-    block.begin(4092, 7, 3, 123456789012, ride_writer.CHIP, 200, bytes(range(80)))
-    assert block_format.BODY_LENGTH == 80
-    for i, turn in enumerate(some_turns(120)):
-        if i % 10 == 0:
-            block.add_speed(i * 13)
-        block.add(*turn)
-    block.add([32767] * 7, 1, 1)
-    block.add([-32768] * 7, 1, 1 << 29)
-    for turn in some_turns(6):
-        block.add(*turn)
-    block.close()
-    data = bytes(block.buffer[:4092])
-    assert (data[:4], data[4:6], data[6:8]) == (b"KRID", b"\1\0", (4092).to_bytes(2, "little"))
-    assert block.count == 120 + 12 + 8
-    assert crc32(data[:-4]) == int.from_bytes(data[-4:], "little") == FORMAT_1
+    block.begin(4092, 7, 3, 123456789012, CHIP, 200, bytes(80))
+    for entry in written:
+        block.add(*entry)
+    stored = ride_writer.ended(block)
+    assert passes([stored]) == [((*sums[:3], *sums[4:]), n, dt_us) for sums, n, dt_us in written]
+    assert (stored.ride, stored.sequence, stored.time_us) == (7, 3, 123456789012)
+    assert (stored.accel_lsb_per_g, stored.gyro_lsb_tenths, stored.sample_hz) == (4096, 655, 200)
+    assert (stored.centidegrees, stored.firmware, stored.delay_tenths_ms) == (3125, __version__, 134)
 
 
-def places(block):
-    return sum(turn.place is not None for turn in block.turns)
+@pytest.mark.parametrize(
+    ("length", "every"), [(block_length, 10), (block_length, 1), (lambda _: 512, 10), (lambda _: 512, 1)]
+)
+def test_full_blocks_keep_speeds_places_and_calibration(length, every):
+    data, written = ride_writer.blocks(8, length=length, speed=True, places_every=every, trim_deg=1.25)
+    if length is block_length:
+        assert [len(block) for block in data] == [4096, 4092, 4088, 4092, 4084, 4092, 4088, 4092]
+    blocks, problems = block_reader.read(b"".join(data))
+    assert problems == [] and passes(blocks) == written
+    expected = [(k * every, ((-203_212_345 + 7 * k) / DEGREE, (-1_079_999_999 + 11 * k) / DEGREE,
+                             MIDNIGHT_S - 17.9 + k / 10)) for k in range(-(-len(written) // every))]  # fmt: skip
+    assert [k for k, _ in places(blocks)] == [k for k, _ in expected]
+    for (_, place), (_, given_place) in zip(places(blocks), expected):
+        assert place == pytest.approx(given_place, rel=0.0, abs=1e-6)
+    turns = [turn for block in blocks for turn in block.turns]
+    speeds = [(i, turn.speed_mps) for i, turn in enumerate(turns) if turn.speed_mps is not None]
+    assert speeds == [(i, i / 100) for i in range(0, len(turns), 100)]
+    calibration, original = blocks[0].calibration(), ride_writer.calibration(1.25)
+    for name in ("accel_offset", "accel_slope", "gyro_bias", "vehicle_from_sensor"):
+        assert list(getattr(calibration, name)) == list(getattr(original, name))
+    assert (calibration.trim_deg, calibration.aligned, calibration.six_done) == (1.25, True, True)
+    for block, content in zip(blocks, data):  # the unused bytes have room for the samples of one pass only
+        used = content[: -6 - 16 * sum(bool(turn.place) for turn in block.turns)]
+        assert len(used) - len(used.rstrip(b"\0")) < 16 + 60
 
 
-@pytest.mark.parametrize("length", range(700, 720))
-def test_the_worst_turn_and_a_position_fit_into_any_block(length):
+@pytest.mark.parametrize("length", range(700, 720, 3))
+def test_worst_pass_and_a_position_fit_into_any_block(length):
     """A pass of the loop with quiet readings needs few bits. In a pass with violent readings after quiet passes, every
     number needs the longest code."""
     quiet = [800] * 7, 8, 40_000
@@ -65,51 +98,13 @@ def test_the_worst_turn_and_a_position_fit_into_any_block(length):
             block.add_place(ride_writer.place(1))
             block.add([-32768] * 7, 1, 1 << 29)
         count = block.count
-        read = ride_writer.ended(block)
-        assert places(read) == 1 + violent
-    assert read.turns[-1].sums == (-32768,) * 6
-    assert {turn.sums for turn in read.turns[:-1]} == {(800,) * 6}
-    assert len(read.turns) == count - 1 > 90
+        stored = ride_writer.ended(block)
+        assert len(places([stored])) == 1 + violent
+    assert stored.turns[-1].sums == (-32768,) * 6 and {turn.sums for turn in stored.turns[:-1]} == {(800,) * 6}
+    assert len(stored.turns) == count - 1 > 90
 
 
-def test_a_block_contains_nothing_of_the_previous_one():
-    """Each block can be read without the others. A shorter block overwrites the rest of the previous block with
-    zeros."""
-    first, again = ride_writer.begun(4096), RideBlock(5000)
-    for turn in some_turns(150):
-        first.add_speed(900)
-        first.add(*turn)
-    first.close()
-    for block in (first, again):
-        ride_writer.begun(1024, 1, block)
-        for turn in some_turns(5):
-            block.add(*turn)
-        block.close()
-    assert first.buffer[:1024] == again.buffer[:1024]
-    assert first.count == again.count == 5
-
-
-def test_the_temperature_is_that_of_the_last_turns_mean():
-    chip = types.SimpleNamespace(accel_lsb_per_g=4096, gyro_lsb_per_dps=16.4, gyro_delay_s=0.0186)
-    chip.temperature_c = lambda counts: counts / 4
-    block = RideBlock(5000)
-    block.begin(1024, 1, 0, 0, chip, 200, bytes(80))
-    block.add([0, 0, 0, 900, 0, 0, 0], 3, 15_000)
-    block.add([0, 0, 0, -303, 0, 0, 0], 3, 15_000)
-    found = ride_writer.ended(block)
-    assert found.centidegrees == -2525
-    assert found.gyro_lsb_tenths == 164
-    assert found.delay_tenths_ms == 186
-
-
-@pytest.mark.parametrize("index", [1, 2, 3, 4, 6, 8, 96, 1 << 12])
-def test_a_littlefs_block_begins_with_a_pointer_per_halving(index):
-    pointers = 1 + max(k for k in range(20) if index % (1 << k) == 0)
-    assert block_length(index) == 4096 - 4 * pointers
-    assert block_length(0) == 4096
-
-
-def test_the_first_position_is_dropped_if_it_has_no_room():
+def test_first_position_is_dropped_if_it_has_no_room():
     """After the ride's first position, every block reserves room for a position, even if it is almost full."""
     block = RideBlock(5000)
     for sequence in range(3):
@@ -123,6 +118,97 @@ def test_the_first_position_is_dropped_if_it_has_no_room():
             block.add([sign * 8 * 32767] * 7, 8, (1 << 29) if sign > 0 else 0)
             if block.full() and not sequence:
                 block.add_place(ride_writer.place(0))
-        read = ride_writer.ended(block)
-        assert places(read) == (len(read.turns) if sequence else 0)
-        assert read.turns[-1].sums == (sign * 8 * 32767,) * 6
+        stored = ride_writer.ended(block)
+        assert len(places([stored])) == (len(stored.turns) if sequence else 0)
+        assert stored.turns[-1].sums == (sign * 8 * 32767,) * 6
+
+
+@pytest.mark.parametrize(
+    ("date", "lat", "lon", "place"),
+    [
+        (26 << 9 | 5 << 5 | 17, 48 * DEGREE, -11 * DEGREE // 2, (48.0, -5.5, 1_778_976_001.5)),
+        (26 << 9 | 5 << 5 | 17, 90 * DEGREE, -180 * DEGREE, (90.0, -180.0, 1_778_976_001.5)),
+        *((date, DEGREE, -DEGREE, (1.0, -1.0, None))
+          for date in (0, 5, 26 << 9 | 13 << 5 | 1, 26 << 9 | 2 << 5 | 30, 0xFFFF)),
+        (0, 90 * DEGREE + 1, 0, None),
+        (0, 0, -180 * DEGREE - 1, None),
+    ],
+)  # fmt: skip
+def test_position_in_hundred_thousandths_of_a_minute(date, lat, lon, place):
+    """The date has 7 bits for the years since 2000, 4 bits for the month and 5 bits for the day."""
+    block = ride_writer.begun(1024)
+    block.add_place((date, 1500, lat, lon))
+    block.add([0, 0, 8192, 0, 0, 0, 0], 2, 10_000)
+    assert places([ride_writer.ended(block)]) == ([(0, place)] if place else [])
+
+
+def test_block_contains_nothing_of_the_previous_one():
+    """Each block can be read without the others."""
+    first, again = ride_writer.begun(4096), RideBlock(5000)
+    for entry in ride_writer.turns(150):
+        first.add_speed(900)
+        first.add(*entry)
+    first.close()
+    for block in (first, again):
+        ride_writer.begun(1024, 1, block)
+        for entry in ride_writer.turns(5):
+            block.add(*entry)
+        block.close()
+    assert first.buffer[:1024] == again.buffer[:1024] and first.count == again.count == 5
+
+
+def test_temperature_is_that_of_the_last_passs_mean():
+    chip = types.SimpleNamespace(accel_lsb_per_g=4096, gyro_lsb_per_dps=16.4, gyro_delay_s=0.0186)
+    chip.temperature_c = lambda counts: counts / 4
+    block = RideBlock(5000)
+    block.begin(1024, 1, 0, 0, chip, 200, bytes(80))
+    block.add([0, 0, 0, 900, 0, 0, 0], 3, 15_000)
+    block.add([0, 0, 0, -303, 0, 0, 0], 3, 15_000)
+    stored = ride_writer.ended(block)
+    assert (stored.centidegrees, stored.gyro_lsb_tenths, stored.delay_tenths_ms) == (-2525, 164, 186)
+
+
+@pytest.mark.parametrize("index", [0, 1, 2, 3, 4, 6, 8, 96, 1 << 12])
+def test_littlefs_block_begins_with_a_pointer_per_halving(index):
+    pointers = 1 + max(k for k in range(20) if index % (1 << k) == 0) if index else 0
+    assert block_length(index) == 4096 - 4 * pointers
+
+
+# Encodes random entries with machine code and with Python. Most entries are typical.
+_BOTH = """
+import random
+from array import array
+from kickstand.rides import block as block_format
+from kickstand.rides.block import encode, encode_python
+assert encode is not encode_python
+random.seed(1)
+for block in range(BLOCKS):
+    states, outs = [], []
+    for _ in range(2):
+        state = array("i", [0] * (block_format._PERIOD + 1))
+        state[0] = 1
+        for i in range(block_format.FIELDS):
+            state[block_format._MEANS + i] = block_format.START_MEAN
+        state[block_format._PERIOD] = 5000
+        states.append(state)
+        outs.append(bytearray(4096))
+    while states[0][block_format._AT] < 4096 - 60:
+        wide = random.choice((10, 300, 32767))
+        n = random.choice((0, 1, 2, 2, 2, 8))
+        entry = array("i", [n, n * 5000 + random.randint(-200, 200)])
+        if random.random() < 0.01:
+            entry[1] = random.randint(0, block_format.MAX_DT_US)
+        for _ in range(6):
+            entry.append(random.randint(-max(1, n) * (wide + 1), max(1, n) * wide))
+        entry.append(random.choice((0, random.randint(0, 30000), random.randint(0, 1 << 24))))
+        for function, state, out in zip((encode, encode_python), states, outs):
+            function(entry, state, out)
+        assert states[0] == states[1], (list(entry), states)
+    assert outs[0] == outs[1]
+print("equal")
+"""
+
+
+@pytest.mark.parametrize("blocks", [20, pytest.param(200, marks=pytest.mark.long)])
+def test_machine_code_codes_as_python_does(blocks):
+    assert run_mpy(_BOTH.replace("BLOCKS", str(blocks))) == "equal\n"

@@ -12,58 +12,58 @@ import resource
 import shutil
 import signal
 import time
-import types
 from pathlib import Path
 
 import pytest
-from kickstand.rides import ride_paths
 from kickstand_tools.common import output
-from kickstand_tools.deploy import board_console
 from kickstand_tools.logs.reader import read_log
+from ride_boards import RideBoard, Stream, StreamingBoard, half_seconds, streamed
 from support import command, fake_board
 from support.recordings import ride_writer
-from test_cli_pull import left, put
-from test_cli_record import Clocks, Stream, Streaming, half_seconds
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork()")
 
 WEATHER = b"# my weather station\nwhile True: pass\n"
-OFTEN = [("record", "full"), ("pull", "kill"), ("pull", "cable"), ("flash", "cable"), ("smooth", "kill")]
-# number of random moments at which each case is tested: FAST for the cases in OFTEN, and ALL for all cases in a nightly
-# run
-FAST, ALL = 2, 10
 
 
 class Scene:
     """The files and the board of a command.
 
     arguments: the command line.
-    plug(monkeypatch): connects the board, in the fork.
+    board: the board, or None.
     lost(): returns one sentence for each loss since the scene was created.
     """
 
-    def __init__(self, place: Path):
-        self.place = place
-        self.out = place / "out"
-        self.out.mkdir(parents=True)
-        (self.out / "notes.txt").write_text("mine")
-        self.kept = {self.out / "notes.txt": [b"mine"]}  # {path: contents that the file may have}
+    arguments: list
+    board = None
 
-    def keep(self, path: Path) -> None:
-        self.kept[path] = [path.read_bytes()]
+    def __init__(self, place: Path):
+        self.place, self.out, self.contents = place, place / "out", {}
+        self.out.mkdir(parents=True)
+        self.keep("out/notes.txt", b"mine")
+
+    def keep(self, name, data=None):
+        """Add a file that must not be lost. A command may replace it by a complete file of the same kind."""
+        path = self.place / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if data is not None:
+            path.write_bytes(data)
+        self.contents[path] = path.read_bytes()
+        return path
 
     def plug(self, patch):
-        pass
+        if self.board:
+            fake_board.plug_in(patch, self.board)
 
     def lost(self):
         return [
             f"{path.name} was lost or cut"
-            for path, contents in self.kept.items()
-            if not path.exists() or not (path.read_bytes() in contents or is_whole(path))
+            for path, content in self.contents.items()
+            if not path.exists() or not (path.read_bytes() == content or is_complete(path))
         ]
 
 
-def is_whole(path: Path) -> bool:
+def is_complete(path: Path) -> bool:
     """Return True for a file that a command has written completely."""
     data = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
     if path.suffix in (".csv", ".gz"):
@@ -73,32 +73,26 @@ def is_whole(path: Path) -> bool:
 
 
 class Pull(Scene):
-    """Three rides on the board, one of which was pulled earlier."""
+    """Three rides on the board."""
 
-    def __init__(self, place):
+    def __init__(self, place, _source):
         super().__init__(place)
-        self.board = fake_board.FakeBoard(place / "flash")
-        self.whole = {}
+        self.board = RideBoard(place / "flash")
+        self.readings = {}
         for ride in (1, 2, 3):
-            blocks, turns = ride_writer.blocks(4, ride=ride)
-            put(self.board, f"000/{ride:02}/00000.rid", blocks)
-            self.whole[ride] = len(turns)
+            blocks, turns = ride_writer.blocks(2, ride=ride, length=lambda _: 2048)
+            self.board.put(f"000/{ride:02}/00000.rid", blocks)
+            self.readings[ride] = len(turns)
         self.arguments = ["pull", "--out", self.out, "--delete"]
 
     def plug(self, patch):
-        fake_board.plug_in(patch, self.board)
-        patch.setattr(ride_paths, "directory", lambda _settings: "rides")
-        patch.setattr(ride_paths, "os", self.board.modules["os"])
-        settings = types.SimpleNamespace(VEHICLE="motorcycle")
-        self.board.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: settings))
-        self.board.modules["kickstand.rides"] = types.SimpleNamespace(ride_paths=ride_paths)
+        self.board.plug_in(patch)
 
     def lost(self):
-        there = left(self.board)
         return super().lost() + [
             f"ride {ride} is neither on the board nor here"
-            for ride, count in self.whole.items()
-            if f"000/{ride:02}/00000.rid" not in there
+            for ride, count in self.readings.items()
+            if f"000/{ride:02}/00000.rid" not in self.board.paths()
             and not any(len(read_log(path).time_us) == count for path in self.out.glob(f"ride-{ride:05}-*.gz"))
         ]
 
@@ -106,61 +100,64 @@ class Pull(Scene):
 class Record(Scene):
     """A recording beside an earlier recording."""
 
-    def __init__(self, place):
+    def __init__(self, place, _source):
         super().__init__(place)
-        (self.out / "old.csv").write_text("yesterday\n")
-        self.keep(self.out / "old.csv")
+        self.keep("out/old.csv", b"yesterday\n")
         self.arguments = ["record", "--out", self.out / "ride.csv.gz"]
-        self.board = Streaming(place)
-        self.board.serial = Stream(half_seconds(12)[0], "ctrl-c")
+        stream = Stream(b"".join(map(streamed, half_seconds(12)[0])), signal.SIGINT)
+        self.board = StreamingBoard(place, stream)
 
     def plug(self, patch):
-        patch.setattr(board_console, "time", Clocks)
-        fake_board.plug_in(patch, self.board)
+        self.board.plug_in(patch)
 
 
 class Flash(Scene):
     """A used board with a user's program, notes, rides and calibration."""
 
-    def __init__(self, place):
+    def __init__(self, place, _source):
         super().__init__(place)
-        self.root = place / "flash"
-        self.board = fake_board.FakeBoard(self.root)
-        self.own = {"rides/000/01/00000.rid": b"ride", "user.py": b"mine", "kickstand_a.cal": b"calibration"}
-        for name, data in self.own.items():
-            (self.root / name).parent.mkdir(parents=True, exist_ok=True)
-            (self.root / name).write_bytes(data)
-        (self.root / "main.py").write_bytes(WEATHER)
+        for name in ("rides/000/01/00000.rid", "user.py", "kickstand_a.cal"):
+            self.keep(f"flash/{name}", name.encode())
+        (place / "flash" / "main.py").write_bytes(WEATHER)
+        self.board = fake_board.FakeBoard(place / "flash")
         self.arguments = ["flash", "--yes"]
 
-    def plug(self, patch):
-        fake_board.plug_in(patch, self.board)
-
     def lost(self):
-        programs = [path.read_bytes() for path in self.root.glob("*.py")]
-        gone = [name for name, data in self.own.items() if (self.root / name).read_bytes() != data]
-        return super().lost() + gone + ([] if WEATHER in programs else ["main.py of another project"])
+        programs = [path.read_bytes() for path in (self.place / "flash").glob("*.py")]
+        return super().lost() + ([] if WEATHER in programs else ["main.py of another project"])
 
 
 class Computed(Scene):
     """A command that replaces the results of an earlier run. source: the folder of a simulated ride."""
 
-    def __init__(self, place, source, verb):
+    verb = ""
+
+    def __init__(self, place, source):
         super().__init__(place)
         for name in ("RIDE.csv", "RIDE.cal.json"):
             shutil.copy(source / name, place / name)
-            self.keep(place / name)
-        ride, out = place / "RIDE.csv", self.out / "old.csv"
-        out.write_bytes(b"t_s,of,before\n")
-        self.arguments = {
-            "import": ["import", ride, "--out", out],
-            "smooth": ["smooth", ride, "--calibration", place / "RIDE.cal.json", "--out", out],
-            "plot": ["plot", ride, "--calibration", place / "RIDE.cal.json", "--out", self.out],
-        }[verb]
-        self.keep(out)
+            self.keep(name)
+        ride, cal = place / "RIDE.csv", ["--calibration", place / "RIDE.cal.json"]
+        result = self.keep("out/old.csv", b"t_s,of,before\n")
         for name in ("RIDE.png", "RIDE.html"):
-            (self.out / name).write_bytes(b"an earlier picture")
-            self.keep(self.out / name)
+            self.keep(f"out/{name}", b"an earlier picture")
+        self.arguments = {
+            "import": ["import", ride, "--out", result],
+            "smooth": ["smooth", ride, *cal, "--out", result],
+            "plot": ["plot", ride, *cal, "--out", self.out],
+        }[self.verb]
+
+
+class Import(Computed):
+    verb = "import"
+
+
+class Smooth(Computed):
+    verb = "smooth"
+
+
+class Plot(Computed):
+    verb = "plot"
 
 
 @pytest.fixture(scope="module")
@@ -169,55 +166,50 @@ def source(tmp_path_factory):
     place = tmp_path_factory.mktemp("source")
     command.works("simulate", "--profile", "street", "--seconds", 20, "--out", place)
     command.works("calibrate", "two", place / "KICKSTAND.csv", place / "UPRIGHT.csv", "--out", place / "RIDE.cal.json")
-    for verb in ("import", "smooth"):  # import now, so each fork finds the modules already imported
-        (made := place / verb).mkdir()
-        command.works(*Computed(made, place, verb).arguments)
+    for scene in (Import, Smooth):  # import now, so each fork finds the modules already imported
+        command.works(*scene(place / scene.verb, place).arguments)
     return place
 
 
-def in_a_fork(scene, fault, share, usual_s=1.0):
+def in_a_fork(scene, fault, share=0.0, usual_s=1.0):
     """Run the scene's command in a fork. Return its duration in s.
 
     share: the share of usual_s, of the file or of the transfer after which the fault happens.
     usual_s: duration of the command without a fault.
     """
-    begun_s = time.monotonic()
+    begin_s = time.monotonic()
     child = os.fork()
     if not child:
         try:
             null = os.open(os.devnull, os.O_WRONLY)
             os.dup2(null, 1)
             os.dup2(null, 2)
-            patch = pytest.MonkeyPatch()
-            scene.plug(patch)
+            scene.plug(pytest.MonkeyPatch())
             if fault == "full":
                 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
                 resource.setrlimit(resource.RLIMIT_FSIZE, (round(60_000 * share**2), resource.RLIM_INFINITY))
             elif fault == "cable":
                 cut(scene.board, share)
-            elif fault == "term":
-                signal.signal(signal.SIGALRM, lambda *_: os.kill(os.getpid(), signal.SIGTERM))
-                signal.setitimer(signal.ITIMER_REAL, max(1e-4, share * usual_s))
-            elif fault == "kill":
-                signal.signal(signal.SIGALRM, signal.SIG_DFL)
+            elif fault in ("kill", "term"):
+                handler = (lambda *_: os.kill(os.getpid(), signal.SIGTERM)) if fault == "term" else signal.SIG_DFL
+                signal.signal(signal.SIGALRM, handler)
                 signal.setitimer(signal.ITIMER_REAL, max(1e-4, share * usual_s))
             command.run(*scene.arguments)
         finally:
             os._exit(0)
     os.waitpid(child, 0)
-    return time.monotonic() - begun_s
+    return time.monotonic() - begin_s
 
 
 def cut(board, share):
     """Let the cable be pulled after a share of the changes to the board's flash, or of the board's output."""
     left = [round(share * (30 if isinstance(board.serial, Stream) else 300))]
+    waiting = board.serial.inWaiting
 
     def pulled(*_):
         left[0] -= 1
         if left[0] <= 0:
             raise ConnectionError("device disconnected")
-
-    waiting = board.serial.inWaiting
 
     def in_waiting():
         pulled()
@@ -227,40 +219,32 @@ def cut(board, share):
     board.serial.inWaiting = in_waiting
 
 
-SCENES = {"record": Record, "pull": Pull, "flash": Flash}
-KINDS = [(verb, fault) for verb in SCENES for fault in ("kill", "full", "cable", "term")]
-KINDS += [(verb, fault) for verb in ("import", "smooth", "plot") for fault in ("kill", "full", "term")]
+BOARDS, FILES = (Record, Pull, Flash), (Import, Smooth, Plot)
+OFTEN = {(Record, "full"), (Pull, "kill"), (Pull, "cable"), (Flash, "cable"), (Smooth, "kill")}
+KINDS = [(scene, fault) for scene in BOARDS for fault in ("kill", "full", "cable", "term")]
+KINDS += [(scene, fault) for scene in FILES for fault in ("kill", "full", "term")]
 
 
 @pytest.mark.parametrize(
-    ("verb", "fault", "count"),
-    [
-        *((*kind, FAST) for kind in OFTEN),
-        *(pytest.param(*kind, ALL, marks=pytest.mark.nightly) for kind in KINDS),
-    ],
+    ("scene", "fault", "count"),
+    [(*kind, 2) for kind in KINDS if kind in OFTEN]
+    + [pytest.param(*kind, 8, marks=pytest.mark.long) for kind in KINDS],
+    ids=lambda value: getattr(value, "__name__", value),
 )
-def test_no_existing_file_is_lost(verb, fault, count, source, tmp_path):
-    """The nightly run tests 21 pairs of a command and a fault, with 10 random moments each."""
-    chance = random.Random(f"{verb} {fault}")
-
-    def scene(k):
-        place = tmp_path / str(k)
-        place.mkdir()
-        (place / "flash").mkdir()
-        return SCENES[verb](place) if verb in SCENES else Computed(place, source, verb)
-
-    usual_s = in_a_fork(scene("usual"), "none", 1.0)
-    lost = []
+def test_no_existing_file_is_lost(scene, fault, count, source, tmp_path):
+    chance = random.Random(f"{scene.__name__} {fault}")
+    usual_s = in_a_fork(scene(tmp_path / "usual", source), "none") if fault in ("kill", "term") else 0.0
+    losses = []
     for k in range(count):
-        tried = scene(k)
-        in_a_fork(tried, fault, chance.random(), usual_s)
-        lost += tried.lost()
+        trial = scene(tmp_path / str(k), source)
+        in_a_fork(trial, fault, chance.random(), usual_s)
+        losses += trial.lost()
         if fault != "kill":
-            lost += [f"{path.name} was left" for path in tried.out.glob(".*")]
-    assert lost == []
+            losses += [f"{path.name} was left" for path in trial.out.glob(".*")]
+    assert losses == []
 
 
-def test_a_killed_command_that_writes_in_place_loses_data(source, tmp_path, monkeypatch):
+def test_killed_command_that_writes_in_place_loses_data(source, tmp_path, monkeypatch):
     """A command without a temporary file loses an earlier result, so the test above can fail."""
 
     @contextlib.contextmanager
@@ -268,10 +252,9 @@ def test_a_killed_command_that_writes_in_place_loses_data(source, tmp_path, monk
         yield path
 
     monkeypatch.setattr(output, "whole_file", in_place)
-    lost = []
+    losses = []
     for k in range(3):
-        (tmp_path / str(k)).mkdir()
-        tried = Computed(tmp_path / str(k), source, "smooth")
-        in_a_fork(tried, "full", 0.3 + 0.1 * k)
-        lost += tried.lost()
-    assert lost
+        trial = Smooth(tmp_path / str(k), source)
+        in_a_fork(trial, "full", 0.3 + 0.1 * k)
+        losses += trial.lost()
+    assert losses

@@ -6,6 +6,6 @@ import pytest
 from support.mpy import BOARD_HEAP, run_tests
 
 
-@pytest.mark.parametrize("name", ["display", "oled", "place", "speed"])
+@pytest.mark.parametrize("name", ["display", "framebuf", "gps", "wheel"])
 def test_under_micropython(name: str) -> None:
-    run_tests(Path(__file__).with_name(f"test_board_{name}.py"), BOARD_HEAP)
+    run_tests(Path(__file__).with_name(f"test_{name}.py"), BOARD_HEAP)

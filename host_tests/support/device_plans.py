@@ -1,13 +1,16 @@
 """Runs a device plan on either engine, in a directory that simulates the board's flash."""
 
+import contextlib
 import functools
 import gc
+import importlib
 import json
 import math
-import os
 import re
 import shutil
+import sys
 import tempfile
+import warnings
 from pathlib import Path
 
 from support import device_runs
@@ -73,22 +76,59 @@ class Record:
         return [lean for lean in shown if lean is not None]
 
 
-def run(engine, flash, plan, capsys=None):
-    """Run a plan and return its Record. flash: a directory that keeps its content between runs, as a board's flash."""
+WORLD_KEYS = ("lean", "ride", "poses", "seed", "remount")
+
+
+@functools.lru_cache(maxsize=8)
+def _shared_world(key):
+    """Return device_runs.world_of() of a description. Runs in the same world share its readings, which take time."""
+    world, ride = device_runs.world_of(json.loads(key))
+    return functools.lru_cache(maxsize=20_000)(world), ride
+
+
+def world_of(plan):
+    """Return (world, ride) of a plan, as device_runs.world_of() does."""
+    motion = {key: plan[key] for key in WORLD_KEYS if key in plan}
+    motion["config"] = {"VEHICLE": (plan.get("config") or {}).get("VEHICLE")}
+    return _shared_world(json.dumps(motion))
+
+
+@contextlib.contextmanager
+def on_flash(flash):
+    """Make a directory the working directory and the first on the import path, as a board's flash is.
+
+    The app collects garbage often. Objects of earlier tests are excluded, because scanning them takes minutes.
+    """
+    sys.path.insert(0, str(flash))
+    importlib.invalidate_caches()
+    writes_none, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+    gc.freeze()
+    try:
+        with contextlib.chdir(flash), warnings.catch_warnings():
+            warnings.simplefilter("ignore", ResourceWarning)  # a board that loses its power closes no file
+            yield
+            gc.collect()
+    finally:
+        gc.unfreeze()
+        sys.dont_write_bytecode = writes_none
+        sys.path.remove(str(flash))
+        for name in ("user", "config"):
+            sys.modules.pop(name, None)
+
+
+def run(engine, flash, plan, capsys=None, fit=None):
+    """Run a plan and return its Record.
+
+    flash: a directory that keeps its content between runs, as a board's flash.
+    fit: fit(board) changes the board before power-on, on CPython only.
+    """
     if engine == "cpython":
-        before = os.getcwd()
-        os.chdir(flash)
-        # Exclude the objects of earlier tests, because the app collects garbage often and scanning them takes minutes
-        gc.freeze()
-        try:
-            answer = json.loads(json.dumps(device_runs.run_device(plan)))
-        finally:
-            gc.unfreeze()
-            os.chdir(before)
+        with on_flash(flash):
+            answer = json.loads(json.dumps(device_runs.run_device(plan, fit, world_of(plan))))
         return Record(answer, capsys.readouterr().out if capsys else "")
     heap = "8M" if "card" in plan else BOARD_HEAP
-    said = run_mpy(SCRIPT, heap=heap, stdin=json.dumps(plan), directory=flash)
-    console, _, answer = said.rstrip("\n").rpartition("\n")
+    output = run_mpy(SCRIPT, heap=heap, stdin=json.dumps(plan), directory=flash)
+    console, _, answer = output.rstrip("\n").rpartition("\n")
     return Record(json.loads(answer), console)
 
 

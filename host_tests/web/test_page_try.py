@@ -1,110 +1,208 @@
-"""The page Try in Chromium: used by the keyboard alone, with room for every step, and with a missing file."""
+"""The page Try in Chromium. The main job is to align the simulated meter, to ride, and to compare the lean.
 
+The board's clock is eight times as fast as usual, if the test does not need the usual clock.
+"""
+
+import json
 import re
+import time
+from pathlib import Path
 
 import pytest
-from support.web.rider import LAPTOP, Rider
+from support.mpy import run_mpy
+from support.web import page_repeated
+from support.web.rider import LAPTOP, PHONE, Rider
+
+WINDOW = {"width": 1000, "height": 700}
+LEAN_DEG = 30
+LOOK, ROOM, COLOURS, FOREIGN = (
+    Path(__file__).with_name(f"{name}.js").read_text() for name in ("look", "room", "colours", "foreign")
+)
+
+
+@pytest.fixture
+def visit(chromium, address, faster_address):
+    """Return a function that opens the page. At the end, the page had no error and asked no other server."""
+    riders = []
+
+    def visit(name="", faster=False, **kind):
+        riders.append(Rider(chromium, (faster_address if faster else address) + name, **kind))
+        return riders[-1]
+
+    yield visit
+    for rider in riders:
+        assert rider.errors == [] and rider.strangers() == []
+        rider.context.close()
+
+
+def ride_off(rider):
+    """Align the meter, and ride straight until the guide asks for a lean."""
+    rider.align()
+    rider.guide_says("Ride!")
+    rider.click("#do")
+    rider.guide_says("Lean it")
+
+
+def test_two_presses_a_ride_and_a_bend_show_the_lean(visit):
+    rider = visit(viewport=WINDOW, faster=True)
+    ride_off(rider)
+    rider.keys("ArrowRight", LEAN_DEG // 5)
+    rider.guide_says("That is all")
+    true_deg, shown_deg = rider.leans()
+    assert true_deg > LEAN_DEG - 4 and shown_deg == pytest.approx(true_deg, abs=2.0)
+    assert rider.moved() == []
+
+
+def loop_s():
+    """Return the processor time of a loop of a million sums on this computer, in s. It is the median of five runs."""
+    times_s = []
+    for _ in range(5):
+        begin_s, total = time.process_time(), 0
+        for i in range(1_000_000):
+            total += i * i
+        times_s.append(time.process_time() - begin_s)
+    return sorted(times_s)[2]
+
+
+@pytest.mark.long
+def test_faults_are_shown_as_the_firmware_does_and_without_a_network(visit, address, tmp_path):
+    """At the usual speed. The firmware's own loop, with the same orders at the same times, fills the display's memory
+    in the same way. The board needs less than a slow phone's processor has."""
+    rider = visit(viewport=WINDOW)
+    rider.align()
+    rider.reads("Aligned!")
+    rider.click("#do")
+    rider.slow(4)
+    used_s = rider.worker_s()
+    rider.wait(3)
+    used_s = rider.worker_s() - used_s
+    rider.slow(1)
+    # The processor time on the reference computer, where loop_s() is 0.06. A slow phone is four times as slow.
+    assert 0.0 < used_s * 0.06 / loop_s() < 3 / 4
+    rider.click("#wire")
+    rider.guide_says("wire is out")
+    rider.reads("No sensor")
+    rider.page.wait_for_selector("#shown-lean:has-text('a fault')")
+    rider.click("#do")  # the guide's button: plug the board in
+    rider.reads("Lean")
+    for armed in "true", "false":
+        rider.click("#cut")
+        rider.page.wait_for_selector(f"#cut[aria-pressed={armed}]")
+    displays, orders = rider.seen("displays"), rider.seen("orders")
+    plan = json.dumps({"orders": orders, "until_s": displays[-1][0] + 0.001})
+    printed = run_mpy(Path(page_repeated.__file__), "loop", stdin=plan, directory=tmp_path)
+    assert len(displays) > 40 and json.loads(printed.splitlines()[-1])["displays"] == displays
+    rider.page.wait_for_function("navigator.serviceWorker.controller")
+    assert "works without a network" in rider.text("#offline")
+    rider.context.set_offline(True)
+    for name in "", "index.html":
+        rider.page.goto(address + name)
+        rider.reads("Raw")
+
+
+@pytest.mark.long
+def test_the_page_flashes_nothing_in_a_bend(visit):
+    rider = visit(faster=True, **LAPTOP)
+    ride_off(rider)
+    rider.keys("ArrowRight", 5)
+    rider.wait(3)
+    samples = rider.page.evaluate(LOOK, 3)
+    assert len(samples) > 60
+    for label, shown, todo in samples:
+        assert re.match(r"Display: Lean \d+° right", label) and re.match(r"\d+° right$", shown) and "sure" not in todo
+
 
 ACTIVE = "document.activeElement.id || document.activeElement.value"
 
 
-def tab_to(rider, name):
-    """Press the Tab key until this control has the focus."""
-    for _ in range(20):
-        rider.page.keyboard.press("Tab")
-        if rider.page.evaluate(ACTIVE) == name:
-            return
-    raise AssertionError(f"no Tab leads to {name}")
-
-
-def says(rider, selector, text):
-    rider.page.wait_for_function("([one, text]) => document.querySelector(one).value === text", arg=[selector, text])
-
-
-def test_by_the_keyboard_alone(chromium, address):
+@pytest.mark.long
+def test_by_the_keyboard_alone(visit):
     """The arrow keys change the lean, and the space bar is the board's button. Controls that the rider cannot move
     show what the motorcycle does. The focus stays when the guide shows its next step."""
-    rider = Rider(chromium, address, **LAPTOP)
+    rider = visit(faster=True, **LAPTOP)
+    page = rider.page
+
+    def tab_to(name):
+        for _ in range(20):
+            page.keyboard.press("Tab")
+            if page.evaluate(ACTIVE) == name:
+                return
+        raise AssertionError(f"no Tab leads to {name}")
+
+    def says(selector, text):
+        page.wait_for_function("([one, text]) => document.querySelector(one).value === text", arg=[selector, text])
+
     rider.reads("Raw")
-    says(rider, "#lean-out", "12° left")
-    assert rider.page.is_disabled("#speed")
-    assert rider.page.input_value("#speed") == "0"
-    tab_to(rider, "ride")
+    says("#lean-out", "12° left")
+    assert page.is_disabled("#speed") and page.input_value("#speed") == "0"
+    tab_to("ride")
     rider.keys("Space", 1)
-    says(rider, "#speed-out", "54 km/h")
+    says("#speed-out", "54 km/h")
     rider.keys("ArrowUp", 1)
     rider.keys("ArrowRight", 2)
-    says(rider, "#speed-out", "64 km/h")
-    says(rider, "#lean-out", "10° right")
-    assert rider.page.get_attribute("#pose [value=ride]", "aria-pressed") == "true"
+    says("#speed-out", "64 km/h")
+    says("#lean-out", "10° right")
+    assert page.get_attribute("#pose [value=ride]", "aria-pressed") == "true"
+    assert page.get_attribute("#speed", "min") == "20"
     rider.guide_says("Put the motorcycle on its stand first")
-    rider.page.focus("#do")
-    rider.page.eval_on_selector("#pose [value=kickstand]", "button => button.click()")
-    rider.page.wait_for_selector("#do", state="hidden")
-    assert rider.page.evaluate(ACTIVE) == "press"
-    says(rider, "#speed-out", "0 km/h")
-    assert rider.page.is_disabled("#speed")
-    tab_to(rider, "ride")
+    page.focus("#do")
     rider.keys("Enter", 1)
-    says(rider, "#speed-out", "64 km/h")
-    assert rider.page.get_attribute("#speed", "min") == "20"
-    rider.guide_says("Put the motorcycle on its stand first")
+    says("#speed-out", "0 km/h")
+    assert page.evaluate(ACTIVE) == "press" and page.is_disabled("#speed")
+    rider.guide_says("Press the button.")
     rider.keys("Space", 1)
     rider.reads("Stand: hold")
-    rider.page.focus("#do")
-    rider.keys("Enter", 1)
-    assert rider.page.evaluate(ACTIVE) == "press"
-    assert rider.page.get_attribute("#pose [value=kickstand]", "aria-pressed") == "true"
     assert rider.moved() == []
-    rider.context.close()
 
 
-def test_every_step_has_its_room(chromium, address, files):
-    """A longer text must not move the parts of the page below it. The texts come from the guide's source, so the
-    longest text is included."""
-    guide = files["guide.mjs"].decode()
-    pages = re.findall(r'^  \w+: "(.{20,})",$', guide, re.M)
-    steps = [text for pair in re.findall(r'"([^"\n]{25,})"|`([^`]{25,})`', guide) for text in pair if text]
-    steps += [text.replace("${PAGES[kind]}", page) for text in steps for page in pages if "${PAGES[kind]}" in text]
-    assert len(steps) > 40
-    rider = Rider(chromium, address + "index.html")
+@pytest.mark.long
+def test_a_phones_first_screen_has_all_for_the_first_minute(visit):
+    rider = visit(**PHONE)
+    page = rider.page
+    tops = page.eval_on_selector_all("main > section", "all => all.map((one) => one.getBoundingClientRect().top)")
+    assert tops == sorted(tops), "what arrives first is seen first, or the page moves while it loads"
     rider.reads("Raw")
-    for width, height in (1440, 900), (1000, 700), (844, 390), (640, 900), (390, 844), (360, 640):
-        rider.page.set_viewport_size({"width": width, "height": height})
-        assert rider.fits(), width
-        long = rider.page.evaluate(
-            """(steps) => {
-              const [todo, button, guide] = ["#todo", "#do", ".guide"].map((one) => document.querySelector(one));
-              button.hidden = false;
-              button.textContent = "Put it on its stand";
-              todo.textContent = "";
-              const bottom = guide.getBoundingClientRect().bottom;
-              return steps.filter((text) => {
-                todo.textContent = text;
-                const moved = guide.getBoundingClientRect().bottom !== bottom;
-                return moved || button.getBoundingClientRect().bottom > bottom - 8;
-              });
-            }""",
-            steps,
-        )
-        assert long == [], width
-    rider.context.close()
+    assert rider.text("nav [aria-current]") == "Try" and rider.fits() and rider.axe() == []
+    for selector in ("#display", "#press", "#todo", "#scene", "#shown-lean", "#pose"):
+        box = page.locator(selector).bounding_box()
+        assert box["y"] + box["height"] <= PHONE["viewport"]["height"], selector
+    page.tap("#press")
+    rider.reads("Stand: hold")
+    page.tap("#wire")
+    rider.guide_says("wire is out")
+    rider.reads("No sensor")
+    device, guide = (page.locator(one).bounding_box() for one in (".device", ".guide"))
+    assert device["y"] >= 0 and guide["y"] >= device["y"] + device["height"]
+    page.tap("#power")
+    rider.guide_says("display is dark")
+    assert rider.moved() == []
 
 
-MISSING_FILES = {
-    "python.json": "./python.json cannot be loaded (HTTP 404)",
-    "micropython/micropython.wasm": "./micropython/micropython.wasm cannot be loaded (HTTP 404)",
-    "bike.mjs": "file of this page cannot be loaded",
-}
+@pytest.mark.long
+def test_a_foreign_script_does_not_run(visit):
+    """The page itself works under its policy. Most other tests switch the policy off."""
+    rider = visit(policy=True, **LAPTOP)
+    rider.page.locator('#display[aria-label^="Display: "]').wait_for()
+    assert rider.errors == []
+    rider.page.evaluate(FOREIGN)
+    assert rider.page.evaluate("() => window.ours") is None
+    assert "Content Security Policy" in rider.errors.pop()
 
 
-@pytest.mark.parametrize("name", MISSING_FILES)
-def test_a_missing_file_is_told_in_one_line(chromium, address, name):
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("python.json", "./python.json cannot be loaded (HTTP 404)"),
+        ("micropython/micropython.wasm", "./micropython/micropython.wasm cannot be loaded (HTTP 404)"),
+        ("bike.mjs", "file of this page cannot be loaded"),
+    ],
+)
+def test_a_missing_file_is_told_in_one_line(chromium, address, name, words):
     context = chromium.new_context()
     context.route(f"**/{name}", lambda route: route.fulfill(status=404, body="not here"))
     page = context.new_page()
     page.goto(address)
-    words = MISSING_FILES[name]
     page.wait_for_function("text => document.querySelector('#todo').textContent.includes(text)", arg=words)
     assert page.inner_text("#todo").endswith("Load the page again.")
     context.close()

@@ -1,12 +1,15 @@
-"""The simulated board of the page Try, run on CPython."""
+"""The board of the page Try, on CPython and MicroPython: what it does at each order, and the records of each 20 ms."""
 
 import itertools
 import json
+import re
+from pathlib import Path
 
 import pytest
-from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.lcd import Lcd
-from kickstand_tools.web.device import STATE, WHOLE_TICKS, PageDevice, display
+from kickstand_tools.web.device import STATE, PageDevice
+from page_drive import ALIGN, RIDE, SHORT, Drive
+from support.mpy import run_mpy
+from support.web import page_repeated
 
 
 @pytest.fixture
@@ -23,81 +26,17 @@ def ticks(device, until_s):
     return json.loads(device.take())
 
 
-def texts(found):
-    return [" ".join(tick["display"]["text"]) for tick in found if "display" in tick]
+def press(device):
+    device.order("button", True)
+    device.order("button", False)
 
 
-def last(found, name):
-    return next(tick[name] for tick in reversed(found) if name in tick)
+def texts(records):
+    return [" ".join(tick["display"]["text"]) for tick in records if "display" in tick]
 
 
-def test_the_page_gets_a_record_every_20_ms(board):
-    found = ticks(board, 2.5)
-    assert [round(50 * tick["t_s"]) for tick in found] == list(range(1, 1 + len(found))) and len(found) in (125, 126)
-    assert any("On stand: press" in text for text in texts(found))
-    assert found[-1]["phase"] == "kickstand" and found[-1]["lean_deg"] == pytest.approx(-12.0, abs=0.1)
-    assert found[-1]["powered"] and found[-1]["speed_mps"] == 0.0
-    assert last(found, "meter") == [None, None]  # the board is not aligned yet
-    assert "display" in found[1]  # the dark display is sent too
-    assert sum("display" in tick for tick in found) < 10  # a display is sent only if it has changed
-    shown = last(found, "display")
-    assert shown["codes"][0][:4] == list(b"Raw ") and found[1]["display"]["codes"] == [[0x20] * 16] * 2
-    assert shown["lit"] and len(shown["cgram"]) == 64 and shown["shown_deg"] is None
-    assert json.loads(board.take()) == []
-
-
-def test_a_display_that_keeps_changing_is_sent_now_and_then(board):
-    """Usually a display is sent only if it has not changed for 20 ms."""
-
-    def change():
-        board.board.lcd.changes += 1
-
-    board.board.every(0.01, change)
-    found = ticks(board, 1.0)
-    sent = [k for k, tick in enumerate(found) if "display" in tick]
-    assert sent[0] == WHOLE_TICKS == 10 and max(b - a for a, b in itertools.pairwise(sent)) <= 11
-
-
-def test_a_press_aligns_and_the_bike_rides_on(board):
-    """The rider presses the button on the kickstand and upright."""
-    board.run_to(2.0)
-    for pose, until_s in ((None, 6.5), ("upright", 14.0)):
-        if pose:
-            board.order("pose", pose)
-            board.run_to(9.0)
-        board.order("button", True)
-        assert board.order("button", False) == pytest.approx(9.0 if pose else 2.0, abs=0.1)
-        found = ticks(board, until_s)
-    assert any("Aligned!" in text for text in texts(found))
-    board.order("pose", 15.0)
-    board.run_to(20.0)
-    board.order("lean", 25.0)
-    found = ticks(board, 24.0)
-    lean_deg, forward_g = last(found, "meter")
-    assert lean_deg == pytest.approx(25.0, abs=3.0) and forward_g == pytest.approx(0.0, abs=0.1)
-    assert last(found, "display")["shown_deg"] == pytest.approx(25.0, abs=3.0)
-    assert found[-1]["yaw_rate_dps"] < -10.0 and found[-1]["speed_mps"] == pytest.approx(15.0, abs=0.5)
-    assert board.state()["trusted"] and set(board.state()) == set(STATE)
-
-
-def test_power_and_plugs_may_be_pulled(board):
-    board.run_to(2.0)
-    for fitted in (False, False, True, True):
-        board.order("sensor", fitted)
-        found = ticks(board, board.board.clock.now_us / 1e6 + 2.0)
-        if not fitted:
-            assert board.state()["fault"] or "sensor" in texts(found)[-1].lower()
-    board.order("power", False)
-    found = ticks(board, 12.0)
-    assert not board.powered and not found[-1]["powered"] and board.state() == {"view": "off"}
-    assert not display(board.board.lcd)["lit"]
-    board.order("display", "ssd1306")
-    board.order("power", True)
-    assert board.state() == {"view": "starting"}
-    found = ticks(board, 15.0)
-    shown = last(found, "display")
-    assert found[-1]["powered"] and shown["lit"] and len(shown["pixels"]) == 1024
-    assert any("On stand" in text for text in texts(found))
+def last(records, name):
+    return next(tick[name] for tick in reversed(records) if name in tick)
 
 
 def align(device):
@@ -106,134 +45,147 @@ def align(device):
     for at_s, pose in ((begin_s, "kickstand"), (begin_s + 6.5, "upright")):
         device.order("pose", pose)
         device.run_to(at_s + 2.0)
-        device.order("button", True)
-        device.order("button", False)
+        press(device)
         device.run_to(at_s + 6.5)
     return json.loads(device.take())
 
 
-def test_a_record_has_the_true_motion_in_its_unit(board):
-    """The lean is in degrees with two digits, the speed in m/s with two, the yaw rate in deg/s with one."""
+def test_a_first_visit_is_recorded_every_20_ms(board):
+    """The rider presses the button in both poses, and leans in a ride of 15 m/s. Changes of display and state are
+    sent."""
+    records = align(board)
+    assert [round(50 * tick["t_s"]) for tick in records] == list(range(1, 1 + len(records)))
+    assert records[0]["phase"] == "kickstand" and records[0]["lean_deg"] == pytest.approx(-12.0, abs=0.1)
+    first = records[1]["display"]
+    assert first["codes"] == [[0x20] * 16] * 2 and first["shown_deg"] is None
+    shown = texts(records)
+    assert [any(words in text for text in shown) for words in ("On stand: press", "Aligned!")] == [True, True]
+    assert len(shown) < 0.2 * len(records)
+    states = [tick["state"] for tick in records if "state" in tick]
+    assert states[0]["code"] == "starting" and states[-1]["view"] == "align" and set(states[-1]) == set(STATE)
+    assert all(one != other for one, other in itertools.pairwise(states)) and len(states) < 30
     board.order("pose", 15.0)
-    board.run_to(8.0)
-    board.order("lean", -20.0)
-    found = ticks(board, 8.3)[-1]
-    lean_deg, speed_mps, yaw_rate_dps, phase = board.bike.truth(found["t_s"])
-    assert (found["lean_deg"], found["speed_mps"]) == (round(lean_deg, 2), round(speed_mps, 2))
-    assert (found["yaw_rate_dps"], found["phase"]) == (round(yaw_rate_dps, 1), phase)
-    assert found["lean_deg"] < -3.0 and found["yaw_rate_dps"] > 2.0  # yaw is positive to the left
-
-
-def test_the_meter_is_sent_with_its_digits(board):
-    """The lean has one digit, the forward force three. Lean and forward force are missing before the alignment."""
-    assert last(ticks(board, 2.0), "meter") == [None, None]
-    sent = [tick["meter"] for tick in align(board)]
-    lean_deg, forward_g = sent[-1]
-    assert lean_deg == pytest.approx(0.0, abs=1.5) and forward_g == pytest.approx(0.0, abs=0.05)
-    for values, digits in (([lean for lean, _ in sent if lean], 1), ([force for _, force in sent if force], 3)):
+    records += ticks(board, 20.0)
+    board.order("lean", -25.0)
+    records += ticks(board, 24.0)
+    lean_deg, speed_mps, yaw_rate_dps, phase = board.bike.truth(records[-1]["t_s"])
+    assert records[-1]["lean_deg"] == round(lean_deg, 2) and records[-1]["speed_mps"] == round(speed_mps, 2)
+    assert records[-1]["yaw_rate_dps"] == round(yaw_rate_dps, 1) > 10.0 and records[-1]["phase"] == phase
+    assert last(records, "meter") == [pytest.approx(lean_deg, abs=3.0), pytest.approx(0.0, abs=0.1)]
+    assert last(records, "display")["shown_deg"] == pytest.approx(lean_deg, abs=3.0)
+    assert board.state()["trusted"] and json.loads(board.take()) == []
+    meters = [tick["meter"] for tick in records if "meter" in tick]
+    assert meters[0] == [None, None]  # not aligned yet
+    for column, digits in enumerate((1, 3)):
+        values = [meter[column] for meter in meters if meter[column]]
         assert all(round(value, digits) == value for value in values)
         assert any(round(value, digits - 1) != value for value in values)
 
 
-def test_a_state_is_sent_when_it_changes(board):
-    found = ticks(board, 3.0)
-    sent = [tick["state"] for tick in found if "state" in tick]
-    assert sent[0]["code"] == "starting" and sent[-1]["view"] == "not_aligned"
-    assert sent[-1] == board.state() and set(sent[-1]) == set(STATE)
-    assert all(a != b for a, b in itertools.pairwise(sent)) and len(sent) < 10
-
-
-@pytest.mark.parametrize(("held_s", "pressed_s"), [(0.0, 0.1), (0.05, 0.1), (0.3, 0.3)])
-def test_a_press_lasts_at_least_100_ms(board, held_s, pressed_s):
+def test_wire_power_and_display_may_be_pulled(board):
     board.run_to(2.0)
-    pressed_at_s = board.order("button", True)
-    board.run_to(pressed_at_s + held_s)
-    board.order("button", False)
-    board.run_to(pressed_at_s + pressed_s - 0.02)
-    assert board.board.button.closed
-    board.run_to(pressed_at_s + pressed_s + 0.02)
-    assert not board.board.button.closed
+    for fitted in (False, False, True, True):
+        board.order("sensor", fitted)
+        records = ticks(board, board.board.clock.now_us / 1e6 + 2.0)
+        assert bool(board.state()["fault"]) is not fitted, texts(records)
+    board.order("power", False)
+    assert board.order("power", False) == pytest.approx(10.0, abs=0.1)  # the board is already off
+    board.order("display", "ssd1306")
+    records = ticks(board, 12.0)
+    assert records[-1]["t_s"] == pytest.approx(12.0, abs=0.021) and not records[-1]["powered"]
+    assert "meter" not in records[-1] and board.state() == {"view": "off"} and not last(records, "display")["lit"]
+    board.order("power", True)
+    assert board.state() == {"view": "starting"}
+    records = ticks(board, 15.0)
+    shown = last(records, "display")
+    assert records[-1]["powered"] and shown["lit"] and len(shown["pixels"]) == 1024
+    assert any("On stand" in text for text in texts(records)) and not any("?" in text for text in texts(records))
+    for kind, pixels in (("lcd", 0), ("sh1106", 1024)):  # a display that has power lights up after its initialisation
+        board.order("display", kind)
+        shown = last(ticks(board, board.board.clock.now_us / 1e6 + 3.0), "display")
+        assert shown["lit"] and len(shown.get("pixels", [])) == pixels and shown["text"][0].startswith("Raw")
 
 
 def test_time_goes_on_in_safe_mode(board):
-    """The button is held while the power is switched on. The firmware then ends, and the board waits for its power to
-    be switched off."""
-    board.run_to(2.0)
+    """The button is held while the power is switched on. The firmware then ends, until the power is switched off."""
     board.order("power", False)
-    assert board.order("power", False) == pytest.approx(2.0, abs=0.1)  # the board is already off
     board.order("button", True)
-    board.run_to(2.2)
     board.order("power", True)
-    found = ticks(board, 5.0)
-    assert board.state() == {"view": "safe"} and last(found, "state") == {"view": "safe"}
-    assert any("Safe mode" in text for text in texts(found))
-    assert found[-1]["t_s"] == pytest.approx(5.0, abs=0.03) and "meter" not in found[-1]
+    records = ticks(board, 3.0)
+    assert board.state() == last(records, "state") == {"view": "safe"}
+    assert any("Safe mode" in text for text in texts(records))
+    assert records[-1]["t_s"] == pytest.approx(3.0, abs=0.03) and "meter" not in records[-1]
     board.order("button", False)
     board.order("power", False)
     assert not board.powered and board.state() == {"view": "off"}
     board.order("power", True)
-    board.run_to(8.0)
+    board.run_to(5.0)
     assert board.state()["view"] != "safe"
 
 
-def test_the_time_runs_to_the_wanted_time_while_off(board):
-    board.run_to(2.0)
-    board.order("power", False)
-    found = ticks(board, 4.0)
-    assert [round(50 * tick["t_s"]) for tick in found][-1] == 200
-    assert board.order("power", True) == pytest.approx(4.0, abs=0.01)
-
-
+@pytest.mark.long
 def test_the_supply_is_cut_during_one_save(board):
-    """The calibration of the first alignment is lost, and that of the second is kept."""
+    """The calibration of the first alignment is lost, and that of the second is kept. A cut can be cancelled."""
     board.order("cut_save", True)
     align(board)
     assert not board.powered
     board.order("power", True)
-    found = align(board)
-    assert any("On stand: press" in text for text in texts(found))
-    assert board.powered and last(found, "meter")[0] == pytest.approx(0.0, abs=1.5)
-
-
-def test_a_cut_can_be_cancelled(board):
+    records = align(board)
+    assert any("On stand: press" in text for text in texts(records))
+    assert board.powered and last(records, "meter")[0] == pytest.approx(0.0, abs=1.5)
     board.order("cut_save", True)
     board.order("cut_save", False)
-    assert last(align(board), "meter")[0] == pytest.approx(0.0, abs=1.5)
+    align(board)
     assert board.powered
 
 
-def test_a_display_fitted_without_power_stays_dark(board):
-    board.run_to(1.0)
-    board.order("power", False)
-    board.order("display", "lcd")
-    found = ticks(board, 1.5)
-    shown = last(found, "display")  # the display is sent again, because it was exchanged
-    assert not shown["lit"] and shown["text"] == [" " * 16] * 2
-    board.order("power", True)
-    assert last(ticks(board, 3.0), "display")["lit"]
-    board.order("display", "sh1106")  # a display that has power lights up after its initialisation
-    assert "pixels" in last(ticks(board, 6.0), "display")
+# On MicroPython
+
+# The orders include safe mode: the button is held while the power is switched on.
+ORDERS = [
+    *([1.0, "button", True], [1.0, "button", False], [5.0, "pose", "upright"]),
+    *([6.0, "sensor", False], [7.3, "sensor", True]),
+    *([9.0, "power", False], [9.5, "button", True], [9.7, "power", True], [11.2, "button", False]),
+    *([12.0, "power", False], [12.3, "power", True]),
+]
 
 
-def test_an_oled_keeps_its_text_while_a_picture_arrives(board):
-    """The text of a half received picture cannot be read."""
-    board.order("display", "ssd1306")
-    found = ticks(board, 3.0)
-    assert texts(found) and not any(text.startswith("?") for text in texts(found))
+def repeated(kind, orders, flash):
+    flash.mkdir()
+    plan = json.dumps({"orders": orders, "until_s": 14.0})
+    return json.loads(run_mpy(Path(page_repeated.__file__), kind, stdin=plan, directory=flash).splitlines()[-1])
 
 
-def test_characters_are_sent_only_of_a_display_that_is_on():
-    lcd = Lcd(Clock())
-    lcd.ddram[0] = ord("A")
-    blank = [[0x20] * 16] * 2
-    for on, two_lines, codes in (
-        (False, False, blank),
-        (True, False, blank),
-        (False, True, blank),
-        (True, True, [[0x41] + [0x20] * 15, [0x20] * 16]),
-    ):
-        lcd.on, lcd.two_lines = on, two_lines
-        assert display(lcd)["codes"] == codes
-    lcd.ddram[:16] = b"Lean 12\xdf left   "
-    assert display(lcd)["shown_deg"] == -12.0
-    assert display(lcd)["cgram"] == [0] * 64
+@pytest.mark.long
+def test_the_page_turns_the_loop_as_the_firmware_does(tmp_path):
+    page = repeated("page", ORDERS, tmp_path / "page")
+    loop = repeated("loop", page["orders"], tmp_path / "loop")
+    shown = {display["text"][0].rstrip() for _, display in page["displays"]}
+    assert {"", "Kickstand", "Stand: hold", "Now upright:", "Calibration", "Safe mode"} <= shown
+    assert page["displays"] == loop["displays"]
+
+
+# Every complete first line that the display can show in this ride
+WHOLE = re.compile(
+    r" {16}$|Kickstand {7}$|Raw +-?\d+° [+-]\d\.\d\dg *$|Stand: hold {5}$|Now upright: {4}$|Upright: hold {3}$"
+    r"|Aligned! +\d+\.\d° *$|Lean  -- {8}$|Lean +\d+° (left|right)? *$|Max left +\d+° *$|(Accel|Brake) +\d\.\d\d g *$"
+    r"|Formula +-?\d+° *$| *-?\d\.\d\d *-?\d\.\d\d *-?\d\.\d\dg *$"
+)
+LASTING_S = 0.08  # the firmware writes a page every 0.1 s, so a text that disappears sooner was not a page
+
+
+@pytest.mark.long
+def test_no_display_is_shown_half_written(tmp_path, monkeypatch):
+    """The display of a ride with bends is sampled every 20 ms. The rider turns through the pages."""
+    monkeypatch.chdir(tmp_path)
+    with Drive() as drive:
+        for order in [*ALIGN, RIDE, ("wait", 20)]:
+            drive.do(*order)
+        for lean_deg in (30, -25, 10, -40, 0, 5, 45, -3):
+            for order in [("lean", lean_deg), ("wait", 3), SHORT]:
+                drive.do(*order)
+    shown = [(tick["t_s"], tick["display"]["text"][0]) for tick in drive.records if "display" in tick]
+    assert len(shown) > 100 and [line for _, line in shown if not WHOLE.match(line)] == []
+    pages = [(t_s, re.sub(r"[-+\d.°]+|left|right|Brake|Accel", "", line).strip()) for t_s, line in shown if t_s > 1.0]
+    changes = [pages[0], *(other for one, other in itertools.pairwise(pages) if one[1] != other[1])]
+    assert all(other[0] - one[0] > LASTING_S for one, other in itertools.pairwise(changes))

@@ -9,11 +9,6 @@ import sys
 
 import machine
 
-# Collect garbage often while the other modules are loaded. Otherwise lasting objects would be placed behind the
-# garbage, far along the heap. Then every later collection would scan the heap up to those objects. App resets the
-# threshold before its loop begins.
-gc.threshold(80_000)
-
 IS_ESP32 = sys.platform == "esp32"
 # The board and its chip, such as "Raspberry Pi Pico with RP2040" or "ESP32C3 module with ESP32-C3"
 MACHINE = getattr(sys.implementation, "_machine", "")
@@ -30,12 +25,16 @@ if IS_ESP32:
     SD_SPI = (2, 3)  # slots of machine.SDCard that use SPI
     # Pins that the chip itself needs. An output on a pin of the chip's USB disconnects the board from the computer
     # until BOOT is held. An output on a pin of a classic chip's flash (6 to 11) crashes the board at each start. Pins 1
-    # and 3 of a classic chip are the console.
+    # and 3 of a classic chip are the console. ESP32-PICO-D4 and D2WD have their flash on 16 and 17, too (data sheet of
+    # the PICO-D4, section 2.2).
     _CHIP = MACHINE.split(" with ESP32")[-1].lstrip("-")[:2]  # "S2", "C3", ...; classic: "", "UN", "D2" or "PI"
     _CLASSIC = not (_CHIP[:1] in ("S", "C", "H", "P") and _CHIP[1:].isdigit())
-    TAKEN_PINS = {"S2": (19, 20), "S3": (19, 20), "C3": (18, 19), "C6": (12, 13), "H2": (26, 27)}.get(
-        _CHIP, (1, 3, 6, 7, 8, 9, 10, 11) if _CLASSIC else ()
-    )
+    TAKEN_PINS = {
+        "S2": (19, 20), "S3": (19, 20), "C3": (18, 19), "C5": (13, 14), "C6": (12, 13), "H2": (26, 27), "P4": (24, 25),
+    }.get(_CHIP, (1, 3, 6, 7, 8, 9, 10, 11) if _CLASSIC else ())  # fmt: skip
+    if "PICO-D4" in MACHINE or "D2WD" in MACHINE:
+        TAKEN_PINS += 16, 17
+        GPS_PINS = None, None
     INPUT_PINS = (34, 35, 36, 37, 38, 39) if _CLASSIC else ()  # pins without output and without pull-up
 else:  # Raspberry Pi Pico and Pico 2, and boards of other makers with the same pins and name
     _KNOWN = sys.platform != "rp2" or "Pico" in MACHINE
@@ -60,6 +59,19 @@ _WATCHDOG_MS = 8000  # the watchdog of a Pico allows at most 8388 ms
 _WEEK_MS = 604_800_000  # a week. An ESP32 counts a time-out in 32 bits, with four counts per ms, so it allows 12 days
 
 _watchdog = None
+
+
+def begin():
+    """Prepare the chip. Call this function at the start of the firmware, before other modules are imported."""
+    # Collect garbage often while the other modules are loaded. Otherwise lasting objects would be placed behind the
+    # garbage, far along the heap. Then every later collection would scan the heap up to those objects. App resets the
+    # threshold before its loop begins.
+    gc.threshold(80_000)
+    if IS_ESP32:
+        try:
+            machine.freq(240_000_000)  # MicroPython starts a classic ESP32 with 160 MHz
+        except ValueError:  # the C series and the H2 run at their highest frequency from the start
+            pass
 
 
 def open_i2c(controller, sda, scl, frequency, timeout_us):
@@ -115,7 +127,7 @@ def rest_watchdog():
         return
     # Data sheets RP2040 section 4.7.6 and RP2350 section 12.9.7: ENABLE is bit 30 of the watchdog's CTRL, at its base
     # address. Sections 2.1.2 and 2.1.3: a write to address + 0x3000 clears the bits that are 1.
-    base = 0x400D8000 if "RP2350" in getattr(sys.implementation, "_machine", "") else 0x40058000
+    base = 0x400D8000 if "RP2350" in MACHINE else 0x40058000
     machine.mem32[base + 0x3000] = 1 << 30
 
 

@@ -56,13 +56,14 @@ class DrivingQuality:
         agree: True if forward is the same in both halves and in all parts, within the limits.
         good: True if the quality is good enough for an alignment.
         speed_problem: an AlignmentError for a fault of the speed, or None.
+        speed_confirmed: True if enough events agree with the speed.
         mount_problem: an AlignmentError for a fault of the mount, or None.
     """
 
     def __init__(self, events, vertical):
         self.fit = Fit()
         self.quality_deg = self.halves_deg = 180.0
-        self.good = self.agree = False
+        self.good = self.agree = self.speed_confirmed = False
         self.speed_problem = self.mount_problem = None
         self.parts = DriveParts()
         self._events = events
@@ -115,8 +116,8 @@ class DrivingQuality:
             level = vector(part.level[0], part.level[1], part.level[2])
             yield
             if (yield from regression.fitting(part, lag, half, blocks)):
-                other = atan2(dot(left, part.forward), dot(forward, part.forward))
-                self.halves_deg = degrees(angle_between(angle, other))
+                second_angle = atan2(dot(left, part.forward), dot(forward, part.forward))
+                self.halves_deg = degrees(angle_between(angle, second_angle))
                 yield
                 self._decide(ratios / weights, angle_deg(level, part.level))
 
@@ -133,6 +134,7 @@ class DrivingQuality:
         if counted < MIN_EVENTS_TO_CHECK_SPEED:
             return
         self.speed_problem = fit_problem(self._events.lag_s, force_ratio)
+        self.speed_confirmed = self.speed_problem is None
         if counted < MIN_EVENTS:
             return
         self.mount_problem = self._find_mount_problem(level_change_deg)

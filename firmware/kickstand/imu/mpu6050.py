@@ -71,8 +71,10 @@ CHIPS = {
     0x74: ("MPU6515", 333.87, 21.0, True, 512, 0xF8),
     0x78: ("MPU6500 0x78", 333.87, 21.0, True, 512, 0xF8),
     0x98: ("ICM20689", 326.8, 25.0, True, 512, 0xF8),
-    # FIFO_EN has no bit for the temperature, which the chip always stores
+    # FIFO_EN has no bit for the temperature, which these chips always store
     0x19: ("MPU6886", 326.8, 25.0, True, 512, 0x18),
+    0x12: ("ICM20602", 326.8, 25.0, True, 1008, 0x18),
+    0x11: ("ICM20600", 326.8, 25.0, True, 1008, 0x18),
 }
 _NAME = const(0)
 _LSB_PER_C = const(1)
@@ -84,6 +86,7 @@ _MAX_FRAMES = const(8)  # most frames in one transfer, which then takes 3 ms at 
 # Most frames in one transfer while fewer than _MAX_FRAMES are in the FIFO. Because of this limit, one slow pass of the
 # loop does not slow the next pass.
 _FEW_FRAMES = const(3)
+_STEP = const(512)  # largest change of the temperature between two fetches, in counts: 1.5 degrees C
 # Longest time for which readings may stay equal, because noise changes every sample of a working chip
 _FROZEN_MS = const(100)
 
@@ -141,11 +144,11 @@ class Mpu6050:
         self._one, self._two, self._three = bytearray(1), bytearray(2), bytearray(3)
         self._readback = bytearray(_FIFO_EN - _SMPLRT_DIV + 1)
         self._frames = bytearray(FRAME * _MAX_FRAMES)
+        self._in_step = False  # True if the frames hold samples from after the last start of the FIFO
         # Entry n is a view of the first n frames. The views are created once, because each slice takes heap.
         self._some_frames = [memoryview(self._frames)[: FRAME * n] for n in range(_MAX_FRAMES + 1)]
         self.frames_left = self.overflows = 0
         self._most = 0  # largest number of bytes found in the FIFO
-        self._odd = False  # True if the last fetch() found an incomplete frame
         self._settled = False  # True once a chip was started at this address, so the other address is not tried
         self._started = False  # True once setup() is complete and the FIFO fills
         self._full = 0  # number of bytes in the FIFO above which it may have overflowed
@@ -244,7 +247,9 @@ class Mpu6050:
         """Read samples from the FIFO, and set frames_left.
 
         After an overflow the frames no longer begin at multiples of 14 bytes. If the FIFO has overflowed, fetch()
-        empties the FIFO, increments overflows and returns 0. While the chip is writing a frame, fetch() returns 0 too.
+        empties the FIFO, increments overflows and returns 0. Only whole frames are read: the chip may be writing one.
+        Bytes that were lost or doubled on the bus leave a part of a frame too. Then the frames are cut at wrong places,
+        and the temperature jumps, which counts as an overflow.
 
         Returns:
             The number of samples read: _MAX_FRAMES if the FIFO holds at least that many, else at most _FEW_FRAMES.
@@ -256,22 +261,32 @@ class Mpu6050:
         waiting = self._two[0] << 8 | self._two[1]
         if waiting > self._most:
             self._most = waiting
-        odd = waiting % FRAME != 0
-        if waiting > self._full or (odd and self._odd):
-            self.overflows += 1
-            self.frames_left = 0
-            self.restart_fifo()
-            return 0
-        self._odd = odd
-        n = waiting // FRAME
-        if odd:  # the chip may be writing a frame; if the next fetch() finds a part too, an overflow has cut a frame
-            self.frames_left = n + 1
-            return 0
+        if waiting > self._full:
+            return self._overflowed()
+        n = waiting // FRAME  # the chip may be writing one more frame, whose bytes stay
         taken = _MAX_FRAMES if n >= _MAX_FRAMES else _FEW_FRAMES if n > _FEW_FRAMES else n
         self.frames_left = n - taken
         if taken:
+            before = self._temperature(0)
             self._i2c.readfrom_mem_into(self.address, _FIFO_R_W, self._some_frames[taken])
+            if waiting % FRAME and self._in_step:
+                if not (
+                    -_STEP < self._temperature(0) - before < _STEP
+                    and -_STEP < self._temperature(taken - 1) - before < _STEP
+                ):
+                    return self._overflowed()
+            self._in_step = True
         return taken
+
+    def _overflowed(self):
+        self.overflows += 1
+        self.frames_left = 0
+        self.restart_fifo()
+        return 0
+
+    def _temperature(self, k):
+        """Return the temperature of sample k of the last fetch(), in counts, as two bytes without a sign."""
+        return self._frames[FRAME * k + 6] << 8 | self._frames[FRAME * k + 7]
 
     def least_free_samples(self):
         """Return the smallest free space that any fetch() has found in the FIFO, in samples."""
@@ -296,7 +311,7 @@ class Mpu6050:
         self.write_register(_USER_CTRL, _FIFO_RESET)  # the reset works only while the FIFO is disabled (p. 38)
         self.write_register(_USER_CTRL, _FIFO_ENABLE)
         self.write_register(_FIFO_EN, _FIFO_ALL)
-        self._odd = False
+        self._in_step = False
         if not self._fifo_runs(self.read_register(_FIFO_EN), self.read_register(_USER_CTRL)):
             raise NotKept("MPU6050 FIFO does not read back")
 

@@ -68,7 +68,9 @@ class Recorder:
         self._chip = chip
         self._body = pack(chip.who_am_i, chip.accel_range_g, calibration)
         now_ms = ticks_ms()
-        self._start_us = self._time_us = now_ms * 1000
+        # The time is kept in two parts, because integers of over 30 bits would take heap in each pass
+        self._start_s, self._start_us = self._time_s, self._time_us = now_ms // 1000, now_ms % 1000 * 1000
+        self._empty = True  # until the first samples
         self._before_ms = now_ms
         self._sequence = 0
         self._bytes = 0
@@ -115,7 +117,7 @@ class Recorder:
         now_ms = ticks_ms()
         if self._interrupted:  # a replay recognises a gap by its length, and restarts its filter as the board did
             self._interrupted = False
-            if self._time_us != self._start_us:
+            if not self._empty:
                 dt_us = max(GAP_US + 1, min(MAX_DT_US, ticks_diff(now_ms, self._before_ms) * 1000))
         self._before_ms = now_ms
         if self._speed is not None:
@@ -125,7 +127,11 @@ class Recorder:
             self._block.add_place(self._place)
             self._place = None
         self._block.add(sums, n, dt_us)
+        self._empty = False
         self._time_us += dt_us
+        if self._time_us >= 1_000_000:
+            self._time_s += self._time_us // 1_000_000
+            self._time_us %= 1_000_000
         if self._block.full():
             self._end_block()
             if self.active:
@@ -175,7 +181,7 @@ class Recorder:
 
     def seconds(self):
         """Return the duration of this recording so far, in seconds."""
-        return (self._time_us - self._start_us) // 1_000_000
+        return self._time_s - self._start_s - (self._time_us < self._start_us)
 
     def room_s(self):
         """Return the number of seconds that can still be recorded, or None without a limit."""
@@ -189,7 +195,8 @@ class Recorder:
     def _begin_block(self):
         """Begin an empty block. The next passes of the app's loop fill the block."""
         length, number = self.keeper.next_length(), (self._ride, self._sequence)
-        self._block.begin(length, *number, self._time_us, self._chip, self._sample_hz, self._body)
+        time_us = 1_000_000 * self._time_s + self._time_us
+        self._block.begin(length, *number, time_us, self._chip, self._sample_hz, self._body)
         self._sequence += 1
 
     def _end_block(self):

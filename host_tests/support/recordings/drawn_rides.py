@@ -19,7 +19,17 @@ from kickstand_tools.simulation import hands, poses
 from kickstand_tools.simulation.hands import Hand
 from kickstand_tools.simulation.physics.chip import GYRO_DPS_PER_G, Chip
 
-from support.recordings.other_bike import FINE_HZ, KINDS, G, _about, _course, _mounting, _noise, _readings, _tolerances
+from support.recordings.other_bike import (
+    FINE_HZ,
+    KINDS,
+    G,
+    about,
+    course_of,
+    perfect_readings,
+    random_mounting,
+    random_tolerances,
+    smooth_noise,
+)
 from support.recordings.smoothed_rides import Known, rms
 
 # The share of rides with each mount. A "foreign" mount shakes or bends, so the sensor measures the mount's own
@@ -117,32 +127,34 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
         if total > seconds - 8.0 and len(kept) > 3:
             break
         kept.append(leg)
-    time, lean, v = _course([*kept, (8.0, 0.0, 15.0)])
+    time, lean, v = course_of([*kept, (8.0, 0.0, 15.0)])
     n = len(time)
     riding = np.clip((v - 1.0) / 3.0, 0.0, 1.0)
     # The chassis's lean differs from the lean of balance, because the tyres are wide, the road is tilted and the rider
     # moves.
-    wander = chance.uniform(0.2, 0.8) * _noise(chance, n, chance.uniform(0.5, 1.5)) * riding
+    wander = chance.uniform(0.2, 0.8) * smooth_noise(chance, n, chance.uniform(0.5, 1.5)) * riding
     balance = np.radians(lean + wander)
-    tilt = np.radians(chance.uniform(-2.5, 2.5) + chance.uniform(0.3, 1.0) * _noise(chance, n, 8.0))
+    tilt = np.radians(chance.uniform(-2.5, 2.5) + chance.uniform(0.3, 1.0) * smooth_noise(chance, n, 8.0))
     tyre, height = chance.uniform(0.03, 0.08), chance.uniform(0.55, 0.7)
     met = balance - tilt
     flank = np.arctan2(tyre * np.sin(met), height - tyre + tyre * np.cos(met))
-    rider = np.radians(np.exp(chance.uniform(np.log(0.3), np.log(1.5))) * _noise(chance, n, chance.uniform(0.7, 3.0)))
+    rider = np.radians(
+        np.exp(chance.uniform(np.log(0.3), np.log(1.5))) * smooth_noise(chance, n, chance.uniform(0.7, 3.0))
+    )
     hung = chance.uniform(-0.02, 0.06)
     chassis = balance + (flank + rider - hung * balance) * riding
     # The yaw rate follows from the balance of roll. To lean over, a bike first steers to the other side.
     falling = chance.uniform(0.6, 0.75) * _twice(balance) / np.cos(balance)
     yaw_rate = np.where(v > 0.5, (falling - G * np.tan(balance)) / np.maximum(v, 3.0), 0.0)
     steep = chance.uniform(1.5, 4.0) if kind == "hills" else chance.uniform(0.3, 1.5)
-    slope = np.radians(steep) * _noise(chance, n, chance.uniform(4.0, 10.0)) * riding
+    slope = np.radians(steep) * smooth_noise(chance, n, chance.uniform(4.0, 10.0)) * riding
     chance.uniform(0.15, 0.4)  # unused: keeps the random sequence of each seed
     dive = _dive(np.random.default_rng([seed, 25]), np.gradient(v) * FINE_HZ / G)
     dive = _through(dive, *_spring(chance.uniform(1.4, 2.2), chance.uniform(0.35, 0.6)))
     low, high = ROUGH.get(kind, USUALLY_ROUGH)
     wheelbase = chance.uniform(1.3, 1.55)
     rear, front = _road(chance, v, wheelbase, np.exp(chance.uniform(np.log(low), np.log(high))))
-    slip = np.radians(chance.uniform(0.1, 0.5)) * _noise(chance, n, chance.uniform(0.5, 3.0))
+    slip = np.radians(chance.uniform(0.1, 0.5)) * smooth_noise(chance, n, chance.uniform(0.5, 3.0))
     pitch = slope + dive + (front - rear) / wheelbase
     engine = np.exp(chance.uniform(np.log(0.03), np.log(0.2))) * np.clip(v / 10.0, 0.3, 1.5)
     turns = np.cumsum(np.clip(35.0 + 6.0 * (v % 9.0), 20.0, 150.0)) / FINE_HZ
@@ -150,7 +162,7 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
     logs, calibrations = [], []
     for mount in used:
         place = chance.uniform(0.2, 0.8), chance.uniform(0.1, 1.0)
-        force, rates = _readings(v, yaw_rate, slope, chassis, pitch, place[0], slip, rear, place[1])
+        force, rates = perfect_readings(v, yaw_rate, slope, chassis, pitch, place[0], slip, rear, place[1])
         sensor = np.random.default_rng([seed, 26, len(logs)]) if sheet else None
         log, calibration = _device(chance, mount, force, np.degrees(rates), v, engine, turns, sensor)
         logs.append(log)
@@ -196,7 +208,7 @@ def _device(chance, mount, force, rates, v, engine, turns, sensor):
     if mount == "foreign":
         for axis, most_g, over_s in ((0, 0.06, 0.2), (1, 0.05, 1.5), (1, 0.2, 0.05), (2, 0.06, 0.2)):
             size, over_s = most_g * chance.uniform(0.3, 1.0), over_s * np.exp(chance.uniform(-0.7, 0.7))
-            force[:, axis] += size * _noise(chance, n, over_s) * np.clip(v / 5.0, 0.0, 1.0)
+            force[:, axis] += size * smooth_noise(chance, n, over_s) * np.clip(v / 5.0, 0.0, 1.0)
     if mount == "clipping":
         force, rates = np.clip(force, -1.6, 1.6), np.clip(rates, -125.0, 125.0)
     step = FINE_HZ // (100 if mount == "aliasing" else 200)
@@ -208,7 +220,7 @@ def _device(chance, mount, force, rates, v, engine, turns, sensor):
     rough = rough[: count * step : step]
     force = force + chance.uniform(0.02, 0.08) * rough * chance.standard_normal((count, 3))
     rates = rates + chance.uniform(0.3, 1.5) * rough * chance.standard_normal((count, 3))
-    gyro, accel = _tolerances(chance)
+    gyro, accel = random_tolerances(chance)
     rate_hz = FINE_HZ / step
     middle = np.asarray((np.arange(count) + 0.5) / rate_hz, dtype=np.float64)
     drift = np.cumsum(chance.standard_normal((count, 3)), axis=0) * 0.004 / np.sqrt(rate_hz)
@@ -220,11 +232,11 @@ def _device(chance, mount, force, rates, v, engine, turns, sensor):
         force = force + chance.uniform(-0.03, 0.03, 3) * (1.0 - np.exp(-middle / 120.0))[:, None]
     roll = np.radians(chance.uniform(-1.5, 1.5))
     yaw = np.radians(chance.uniform(-1.0, 1.0)) / np.tan(np.radians(chance.uniform(8.0, 14.0)))
-    mounting = _mounting(chance)
+    mounting = random_mounting(chance)
     if sensor is not None:
         return _of_the_sheet(sensor, middle, force @ mounting, rates @ mounting + bias, mounting)
     calibration = CalibrationFile(
-        vehicle_from_sensor=_about(2, roll) @ _about(1, yaw) @ mounting, aligned=True, six_done=True, gyro_delay_s=0.0
+        vehicle_from_sensor=about(2, roll) @ about(1, yaw) @ mounting, aligned=True, six_done=True, gyro_delay_s=0.0
     )
     return Log(middle, force @ mounting, rates @ mounting), calibration
 

@@ -4,8 +4,8 @@ import struct
 import subprocess
 from pathlib import Path
 
-import imageio_ffmpeg
 import numpy as np
+from kickstand_tools.overlay.video import ffmpeg, open_video
 
 SCALE = 3755  # scale of the gyro's integers in HERO cameras
 
@@ -14,18 +14,19 @@ def film(path: Path, seconds: float, fps: int = 10, size: str = "320x240", colou
     """Create a video of one colour, with sound."""
     sources = ["-f", "lavfi", "-i", f"color={colour}:size={size}:rate={fps}:duration={seconds}"]
     sources += ["-f", "lavfi", "-i", f"sine=duration={seconds}"]
-    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error", *sources, "-pix_fmt", "yuv420p", str(path)]
+    command = [ffmpeg(), "-y", "-loglevel", "error", *sources, "-pix_fmt", "yuv420p", str(path)]
     subprocess.run(command, check=True)
     return path
 
 
 def frames(path: Path, form: str = "rgb24") -> np.ndarray:
     """Return all pictures of a video, shape (n, height, width, 3), or (..., 4) for "rgba", with transparency."""
-    channels = 4 if form == "rgba" else 3
+    film, channels = open_video(path), 4 if form == "rgba" else 3
     decoder = ["-c:v", "libvpx-vp9"] if path.suffix == ".webm" else []  # ffmpeg's own decoder ignores transparency
-    reader = imageio_ffmpeg.read_frames(str(path), pix_fmt=form, bits_per_pixel=8 * channels, input_params=decoder)
-    width, height = next(reader)["size"]
-    return np.array([np.frombuffer(frame, np.uint8).reshape(height, width, channels) for frame in reader])
+    pictures = ["-i", str(path), "-f", "rawvideo", "-pix_fmt", form, "-"]
+    command = [ffmpeg(), "-loglevel", "error", *decoder, *pictures]
+    content = subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout
+    return np.frombuffer(content, np.uint8).reshape(-1, film.height, film.width, channels)
 
 
 def with_telemetry(video: Path, rate_dps: np.ndarray, rate_hz: float) -> Path:

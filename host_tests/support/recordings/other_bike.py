@@ -70,39 +70,41 @@ def other_ride(kind, seed, seconds, height_m=0.0, speed=False):
     chance = np.random.default_rng([seed, *kind.encode()])
     legs = KINDS[kind](chance)
     legs = [leg for leg, end in zip(legs, np.cumsum([leg[0] for leg in legs])) if end <= seconds]
-    time, lean, v = _course(legs)
+    time, lean, v = course_of(legs)
     n = len(time)
     riding = np.clip((v - 1.0) / 3.0, 0.0, 1.0)
-    chassis = np.radians(lean + RIDER_DEG * riding * _noise(chance, n, 0.7))
+    chassis = np.radians(lean + RIDER_DEG * riding * smooth_noise(chance, n, 0.7))
     yaw_rate = np.where(v > 0.5, -G * np.tan(np.radians(lean)) / np.maximum(v, 3.0), 0.0)
-    slope = np.radians(0.8) * _noise(chance, n, 4.0) * riding
-    dive = np.radians(0.25) * _smooth(np.gradient(v) * FINE_HZ, 0.2)
-    force, rates = _readings(v, yaw_rate, slope, chassis, slope + dive, height_m)
+    slope = np.radians(0.8) * smooth_noise(chance, n, 4.0) * riding
+    dive = np.radians(0.25) * smoothed(np.gradient(v) * FINE_HZ, 0.2)
+    force, rates = perfect_readings(v, yaw_rate, slope, chassis, slope + dive, height_m)
     step = FINE_HZ // RATE_HZ
     force, rates = (values[: n // step * step].reshape(-1, step, 3).mean(axis=1) for values in (force, rates))
     count = len(force)
     shaken = np.clip(v[: n // step * step : step] / 5.0, 0.1, 1.0)[:, None]
     force = force + VIBRATION_G * shaken * chance.standard_normal((count, 3))
     rates = np.degrees(rates) + VIBRATION_DPS * shaken * chance.standard_normal((count, 3))
-    gyro, accel = _tolerances(chance)
+    gyro, accel = random_tolerances(chance)
     drift = np.cumsum(chance.standard_normal((count, 3)), axis=0) * 0.004 / np.sqrt(RATE_HZ)
     rates = rates @ gyro.T + chance.uniform(-0.3, 0.3, 3) + drift
     force = force @ accel.T + chance.uniform(-0.005, 0.005, 3)
     # The upright pose has an error in roll. A change of pitch between the poses causes an error in yaw.
     roll, yaw = np.radians(UP_ERROR_DEG), np.radians(PITCH_ERROR_DEG) / np.tan(np.radians(STAND_DEG))
     roll, yaw = roll * chance.choice((-1.0, 1.0)), yaw * chance.choice((-1.0, 1.0))
-    wrong = _about(2, roll) @ _about(1, yaw)
-    mounting = _mounting(chance)
+    misalignment = about(2, roll) @ about(1, yaw)
+    mounting = random_mounting(chance)
     middle = (np.arange(count) + 0.5) / RATE_HZ
-    given = np.full(count, np.nan)
+    logged = np.full(count, np.nan)
     if speed:
-        given[::RATE_HZ] = np.interp(middle[::RATE_HZ] - 0.4, time, v)
-    log = Log(middle, force @ mounting, rates @ mounting, given)
-    calibration = CalibrationFile(vehicle_from_sensor=wrong @ mounting, aligned=True, six_done=True, gyro_delay_s=0.0)
+        logged[::RATE_HZ] = np.interp(middle[::RATE_HZ] - 0.4, time, v)
+    log = Log(middle, force @ mounting, rates @ mounting, logged)
+    calibration = CalibrationFile(
+        vehicle_from_sensor=misalignment @ mounting, aligned=True, six_done=True, gyro_delay_s=0.0
+    )
     return log, calibration, np.degrees(np.interp(middle, time, chassis)), np.interp(middle, time, v)
 
 
-def _tolerances(chance):
+def random_tolerances(chance):
     """Return two matrices (3, 3) with the errors of scale and of cross-axes that remain after the six positions.
 
     The first matrix is for the gyro, the second matrix is for the accelerometer.
@@ -113,23 +115,23 @@ def _tolerances(chance):
     ]
 
 
-def _mounting(chance):
+def random_mounting(chance):
     """Return the mounting of a sensor, a random rotation matrix."""
     mounting, _ = np.linalg.qr(chance.standard_normal((3, 3)))
     return mounting * np.linalg.det(mounting)
 
 
-def _course(legs):
+def course_of(legs):
     """Return the smooth course of the legs at FINE_HZ: time in s, lean in degrees, speed in m/s."""
     ends = np.cumsum([leg[0] for leg in legs])
     time = np.arange(int(ends[-1] * FINE_HZ)) / FINE_HZ
-    which = np.searchsorted(ends, time, side="right").clip(0, len(legs) - 1)
-    lean = _smooth(np.array([leg[1] for leg in legs])[which], 0.5)
+    leg_index = np.searchsorted(ends, time, side="right").clip(0, len(legs) - 1)
+    lean = smoothed(np.array([leg[1] for leg in legs])[leg_index], 0.5)
     v = np.interp(time, np.concatenate(([0.0], ends)), [legs[0][2], *[leg[2] for leg in legs]])
-    return time, lean, _smooth(v, 0.4)
+    return time, lean, smoothed(v, 0.4)
 
 
-def _readings(v, yaw_rate, slope, lean, pitch, height_m, slip=0.0, heave_m=0.0, ahead_m=0.0):
+def perfect_readings(v, yaw_rate, slope, lean, pitch, height_m, slip=0.0, heave_m=0.0, ahead_m=0.0):
     """Compute what a perfect sensor reads, by numerical derivatives of its position and its attitude.
 
     slip: angle from the bike's heading to its direction of travel, in rad, positive to the left.
@@ -144,17 +146,17 @@ def _readings(v, yaw_rate, slope, lean, pitch, height_m, slip=0.0, heave_m=0.0, 
     heading = np.cumsum(yaw_rate) / FINE_HZ
     course = heading + slip
     direction = np.cos(slope) * np.cos(course), np.cos(slope) * np.sin(course), np.sin(slope)
-    place = np.cumsum(np.column_stack(direction) * v[:, None] / FINE_HZ, axis=0)
+    position = np.cumsum(np.column_stack(direction) * v[:, None] / FINE_HZ, axis=0)
     c, s = np.cos(heading), np.sin(heading)
-    nothing = np.zeros_like(c)
+    zero = np.zeros_like(c)
     ahead = np.stack((c * np.cos(pitch), s * np.cos(pitch), np.sin(pitch)), axis=1)
-    level_left = np.stack((-s, c, nothing), axis=1)
+    level_left = np.stack((-s, c, zero), axis=1)
     above = np.cross(ahead, level_left)
     ct, st = np.cos(lean)[:, None], np.sin(lean)[:, None]
     left, up = ct * level_left + st * above, ct * above - st * level_left
-    place = place + height_m * up + ahead_m * ahead
-    place[:, 2] += heave_m
-    acceleration = np.gradient(np.gradient(place, axis=0), axis=0) * FINE_HZ**2 + [0.0, 0.0, G]
+    position = position + height_m * up + ahead_m * ahead
+    position[:, 2] += heave_m
+    acceleration = np.gradient(np.gradient(position, axis=0), axis=0) * FINE_HZ**2 + [0.0, 0.0, G]
     body = np.stack((left, up, ahead), axis=1)  # each row is an axis of the vehicle, in the world's axes
     change = np.gradient(body, axis=0) * FINE_HZ
     force = np.einsum("nij,nj->ni", body, acceleration) / G
@@ -163,22 +165,22 @@ def _readings(v, yaw_rate, slope, lean, pitch, height_m, slip=0.0, heave_m=0.0, 
     return force, rates
 
 
-def _about(axis, angle):
+def about(axis, angle):
     return rotation_matrix(-angle * np.eye(3)[axis])
 
 
-def _smooth(values, seconds):
+def smoothed(values, seconds):
     """Apply a moving mean three times. The result moves as smoothly as a rider."""
     width = max(1, round(seconds * FINE_HZ))
     window = np.full(width, 1.0 / width)
     for _ in range(3):
-        longer = np.pad(values, (width // 2, width - 1 - width // 2), mode="edge")
-        values = np.convolve(longer, window, mode="valid")
+        padded = np.pad(values, (width // 2, width - 1 - width // 2), mode="edge")
+        values = np.convolve(padded, window, mode="valid")
     return values
 
 
-def _noise(chance, n, seconds):
+def smooth_noise(chance, n, seconds):
     """Return n samples of smooth noise with rms 1. The noise changes within about this many `seconds`."""
     knots = chance.standard_normal(int(n / FINE_HZ / seconds) + 3)
-    values = _smooth(np.interp(np.arange(n) / FINE_HZ / seconds, np.arange(len(knots)), knots), 0.5 * seconds)
+    values = smoothed(np.interp(np.arange(n) / FINE_HZ / seconds, np.arange(len(knots)), knots), 0.5 * seconds)
     return values / np.std(values)

@@ -11,7 +11,7 @@ from concurrent.futures import Future
 from pathlib import Path
 
 from support import virtual_radio
-from support.device_runs import Device, _world
+from support.device_runs import Device, world_of
 from support.radio_decoder import SERVICE
 
 FAKE = Path(__file__).with_name("fake_bluetooth.js").read_text()
@@ -33,9 +33,17 @@ class Bridge:
         self._thread = threading.Thread(target=self._run, args=(plan, begin_s, directory), daemon=True)
         self._thread.start()
 
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._over = True
+        self._thread.join(20)
+
     def _run(self, plan, begin_s, directory):
+        previous = os.getcwd()
         os.chdir(directory)
-        world, _ = _world(plan)
+        world, _ = world_of(plan)
         device = self.device = Device(world, machine="pico w")
         for press in plan["presses"]:
             device.board.press(*press)
@@ -46,6 +54,7 @@ class Bridge:
         with contextlib.suppress(SystemExit):
             device.run(plan["config"], [plan["until"]])
         air.close()
+        os.chdir(previous)
 
     def _look_whether_over(self):
         if self._over:
@@ -105,12 +114,8 @@ class Bridge:
 
     def drop(self):
         """Cut the connection."""
-        self.air.radio._clock.at(0, self.air.dropped)
+        self.device.board.clock.at(0, self.air.dropped)
 
     def silence(self, on):
         """Move the board out of reach, and back."""
         self.air.radio.away = on
-
-    def end(self):
-        self._over = True
-        self._thread.join(20)

@@ -65,13 +65,6 @@ class Rider:
         for _ in range(times):
             self.page.keyboard.press(key)
 
-    def hold(self, seconds):
-        """Hold the space bar down for this time."""
-        self.page.keyboard.down("Space")
-        self.wait(seconds)
-        self.page.keyboard.up("Space")
-        self.wait(0.3)  # wait as a finger does, which does not press again at once
-
     def click(self, selector):
         self.page.click(selector)
 

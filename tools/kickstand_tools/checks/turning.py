@@ -1,4 +1,4 @@
-"""Measures how well the rates of a log explain its forces, window by window.
+"""Measures how well the rates of a log explain its forces, and finds the gyro's bias from both.
 
 The rates of a window are integrated to a rotation C. C rotates from the sensor's axes at each instant to the sensor's
 axes at the beginning of the window. In the axes at the beginning, the specific force f (in g) is a constant vector `up`
@@ -6,178 +6,277 @@ plus the acceleration. The acceleration follows from the velocity V, which is gi
 
     C f = up + C (dV/dt + rate x V) / g
 
-V is the log's speed times a constant direction. Without a speed, V is a velocity that changes slowly. The method of
-least squares estimates `up`, V and the gyro's bias, with a prior for V and the bias. The residual shows how well the
-rates fit the forces.
+The term rate x V matters: in a long bend the force keeps its direction along the bike, although the bike turns. `up` is
+1 g long, so a force of 1.3 g in a long bend is not gravity, and the rate in the bend is not the gyro's bias. V is
+unknown. A vehicle moves along one direction of its own, at a speed that changes. So V is a speed along a constant
+direction, plus a little across it for a phone in a hand. The method of least squares estimates `up`, V, the direction
+and the gyro's bias, with a prior for V and the bias. The residual shows how well the rates fit the forces.
 """
 
+import itertools
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ..signals import Array, Ints, cross_matrix, rotation_matrix
-from .cells import CELL_S
+from ..signals import Array, Bools, Ints, cross_matrix, rotation_matrix, stretches
 
-KNOT_S = 5.0  # time between the knots of an unknown velocity
-EVENED = 10  # number of cells over which the rotated forces are averaged, to remove vibration
+WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # short windows are used if the log has no long window without a gap
+MOST_WINDOWS = 10  # number of windows that are fitted: the windows with the largest rates
+
+FAR_DPS = 10.0 * np.array(list(itertools.product((1.0, -1.0), repeat=3)))  # guesses of a large bias
+MERGED_S = 0.2  # cells are merged to this length
+KNOT_S = 2.5  # time between the knots of the velocity
+EVENED_S = 1.0  # time over which the rotated forces are averaged, to remove vibration
 FORCE_G = 0.1  # standard deviation of the noise of these means
-# Standard deviations of the prior. VELOCITY_MPS is for an unknown velocity. DIRECTION is for each component of the
-# constant direction. BIAS_DPS is for the correction of the gyro's bias.
-VELOCITY_MPS, DIRECTION, BIAS_DPS = 20.0, 1.0, 3.0
-BIAS_STEPS, MOST_DPS = 2, 5.0  # number of steps that correct the bias, and largest change in one step
-LATE_S = (0.0, 0.5, 1.0, 1.5)  # delays of the speed that are tried, because a satellite receiver's speed is late
+# Standard deviations of the prior: of the velocity along the vehicle's direction and across it, and of the gyro's bias.
+ALONG_MPS, ACROSS_MPS, BIAS_DPS = 30.0, 2.0, 10.0
+UP_G = 0.07  # standard deviation of the length of `up`, because of the accelerometer's errors
+STEPS = 5  # most steps that correct the bias
+MOST_DPS = 8.0  # largest change of the bias in one step
+SETTLED = 0.02  # the bias is found if a step reduces the cost by a smaller share
+SMALLER, LEAST_STEP = 0.3, 0.1  # a step that increases the cost is tried again, smaller
+
+
+@dataclass
+class TurningFit:
+    """The result of the least squares in w windows for one exchange of the gyro's axes.
+
+    left: mean square of the force that the rates do not explain in each window, shape (w), in g2.
+    bias: the gyro's bias, along the axes of its readings, shape (3), in deg/s.
+    cost: the sum of the squares, with the prior.
+    """
+
+    left: Array
+    bias: Array
+    cost: float
+
+
+def liveliest(force: Array, rate: Array, known: Bools, cell_s: float) -> tuple["Turning", list[Array]] | None:
+    """Return the windows of a log with the largest rates, and guesses of the gyro's bias; None without a window.
+
+    A phone has no bias. In other logs, the median rate is a guess: most of a ride is nearly straight.
+
+    force: mean force of each cell, shape (n, 3), in g.
+    rate: mean rate of each cell, shape (n, 3), in deg/s.
+    known: False for the cells in gaps, shape (n).
+    cell_s: duration of a cell.
+    """
+    places = windows(known, round(WINDOW_S / cell_s))
+    places = places if len(places) else windows(known, round(SHORT_WINDOW_S / cell_s))
+    if not len(places):
+        return None
+    usual = np.median(rate[known], axis=0)
+    turned = np.sum((rate[places] - usual) ** 2, axis=(1, 2))
+    places = places[np.sort(np.argsort(-turned)[:MOST_WINDOWS])]
+    merged = (len(places), -1, round(MERGED_S / cell_s), 3)
+    force, rate = (np.mean(values[places].reshape(merged), axis=2) for values in (force, rate))
+    return Turning(force, rate, MERGED_S), [np.zeros(3), usual]
+
+
+def bias_dps(force: Array, rate: Array, known: Bools, cell_s: float) -> Array | None:
+    """Find the gyro's bias in a log without a standstill, shape (3), in deg/s; None if the log is too short.
+
+    For the parameters see liveliest().
+    """
+    found = liveliest(force, rate, known, cell_s)
+    if found is None:
+        return None
+    turning, guesses = found
+    return min((turning.fit(np.eye(3), guess) for guess in [*guesses, *FAR_DPS]), key=lambda fit: fit.cost).bias
+
+
+def windows(known: Bools, length: int) -> Ints:
+    """Find the windows of `length` cells without an unknown cell.
+
+    Returns the indices of the cells of each window, shape (windows, length).
+    """
+    starts = [k for begin, end in stretches(known) for k in range(begin, end - length + 1, length)]
+    return np.array(starts, dtype=int).reshape(-1, 1) + np.arange(length)
 
 
 class Turning:
-    """Fits rates to forces in w windows of n cells of CELL_S.
+    """Fits rates to forces in w windows of n cells.
 
     force: shape (w, n, 3), in g.
     rate: shape (w, n, 3), in deg/s.
-    bias: a first guess of the gyro's bias, shape (3), in deg/s.
-    speed: index of the cell, and speed in m/s, shape (m, 2); None if unknown.
-    places: indices of the windows' cells, shape (w, n).
+    cell_s: duration of a cell.
     """
 
-    def __init__(self, force: Array, rate: Array, bias: Array, speed: Array | None, places: Ints) -> None:
-        self._force, self._rate, self._bias = force, rate, bias
-        # The velocity is a sum of k functions of time. Each entry of this list, one per delay of the speed, holds these
-        # functions and their derivatives, both of shape (k, w, n).
-        self._velocities = [_knots(*places.shape)]
-        self._usual = VELOCITY_MPS
-        if speed is not None:
-            self._velocities = [_given(speed, places, late_s) for late_s in LATE_S]
-            self._usual = DIRECTION
+    def __init__(self, force: Array, rate: Array, cell_s: float) -> None:
+        self._force, self._rate, self._cell_s = force, rate, cell_s
 
-    @property
-    def unbiased(self) -> bool:
-        """True if the first guess of the gyro's bias is about 0."""
-        return bool(np.max(np.abs(self._bias)) < BIAS_DPS)
+    def rough(self, exchanges: Array, bias: Array) -> Array:
+        """Return the mean square of the unexplained force for each of k exchanges and a known bias, shape (k), in g2.
 
-    def rough(self, exchanges: Array) -> Array:
-        """Compute the residual of each of k exchanges without fitting the velocity.
-
-        exchanges: shape (k, 3, 3). The rate is exchange @ reading.
-        Returns the mean square of the force that the integrated rates do not explain, shape (k), in g2.
+        exchanges: signed permutations, shape (k, 3, 3). The rate is exchange @ (reading - bias).
         """
-        sizes = np.mean(np.sum(self._force**2, axis=2))
         left = np.empty(len(exchanges))
         for sign in 1.0, -1.0:
-            turn = _turn(self._signed(sign, self._bias))
-            both = np.einsum("wnij,wnk->wijk", turn, self._force) / turn.shape[1]
-            right = np.linalg.det(exchanges) * sign > 0.0
-            # Rotating the gyro's readings has the same effect as rotating the forces by the inverse rotation.
-            up = np.einsum("wijk,qkj->qwi", both, sign * exchanges[right])
-            left[right] = sizes - np.mean(np.sum(up**2, axis=2), axis=1)
-        return left
-
-    def unexplained(self, exchanges: Array) -> Array:
-        """Compute the residual of each of k exchanges in each window.
-
-        exchanges: shape (k, 3, 3). The rate is exchange @ reading.
-        Returns the mean square of the force that the rates do not explain, shape (k, w), in g2.
-        """
-        left = np.empty((len(exchanges), len(self._force)))
-        for sign in 1.0, -1.0:
-            # All exchanges of one sign start with the same rates. Each corrects the bias by itself
-            first = self._models(sign, self._bias, self._velocities)
+            model = _Model(sign, self._rate, bias, self._cell_s)
             for k in np.flatnonzero(np.linalg.det(exchanges) * sign > 0.0):
-                # permute the force instead of the rates. Only the sign of the permutation is applied to the rates
-                left[k] = self._unexplained(sign, self._force @ (sign * exchanges[k]), first)
+                fit = model.fit(_permuted(self._force, sign, exchanges[k]))
+                left[k] = np.mean(fit.left + _WEIGHT * (np.linalg.norm(fit.up, axis=1) - 1.0) ** 2 / model.means)
         return left
 
-    def _unexplained(self, sign: float, force: Array, first: list["_Model"]) -> Array:
-        """Choose the delay of the speed, then correct the gyro's bias. Returns the residual, shape (w), in g2.
+    def fit(self, exchange: Array, bias: Array) -> TurningFit:
+        """Fit velocity, direction and bias for one exchange. bias: the first guess."""
+        sign = float(np.sign(np.linalg.det(exchange)))
+        force = _permuted(self._force, sign, exchange)
+        model = _Model(sign, self._rate, bias, self._cell_s)
+        fit, share = model.along_fit(force), 1.0
+        for _ in range(STEPS):
+            change = share * np.clip(model.bias_change(force, fit), -MOST_DPS, MOST_DPS)
+            other = _Model(sign, self._rate, model.bias + change, self._cell_s)
+            better = other.along_fit(force)
+            if better.cost < fit.cost:
+                settled = better.cost > (1.0 - SETTLED) * fit.cost
+                model, fit, share = other, better, 1.0
+                if settled:
+                    break
+            else:
+                share *= SMALLER
+                if share < LEAST_STEP:
+                    break
+        return TurningFit(fit.left, model.bias, fit.cost)
 
-        first: a model for each delay of the speed, with the first guess of the bias.
-        """
-        model, bias = min(first, key=lambda each: np.mean(each.fit(force).left)), self._bias
-        for _ in range(BIAS_STEPS):
-            bias = bias + model.bias_change(sign, model.fit(force))
-            (model,) = self._models(sign, bias, [model.velocity])
-        return model.fit(force).left
 
-    def _signed(self, sign: float, bias: Array) -> Array:
-        """Return the rates minus a bias, shape (w, n, 3), in rad/s."""
-        return sign * np.radians(self._rate - bias)
-
-    def _models(self, sign: float, bias: Array, velocities: list[tuple[Array, Array]]) -> list["_Model"]:
-        """Return a model for each velocity. The rotations are integrated once for all of them."""
-        rate = self._signed(sign, bias)
-        turn = _turn(rate)
-        moving = turn @ cross_matrix(rate)
-        return [_Model(turn, moving, velocity, FORCE_G / self._usual) for velocity in velocities]
+_WEIGHT = (FORCE_G / UP_G) ** 2
 
 
 @dataclass
 class _Fit:
-    """The result of the least squares in each of w windows. The velocity has k coefficients.
+    """The least squares in w windows for one bias. The velocity has k coefficients.
 
-    turned: the force, rotated to the axes at the beginning of the window, shape (w, n, 3).
-    moved: the averaged force, shape (w, m, 3).
-    found: the coefficients, shape (w, k).
-    left: mean square of the residual, shape (w).
+    along_up: the direction of `up` before this fit, shape (w, 3), or 0 if its length was not used.
+    found: the coefficients of the velocity, shape (w, k).
+    inverse: the inverse of the normal equations, shape (w, k, k).
+    up: shape (w, 3), in g.
+    left, cost: see TurningFit.
     """
 
-    turned: Array
-    moved: Array
+    along_up: Array
     found: Array
+    inverse: Array
+    up: Array
     left: Array
+    cost: float
 
 
 class _Model:
-    """How the force in w windows depends on the k coefficients of the velocity, for given rates.
+    """How the force in w windows depends on the velocity, for one bias.
 
-    turn: the rotation C, integrated from the rate, shape (w, n, 3, 3).
-    moving: C times the cross matrix of the rate, shape (w, n, 3, 3).
-    velocity: functions of time and their derivatives, see Turning.
-    prior: standard deviation of the noise divided by that of the prior of a coefficient.
+    sign: 1, or -1 to reverse all rates.
     """
 
-    def __init__(self, turn: Array, moving: Array, velocity: tuple[Array, Array], prior: float) -> None:
-        self.velocity = velocity
-        self._turn = turn
-        values, changes = (part[..., None, None] for part in velocity)
-        parts = moving * values + turn * changes  # shape (k, w, n, 3, 3)
-        # Derivatives of the averaged force by the coefficients, shape (w, m, 3, k)
-        self._along = _evened(np.concatenate(list(parts), axis=-1) / STANDARD_GRAVITY)
-        square = np.einsum("wnij,wnik->wjk", self._along, self._along)
-        self._inverse = np.linalg.inv(square + prior**2 * np.eye(square.shape[-1]))
+    def __init__(self, sign: float, readings: Array, bias: Array, cell_s: float) -> None:
+        self.bias, self._sign, self._cell_s = bias, sign, cell_s
+        self._rate = rate = sign * np.radians(readings - bias)
+        self._evened = round(EVENED_S / cell_s)
+        self.means = rate.shape[1] // self._evened  # number of averaged forces in a window
+        self._turn = _turn(rate, cell_s)
+        self._functions = values, changes = _knots(rate.shape[1], cell_s)
+        moving = self._turn @ cross_matrix(rate)
+        # Derivatives of the averaged force by the coefficients, shape (w, m, 3, knots, 3)
+        shape = len(rate), -1, self._evened, 3, 3
+        each = (len(values), -1, self._evened)
+        along = np.einsum("wmcij,kmc->wmikj", moving.reshape(shape), values.reshape(each), optimize=True)
+        along += np.einsum("wmcij,kmc->wmikj", self._turn.reshape(shape), changes.reshape(each), optimize=True)
+        along = along.reshape(*along.shape[:3], -1) / (self._evened * STANDARD_GRAVITY)
+        self._mean = np.mean(along, axis=1)
+        self._along = (along - self._mean[:, None]).reshape(len(rate), -1, along.shape[-1])
+        self._square = self._along.swapaxes(1, 2) @ self._along
+        self._knots = len(values)
 
-    def fit(self, force: Array) -> _Fit:
-        """Fit the coefficients. force: along the exchanged axes, shape (w, n, 3), in g."""
-        turned = np.einsum("wnij,wnj->wni", self._turn, force)
-        moved = _evened(turned)
-        seen = np.einsum("wnij,wni->wj", self._along, moved)
-        found = np.einsum("wij,wj->wi", self._inverse, seen)
-        left = (np.sum(moved**2, axis=(1, 2)) - np.sum(found * seen, axis=1)) / moved.shape[1]
-        return _Fit(turned, moved, found, left)
+    def fit(self, force: Array, before: "_Fit | None" = None) -> _Fit:
+        """Fit the velocity. force: along the exchanged axes, shape (w, n, 3), in g.
 
-    def bias_change(self, sign: float, fit: _Fit) -> Array:
+        before: an earlier fit, for the direction of the velocity, which is the same in all windows, and of `up`. None
+            if unknown: then the velocity has any direction, and `up` any length.
+        """
+        means = self._means(np.einsum("wnij,wnj->wni", self._turn, force))
+        mean = np.mean(means, axis=1)
+        moved = (means - mean[:, None]).reshape(len(force), -1)
+        seen = np.einsum("wij,wi->wj", self._along, moved)
+        squares = np.sum(moved**2, axis=1)
+        along_up, inverse = np.zeros_like(mean), self._any_direction
+        if before is not None:
+            velocity = before.found.reshape(-1, 3)
+            direction = np.linalg.eigh(velocity.T @ velocity)[1][:, -1]
+            along_up = before.up / np.maximum(np.linalg.norm(before.up, axis=1), 1e-9)[:, None]
+            # One more equation per window: along_up @ up = 1
+            row, long = np.einsum("wi,wij->wj", along_up, self._mean), np.sum(along_up * mean, axis=1) - 1.0
+            inverse = self._inverse(direction, row)
+            seen += _WEIGHT * row * long[:, None]
+            squares += _WEIGHT * long**2
+        found = np.einsum("wij,wj->wi", inverse, seen)
+        squares -= np.sum(found * seen, axis=1)
+        up = mean - np.einsum("wij,wj->wi", self._mean, found)
+        cost = float(np.sum(squares) + (FORCE_G / BIAS_DPS) ** 2 * (self.bias @ self.bias))
+        return _Fit(along_up, found, inverse, up, squares / self.means, cost)
+
+    def along_fit(self, force: Array) -> _Fit:
+        """Fit the velocity along one direction."""
+        return self.fit(force, self.fit(force))
+
+    def bias_change(self, force: Array, fit: _Fit) -> Array:
         """Return the correction of the bias by one step of linear least squares, shape (3), in deg/s.
 
-        A change of the bias rotates the force by the integral of this change from the middle of the window.
+        The velocity is eliminated from the normal equations (Schur complement).
         """
-        angle = np.cumsum(self._turn, axis=1) * CELL_S
-        angle -= angle[:, angle.shape[1] // 2, None]
-        by_bias = _evened(-sign * np.radians(1.0) * cross_matrix(fit.turned) @ angle)
-        mixed = np.einsum("wnij,wnik->wjk", self._along, by_bias)
-        # Eliminate the velocities of the windows from the normal equations (Schur complement).
-        square = np.einsum("wnij,wnik->jk", by_bias, by_bias)
-        square -= np.einsum("wji,wjl->il", mixed, self._inverse @ mixed)
-        vector = np.einsum("wnij,wni->j", by_bias, fit.moved) - np.einsum("wji,wj->i", mixed, fit.found)
-        change = np.linalg.solve(square + (FORCE_G / BIAS_DPS) ** 2 * np.eye(3), vector)
-        return np.clip(change, -MOST_DPS, MOST_DPS)
+        found = fit.found.reshape(len(force), self._knots, 3)
+        speed, change = (np.einsum("kn,wkj->wnj", functions, found) for functions in self._functions)
+        force = force - (change + np.einsum("wnij,wnj->wni", cross_matrix(self._rate), speed)) / STANDARD_GRAVITY
+        force = np.einsum("wnij,wnj->wni", self._turn, force)
+        left = self._means(force)
+        # Derivatives by the bias. A change of the bias rotates the force by the integral of this change. It also
+        # changes the force that the bend needs.
+        angle = np.cumsum(self._turn, axis=1) * self._cell_s
+        by = cross_matrix(force) @ angle - self._turn @ cross_matrix(speed / STANDARD_GRAVITY)
+        by = self._means(self._sign * np.radians(1.0) * by)
+        row = np.einsum("wi,wij->wj", fit.along_up, self._mean)
+        up, by_up = np.mean(left, axis=1), np.mean(by, axis=1)
+        long = np.sum(fit.along_up * up, axis=1) - 1.0
+        long_by = np.einsum("wi,wij->wj", fit.along_up, by_up)
+        left = (left - up[:, None]).reshape(len(left), -1)
+        by = (by - by_up[:, None]).reshape(len(left), -1, 3)
+        mixed = self._along.swapaxes(1, 2) @ by + _WEIGHT * row[:, :, None] * long_by[:, None]
+        square = np.sum(by.swapaxes(1, 2) @ by - mixed.swapaxes(1, 2) @ fit.inverse @ mixed, axis=0)
+        square += _WEIGHT * long_by.T @ long_by
+        vector = -np.einsum("wni,wn->i", by, left) - _WEIGHT * long @ long_by
+        prior = (FORCE_G / BIAS_DPS) ** 2
+        return np.linalg.solve(square + prior * np.eye(3), vector - prior * self.bias)
+
+    def _means(self, values: Array) -> Array:
+        return np.mean(values.reshape(len(values), self.means, self._evened, *values.shape[2:]), axis=2)
+
+    @cached_property
+    def _any_direction(self) -> Array:
+        return self._inverted(np.eye(3) / ALONG_MPS**2)
+
+    def _inverse(self, direction: Array, row: Array) -> Array:
+        along = np.outer(direction, direction)
+        prior = along / ALONG_MPS**2 + (np.eye(3) - along) / ACROSS_MPS**2
+        return self._inverted(prior, _WEIGHT * row[:, :, None] * row[:, None])
+
+    def _inverted(self, prior: Array, square: Array | float = 0.0) -> Array:
+        return np.linalg.inv(self._square + square + FORCE_G**2 * np.kron(np.eye(self._knots), prior))
 
 
-def _turn(rate: Array) -> Array:
+def _permuted(force: Array, sign: float, exchange: Array) -> Array:
+    """Permute the force instead of the rates, so that all exchanges of one sign share a model."""
+    return force @ (sign * exchange)
+
+
+def _turn(rate: Array, cell_s: float) -> Array:
     """Integrate rates to rotations.
 
     rate: shape (w, n, 3), in rad/s.
     Returns the rotation from the axes in the middle of each cell to the axes at the beginning of the window, shape
     (w, n, 3, 3).
     """
-    half = rotation_matrix(rate * (CELL_S / 2.0))
+    half = rotation_matrix(rate * (cell_s / 2.0))
     after = half @ half  # the rotation over each cell
     reach = 1
     # Before each pass, after[:, k] is the rotation over the last `reach` cells up to cell k. A pass doubles `reach`
@@ -187,33 +286,14 @@ def _turn(rate: Array) -> Array:
     return np.concatenate((half[:, :1], after[:, :-1] @ half[:, 1:]), axis=1)
 
 
-def _evened(values: Array) -> Array:
-    """Average values over EVENED cells, and subtract each window's mean to remove the constant vector `up`.
-
-    values: shape (w, n, ...).
-    """
-    means = np.mean(values.reshape(len(values), -1, EVENED, *values.shape[2:]), axis=2)
-    return means - np.mean(means, axis=1, keepdims=True)
-
-
-def _knots(windows: int, cells: int) -> tuple[Array, Array]:
-    """Return the functions of an unknown velocity, one per knot, and their derivatives.
+def _knots(cells: int, cell_s: float) -> tuple[Array, Array]:
+    """Return the functions of the velocity, one per knot, and their derivatives, each of shape (knots, cells).
 
     Each function is 1 at its own knot and 0 at the other knots. Between knots each function is linear.
     """
-    time = (np.arange(cells) + 0.5) * CELL_S
-    count = round(cells * CELL_S / KNOT_S) + 1
+    time = (np.arange(cells) + 0.5) * cell_s
+    count = round(cells * cell_s / KNOT_S) + 1
     knots = np.arange(count) * KNOT_S
     values = np.array([np.interp(time, knots, unit) for unit in np.eye(count)])
     step = np.minimum((time / KNOT_S).astype(int), count - 2)
-    changes = (np.eye(count)[step + 1] - np.eye(count)[step]).T / KNOT_S
-    return np.repeat(values[:, None], windows, axis=1), np.repeat(changes[:, None], windows, axis=1)
-
-
-def _given(speed: Array, places: Ints, late_s: float) -> tuple[Array, Array]:
-    """Return the function of a known speed, delayed by late_s, and its derivative."""
-    second = round(1.0 / CELL_S)
-    cells = np.arange(-second, places.max() + 1 + second)
-    values = np.interp(cells + late_s / CELL_S, *speed.T)
-    changes = (values[second:] - values[:-second]) / (second * CELL_S)  # mean change during the second around each cell
-    return values[places + second][None], changes[places + second // 2][None]
+    return values, (np.eye(count)[step + 1] - np.eye(count)[step]).T / KNOT_S

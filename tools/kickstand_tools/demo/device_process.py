@@ -54,7 +54,8 @@ class DeviceProcess:
             errors="replace",
             start_new_session=True,  # so that Ctrl-C does not reach the device's process
         )
-        threading.Thread(target=self._read, daemon=True).start()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
 
     def __enter__(self) -> "DeviceProcess":
         return self
@@ -66,12 +67,14 @@ class DeviceProcess:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        self._reader.join()
         self._directory.cleanup()
 
     def _read(self) -> None:
         assert self._process.stdout
-        for line in self._process.stdout:
-            self._lines.put(line)
+        with self._process.stdout as output:
+            for line in output:
+                self._lines.put(line)
         self._lines.put(None)
 
     def hang_up(self) -> None:

@@ -4,19 +4,21 @@ import gzip
 import itertools
 import struct
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import IO
+from typing import IO, Any
 
 from ..common.errors import InputError, printable
 from ..logs.source import SUFFIXES, errors_of, open_input
+from .texts import plain_text
 
 _EXCEL = b"\xd0\xcf\x11\xe0"  # first bytes of older Excel files; newer Excel files are zips
 # Largest recording as text: some hours at 100 Hz. Reading takes at most ten times this memory.
 MOST_BYTES = 250_000_000
 MOST_FILES = 10_000  # largest number of files in a folder or a zip
 LONGEST_LINE = 1_000_000  # characters in the longest line, ten times as many as a thousand columns need
+_RARE = (".json", ".jsonl", ".ndjson", ".gcsv", ".log", "")  # suffixes of tables that are read if there are no others
 _BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 
 
@@ -91,7 +93,7 @@ def _contents(path: Path) -> Iterator[tuple[str, bytes]]:
     names = sorted(itertools.islice(names, MOST_FILES + 1))
     if len(names) > MOST_FILES:
         raise InputError(f"{path} holds over {MOST_FILES} files: give the folder of one recording")
-    inside = [file for file in names if _wanted(file.relative_to(path).as_posix())]
+    inside = _tables(names, lambda file: file.relative_to(path).as_posix())
     packed = [file for file in names if file.suffix.lower() == ".zip"]
     if not inside and len(packed) > 1:
         raise InputError(f"{path} holds {len(packed)} zip files: give one of them, such as {packed[0]}")
@@ -129,9 +131,9 @@ def _unzipped(path: Path) -> Iterator[tuple[str, bytes]]:
         with zipfile.ZipFile(file) as archive:
             if "[Content_Types].xml" in archive.namelist():
                 raise InputError(f"{path}: a table of Excel: export it as CSV")
-            for entry in archive.infolist():
-                if not entry.is_dir() and _wanted(entry.filename):
-                    yield printable(entry.filename.replace("\\", "/")), _unpacked(archive, entry, path)
+            entries = [entry for entry in archive.infolist() if not entry.is_dir()]
+            for entry in _tables(entries, lambda entry: entry.filename):
+                yield printable(entry.filename.replace("\\", "/")), _unpacked(archive, entry, path)
 
 
 def _unpacked(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, path: Path) -> bytes:
@@ -147,11 +149,12 @@ def _unpacked(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, path: Path) -> b
         raise zipfile.BadZipFile(str(error)) from error
 
 
-def _wanted(name: str) -> bool:
-    """True if the name is that of a table, and neither hidden nor a companion file of macOS."""
-    path = PurePosixPath(name)
-    hidden = any(part.startswith((".", "__MACOSX")) for part in path.parts)
-    return not hidden and name.lower().removesuffix(".gz").endswith(SUFFIXES)
+def _tables(files: list[Any], name_of: Callable[[Any], str]) -> list[Any]:
+    """The files with the name of a table, neither hidden nor a companion file of macOS."""
+    paths = [(file, PurePosixPath(name_of(file).lower().removesuffix(".gz"))) for file in files]
+    paths = [(file, path) for file, path in paths if not any(part.startswith((".", "__macosx")) for part in path.parts)]
+    usual = [file for file, path in paths if path.suffix in SUFFIXES]
+    return usual or [file for file, path in paths if path.suffix in _RARE and not path.name.endswith(".cal.json")]
 
 
 def _no_text(path: Path) -> list[RecordingFile]:
@@ -167,11 +170,12 @@ def _recording_file(name: str, content: bytes) -> RecordingFile | None:
     if content.startswith(b"PAR1"):
         return RecordingFile(name, content, "")
     text = _decoded(content)
-    if max(map(len, text[: 64 * LONGEST_LINE].split("\n", 64)[:64])) > LONGEST_LINE:
-        raise InputError(f"{name}: a line of over {LONGEST_LINE:,} characters: it is no table of a recording")
     if sum(character < " " and character not in "\t\r\n" for character in text[:4000]) > 3:
         return None
-    return RecordingFile(name, content, text.replace("\r\n", "\n").replace("\r", "\n"))
+    text = plain_text(text.replace("\r\n", "\n").replace("\r", "\n"))
+    if max(map(len, text[: 64 * LONGEST_LINE].split("\n", 64)[:64])) > LONGEST_LINE:
+        raise InputError(f"{name}: a line of over {LONGEST_LINE:,} characters: it is no table of a recording")
+    return RecordingFile(name, content, text)
 
 
 def _decoded(content: bytes) -> str:

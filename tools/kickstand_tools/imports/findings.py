@@ -10,6 +10,7 @@ Each finding has a reason, and is certain or uncertain. An uncertain finding is 
 it.
 """
 
+import difflib
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -21,14 +22,17 @@ from ..common.errors import InputError
 from ..signals import Array, moving_mean, moving_spread
 from .rate_fit import RateFit, fit_rates
 from .recording import Sheet, plain, unit_in
+from .speeds import unit_by_positions
 from .units import (
     ACCELERATIONS,
     COUNTS_PER_DPS,
     COUNTS_PER_G,
     DATES,
+    MOMENT,
     NO_TIME,
     RATES,
     SPEEDS,
+    TIMES,
     counts_per,
     since_first_s,
     time_unit,
@@ -41,23 +45,32 @@ REQUIRED = ("t", *ACCEL, *GYRO)
 OPTIONAL = ("speed", "lat", "lon", "temp")
 _KINDS = {  # kinds of sensors, by the words in their columns' names
     "linear": r"lin|user|withoutgravity|nograv",
-    "gravity": r"grav",
+    "gravity": r"^(?!.*(incl|with)).*grav",
     "other": r"mag|compass|orient|euler|quat|angle|roll|pitch|yaw|azimuth|^[bmqh]$|^mg?$|press|baro",
     "gyro": r"gyr|rot|omega|angular|angvel|^gy$|^as$|^[wr]$|rate$",
     "accel": r"acc|force|^ac$|^gf$|^f$|^a$",
     "either": r"^g$",
 }
 _TIME = re.compile(r"time|milli|micro|^(t|ts|ms|us|ns|s|sec|secs|seconds|elapsed\w*)$|epoch|utc|clock|stamp|^monitors$")
-_CLOCK = re.compile(r"\s*(\d{4}-\d\d-\d\d.)?\d{1,2}:\d\d")
+# Words for an axis, longest first: of vehicles, and of web pages, whose alpha turns about z
+_AXES = {"longitudinal": "x", "inline": "x", "long": "x", "roll": "x", "beta": "x", "lateral": "y", "lat": "y"}
+_AXES |= {"pitch": "y", "gamma": "y", "vertical": "z", "vert": "z", "yaw": "z", "alpha": "z"}
+# Scales above the rows: seconds per count, g per count, rad/s per count, counts per g
+_SCALE = re.compile(
+    r'^\W*(tscale|ascale|gscale|gyro_?scale|acc_?1g)"?[,;:=\s]+"?([\d.eE+-]+)', re.IGNORECASE | re.MULTILINE
+)
+_SAMPLE_RATE = re.compile(r"(?:rate|frequency|sampl\w*)[^\d\n]*([\d.]+)\W*hz", re.IGNORECASE)
 _COUNTER = re.compile(r"^(no|nr|n|i|index|count|counter|record|sample|frame|id|row)$")
 CALM_S = 0.5  # length of the moving window in which the motion is measured to find calm samples
 CALMEST = 0.2  # share of the samples that count as calm
 NEAR = 1.3  # a calm acceleration is within this factor of gravity, also with clones of the chip and on rough rides
+LEANT = 1.75  # in a long bend, even the calm acceleration is longer than gravity by this factor: 55 degrees of lean
 NOISE_DPS = 0.1  # standard deviation of a gyro at rest
 # Length of the mean acceleration, divided by the mean length of the accelerations. Without gravity the ratio is smaller
 # than this.
 LINEAR = 0.35
 _SLOWEST_S, _QUICKEST_S = 1.0, 1e-4  # limits of the time between samples
+DOUBTED_HZ, DOUBTED_S, DOUBTED_ROWS = 1000.0, 10.0, 2000  # more samples per second, or so many rows in less time
 
 
 @dataclass
@@ -129,12 +142,16 @@ def find(sheet: Sheet) -> Findings:
     for key, kind in (("a", "accel"), ("g", "gyro")):
         if key not in findings.found:
             findings.single |= _single(sheet, key, kind)
-    speed = _speed(sheet)
-    if speed is not None:
-        findings.found["speed"] = speed
-    lat, lon = _find_by_name(sheet, "^lat|latitude"), _find_by_name(sheet, "^lon|^lng|longitude")
+    used = [name for finding in findings.found.values() for name in finding.columns]
+    speed = _speed(sheet, used)
+    lat, lon = (_find_by_name(sheet, words, used) for words in ("^lat|latitude", "^lon|^lng|longitude"))
     if lat is not None and lon is not None:
         findings.found |= {"lat": lat, "lon": lon}
+    if speed is not None and time is not None and not speed.unit and lat is not None and lon is not None:
+        at, *places = (sheet.columns.index(one.columns[0]) for one in (time, speed, lat, lon))
+        speed.unit = unit_by_positions(sheet, sheet.times(at, time.unit), places[0], places[1], places[2])
+    if speed is not None:
+        findings.found["speed"] = speed
     return findings
 
 
@@ -147,17 +164,18 @@ def _time(sheet: Sheet) -> ColumnFinding | None:
     usable = []
     for place, name in enumerate(sheet.columns):
         named = bool(_TIME.search(plain(name.rpartition(":")[2])))
+        stated = stated_unit(name) if stated_unit(name) in TIMES else ""
         values = sheet.cells[place]
-        if not named and values.dtype.kind == "O" and not _CLOCK.match(str(values[0])):
+        if not (named or stated) and values.dtype.kind == "O" and not MOMENT.fullmatch(str(values[0])):
             continue
         try:
             text = time_unit(values) == DATES
-            ns = sheet.times(place, "")
+            ns = sheet.times(place, stated)
         except InputError:
             continue
         good = ns[ns != NO_TIME].astype(float)
-        steps = np.diff(good)
-        if len(steps) < 2 or np.mean(steps >= 0.0) < 0.95 or good[-1] <= good[0]:
+        steps = np.diff(good[:: -1 if named and len(good) and good[-1] < good[0] else 1])  # newest first
+        if len(steps) < 2 or np.mean(steps >= 0.0) < 0.95 or np.sum(steps) <= 0.0:
             continue
         if not named and (_COUNTER.match(plain(name)) or np.all(np.diff(sheet.numbers(place)) == 1.0)):
             continue  # the column only numbers the rows
@@ -165,29 +183,46 @@ def _time(sheet: Sheet) -> ColumnFinding | None:
     if not usable:
         return None
     place = -max(usable)[3]
-    name = sheet.columns[place]
-    stated = stated_unit(name)
-    numbers = sheet.numbers(place)
-    found = time_unit(sheet.cells[place])
-    if stated in _SECONDS and _step_fits(numbers, stated):
-        return ColumnFinding([name], stated, f"{name} says {stated}")
-    if found == DATES:
+    name, numbers = sheet.columns[place], sheet.numbers(place)
+    if time_unit(sheet.cells[place]) == DATES:
         return ColumnFinding([name], "", "dates or times of day")
-    hz = 1.0 / max(_mean_step(numbers) * _SECONDS[found], 1e-9)
-    return ColumnFinding([name], found, f"in {found} there are {hz:.3g} samples per second")
+    stated, rate = stated_unit(name), _SAMPLE_RATE.search(sheet.head)
+    step, scale = _mean_step(numbers), _scales(sheet).get("t", "")
+    fitting = [key for key, size in TIMES.items() if rate and 0.9 < step * size * float(rate[1]) / 1e9 < 1.1]
+    unit_name = scale or (stated if stated in TIMES else "") or next(iter(fitting), "") or time_unit(sheet.cells[place])
+    why = f"{name} says {unit_name}" if unit_name == stated else "the lines above the rows say so"
+    step_s = step * TIMES[unit_name] / 1e9
+    if not (scale or fitting or unit_name == stated):
+        why = f"in {unit_name} there are {1.0 / max(step_s, 1e-9):.3g} samples per second"
+    doubted = step_s * DOUBTED_HZ < 1.0 or (len(numbers) >= DOUBTED_ROWS and step_s * len(numbers) < DOUBTED_S)
+    if doubted:
+        likely = (key for key in ("min", "h", "d") if 1.0 / DOUBTED_HZ < step * TIMES[key] / 1e9 < _SLOWEST_S)
+        why = f"{name} has {1.0 / max(step_s, 1e-9):.0f} samples per second in {unit_name}, which is doubtful"
+        unit_name = next(likely, unit_name)
+    return ColumnFinding([name], unit_name, why, not doubted)
 
 
-_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+def _scales(sheet: Sheet) -> dict[str, str]:
+    """The units that the lines above the rows give, by "t", "a" and "g"."""
+    found: dict[str, str] = {}
+    for key, text in _SCALE.findall(sheet.head):
+        scale, kind = float(text), key[0].lower()
+        if kind == "t":
+            found["t"] = _time_unit_of(scale)
+        elif scale > 0.0:
+            counts = scale if key.lower().endswith("1g") else 1.0 / (np.degrees(scale) if kind == "g" else scale)
+            found[kind] = f"counts/{counts:.6g}"
+    return found
+
+
+def _time_unit_of(seconds: float) -> str:
+    return next((name for name, size in TIMES.items() if abs(size / 1e9 - seconds) < 1e-3 * seconds), "")
 
 
 def _mean_step(numbers: Array) -> float:
     good = unwrapped(numbers[np.isfinite(numbers)])
     low, high = np.percentile(good, (10.0, 90.0))
     return float(high - low) / max(0.8 * len(good), 1.0)
-
-
-def _step_fits(numbers: Array, name: str) -> bool:
-    return _QUICKEST_S / 2.0 < _mean_step(numbers) * _SECONDS[name] < _SLOWEST_S
 
 
 def _seconds(sheet: Sheet, time: ColumnFinding | None) -> Array | None:
@@ -202,12 +237,56 @@ def _seconds(sheet: Sheet, time: ColumnFinding | None) -> Array | None:
 
 @dataclass
 class _Triple:
-    """Three columns, one per axis. kind: a key of _KINDS, "" if their names do not show it."""
+    """Three columns, one per axis. kind: a key of _KINDS, "" if neither their names nor their unit show it."""
 
     stem: str
     places: list[int]
     kind: str
     values: Array
+
+
+def completed(sheet: Sheet) -> Sheet:
+    """Complete columns that belong together: seconds and their fractions, axes that are in several rows, and the user's
+    acceleration and gravity."""
+    names = [plain(name) for name in sheet.columns]
+    scale = next((float(text) for key, text in _SCALE.findall(sheet.head) if key.lower() == "tscale"), 0.0)
+    if scale and not _time_unit_of(scale):
+        sheet.columns[0], sheet.cells[0] = f"{sheet.columns[0]} (s)", sheet.numbers(0) * scale
+    for fraction, size in _FRACTIONS.items():
+        k = next(
+            (k for k, name in enumerate(names) if k and name.removesuffix("s").endswith(fraction.removesuffix("s"))), 0
+        )
+        if k and re.search(r"secs?$|seconds?$|stamp$|time$", names[k - 1]) and names[k - 1] != names[k]:
+            whole, part = sheet.cells[k - 1], sheet.numbers(k)
+            if whole.dtype.kind == "i" and np.nanmin(part) >= 0.0 and np.nanmax(part) * size < 10**9:
+                part_ns = np.nan_to_num(part * size).astype(np.int64)
+                sheet.columns.append(f"time {sheet.columns[k - 1]} + {sheet.columns[k]} (ns)")
+                sheet.cells.append(whole.astype(np.int64) * 10**9 + part_ns)
+                break
+    threes = {three.kind: three for three in reversed(_find_triples(sheet))}
+    for three in threes.values():
+        if not np.any(np.all(np.isfinite(three.values), axis=1)):
+            _merge_rows(sheet, three)
+    if "linear" in threes and "gravity" in threes and "accel" not in threes:
+        total = threes["linear"].values + threes["gravity"].values
+        stated = stated_unit(sheet.columns[threes["linear"].places[0]])
+        sheet.columns += [f"total acceleration {axis}" + (f" ({stated})" if stated else "") for axis in "xyz"]
+        sheet.cells += list(total.T)
+    return sheet
+
+
+# The ends of names of columns with fractions of a second, and the ns of their unit
+_FRACTIONS = {"nsec": 1, "nanosec": 1, "nanosecond": 1, "usec": 1000, "microsecond": 1000, "msec": 10**6}
+_FRACTIONS |= {"millisecond": 10**6, "millis": 10**6}
+
+
+def _merge_rows(sheet: Sheet, three: _Triple) -> None:
+    """Fill axes that are in successive rows into the row of the last axis."""
+    starts = np.argmax(np.isfinite(three.values), axis=0)
+    ends = np.isfinite(three.values[:, int(np.argmax(starts))])
+    for place, column in zip(three.places, three.values.T):
+        row = np.maximum.accumulate(np.where(np.isfinite(column), np.arange(len(column)), 0))
+        sheet.cells[place] = np.where(ends, column[row], np.nan)
 
 
 def _find_triples(sheet: Sheet) -> list[_Triple]:
@@ -223,7 +302,9 @@ def _find_triples(sheet: Sheet) -> list[_Triple]:
             places = [axes[axis] for axis in axes_of_one]
             if not used & set(places) and _numeric(sheet, places):
                 used |= set(places)
-                found.append(_Triple(stem, places, _kind(stem), sheet.table(places)))
+                said = stated_unit(sheet.columns[places[0]])
+                kind = _kind(stem) or ("gyro" if said in RATES else "accel" if said in ACCELERATIONS else "")
+                found.append(_Triple(stem, places, kind, sheet.table(places)))
     if not found:
         found = _side_by_side(sheet)
     return found
@@ -251,11 +332,15 @@ def _side_by_side(sheet: Sheet) -> list[_Triple]:
     """Two groups for columns without meaningful names: the first six adjacent columns that are not a time."""
     numeric = [
         place
-        for place in range(len(sheet.columns))
-        if _numeric(sheet, [place]) and not _TIME.search(plain(sheet.columns[place])) and not _increasing(sheet, place)
+        for place, name in enumerate(sheet.columns)
+        if _numeric(sheet, [place]) and not _TIME.search(plain(name)) and not _increasing(sheet, place)
+        if np.nanstd(sheet.numbers(place)) > 0.0 and not _KNOWN.search(plain(name))
     ]
-    runs = [numeric[k : k + 3] for k in range(0, len(numeric) - 2, 3)]
+    runs = [numeric[k : k + 3] for k in range(0, len(numeric) - 2, 3)] if len(numeric) > 5 else []
     return [_Triple("", run, "", sheet.table(run)) for run in runs if run[2] - run[0] == 2]
+
+
+_KNOWN = re.compile(r"speed|velocity|lat|lon|lng|alt|height|lean|angle|heading|temp|sat|acc")
 
 
 def _increasing(sheet: Sheet, place: int) -> bool:
@@ -268,18 +353,24 @@ def _split_axis(name: str) -> Iterable[tuple[str, str]]:
     """Yield (name without its axis, axis) for each way to find an axis in a name."""
     bare = _without_unit(name)
     sensor, colon, bare = bare.rpartition(":")
-    words = re.sub(r"axis|[^a-z0-9]+", " ", bare.lower()).split()
+    words = re.sub(r"axis|[\W_]+", " ", bare.lower()).split()
     sensor = plain(sensor) + (":" if colon else "")
-    for axis in "xyz":
-        if axis in words:
-            yield sensor + "".join(word for word in words if word != axis), axis
+    if len(words) == 1:  # LongAcc, accLat
+        word = next((word for word in _AXES if words[0].startswith(word) or words[0].endswith(word)), "")
+        words = [word, words[0].replace(word, "", 1)] if word and word != words[0] else words
+    for k, word in enumerate(words):
+        rest = " ".join(words[:k] + words[k + 1 :])
+        axis = word if word in ("x", "y", "z") else _AXES.get(word, "")
+        if axis and (rest or word == axis):
+            yield sensor + rest, axis
             return
-    whole = "".join(words)
-    if len(whole) > 1 and whole[-1] in "xyz" and not (len(whole) > 6 and whole.endswith(("accuracy", "velocity"))):
-        yield sensor + whole[:-1], whole[-1]
+    whole, head, last = "".join(words), " ".join(words[:-1]), words[-1] if words else ""
+    head += " " if head else ""
+    if len(whole) > 1 and last[-1] in "xyz" and not (len(whole) > 6 and whole.endswith(("accuracy", "velocity"))):
+        yield sensor + (head + last[:-1]).strip(), last[-1]
     elif len(whole) > 1 and whole[0] in "xyz":
         yield sensor + whole[1:], whole[0]
-    elif match := re.fullmatch(r"(.*?)(\d{1,2})", whole):
+    elif (match := re.fullmatch(r"(.*?)(\d{1,2})", whole)) and not bare.startswith("#"):
         yield sensor + match[1], match[2]
 
 
@@ -292,7 +383,7 @@ def _without_unit(name: str) -> str:
 
 def _is_unit(text: str) -> bool:
     known = unit(text)
-    return known in (*ACCELERATIONS, *RATES, *SPEEDS, *_SECONDS, "counts") or bool(counts_per(text))
+    return known in (*ACCELERATIONS, *RATES, *SPEEDS, *TIMES, "counts") or bool(counts_per(text))
 
 
 def stated_unit(name: str) -> str:
@@ -303,17 +394,17 @@ def stated_unit(name: str) -> str:
         return in_brackets
     if "_" in name and _is_unit(last):
         return last
-    for word, known in (("milli", "ms"), ("micro", "us"), ("nano", "ns")):
+    for word, known in (("milli", "ms"), ("micro", "us"), ("nano", "ns"), ("minutes", "min"), ("hours", "h")):
         if word in bare:
             return known
     if bare.endswith("ms"):
         return "ms"
-    return unit(bare) if unit(bare) in _SECONDS else ""
+    return unit(bare) if unit(bare) in TIMES else ""
 
 
 def _kind(stem: str) -> str:
     sensor, _, stem = stem.rpartition(":")
-    for text in (stem, sensor):
+    for text in (stem.replace(" ", ""), *stem.split()[-1:], sensor):
         for kind, words in _KINDS.items():
             if text and re.search(words, text):
                 return kind
@@ -327,11 +418,15 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
     """Add the accelerometer and the gyro to findings, and note what is missing."""
     threes = _find_triples(sheet)
     kinds = {kind: [three for three in threes if three.kind == kind] for kind in (*_KINDS, "")}
-    unnamed = [*kinds["either"], *kinds[""]]
+    unnamed, scales = [*kinds["either"], *kinds[""]], _scales(sheet)
     possible = [*kinds["accel"], *kinds["either"], *([] if kinds["accel"] else kinds[""])]
-    accel = _first_with_gravity(possible, seconds)
-    rates = next(iter(kinds["gyro"]), None) or next((three for three in unnamed if three is not accel), None)
     without = kinds["linear"] or kinds["accel"]
+    accel = _first_with_gravity(possible, seconds) or _first_with_gravity(kinds["linear"], seconds)
+    accel = accel or next((three for three in kinds["accel"] if not _is_linear(three, seconds)), None)
+    exchanged = None if accel else _first_with_gravity(kinds["gyro"], seconds)
+    rates = _partner(accel, kinds["gyro"]) or _partner(accel, [three for three in unnamed if three is not accel])
+    if exchanged is not None and without:
+        accel, rates = exchanged, without[0]
     if accel is None:
         lost = "gravity in its acceleration" if without else "acceleration"
         findings.lacking.append(lost)
@@ -339,21 +434,30 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
             findings.remarks.append("gravity has been taken off its acceleration: record the one with gravity")
     else:
         names = _names(sheet, accel)
-        findings.found["a"] = of_accel = accelerometer(accel.values, seconds, stated_unit(names[0]))
-        of_accel.columns = names
+        of_accel = accelerometer(accel.values, seconds, scales.get("a") or stated_unit(names[0]))
+        of_accel.columns, findings.found["a"] = names, of_accel
+        if exchanged is not None:
+            of_accel.certain, of_accel.why = False, f"{of_accel.why}, so these columns are the accelerometer's"
     if rates is None:
         findings.lacking.append("gyro")
         return
     names = _names(sheet, rates)
     findings.found["g"] = ColumnFinding(names, stated_unit(names[0]), "by name", False)
     if accel is not None:
-        found = gyro(accel.values, rates.values, findings.found["a"], seconds, stated_unit(names[0]))
+        found = gyro(accel.values, rates.values, findings.found["a"], seconds, scales.get("g") or stated_unit(names[0]))
         found.columns = names
         findings.found["g"] = found
 
 
+def _partner(accel: _Triple | None, gyros: Sequence[_Triple]) -> _Triple | None:
+    """The gyro whose names are most like those of the accelerometer, because a table may have two sensors."""
+    stem = "" if accel is None else accel.stem
+    return max(gyros, key=lambda gyro: difflib.SequenceMatcher(None, stem, gyro.stem).ratio(), default=None)
+
+
 def _names(sheet: Sheet, three: _Triple) -> list[str]:
-    return [sheet.columns[place] for place in three.places]
+    names = sheet.columns
+    return [names[place] if names.count(names[place]) == 1 else f"#{place + 1}" for place in three.places]
 
 
 def _first_with_gravity(threes: Sequence[_Triple], seconds: Array | None) -> _Triple | None:
@@ -377,9 +481,19 @@ def _has_gravity(three: _Triple, seconds: Array | None, near: bool) -> bool:
     length = float(np.median(np.linalg.norm(values, axis=1)))
     if length <= 0.0 or float(np.percentile(means, 10.0)) < LINEAR * length:
         return False
-    if near and not any(1.0 / NEAR < length / gravity < NEAR for gravity in _gravities().values()):
+    most = NEAR if _are_whole(values) else LEANT  # raw counts differ by a factor of 2
+    if near and not any(1.0 / NEAR < length / gravity < most for gravity in _gravities().values()):
         return False
     return float(np.std(means)) / length < (0.25 if near else 0.02)
+
+
+def _is_linear(three: _Triple, seconds: Array | None) -> bool:
+    """True if the mean of the values over some seconds is short, because they do not contain gravity."""
+    values = three.values[np.all(np.isfinite(three.values), axis=1)]
+    if len(values) < 3:
+        return True
+    means = np.linalg.norm(moving_mean(values, _rows_in(10.0 * CALM_S, seconds, len(three.values))), axis=1)
+    return float(np.median(means)) < LINEAR * float(np.median(np.linalg.norm(values, axis=1)))
 
 
 def _rows_in(span_s: float, seconds: Array | None, count: int) -> int:
@@ -413,13 +527,16 @@ def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> Col
     whole = _are_whole(values)
     gravities = {name: size for name, size in _gravities().items() if whole or not name.startswith("counts")}
     near = min(gravities, key=lambda name: abs(np.log(length / gravities[name])))
-    off = max(length / gravities[near], gravities[near] / length)
     why = f"gravity at rest is {length:.4g} long"
-    if stated in gravities and max(length / gravities[stated], gravities[stated] / length) < NEAR:
+    if counts_per(stated):
+        gravities[stated] = counts_per(stated)
+    most = NEAR if whole else LEANT
+    if stated in gravities and 1.0 / NEAR < length / gravities[stated] < most:
         return ColumnFinding([], stated, f"{why}, as its name says")
     if near.startswith("counts"):
         why += f": raw counts of a sensor with {near.partition('/')[2]} counts (LSB) per g"
-    return ColumnFinding([], near, why, off < NEAR and stated in ("", near, "counts"))
+    certain = 1.0 / NEAR < length / gravities[near] < most and stated in ("", near, "counts")
+    return ColumnFinding([], near, why, certain)
 
 
 def _are_whole(values: Array) -> bool:
@@ -435,9 +552,11 @@ def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None
     fit = RateFit() if seconds is None else fit_rates(seconds, force, rates)
     candidates = gyro_units(rates, accel)
     by_fit = fit.unit_among(candidates)
-    if stated in RATES:
+    if stated in RATES or counts_per(stated):
         also = f", and so do the turns of gravity: {by_fit}" if by_fit == stated else ""
-        against = f", but gravity turns as by {by_fit}" if by_fit not in ("", stated) else ""
+        size = RATES.get(stated) or 1.0 / counts_per(stated)
+        apart = by_fit and not 0.7 < candidates[by_fit] / size < 1.4
+        against = f", but gravity turns as by {by_fit}" if apart else ""
         return ColumnFinding([], stated, f"its name says so{also}{against}", not against)
     if by_fit:
         return ColumnFinding([], by_fit, "in it the rates turn gravity as it turns")
@@ -481,9 +600,9 @@ def _by_size(rates: Array, force: Array) -> tuple[str, str]:
 # Speed and position
 
 
-def _speed(sheet: Sheet) -> ColumnFinding | None:
+def _speed(sheet: Sheet, used: Sequence[str]) -> ColumnFinding | None:
     for place, name in enumerate(sheet.columns):
-        bare = plain(name)
+        bare = plain(name) if name not in used else ""
         # velocityx and others are components, but velocity alone also ends in y
         if re.search(r"speed|velocity|kmh|kph", bare) and not re.search(r"acc|ang|[xz]$|(?<!velocit)y$", bare):
             if not np.any(np.isfinite(sheet.numbers(place))):
@@ -497,9 +616,9 @@ def _speed(sheet: Sheet) -> ColumnFinding | None:
 _SPEED_WORDS = (("kmh", "km/h"), ("kph", "km/h"), ("mph", "mph"), ("mps", "m/s"), ("knot", "knots"))
 
 
-def _find_by_name(sheet: Sheet, words: str) -> ColumnFinding | None:
+def _find_by_name(sheet: Sheet, words: str, used: Sequence[str]) -> ColumnFinding | None:
     for place, name in enumerate(sheet.columns):
-        bare = plain(name)
+        bare = plain(name) if name not in used else ""
         if re.search(words, bare) and "acc" not in bare and np.any(np.isfinite(sheet.numbers(place))):
             return ColumnFinding([name], "", "by its name")
     return None

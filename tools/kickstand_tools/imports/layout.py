@@ -1,9 +1,9 @@
 """Finds the layout of a table of an unknown app: where the rows are, and to which sensor each cell belongs.
 
-Cells may be separated by commas, semicolons, tabs or blanks, with a decimal point or comma. Any lines may come before
-the rows. Names above the rows are optional, and so is a line of units below the names. The table may also be `label:
-value` texts of a serial monitor, with or without time stamps, in one or several lines per sample. The table may also
-have one row per event of a sensor, or one file per sensor.
+Cells may be separated by commas, semicolons, tabs or blanks. Any lines may come before the rows. Names above the rows
+are optional, and so is a line of units below the names. The table may also be `label: value` texts of a serial monitor,
+with or without time stamps, in one or several lines per sample. The table may also have one row per event of a sensor,
+or one file per sensor.
 """
 
 import csv
@@ -18,8 +18,8 @@ import numpy as np
 
 from ..logs.csv_reader import Cells, cells_of, columns_of, columns_of_text, filled, numbers_of, separator_of
 from .files import RecordingFile
-from .recording import Sheet, decimal_points
-from .units import ACCELERATIONS, RATES, SPEEDS, TIMES, unit
+from .recording import Sheet
+from .units import ACCELERATIONS, MOMENT, RATES, SPEEDS, TIMES, unit
 
 LOOKED_AT = 400  # lines used to find the layout
 SEPARATORS = "\t;, "  # if two separators split the same lines into the same number of cells, the first is used
@@ -28,8 +28,6 @@ MOST_KINDS = 20  # largest number of names of sensors or events in one column
 EVENT = ":"  # separates a sensor's name from a column's name
 _UNITS = {**ACCELERATIONS, **RATES, **SPEEDS, **TIMES}
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
-_COMMA_NUMBER = re.compile(r"[+-]?\d+(?:,\d+)?(?:[eE][+-]?\d+)?")
-_WHEN = re.compile(r"(?:\d{4}-\d\d-\d\d[T ])?\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?(?:Z|[+-]\d\d:?\d\d)?")
 _MARKS = " \t#%/;*'\"!"  # characters that begin a comment
 _SENSOR_ID = re.compile(r"sensor|type|kind|event|source|device")
 _STAMP = re.compile(r"^\s*(\d{1,2}:\d\d:\d\d[.,]\d+)\s*->\s*")
@@ -48,14 +46,12 @@ class Grid:
     names: number of the line of names, None without such a line.
     first: number of the first row's line.
     separator: separates the cells, " " for any blanks.
-    comma: True for decimal commas.
     width: number of cells in a row.
     """
 
     names: int | None
     first: int
     separator: str
-    comma: bool
     width: int
 
 
@@ -89,6 +85,8 @@ def joined_sheet(files: list[RecordingFile]) -> Sheet | None:
     for k, (name, sheet) in enumerate(there):
         begin = sum(rows[:k])
         for column, values in zip(sheet.columns[1:], sheet.cells[1:]):
+            if _increases(numbers_of(values)) or MOMENT.fullmatch(str(values[0])):
+                continue  # another time, which only the rows of this file have
             wide = np.full(total, np.nan)
             wide[begin : begin + rows[k]] = numbers_of(values)
             columns.append(f"{name}{EVENT}{column}")
@@ -127,41 +125,36 @@ def find_grid(lines: Sequence[str]) -> Grid | None:
     """Find the layout that fits most of these lines; None if hardly any line has numbers."""
     best: tuple[int, int, Grid] | None = None
     for separator in SEPARATORS:
-        # Decimal commas are tried first, because whole numbers after a time with a decimal comma fit both layouts
-        for comma in (True, False):
-            if comma and separator == ",":
-                continue
-            found = _rows(lines, separator, comma)
-            if found is not None and (best is None or found[:2] > best[:2]):
-                best = found
+        found = _rows(lines, separator)
+        compared = 1 if separator == " " else 2  # dates and zones contain blanks, so blanks need more rows to win
+        if found is not None and (best is None or found[:compared] > best[:compared]):
+            best = found
     return None if best is None else best[2]
 
 
-def _rows(lines: Sequence[str], separator: str, comma: bool) -> tuple[int, int, Grid] | None:
+def _rows(lines: Sequence[str], separator: str) -> tuple[int, int, Grid] | None:
     """Return the number of rows, the number of numbers, and the grid for cells separated in this way. None if the lines
     do not fit."""
-    number = _COMMA_NUMBER if comma else _NUMBER
     split = [split_row(line, separator) for line in lines]
-    counts = [sum(bool(number.fullmatch(cell) or _WHEN.fullmatch(cell)) for cell in cells) for cells in split]
-    if comma and not any("," in cell for cells in split[-20:] for cell in cells):
-        return None
+    counts = [sum(bool(_NUMBER.fullmatch(cell) or MOMENT.fullmatch(cell)) for cell in cells) for cells in split]
     widths = Counter(len(cells) for cells, count in zip(split, counts) if count >= FEWEST_CELLS)
     if not widths:
         return None
     width = max(widths, key=lambda width: (widths[width], width))
     rows = [k for k, count in enumerate(counts) if count >= FEWEST_CELLS and len(split[k]) == width]
     numbers = int(np.median([counts[k] for k in rows]))
-    first = rows[0]
-    names = next((k for k in range(first - 1, -1, -1) if lines[k].strip()), None)
-    if names is not None and not _has_names(lines[names], width):
+    first = next(k for k, count in enumerate(counts) if count >= FEWEST_CELLS and len(split[k]) in widths)
+    while first and len(split[first - 1]) > 2 and len(split[first - 1]) in (*widths, width) and counts[first - 1]:
+        if any(cell and not _NUMBER.fullmatch(cell) for cell in split[first - 1][1:]):
+            break
+        first -= 1  # a row with few numbers, because its other cells are empty
+    above = [k for k in range(first - 1, -1, -1) if lines[k].strip()]
+    width, names = next(((w, k) for k in above[:3] for w in (width, *widths) if _has_names(lines[k], w)), (width, None))
+    if names not in above[:1] and not (above and _all_units(split_row(lines[above[0]].lstrip(_MARKS), separator))):
         names = None
-    if names is not None and _all_units(split_row(lines[names].lstrip(_MARKS), separator)):
-        above = names - 1
-        if above >= 0 and _is_names(split_row(lines[above].lstrip(_MARKS), separator), width):
-            names = above
     if len(rows) < 2 and names is None:
         return None
-    return len(rows), numbers, Grid(names, first, separator, comma, width)
+    return len(rows), numbers, Grid(names, first, separator, width)
 
 
 def _has_names(line: str, width: int) -> bool:
@@ -170,9 +163,11 @@ def _has_names(line: str, width: int) -> bool:
 
 
 def _is_names(cells: list[str], width: int) -> bool:
-    """True if the cells can be the names of `width` columns, because hardly any cell is a number."""
+    """True if the cells can be the names of `width` columns: most differ, and hardly any is a number or a unit."""
     there = [cell for cell in cells if cell]
     numbers = sum(bool(_NUMBER.fullmatch(cell)) or bool(re.search(r"[{}=]|:$", cell)) for cell in there)
+    if len(set(there)) <= len(there) / 2 or (_all_units(cells) and len(there) > FEWEST_CELLS):
+        return False
     return max(2, width - 3) <= len(there) <= width + 1 and numbers <= len(there) / 4
 
 
@@ -191,8 +186,8 @@ def _grid_below(lines: Sequence[str], wanted: Collection[str]) -> Grid | None:
             if set(wanted) <= set(cells):
                 below = find_grid(lines[k + 1 :])
                 if below is None:
-                    return Grid(k, k + 1, separator, False, len(cells))
-                return Grid(k, k + 1 + below.first, below.separator, below.comma, max(below.width, len(cells)))
+                    return Grid(k, k + 1, separator, len(cells))
+                return Grid(k, k + 1 + below.first, below.separator, max(below.width, len(cells)))
     return None
 
 
@@ -200,16 +195,15 @@ def _read(name: str, text: str, lines: Sequence[str], grid: Grid) -> Sheet:
     """The table of a grid."""
     columns = _names(lines, grid)
     body = text.split("\n", grid.first)[-1] if grid.first else text
-    if grid.comma:
-        body = decimal_points(body)
     width = max(len(columns), grid.width)
     if grid.separator == " ":
         rows = (row for line in body.split("\n") if 0 < len(row := line.split()) <= width)
         cells, left_out = columns_of(rows, width), 0
     else:
-        cells, left_out = columns_of_text(body, grid.separator, width)
+        cells, left_out = columns_of_text(body, grid.separator, width, width)
     used = [k for k, values in enumerate(cells) if columns[k] or np.any(filled(values))]
-    return Sheet(name, [columns[k] or f"#{k + 1}" for k in used], [cells[k] for k in used], left_out)
+    head = "\n".join(lines[: grid.first])
+    return Sheet(name, [columns[k] or f"#{k + 1}" for k in used], [cells[k] for k in used], left_out, head)
 
 
 def _names(lines: Sequence[str], grid: Grid) -> list[str]:
@@ -221,7 +215,8 @@ def _names(lines: Sequence[str], grid: Grid) -> list[str]:
     parts = [split_row(line, separator) for separator in dict.fromkeys((grid.separator, separator_of(line), " "))]
     names = next((part for part in parts if len(part) >= grid.width - 3), parts[0])
     if grid.first > grid.names + 1:
-        units = split_row(lines[grid.first - 1].lstrip("#%/ "), grid.separator)
+        last = next(line for line in reversed(lines[: grid.first]) if line.strip())
+        units = split_row(last.lstrip("#%/ "), grid.separator)
         if _all_units(units) and len(units) <= len(names):
             rest = names[len(units) :]
             names = [f"{name} ({mark.strip('[]()')})" if mark else name for name, mark in zip(names, units)] + rest
@@ -251,7 +246,7 @@ def _by_sensor(sheet: Sheet) -> Sheet:
             if np.any(np.isfinite(numbers[there].astype(float))):
                 columns.append(f"{kind}{EVENT}{name}")
                 cells.append(np.where(there, numbers.astype(float), np.nan))
-    return Sheet(sheet.name, columns, cells, sheet.left_out)
+    return Sheet(sheet.name, columns, cells, sheet.left_out, sheet.head)
 
 
 def _sensor_column(sheet: Sheet) -> int | None:

@@ -16,7 +16,6 @@ from .files import RecordingFile
 from .units import ACCELERATIONS, NO_TIME, RATES, REPEATED, SPEEDS, Nanoseconds, factor, times_ns
 
 LONG = 6  # a common beginning of several names is not repeated if it has at least this many characters
-_DECIMAL_COMMA = re.compile(r"(?:^|[;\t\"])\s*[+-]?\d+,\d")
 SECOND_NS = 10**9
 _ABSURD = 1e6  # in g or deg/s; a larger value is a damaged cell
 
@@ -29,12 +28,14 @@ class Sheet:
     columns: the columns' names in the file. A name may occur twice.
     cells: the cells of each column.
     left_out: number of damaged rows.
+    head: the lines above the rows.
     """
 
     name: str
     columns: list[str]
     cells: list[Cells]
     left_out: int = 0
+    head: str = ""
 
     def place(self, *names: str) -> int | None:
         """Find the first of these names that a column has, compared by plain(). Return the column's number, or None."""
@@ -79,8 +80,8 @@ class Sheet:
 
 
 def plain(name: str) -> str:
-    """Reduce a column's name for comparison: lower-case letters and digits only, without its unit in brackets."""
-    return re.sub(r"[^a-z0-9]", "", re.sub(r"[(\[].*?[)\]]", "", name).lower())
+    """Reduce a column's name for comparison: lower-case letters and digits, without its unit in brackets."""
+    return re.sub(r"[\W_]", "", re.sub(r"[(\[].*?[)\]]", "", name).lower())
 
 
 def unit_in(name: str) -> str:
@@ -108,14 +109,7 @@ def read_sheet(file: RecordingFile, header: int = 0, skipped: int = 0) -> Sheet:
     while columns and not columns[-1]:
         columns.pop()  # empty names at the end come from lines that end in a separator
     text, separator = lines[-1], separator_of(lines[header])
-    if separator != "," and _DECIMAL_COMMA.search(text[:20000]):
-        text = decimal_points(text)
     return Sheet(file.name, columns, *columns_of_text(text, separator, max(len(columns), 1)))
-
-
-def decimal_points(text: str) -> str:
-    """Replace decimal commas by decimal points. The text's cells must not be separated by commas."""
-    return text.replace(",", ".")
 
 
 @dataclass

@@ -1,9 +1,10 @@
 """Converts the units of apps to the units of a log (g, deg/s, m/s, degrees). Converts times to nanoseconds. Times may
 be dates, clocks, or numbers in s, ms, us or ns, since any start or since 1970."""
 
+import functools
 import math
 import re
-from datetime import UTC, datetime, timedelta
+from datetime import date
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,8 @@ from ..signals import Array, Ints
 ACCELERATIONS = {"g": 1.0, "m/s2": 1.0 / STANDARD_GRAVITY, "mg": 1e-3}
 RATES = {"deg/s": 1.0, "rad/s": math.degrees(1.0), "mdeg/s": 1e-3, "mrad/s": math.degrees(1e-3)}
 SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704, "knots": 1852.0 / 3600.0}
-TIMES = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "ns": 1}  # in ns
+TIMES = {"s": 10**9, "ms": 10**6, "us": 1000, "ns": 1, "min": 60 * 10**9, "h": 3600 * 10**9}  # in ns
+TIMES |= {"d": 86400 * 10**9, "0.1ms": 100_000, "ticks": 100}  # ticks of Windows and .NET
 ANGLES = {"deg": 1.0, "min": 1.0 / 60.0}
 # Counts (LSB) per g and per deg/s of an MPU6050 at its ranges: register map, registers 0x3B to 0x48
 COUNTS_PER_G = (16384.0, 8192.0, 4096.0, 2048.0)
@@ -33,11 +35,15 @@ _SPELLINGS = {
     "m/s": "mps",
     "mph": "mi/h",
     "knots": "knot kn kt kts",
-    "s": "sec seconds",
-    "ms": "msec",
-    "us": "µs μs",
+    "s": "sec secs second seconds",
+    "ms": "msec msecs millis milliseconds",
+    "us": "µs μs usec usecs micros microseconds",
+    "ns": "nsec nsecs nanos nanoseconds",
     "deg": "° degrees",
-    "min": "minutes",
+    "min": "minutes minute mins",
+    "h": "hours hour hrs hr",
+    "d": "days day",
+    "ticks": "100ns tick",
     "counts": "count lsb raw",
 }
 _SAME = {other: name for name, others in _SPELLINGS.items() for other in others.split()}
@@ -50,16 +56,21 @@ EPOCH_NS = 10**17  # March 1973; a larger time counts from 1970
 DAY_NS = 86400 * 10**9
 _LATEST_NS = 4.0e18  # the year 2096; twice this value still fits into 64 bits
 _WRAP = 2**32  # micros() of a microcontroller restarts from 0 after 71.6 minutes, millis() after 49.7 days
-_DAY = re.compile(r"^(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})(?=[T ])")
-_THOUSANDTHS = re.compile(r"(:\d\d)[:,](\d{3})$")
-_BLANK = re.compile(r"\s+(?=[+-]\d\d:?\d\d$)")
+_TICKS = (621_355_968 * 10**9, 116_444_736 * 10**9, 0)  # 1970 in ticks since the year 1, since 1601, and since 1970
+_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+# A date in any order, a clock of 12 or 24 hours, and a zone. Date, hours and zone may be missing.
+MOMENT = re.compile(
+    r"\s*(?:(\d{1,4}|[A-Za-z]{3,9})[-/. ]+(\d{1,2}|[A-Za-z]{3,9})[-/., ]+(\d{1,4})[T ,]+)?"
+    r"(?:(\d{1,3})([:.]))?(\d{1,2})(?(5)\5|:)(\d{1,2})(?:[.,:](\d+))?\s*(?:([AaPp])\.?[Mm]\.?)?"
+    r"\s*(Z|UTC|GMT|[+-]\d\d:?\d\d)?\s*"
+)
+_COMPACT = re.compile(r"^\s*(\d{4})(\d\d)(\d\d)[T_ ](\d\d)(\d\d)(\d\d)")
 _COUNTS = re.compile(r"(?:counts?|lsb|raw)/(\d+(?:\.\d+)?)")
-_CLOCK = re.compile(r"^\s*(?:(\d+):)?(\d{1,2}):(\d{1,2}(?:\.\d+)?)\s*$")
 
 
 def unit(text: str) -> str:
     """A unit in the spelling of the tables above: "m/s^2" becomes "m/s2". Other units are unchanged."""
-    short = re.sub(r"[\s^*·]", "", text.strip().lower()).replace("²", "2").replace("s-2", "/s2").replace("//", "/")
+    short = re.sub(r"[\s^*·()]", "", text.strip().lower()).replace("²", "2").replace("s-2", "/s2").replace("//", "/")
     return _SAME.get(short, short)
 
 
@@ -98,30 +109,58 @@ def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") ->
     count = int(np.count_nonzero(filled(cells)))
     if np.count_nonzero(np.isfinite(numbers)) > count // 2:
         return _of_numbers(numbers, unit_name, where)
-    texts = as_text(cells)
-    clocks = [_CLOCK.match(text) for text in texts]
-    if sum(map(bool, clocks)) > count // 2:
-        parts = [[float(part or 0.0) for part in match.groups()] if match else [np.nan] * 3 for match in clocks]
-        return _after_midnight(np.array(parts) @ np.array([3600.0, 60.0, 1.0]))
-    dates = np.array([_date_ns(text) for text in texts], dtype=np.int64)
-    if np.count_nonzero(dates != NO_TIME) <= count // 2:
-        shown = ascii(texts[0][:30]) if texts else "empty"
+    moments = [_moment(text) for text in as_text(cells)]
+    if sum(moment is not None for moment in moments) <= count // 2:
+        shown = ascii(str(cells[0])[:30]) if len(cells) else "empty"
         raise InputError(f"{where}: {shown} is no time: numbers, or dates such as 2024-05-17T09:30:00.25Z, are needed")
-    return dates
+    dated = any(moment is not None and moment[1] for moment in moments)
+    ns = [NO_TIME if moment is None or moment[1] is not dated else moment[0] for moment in moments]
+    return _set_once(np.array(ns, dtype=np.int64)) if dated else _after_midnight(np.array(ns, dtype=np.int64))
 
 
-def _date_ns(text: str) -> int:
-    """Return the nanoseconds since 1970 of a date in ISO 8601. A date without a zone is in UTC. A blank before the zone
-    is accepted."""
+def _moment(text: str) -> tuple[int, bool] | None:
+    """Read a date and a clock, or a clock. A date without a zone is in UTC.
+
+    Returns ns since 1970 and True, or ns since midnight and False. None for another text."""
+    match = MOMENT.fullmatch(_COMPACT.sub(r"\1-\2-\3T\4:\5:\6", text))
+    if match is None:
+        return None
+    first, month, last, hours, _, minutes, seconds, part, half, zone = match.groups()
+    hours = int(hours or 0) % 12 + 12 * (half in "Pp") if half else int(hours or 0)
+    ns = (3600 * hours + 60 * int(minutes) + int(seconds)) * 10**9 + int((part or "0").ljust(9, "0")[:9])
+    if first is None:
+        return ns, False
+    days = _days(first, month, last, bool(half))
+    if days is None:
+        return None
+    ahead = zone.replace(":", "") if zone and zone[0] in "+-" else "+0000"
+    return ns + days * DAY_NS - TIMES["h"] * int(ahead[:3]) - TIMES["min"] * int(ahead[0] + ahead[3:]), True
+
+
+@functools.lru_cache
+def _days(first: str, month: str, last: str, month_first: bool) -> int | None:
+    """The number of days from 1970 to a date; None for an impossible date, and after the year 2200."""
+    if first.isalpha() or (len(first) < 3 and month.isdigit() and (int(month) > 12 or month_first)):
+        first, month = month, first
+    if month.isalpha():
+        month = str((*_MONTHS, month[:3].lower()).index(month[:3].lower()) + 1)
+    year, day = (first, last) if len(first) > 2 else (last, first)
     try:
-        plain = _DAY.sub(lambda day: f"{day[1]}-{int(day[2]):02d}-{int(day[3]):02d}", text.strip())
-        plain = _THOUSANDTHS.sub(r"\1.\2", plain)
-        date = datetime.fromisoformat(_BLANK.sub("", plain).replace(" UTC", "+00:00"))
+        days = (date(int(year) + 2000 * (len(year) < 3), int(month), int(day)) - date(1970, 1, 1)).days
     except ValueError:
-        return NO_TIME
-    since = (date if date.tzinfo else date.replace(tzinfo=UTC)) - datetime(1970, 1, 1, tzinfo=UTC)
-    ns = since // timedelta(microseconds=1) * 1000
-    return ns if abs(ns) < 2.0 * _LATEST_NS else NO_TIME
+        return None
+    return days if abs(days) < 2.0 * _LATEST_NS / DAY_NS else None
+
+
+def _set_once(ns: Nanoseconds) -> Nanoseconds:
+    """Join the times before and after a clock was set, if one step is over a day. The earlier times then end one second
+    before the later times begin."""
+    row = np.flatnonzero(ns != NO_TIME)
+    steps = np.diff(ns[row])
+    jumps = np.flatnonzero(np.abs(steps) > DAY_NS)
+    if len(jumps) == 1 and 1 < jumps[0] < len(steps) - 2:
+        ns[row[: jumps[0] + 1]] += steps[jumps[0]] - 10**9
+    return ns
 
 
 def time_unit(cells: Cells, given: str = "") -> str:
@@ -148,11 +187,11 @@ def since_first_s(time_ns: Nanoseconds) -> Array:
 def of_day(clock: Array) -> Nanoseconds:
     """Return times of day in ns. clock: numbers of the form HHMMSS.SS, shape (n). After midnight a day is added."""
     whole = np.floor(clock)
-    return _after_midnight(whole // 10000 * 3600.0 + whole // 100 % 100 * 60.0 + whole % 100 + (clock - whole))
+    seconds = whole // 10000 * 3600.0 + whole // 100 % 100 * 60.0 + whole % 100 + (clock - whole)
+    return _after_midnight(of_seconds(seconds))
 
 
-def _after_midnight(seconds: Array) -> Nanoseconds:
-    ns = of_seconds(seconds)
+def _after_midnight(ns: Nanoseconds) -> Nanoseconds:
     good = ns != NO_TIME
     back = np.diff(ns[good], prepend=ns[good][:1]) < -DAY_NS // 2
     ns[good] += np.cumsum(back) * DAY_NS
@@ -165,6 +204,8 @@ def _of_numbers(values: NDArray[Any], unit_name: str, where: str) -> Nanoseconds
         raise InputError(f"{where}: unit {unit_name!a} is not known: write one of {', '.join(TIMES)}")
     scale = TIMES[known]
     values = unwrapped(values)
+    if known == "ticks" and len(values):
+        values = values - next(zero for zero in _TICKS if zero < float(np.nanmedian(values)) or not zero)
     if values.dtype.kind in "iu":
         good = np.abs(values.astype(float)) < _LATEST_NS / scale
         return np.where(good, values.astype(np.int64) * scale, NO_TIME)
@@ -191,11 +232,13 @@ def _guessed(values: Array) -> str:
     """Guess the unit of times: by their size if they count from 1970, otherwise by their steps."""
     good = unwrapped(values[np.isfinite(values)])
     size = float(np.median(np.abs(good)))
-    steps = np.diff(good)
+    steps = np.abs(np.diff(good))
     step = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
     # with steps of 100 or more, the clock counts microseconds and has run for minutes
-    if size > 1e8 and size < 1e10 and step < 100.0:
+    if 1e8 < size < _LATEST_NS / 1e9 and step < 100.0:
         return "s"
+    if any(zero and 1.0 < size / zero < 1.4 - 0.3 * (zero == _TICKS[0]) for zero in _TICKS):  # until the year 2100
+        return "ticks"
     for name, from_1970 in (("ns", 1e17), ("us", 1e14), ("ms", 1e11)):
         if size > from_1970:
             return name

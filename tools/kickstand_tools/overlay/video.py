@@ -1,5 +1,6 @@
 """Reads and writes videos with ffmpeg, which is part of the package imageio-ffmpeg."""
 
+import contextlib
 import re
 import subprocess
 import tempfile
@@ -134,6 +135,9 @@ def write_video(
             process.kill()
             process.wait()
             raise
+        finally:
+            with contextlib.suppress(BrokenPipeError):  # pictures that ffmpeg has not read
+                process.stdin.close()
         if process.returncode:
             words.seek(0)
             output = words.read().decode(errors="replace").strip().rpartition("\n")[2]

@@ -66,6 +66,7 @@ class Lcd:
         self.on = self.cursor = self.blink = False
         self.two_lines = False
         self._port = self._raw = 0xFF  # the outputs of a PCF8574 are high after power-on
+        self._rs = 0  # level of RS when E last rose
         self._eight_bit = True
         self._high = -1  # the first nibble of a byte until the second arrives, otherwise -1
         self._low_next = False  # True if the next read returns the low nibble
@@ -128,8 +129,10 @@ class Lcd:
         self._port = value
         if (before ^ value) & _LIGHT:
             self.changes += 1
-        if before & _E and not value & _E:
-            self._latch(before)
+        if value & _E and not before & _E:
+            self._rs = before & _RS  # RS must be stable 40 ns before E rises (tAS), so a change with E comes too late
+        elif before & _E and not value & _E:
+            self._latch(before & ~_RS | self._rs)
         return True
 
     def read_byte(self):
@@ -154,7 +157,7 @@ class Lcd:
 
     def _latch(self, port):
         if port & _RW:
-            self._low_next = not self._low_next
+            self._low_next = not self._low_next and not self._eight_bit
             return
         if self.clock.now_us < self._busy_us:
             self.lost += 1

@@ -27,10 +27,12 @@ from ..recording import (
     track_of,
     unit_in,
 )
-from ..units import ACCELERATIONS, EPOCH_NS, RATES, Nanoseconds, of_seconds, unit
+from ..units import EPOCH_NS, RATES, Nanoseconds, of_seconds, unit
 
 NAME = "phyphox"
-_AXIS = re.compile(r"^(?:(.*\S)\s+)?([xyz])\s*\(([^)]*)\)$", re.IGNORECASE)
+_AXIS = re.compile(
+    r"^(?:((?:linear )?acceleration.*|gyroscope.*|gravity.*)\s+)?([xyz]) \((m/s\^2|rad/s)\)$", re.IGNORECASE
+)
 _SIGN = "+1 g up, on every phone"
 _WITHOUT_GRAVITY = "linear"  # part of the name of a sensor without gravity
 
@@ -73,8 +75,8 @@ def _is_ours(file: RecordingFile) -> bool:
     first = names_in(next(iter(file.first_lines(1)), ""))
     if _is_meta(file) or len(first) < 2 or not re.fullmatch(r"(.*\s)?time \(s\)", first[0], re.IGNORECASE):
         return False
-    known = [_AXIS.match(column) for column in first]
-    return any(match and unit(match[3]) in ACCELERATIONS | RATES for match in known) or "latitude" in map(plain, first)
+    axes = [_AXIS.match(column) for column in first if re.search(r"\b[xyz]\b", column, re.IGNORECASE)]
+    return bool(axes and all(axes)) or "latitude" in map(plain, first)
 
 
 def _sensors(sheet: Sheet, stem: str, pauses: "_Pauses") -> Iterator[tuple[str, RecordedSensor]]:
@@ -89,7 +91,7 @@ def _sensors(sheet: Sheet, stem: str, pauses: "_Pauses") -> Iterator[tuple[str, 
             key = time_place, (match[1] or stem).lower(), unit(match[3])
             groups.setdefault(key, {}).setdefault(match[2].lower(), place)
     for (time, what, unit_name), axes in groups.items():
-        if len(axes) < 3 or unit_name not in ACCELERATIONS | RATES:
+        if len(axes) < 3:
             continue
         time_ns = pauses.after(sheet.times(time))
         of_gyro = unit_name in RATES

@@ -464,3 +464,12 @@ def reset():
 
 def reset_cause():
     return board.reset_cause
+
+
+def freq(hz=None):
+    """Return the processor's clock, or set it. A classic ESP32 has 240, 160 and 80 MHz."""
+    if hz is not None:
+        if hz not in (80_000_000, 160_000_000, 240_000_000):
+            raise ValueError("frequency must be 20MHz, 40MHz, 80Mhz, 160MHz or 240MHz")
+        board.processor_hz = hz
+    return board.processor_hz

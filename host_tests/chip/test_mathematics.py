@@ -1,0 +1,185 @@
+"""The firmware's mathematics with the chip's 32-bit floats and 31-bit small integers, compared with the other
+engines."""
+
+import io
+import json
+import struct
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kickstand.drive_alignment.quality import MIN_EVENTS
+from kickstand_tools.common import unix_port
+from kickstand_tools.deploy import bytecode
+from kickstand_tools.replay import replay_engine
+from kickstand_tools.rides import block_reader
+from kickstand_tools.signals import rotation_vector
+from kickstand_tools.simulated_board.gps import sentence
+from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn
+from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
+from support.emulated import PART, esp32, modules, pico
+
+pytestmark = pytest.mark.chip
+
+
+def records():
+    """Return three seconds of a ride as input of replay_engine.run()."""
+    world = PART.world(Ride([accelerate(15.0, 1.0), turn(-30.0, 1.0, 0.5)]).motion)
+    offsets = [-o / s for o, s in zip(PART.accel_offset_g, PART.accel_scale, strict=True)]
+    slopes = [1.0 / s for s in PART.accel_scale]
+    identity = 2 * (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)  # identity matrices as accel_matrix and gyro_matrix
+    measured = (*offsets, *slopes, *PART.gyro_bias_dps, *PART.vehicle_from_sensor, 0.0)
+    packed = struct.pack(replay_engine.CALIBRATION, *measured, *identity, *(9 * (0.0,)), 0.0048)
+    for i in range(300):
+        fx, fy, fz, wx, wy, wz, temperature = world(i / 100)
+        reading = (fx, fy, fz, temperature, wx, wy, wz)
+        packed += struct.pack(replay_engine.RECORD, i * 10_000, *reading, replay_engine.NO_SPEED)
+    return packed
+
+
+def assert_equal_leans(results):
+    """Assert that all engines give the same lean within 0.01 degrees at every sample. results: one per engine."""
+    host, *others = (np.frombuffer(result).reshape(-1, len(replay_engine.COLUMNS)) for result in results)
+    assert abs(host[:, 0]).max() > 25.0
+    for other in others:
+        assert host.shape == other.shape
+        assert len(other) == 300
+        assert np.abs(host - other)[:, :2].max() < 0.01
+        assert np.abs(host - other)[:, 2:5].max() < 1e-5
+
+
+def host_result():
+    out = io.BytesIO()
+    replay_engine.run(io.BytesIO(records()), out)
+    return out.getvalue()
+
+
+def test_the_same_log_gives_the_same_lean(tmp_path):
+    """The lean agrees on a Pico, on MicroPython's unix port and on CPython."""
+    pico()  # skips the test without the emulator
+    from kickstand_emulator.engine import rp2040
+
+    with rp2040(iter([records()]), None) as chip_result:
+        results = [host_result(), chip_result.read()]
+    if unix_port.available():
+        (tmp_path / "records").write_bytes(records())
+        command = unix_port.command(replay_engine.__file__, str(tmp_path / "records"))
+        results.append(subprocess.run(command, env=unix_port.environment(), capture_output=True, check=True).stdout)
+    assert_equal_leans(results)
+
+
+@pytest.mark.esp32
+@pytest.mark.long
+def test_the_same_log_gives_the_same_lean_on_an_esp32():
+    engine = bytecode.cross_compiled(Path(replay_engine.__file__), "xtensawin")
+    with esp32(files=modules("esp32") | {"replay_engine.mpy": engine, "records": records()}) as device:
+        code = "import replay_engine\nout = open('out', 'wb')\n"
+        device.exec(code + "replay_engine.run(open('records', 'rb'), out)\nout.close()", 60.0)
+        assert_equal_leans([host_result(), device.files()["out"]])
+
+
+_SENTENCE = sentence("GPRMC,235959.97,A,8959.99999,S,17959.99998,W,19.438,084.4,311226,,,A")
+_PLACE = """
+import gc
+from time import ticks_diff, ticks_ms, ticks_us
+from kickstand.rides.block import RideBlock
+from kickstand.speed.gps import Gps
+class Uart:
+    data = %r
+    def any(self):
+        return len(self.data)
+    def read(self, n):
+        data, self.data = self.data[:n], self.data[n:]
+        return data
+class Chip:
+    accel_lsb_per_g, gyro_lsb_per_dps, gyro_delay_s = 4096, 65.5, 0.0134
+    def temperature_c(self, counts):
+        return 31.25
+gps = Gps(Uart())
+block = RideBlock(5000)
+block.begin(512, 7, 3, 5, Chip(), 200, bytes(80))
+gps.poll(990)
+gps.poll(1000)
+gc.collect()
+heap, begin_us = gc.mem_alloc(), ticks_us()
+place = gps.place(1000)
+duration_us, heap = ticks_diff(ticks_us(), begin_us), gc.mem_alloc() - heap
+block.add_place(place)
+block.add([200] * 7, 2, 10000)
+block.close()
+print(duration_us, heap)
+print("".join("%%02x" %% byte for byte in block.buffer[:512]))
+"""
+
+
+@pytest.mark.long
+def test_position_on_the_chip_is_exact_fast_and_small(at_prompt):
+    costs, block = at_prompt.exec(_PLACE % _SENTENCE.encode(), 20.0).split("\n")[:2]
+    place = block_reader.parse(bytes.fromhex(block.strip())).turns[0].place
+    assert place == block_reader.Place(-89.0 - 59.99999 / 60, -179.0 - 59.99998 / 60, 1_798_761_599.97)
+    duration_us, heap = map(int, costs.split())
+    assert duration_us < 2000
+    assert heap < 200
+
+
+# The code before this script defines mount, clock, elapsed and allocated. After each sample of 50 ms come samples
+# without a duration, in which the alignment does one step of its work each, as at 100 samples per second.
+_DRIVE = """
+from kickstand.drive_alignment import alignment
+from kickstand.rotation import matrix
+drive = alignment.DriveAlignment("car", None, [0.0, 0.0, 0.0])
+rate, force = [0.0] * 3, [0.0] * 3
+speed, longest, updates, memory = 0.0, 0, 0, []
+def sample(forward_g, dt_us):
+    global longest, updates
+    for i in range(3):
+        force[i] = mount[3 + i] + forward_g * mount[6 + i]
+    if updates % 50 == 0:
+        allocated()
+    begin = clock()
+    drive.update(force, rate, dt_us)
+    if not dt_us:
+        longest = max(longest, elapsed(begin))
+    updates += 1
+for acceleration, count in [(0.0, 70), (3.0, 40)] + [(-2.5, 20), (3.0, 20), (0.0, 10)] * 4:
+    for i in range(count):
+        if i % 10 == 0:
+            memory.append(allocated())
+            drive.measure_speed(speed)
+        speed += 0.05 * acceleration
+        sample(acceleration / 9.80665 + 0.002 * (i % 5 - 2), 50000)
+        for _ in range(4):
+            sample(0.0, 0)
+out = matrix()
+drive.matrix(out)
+result = {"matrix": list(out), "longest": longest, "memory": memory, "counted": drive.counted}
+"""
+_ON_CHIP = """
+import gc, json
+from time import ticks_diff, ticks_us as clock
+def elapsed(begin):
+    return ticks_diff(clock(), begin)
+def allocated():
+    gc.collect()
+    return gc.mem_alloc()
+"""
+
+
+@pytest.mark.long
+def test_alignment_by_driving_on_the_chip(at_prompt):
+    """The chip gives the host's alignment, in steps of 2 ms and in constant memory."""
+    mount = random_mounting(4)
+    host = {"mount": mount, "clock": time.monotonic_ns, "elapsed": lambda begin: 0, "allocated": lambda: 0}
+    exec(_DRIVE, host)
+    code = f"{_ON_CHIP}mount = {mount!r}\n{_DRIVE}print(json.dumps(result))"
+    chip = json.loads(at_prompt.exec(code, 200).splitlines()[-1])
+    assert chip["counted"] == host["result"]["counted"] >= MIN_EVENTS
+    difference = np.reshape(chip["matrix"], (3, 3)) @ np.reshape(host["result"]["matrix"], (3, 3)).T
+    assert np.degrees(np.linalg.norm(rotation_vector(difference))) < 0.05
+    assert chip["longest"] < 2100, "microseconds"
+    memory = chip["memory"]
+    second_half = memory[len(memory) // 2 :]
+    assert max(second_half) - min(second_half) < 400, memory
+    assert second_half[-1] - memory[0] < 3000

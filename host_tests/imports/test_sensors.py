@@ -1,0 +1,211 @@
+"""Sensors with different sample rates are joined on one clock. Gaps and missing sensors are not filled with values.
+Damaged samples are left out and counted."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from kickstand_tools import api
+from kickstand_tools.common.errors import InputError
+from kickstand_tools.imports import units
+from kickstand_tools.imports.importing import ImportDamaged, Imported
+from kickstand_tools.imports.join import in_order, join, on_clock
+from kickstand_tools.imports.recording import AppRecording, ReceiverTrack, RecordedSensor, rate_hz
+from support import command
+from support.recordings import app_exports
+from support.recordings.app_exports import riding
+
+MS = 10**6
+
+
+def sensor(times_ms, values=None, name="accelerometer"):
+    """Return a sensor with three axes, whose values are the column (default: 0, 1, 0) times 1, 2 and 3."""
+    time_ns = np.rint(np.array(times_ms, dtype=float) * MS).astype(np.int64)
+    rows = np.tile([0.0, 1.0, 0.0], (len(time_ns), 1)) if values is None else np.outer(values, [1.0, 2.0, 3.0])
+    return RecordedSensor(name, time_ns, rows)
+
+
+def track_of(time_s, speed: Any = np.nan, lat: Any = np.nan, lon: Any = np.nan):
+    time_s, speed, lat, lon = (np.array(column, float) for column in np.broadcast_arrays(time_s, speed, lat, lon))
+    return ReceiverTrack(np.rint(time_s * 1e9).astype(np.int64), speed, lat, lon)
+
+
+def test_a_slower_gyro_is_interpolated_within_its_own_time():
+    t_ms, gyro_ms = np.arange(0.0, 2000.0, 10.0), np.arange(333.0, 1500.0, 25.0)
+    log, _ = join(AppRecording("none", sensor(t_ms, t_ms / 1000), sensor(gyro_ms, gyro_ms / 1000)), "log")
+    time_s = log.start_s + log.t_s
+    assert time_s[[0, -1]] == pytest.approx([0.34, 1.48])
+    assert log.gyro_dps == pytest.approx(np.outer(time_s, [1.0, 2.0, 3.0]), abs=1e-9)
+    assert log.accel_g == pytest.approx(np.outer(time_s, [1.0, 2.0, 3.0]), abs=1e-9)
+
+
+def test_gaps_are_not_interpolated():
+    slow = sensor([0, 20, 200, 220], [0.0, 2.0, 20.0, 22.0])
+    values = on_clock(slow, np.array([-1, 0, 10, 20, 100, 200, 205, 221]) * MS, 10.0 * MS)[:, 0]
+    assert values == pytest.approx([np.nan, 0.0, 1.0, 2.0, np.nan, 20.0, 20.5, np.nan], nan_ok=True)
+    assert on_clock(sensor([0, 170], [0.0, 17.0]), np.array([50]) * MS, 200.0 * MS)[0, 0] == pytest.approx(5.0)
+
+
+def test_a_faster_gyro_is_averaged_over_each_sample():
+    """Without averaging, a fast vibration would look like a slow rate (aliasing). Samples are not averaged if the step
+    of the clock is at most 1.5 steps of the sensor."""
+    fast = sensor(np.arange(7) * 10.0, [0.0, 1.0, 4.0, 9.0, 16.0, 25.0, 36.0])
+    values = [on_clock(fast, np.array([30 * MS]), step_ms * MS)[0, 0] for step_ms in (15.0, 15.2, 20.0)]
+    assert values == [9.0, 9.0, pytest.approx(12.5)]  # the mean of the samples after 20 ms and up to 40 ms
+    t_s = np.arange(0.0, 4.0, 0.0025)
+    gyro, clock = sensor(1e3 * t_s, 10.0 * t_s + 50.0 * np.sin(2 * np.pi * 99.0 * t_s)), np.arange(100, 390) * 10 * MS
+    error = on_clock(gyro, clock, 10.0 * MS)[:, 0] - clock * 1e-8
+    assert np.std(error) < 0.3 * np.std(np.interp(clock * 1e-9, t_s, gyro.values[:, 0]) - clock * 1e-8)
+
+
+@pytest.mark.parametrize(("gap_ms", "steps"), [(100.0, []), (520.0, [0.53])])
+def test_two_missing_samples_are_no_gap_and_more_stay_one(gap_ms, steps):
+    t_ms = np.arange(0.0, 4000.0, 10.0)
+    for accel_gap, gyro_gap in ((gap_ms, 0.0), (0.0, gap_ms)):
+        accel, gyro = (sensor(t_ms[(t_ms <= 1000.0) | (t_ms > 1000.0 + gap)]) for gap in (accel_gap, gyro_gap))
+        log, _ = join(AppRecording("none", accel, gyro), "log")
+        gaps = Imported("none", log, []).gaps_s
+        assert gaps == pytest.approx(steps, abs=0.02)
+
+
+def test_lost_rows_are_counted():
+    """The gyro's readings last from 20 to 1000 ms, so two samples have no rate. No sensor can read 401 g."""
+    accel, gyro = sensor(np.arange(0.0, 1010.0, 10.0)), sensor(np.arange(20.0, 1010.0, 10.0), np.ones(99), "gyro")
+    accel.values[50] = [0.0, 401.0, 0.0]
+    accel.damaged, gyro.damaged = 3, 5
+    log, lost = join(AppRecording("app", accel, gyro, temp_c=np.arange(101.0)), "n")
+    assert (lost, len(log.t_s), log.temperature_c[:2].tolist()) == (6, 98, [2.0, 3.0])
+    assert log.start_s + log.t_s[0] == pytest.approx(0.02)
+    values = np.array([[1.0, 1, 1], [np.nan, 1, 1], [np.nan] * 3, [1e6, 1, 1], [1, 1, 1], [1, 1, 1], [-9e5, 1, 1]])
+    damaged = RecordedSensor("x", np.array([1, 2, 3, 4, units.NO_TIME, units.REPEATED, 7]), values, damaged=10)
+    assert (damaged.damaged, damaged.time_ns.tolist()) == (13, [1, 7])
+
+
+def test_a_single_wrong_time_is_left_out():
+    """Times over half a second off, whose neighbours fit each other."""
+    for row, time_ms in ((50, 9e9), (50, -9e9), (0, 511.0), (99, 479.0)):
+        times = np.arange(100.0) * 10.0
+        times[row] = time_ms
+        assert len(in_order(sensor(times), "n").time_ns) == 99, (row, time_ms)
+    shuffled = np.arange(200.0) * 10.0
+    shuffled[[50, 51]] = shuffled[[51, 50]]
+    ordered = in_order(sensor(shuffled, np.arange(200.0)), "n")
+    assert np.diff(ordered.time_ns) == pytest.approx(10 * MS) and ordered.values[50:52, 0].tolist() == [51.0, 50.0]
+
+
+def late(count):
+    times = np.arange(100.0) * 10.0
+    times[np.arange(count) * 20 + 20] -= 75.0
+    return times
+
+
+@pytest.mark.parametrize(
+    ("times_ms", "words"),
+    [
+        ([0.0], "n: accelerometer has 1 samples: was it recorded"),
+        ([0.0, 5.0], ""),
+        (np.arange(30) / 9.9, ""),
+        (np.arange(30) / 10.1, "has 10100 samples per second, and no sensor has over 10000"),
+        (late(2), ""),
+        (late(3), "goes back 3 times, first in its row 21"),
+    ],
+)
+def test_impossible_times_are_refused(times_ms, words):
+    if words:
+        with pytest.raises(InputError, match=words):
+            in_order(sensor(times_ms), "n")
+    else:
+        assert len(in_order(sensor(times_ms), "n").time_ns) == len(times_ms)
+
+
+def test_many_readings_past_the_range_are_another_unit():
+    accel, gyro = sensor(np.arange(100.0) * 10.0), sensor(np.arange(100.0) * 10.0, None, "gyro")
+    accel.values[:2, 1] = 1e4
+    assert join(AppRecording("app", accel, gyro), "n")[1] == 2
+    accel.values[2, 1] = 1e4
+    with pytest.raises(InputError, match=r"past any sensor's, up to 1e\+04 g and 1 deg/s: check their units"):
+        join(AppRecording("app", accel, gyro), "n")
+
+
+def test_a_fix_is_only_in_the_nearest_row():
+    """A fix belongs to a row within 170 ms. The first row has a time without a fix."""
+    t_ms = np.arange(0.0, 5000.0, 10.0)
+    t_ms = t_ms[(t_ms < 3000.0) | (t_ms > 3400.0)]
+    track = track_of(
+        [-3.0, 0.504, 1.5, 2.507, 3.2, 9.0], [7, 10.504, 11.5, 12.507, 13, 14], 52.0, [13, 13.1, np.nan, 13, 13, 13]
+    )
+    log, _ = join(AppRecording("none", sensor(t_ms), sensor(t_ms), track, utc_ns=10**18), "log")
+    row = np.flatnonzero(np.isfinite(log.speed_mps))
+    assert row.tolist() == [50, 150, 251] and log.speed_mps[row].tolist() == [10.504, 11.5, 12.507]
+    assert np.flatnonzero(np.isfinite(log.lon_deg)).tolist() == [50, 251]
+    assert log.utc_s[row] - 1e9 == pytest.approx([0.5, 1.5, 2.51])
+    log, _ = join(AppRecording("none", sensor(t_ms), sensor(t_ms), utc_ns=10**9), "log")
+    assert np.flatnonzero(np.isfinite(log.utc_s)).tolist() == [0] and log.utc_s[0] == 1.0
+
+
+def test_markers_and_repetitions_of_a_receiver_are_dropped():
+    """A phone writes -1 for an unknown speed, and perhaps 0, 0 for an unknown position. A logger may write the last
+    value in each row; at a standstill it is kept once per second."""
+    track = track_of([0, 1, 2, 3], [-1.0, 3.0, -1.0, 4.0], [0.0, 52.0, 91.0, 52.1], [0.0, 13.0, 13.0, 13.1])
+    assert (track.speed_mps.tolist(), track.lat_deg.tolist()) == ([3.0, 4.0], [52.0, 52.1])
+    edges = track_of([0, 1, 2, 3, 4, 5], 0.0, [0, 90, 90.1, 1, 0, 1], [0, 180, 1, 180.1, 1, 0])
+    assert np.isfinite(edges.lat_deg).tolist() == [False, True, False, False, True, True]
+    still = track_of(np.arange(80) * 0.05, np.repeat([0.0, 5.0], 40), 52.0, 13.0)
+    assert (still.time_ns // MS).tolist() == [0, 1000, 2000, 3000]
+    assert still.speed_mps.tolist() == [0.0, 0.0, 5.0, 5.0] and len(track_of([0.0]).time_ns) == 0
+
+
+def test_a_rate_leaves_gaps_and_marks_out():
+    time_ns = np.array([0, 10, 20, 30, 40, 90, 100, 110]) * MS
+    assert rate_hz(time_ns) == pytest.approx(100.0)  # the gap of 5 steps does not count
+    assert rate_hz(np.array([0, 10, 20, 30, 40, 89, 99]) * MS) == pytest.approx(6 / 0.099)
+    assert rate_hz(np.append(time_ns, units.REPEATED)) == pytest.approx(100.0)
+    assert rate_hz(time_ns[:1]) == rate_hz(time_ns[:1].repeat(3)) == 0.0
+
+
+def test_shortfalls_of_an_import():
+    for hz, duration_s, codes in ((19.6, 61.0, []), (19.4, 61.0, ["import-slow"]), (20.0, 9.0, ["import-short"])):
+        t_s = np.arange(0.0, duration_s, 1.0 / hz)
+        imported = Imported("a", api.Log(t_s, np.zeros((len(t_s), 3)), np.zeros((len(t_s), 3))), [])
+        assert [notice.code for notice in imported.shortfalls] == codes and imported.rate_hz == pytest.approx(hz)
+
+
+def test_repeated_and_shuffled_rows_of_an_export(tmp_path):
+    """Sensor Kinetics writes the same time for several samples. The times are spread. Late rows are sorted."""
+    imported = api.import_recording(app_exports.into(tmp_path / "k", app_exports.sensor_kinetics(riding())))
+    assert np.diff(imported.log.t_s).min() > 0.002 and len(imported.log.t_s) >= len(riding().t_s) - 3
+    ride = riding().every(4)
+    lines = app_exports.any_table(ride).splitlines()
+    lines[101], lines[103] = lines[103], lines[101]
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    given = {"a": "m/s2", "g": "rad/s", "speed": "km/h"}
+    log = api.import_recording(tmp_path / "log.csv", app_exports.ANY_NAMES, given).log
+    assert log.accel_g == pytest.approx(ride.phone_g, abs=1e-5)
+
+
+def test_a_damaged_row_costs_only_itself(tmp_path):
+    """Rows with an impossible time, an impossible reading or a word are left out and counted, and a cut last line."""
+    ride = riding().every(4)
+    lines = app_exports.racebox(ride).splitlines()
+    lines[200] = lines[200].replace("2024-05-17", "2031-05-17")
+    lines[300] = ",".join([*lines[300].split(",")[:6], "99.9", *lines[300].split(",")[7:]])
+    lines[400] = lines[400].replace(lines[400].split(",")[6], "oops", 1)
+    lines[-1] = lines[-1][:60]
+    (tmp_path / "r.csv").write_text("\n".join(lines))
+    imported = api.import_recording(tmp_path / "r.csv")
+    assert len(imported.log.t_s) == len(ride.t_s) - 4 and imported.notices == [ImportDamaged(3)]
+    assert np.max(np.abs(imported.log.accel_g)) < 2.0
+
+
+@pytest.mark.parametrize(
+    ("from_s", "to_s", "first", "last"), [(5.0, 12.5, 5.0, 12.5), (-1.0, None, 26.98, 27.98), (None, -27.0, 0.0, 0.98)]
+)
+def test_from_and_to_count_from_the_recordings_own_start(tmp_path, from_s, to_s, first, last):
+    source = app_exports.into(tmp_path / "s.zip", app_exports.sensor_logger(riding().every(4)))
+    log = api.import_recording(source, start_s=from_s, end_s=to_s).log
+    assert log.start_s + log.t_s[[0, -1]] == pytest.approx([first, last], abs=0.021)
+    valid = np.flatnonzero(np.isfinite(log.utc_s))
+    assert log.utc_s[valid] - log.t_s[valid] - log.start_s == pytest.approx(app_exports.START_UTC_S, abs=0.02)
+    late = "import", source, "--out", tmp_path / "RIDE.csv", "--from"
+    command.refused(tmp_path, *late, 100, words="lasts 28.0 s: there is nothing from 100 s on")
+    command.refused(tmp_path, *late, 3, "--to", 2, words="there is nothing from 3 to 2 s")

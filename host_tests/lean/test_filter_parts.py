@@ -1,0 +1,136 @@
+"""The detector of rest, the trim and the suspension's dive.
+
+test_known_ride.py notices any change of their parameters.
+"""
+
+from math import cos, degrees, radians, sin, sqrt
+
+import pytest
+from bike_motion import GRAVITY_MPS2
+from kickstand.lean.dive import PRIOR_SHARE, Dive
+from kickstand.lean.measurements import gyro_variances
+from kickstand.lean.rest import RestDetector
+from kickstand.lean.upright_trim import UprightTrim
+
+WINDOW_S = 0.25
+NONE = (0.0, 0.0, 0.0)
+
+
+def test_the_six_positions_give_the_gyros_variances():
+    """A quarter turn about up maps the sensor's axes z, y, x to left, up, forward. The errors change by 0.002 with the
+    temperature, and are never larger than those of the data sheet."""
+    assert gyro_variances([0.0] * 9, [1.0] * 9) is None
+    sigma = [0.001 * k for k in range(1, 9)] + [0.5]
+    variances = gyro_variances(sigma, [0.0, 0.0, 1.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0])
+    by_hand = [0.02**2, 0.008**2 + 4e-6, 0.003**2 + 4e-6, 0.002**2 + 4e-6, 0.001**2 + 4e-6]
+    assert variances == pytest.approx(by_hand)
+
+
+def rest_after(detector, seconds, rates=NONE, force=(0.0, 1.0, 0.0), bias=NONE, **rolling):
+    """Pass equal windows to the detector for some seconds. Return the time until rest, or None without a rest."""
+    rest_s = None
+    for k in range(int(seconds / WINDOW_S + 0.5)):
+        corrected = [rate - error for rate, error in zip(rates, bias)]
+        detector.update(corrected, list(force), list(bias), WINDOW_S, **rolling)
+        if detector.resting and rest_s is None:
+            rest_s = (k + 1) * WINDOW_S
+    return rest_s
+
+
+@pytest.mark.parametrize(
+    ("first", "motion", "rest_s"),
+    [
+        (True, {}, 1.5),
+        (True, {"rolling": True}, 10.0),
+        (True, {"moving": True}, None),
+        (True, {"rates": (0.05, 0.0, 0.0)}, 1.5),  # before the first rest, a steady rate may be a bias
+        (True, {"rates": (0.0, -0.15, 0.0)}, None),
+        (False, {"rates": (0.0, 0.05, 0.0)}, None),
+        (False, {"rates": (0.05, -0.04, 0.03), "bias": (0.04, -0.03, 0.02)}, 1.5),
+        (False, {"rates": (0.05, -0.04, 0.03), "bias": (0.04, -0.03, 0.0)}, None),
+        (False, {"bias": (0.05, 0.0, 0.0)}, 1.5),  # the calibration is right, and the estimated bias is wrong
+        (False, {"rates": (0.03, 0.0, 0.0), "bias": (0.06, 0.0, 0.0)}, None),
+    ],
+)
+def test_rest_is_stillness_without_a_turn(first, motion, rest_s):
+    assert rest_after(RestDetector(first), 12.0, **motion) == rest_s
+
+
+def test_rest_counts_from_the_end_of_other_signs():
+    detector = RestDetector()
+    rest_after(detector, 5.0, rolling=True)
+    assert rest_after(detector, 3.0) == 1.5
+    assert rest_after(detector, 3.0, rolling=True) == 2.0  # ten seconds of stillness in all
+    assert rest_after(detector, 12.0, rates=(0.05, 0.0, 0.0)) is None  # after a rest, a rate is a turn
+    for k, moved in ((1, 1.25), (2, 9.75)):
+        detector = RestDetector()
+        rest_after(detector, moved, rolling=k == 2)
+        # The moving average needs half a second after a movement
+        assert rest_after(detector, 14.0, force=(0.0, 1.0, 0.03), rolling=k == 2) == (2.0, 10.5)[k - 1]
+
+
+def after_turns(sides, lean_share):
+    """Return the trim after turns of a minute each at 35 degrees. The upright pose has an error of 2 degrees.
+
+    sides: 1 for a turn to the right, -1 for a turn to the left.
+    lean_share: in turns, a force of lean_share * sin(lean) acts to the side.
+    """
+    trim = UprightTrim(0.0)
+    for side in sides:
+        lean = radians(35.0 * side)
+        for _ in range(300):
+            trim.update(radians(2.0) + lean_share * sin(lean), lean + radians(2.0), -0.35 * side, 0.2)
+    return trim
+
+
+@pytest.mark.parametrize("lean_share", [0.0, 0.1, -0.1])
+def test_turns_to_both_sides_show_a_pose_error(lean_share):
+    """Tyres and rider have the same effect on both sides. Turns to one side do not separate them from the pose."""
+    assert degrees(after_turns((1, -1, 1, -1), lean_share).angle) == pytest.approx(2.0, abs=0.4)
+    left, both = after_turns((1, 1), lean_share), after_turns((1, -1), lean_share)
+    assert degrees(sqrt(left.variance)) > max(1.5, 2.0 * degrees(sqrt(both.variance)))
+
+
+def test_straights_show_a_pose_error_by_hand():
+    """Disturbances of 1.5 degrees last 2 s each, so 30 s contain 7.5 independent measurements. The pose has a standard
+    deviation of 2.5 degrees."""
+    trim = UprightTrim(0.0)
+    trim.update(0.15, 0.0, 0.0, 0.2)  # a bike that is pushed to the side is not in balance
+    assert trim.angle == 0.0 and degrees(sqrt(trim.variance)) == pytest.approx(2.5)
+    for _ in range(150):
+        trim.update(sin(radians(2.0)), radians(2.0), 0.0, 0.2)
+    share = 1.0 / (1.0 + 1.5**2 / 7.5 / 2.5**2)
+    assert degrees(trim.angle) == pytest.approx(2.0 * share, abs=0.02)
+    assert degrees(sqrt(trim.variance)) == pytest.approx(2.5 * sqrt(1.0 - share), abs=0.02)
+
+
+def ridden(share, seconds, road=0.0, speed=20.0):
+    """Return a Dive after alternate braking and acceleration for some seconds.
+
+    share: true dive of the bike, in rad per g.
+    road: amplitude of the pitch rate that the road causes, in rad/s.
+    """
+    dive = Dive()
+    for k in range(int(seconds / 0.2)):
+        push, jerk = 0.5 * sin(0.3 * k), 0.75 * cos(0.3 * k)
+        dive.update(push, share * jerk + road * sin(0.08 * k), speed, 0.2)
+    return dive
+
+
+@pytest.mark.parametrize(("true", "road", "learned"), [(-1.0, 0.02, -1.0), (0.0, 0.02, 0.0), (1.5, 0.02, 1.5),
+    (6.0, 0.02, 6.0), (30.0, 0.0, 8.0), (-30.0, 0.0, -2.0)])  # fmt: skip
+def test_the_dive_of_any_bike_is_learned_on_a_hilly_road(true, road, learned):
+    """The limits are those of any bike."""
+    assert degrees(ridden(radians(true), 200.0, road).share) == pytest.approx(learned, abs=0.5)
+
+
+def test_only_brakings_show_the_dive():
+    assert ridden(0.1, 10.0, speed=4.0).share == PRIOR_SHARE  # the dive cannot be found below 5 m/s
+    dive = ridden(radians(4.0), 100.0)
+    share = dive.share
+    dive.restart()
+    assert dive.update(0.1, 1.0, 20.0, 0.2) == 0.0  # the first window has no earlier force to compare with
+    assert dive.update(0.2, 0.0, 4.0, 0.2) == pytest.approx(4.0 * share * 0.5 / GRAVITY_MPS2)
+    for jolt in (0.9, float("nan")):
+        assert dive.update(jolt, 1.0, 20.0, 0.2) == 0.0
+    assert dive.share == share

@@ -1,0 +1,201 @@
+"""Numbers are written exactly as Python's own formatting writes them, and read as float() reads them. A log that is
+written and read comes back."""
+
+import gzip
+
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+from kickstand_tools.api import Log, read_log, write_log
+from kickstand_tools.common.errors import InputError
+from kickstand_tools.logs import csv_reader
+from kickstand_tools.logs.csv_lines import (
+    csv_lines,
+    cut_log,
+    joined_cells,
+    number_cells,
+    text_cells,
+    write_lean,
+    write_table,
+)
+from kickstand_tools.logs.csv_reader import (
+    as_text,
+    cells_of,
+    columns_of,
+    columns_of_text,
+    filled,
+    numbers_in,
+    numbers_of,
+    separator_of,
+)
+from kickstand_tools.logs.log import float_schema
+from kickstand_tools.logs.reader import read_blocks
+from support import command
+
+AWKWARD = [0.0, -0.0, -1e-9, 5e-324, 0.5, 1.5, 2.5, -0.5, 9.9999999, 99999.5, 2.0**53, -(2.0**60), 1e300, 1.005]
+
+
+def numbers(digits):
+    random = np.random.default_rng(digits)
+    values = [random.normal(scale=scale, size=300) for scale in (1e-6, 1e-2, 1.0, 30.0, 1e6, 1.7e9)]
+    middles = (np.arange(-40, 40) + 0.5) * 10.0**-digits  # halfway between two texts, as closely as a double allows
+    decimals = np.round(random.normal(size=300), digits + 1)  # one number of ten is halfway between two texts
+    return np.concatenate((*values, middles, np.nextafter(middles, 9.0), decimals))
+
+
+@pytest.mark.parametrize("digits", range(8))
+def test_numbers_are_written_as_python_writes_them(digits):
+    for values in (numbers(digits), np.array(AWKWARD), np.array([*AWKWARD, np.inf, -np.inf]), np.array([-0.25])):
+        lines = joined_cells([number_cells(values, digits)]).decode().split("\n")[:-1]
+        assert lines == [f"{value:.{digits}f}" for value in values.tolist()]
+
+
+@given(st.lists(st.floats(-1e300, 1e300), min_size=1, max_size=20), st.integers(0, 7))
+def test_any_number_is_written_as_python_writes_it(values, digits):
+    lines = joined_cells([number_cells(np.array(values), digits)]).decode().split("\n")[:-1]
+    assert lines == [f"{value:.{digits}f}" for value in values]
+
+
+@pytest.mark.parametrize("values", [[np.nan, 1.25, -np.nan], [np.nan], [np.nan, np.inf]])
+@pytest.mark.parametrize("nan", ["nan", "", "unknown"])
+def test_nan_and_infinity_have_their_texts(values, nan):
+    lines = joined_cells([number_cells(np.array(values), 1, nan)]).decode().split("\n")[:-1]
+    assert lines == [nan if np.isnan(value) else f"{value:.1f}" for value in values]
+
+
+def test_lines_contain_texts_and_numbers():
+    texts, values = ["0.00", "1700000000.125", "2"], np.array([-1.0, 22.125, 3.375])
+    assert joined_cells([text_cells(texts), number_cells(values, 2)]) == b"0.00,-1.00\n1700000000.125,22.12\n2,3.38\n"
+    assert joined_cells([text_cells([]), number_cells(values[:0], 2)]) == b""
+    with pytest.raises(UnicodeEncodeError):
+        text_cells(["\u0661"])
+
+
+def test_a_table_is_written_in_pieces():
+    table = np.random.default_rng(1).normal(size=(31_000, 2))
+    table[30_500, 1] = np.nan
+    pieces = list(csv_lines(table, [3, 0]))
+    assert len(pieces) == 3
+    assert b"".join(pieces).decode() == "".join(f"{a:.3f},{b:.0f}\n".replace("nan", "") for a, b in table.tolist())
+
+
+@pytest.mark.parametrize("digits", range(8))
+def test_numbers_are_read_as_python_reads_them(digits):
+    texts = [f"{value:.{digits}f}" for value in numbers(digits).tolist()]
+    texts += ["-0.0", "7", "-12"] if digits == 0 else [f"-.{'5' * digits}", f"00.{'1' * digits}"]
+    table = numbers_in("".join(f"{text},,\n" for text in texts).encode(), 3)
+    assert table is not None and len(table) == len(texts)
+    values = np.array([float(text) for text in texts])
+    assert np.array_equal(table[:, 0], values) and np.array_equal(np.signbit(table[:, 0]), np.signbit(values))
+    assert np.all(np.isnan(table[:, 1:]))
+
+
+@pytest.mark.parametrize("text", ["1.25,,-3\n,2,4", "1.5,2,1234567890123456789\n1.,-.5,0.1234567890123456\n"])
+def test_plain_numbers_are_read_with_empty_cells(text):
+    values = [[float(cell or "nan") for cell in line.split(",")] for line in text.strip().split("\n")]
+    assert np.array_equal(np.array(numbers_in(text.encode(), 3)), values, equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "\n", "1,2\n3", "1,2,3\n4\n", "1,2\n\n3,4\n", "1,2\n3,4,\n", "0" * 100_001 + ",1\n"]
+    + ["-,1\n", ".,1\n", "1-2,1\n", "--2,1\n", "1.2.3,1\n", "1e3,1\n", "1+2\n", " 1,1\n", "nan,1\n"]
+    + ["1\r,2\n", '"1",2\n', "1.5,2\n\u0661.5,2\n"],
+)
+def test_other_tables_are_left_to_another_reader(text):
+    assert numbers_in(text.encode(), 2) is None
+
+
+def test_the_separator_is_the_most_frequent_outside_quotes():
+    for line, separator in (('a;b,c;"d,,,,"', ";"), ("a\tb", "\t"), ("a,b", ",")):
+        assert separator_of(line) == separator
+    assert cells_of('a, "b,c",d') == ["a", "b,c", "d"] and cells_of("a;b", ";") == ["a", "b"]
+
+
+@pytest.mark.parametrize(
+    ("cells", "kind", "values"),
+    [
+        (["1", "2"], "i", [1, 2]), (["1", "2.5"], "f", [1.0, 2.5]), (["1_0", "2"], "O", ["1_0", "2"]),
+        (["x", "nan"], "O", ["x", ""]), (["1", "-2e3"], "f", [1.0, -2000.0]), (["9" * 30, "1"], "f", [1e30, 1.0]),
+        (["0" * 40 + "7"], "f", [7.0]), ([" 1.5 ", "1"], "f", [1.5, 1.0]),
+        *[([word, "1.5", "x"], "O", ["", "1.5", "x"]) for word in ("-", "NA", "n/a", "nil", "None", "NULL", "#N/A")],
+    ],
+)  # fmt: skip
+def test_columns_have_the_narrowest_type(cells, kind, values):
+    (column,) = columns_of([[cell] for cell in cells], 1)
+    assert column.dtype.kind == kind and column.tolist() == values
+
+
+def test_damaged_rows_of_a_table_are_counted():
+    """A row with too few cells is filled up. The first row may be wider. A lone quotation mark is ignored."""
+    columns, left_out = columns_of_text('1,2.5,x\n2,,\n\n3\n4,"1,y\n1,2,3,4\n' + "9," * 60_000, ",", 3)
+    assert left_out == 2 and columns[0].tolist() == [1, 2, 3, 4]
+    assert columns[1] == pytest.approx([2.5, np.nan, np.nan, 1.0], nan_ok=True)
+    assert columns[2].tolist() == ["x", "", "", "y"]
+    assert [filled(column).tolist() for column in columns[1:]] == [[True, False, False, True]] * 2
+    assert as_text(columns[1]) == ["2.5", "", "", "1.0"]
+    assert numbers_of(columns[2]) == pytest.approx([np.nan] * 4, nan_ok=True) and numbers_of(columns[0]) is columns[0]
+    columns, left_out = columns_of_text("1,2,3\n4,5\n6,7,8,9\n", ",", 2)
+    assert left_out == 1 and [column.tolist() for column in columns] == [[1, 4], [2, 5]]
+
+
+def test_columns_are_those_of_all_blocks_of_rows():
+    """Integers that are followed by decimals or texts become floats or texts."""
+    rows = [[str(k), str(k) if k < 60_000 else f"{k}.5", str(k) if k < 60_000 else "x"] for k in range(70_000)]
+    whole, halves, texts = columns_of(rows, 3)
+    assert whole.dtype.kind == "i" and whole.tolist() == list(range(70_000))
+    assert halves[[0, 69_999]].tolist() == [0.0, 69_999.5] and texts[[7, 69_999]].tolist() == ["7", "x"]
+    assert [column.tolist() for column in columns_of([], 2)] == [[], []]
+
+
+@pytest.mark.parametrize(("name", "most"), [("MOST_CELLS", 9), ("MOST_TEXTS", 1)])
+def test_a_table_of_too_many_cells_is_refused(monkeypatch, name, most):
+    """The sizes are checked from block to block."""
+    monkeypatch.setattr(csv_reader, "ROWS", 2)
+    monkeypatch.setattr(csv_reader, name, most)
+    assert len(columns_of([["x"]] * 2, 1)[0]) == 2
+    with pytest.raises(InputError, match="the table is too large: over"):
+        columns_of([["x"]] * 10, 1)
+
+
+def test_a_written_log_comes_back(tmp_path):
+    """The column t_s has the recorder's own time. Columns without values are left out."""
+    nan = np.nan
+    log = Log(
+        np.array([5.0, 5.25]), np.tile([0.0, 1.0, 0.0], (2, 1)), np.tile([0.0, 0.0, 9.0], (2, 1)),
+        np.array([nan, 3.0]), np.array([20.0, 20.126]),
+    )  # fmt: skip
+    write_log(tmp_path / "a.csv", log)
+    rows = ["5.000000,0.000000,1.000000,0.000000,0.000000,0.000000,9.000000,,20.00"]
+    rows += ["5.250000,0.000000,1.000000,0.000000,0.000000,0.000000,9.000000,3.000,20.13"]
+    assert (tmp_path / "a.csv").read_text().splitlines() == [command.HEADER + ",speed_mps,temp_c", *rows]
+    log.lat_deg[0], log.lon_deg[0], log.utc_s[0] = -33.8688197, 151.2092955, 1_700_000_000.25
+    write_log(tmp_path / "a.csv.gz", log)
+    assert gzip.decompress((tmp_path / "a.csv.gz").read_bytes()).count(b"\n") == 3
+    copy = read_log(tmp_path / "a.csv.gz", axes=False)
+    for name, values in log.columns().items():
+        assert copy.columns()[name] == pytest.approx(values, abs=5e-3 if name == "temp_c" else 1e-8, nan_ok=True)
+    write_table(tmp_path / "b.csv", ["a", "b"], [(1, "x"), (2.5, "y")])
+    assert (tmp_path / "b.csv").read_text() == "a,b\n1,x\n2.5,y\n"
+
+
+def test_a_lean_has_the_times_of_the_log(tmp_path, text_log):
+    log = text_log("0.50,0,1,0,0,0,0", " 1.0,0,1,0,0,0,1", "1.50,0,1,0,0,0,2")
+    rows = [(block, np.array([[1.25, 2.0], [0.0, -3.0], [np.nan, 4.0]])) for block in read_blocks(log)]
+    assert write_lean(tmp_path / "a.csv", ["lean_deg", "x"], [1, 0], rows) == 3
+    assert (tmp_path / "a.csv").read_text() == "t_s,lean_deg,x\n0.50,1.2,2\n1.0,0.0,-3\n1.50,nan,4\n"
+
+
+def test_a_cut_log_counts_its_samples(tmp_path, text_log):
+    rows = [f"{k / 4},0,1,0,0,0,{k}" for k in range(9)]
+    for from_s, to_s, part, result in ((0.5, 1.25, rows[2:6], (4, 0.75)), (2.0, None, rows[8:], (1, 0.0))):
+        assert cut_log(text_log(*rows), tmp_path / "b.csv", from_s, to_s) == result
+        assert (tmp_path / "b.csv").read_text().splitlines()[1:] == part
+
+
+def test_only_fine_columns_of_parquet_have_64_bits():
+    pytest.importorskip("pyarrow")
+    schema = float_schema({"t_s": "s", "up_g": "g"}, ("t_s",), {"made_by": "x"})
+    fields = [(field.name, str(field.type), field.metadata) for field in schema]
+    assert fields == [("t_s", "double", {b"unit": b"s"}), ("up_g", "float", {b"unit": b"g"})]
+    assert schema.metadata == {b"made_by": b"x"}

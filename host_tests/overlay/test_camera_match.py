@@ -1,0 +1,86 @@
+"""The time of a video in a ride, found by the rates of the camera and the bike."""
+
+import numpy as np
+import pytest
+from kickstand_tools.common.errors import InputError
+from kickstand_tools.joining.motion import STEP_S, CellMotion
+from kickstand_tools.overlay.camera_match import camera_offset_s
+from kickstand_tools.overlay.gpmf import Telemetry
+
+RIDE_S = 60.0
+NOWHERE = "at no time does the camera turn like the bike"
+
+
+def rates(t_s, seed=4):
+    """Return random rates about three axes at these times, in deg/s."""
+    knots_s = np.arange(-20.0, 100.0, 0.7)
+    knots = np.random.default_rng(seed).normal(scale=30.0, size=(len(knots_s), 3))
+    return np.column_stack([np.interp(t_s, knots_s, axis) for axis in knots.T])
+
+
+def bike(rate_dps) -> CellMotion:
+    count = len(rate_dps)
+    return CellMotion(np.zeros((count, 3)), rate_dps, np.ones(count, dtype=bool), False, False)
+
+
+CELLS_S = STEP_S * (np.arange(round(RIDE_S / STEP_S)) + 0.5)
+
+
+def outcome(ride, camera) -> float | str:
+    try:
+        offset_s, correlation = camera_offset_s(ride, camera)
+    except InputError as error:
+        return str(error)
+    assert 0.7 < correlation <= 1.0
+    return offset_s
+
+
+@pytest.mark.parametrize(
+    ("begin_s", "seconds", "noise_dps", "found"),
+    [
+        (12.0, 30.0, 0.0, 12.0),
+        (12.03, 30.0, 2.0, 12.03),
+        (0.0, 60.0, 0.0, 0.0),
+        (-10.0, 30.0, 0.0, -10.0),
+        (45.0, 30.0, 0.0, 45.0),
+        (20.0, 12.0, 0.0, 20.0),
+        (20.0, 7.5, 0.0, NOWHERE),
+        (-21.5, 30.0, 0.0, -21.5),
+        (-22.5, 30.0, 0.0, NOWHERE),
+        (12.0, 30.0, 300.0, NOWHERE),
+    ],
+)
+def test_a_camera_is_found_in_the_ride(begin_s, seconds, noise_dps, found):
+    """The camera points elsewhere and has a bias. At least 8 s must be common."""
+    t_s = (np.arange(40.0 * seconds) + 0.5) / 40.0
+    noise = np.random.default_rng(4).normal(size=(len(t_s), 3))
+    camera = Telemetry(t_s, rates(t_s + begin_s)[:, [2, 0, 1]] + [1.0, -2.0, 0.5] + noise_dps * noise)
+    result = outcome(bike(rates(CELLS_S)), camera)
+    assert result == (found if isinstance(found, str) else pytest.approx(found, abs=0.03))
+
+
+def test_a_camera_with_uneven_times_is_found():
+    """Each cell of 50 ms has one to four readings, or none in every third second."""
+    t_s = np.cumsum(np.random.default_rng(4).choice([0.0125, 0.025, 0.05], size=1200))
+    for times_s in (t_s, t_s[np.floor(t_s) % 3 > 0]):
+        result = outcome(bike(rates(CELLS_S)), Telemetry(times_s, rates(times_s + 12.0)))
+        assert result == pytest.approx(12.0, abs=0.03)
+
+
+def test_the_first_reading_may_be_later_than_the_first_picture():
+    t_s = 0.3 + np.arange(1200) / 40.0
+    assert outcome(bike(rates(CELLS_S)), Telemetry(t_s, rates(t_s + 5.0))) == pytest.approx(5.0, abs=0.02)
+
+
+def test_a_motion_that_occurs_twice_is_refused():
+    t_s = np.arange(1200) / 40.0
+    twice = bike(np.tile(rates(CELLS_S), (2, 1)))
+    assert outcome(twice, Telemetry(t_s, rates(t_s + 12.0))) == "the camera turns like the bike at several times"
+
+
+def test_vibration_does_not_count():
+    """It changes from cell to cell, and is as large as the common motion."""
+    t_s = np.arange(1600) / 40.0
+    vibration = np.where(np.arange(len(CELLS_S)) % 2, 30.0, -30.0)[:, None] * [1.0, 0.0, 0.0]
+    result = outcome(bike(rates(CELLS_S) + vibration), Telemetry(t_s, rates(t_s + 7.0)))
+    assert result == pytest.approx(7.0, abs=0.05)

@@ -1,0 +1,179 @@
+"""ffmpeg's answers about a video, how it is started and stopped, and the gyro of a GoPro in a video."""
+
+import struct
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kickstand_tools.common.errors import InputError
+from kickstand_tools.overlay import gpmf, video
+from support.recordings import broken_logs
+
+
+def described(ffmpeg, rate="30 fps", size="1920x1080", more="", **counted):
+    film = ffmpeg.film(300, size, rate, more)
+    ffmpeg.answers(**counted)
+    return video.open_video(film)
+
+
+@pytest.mark.parametrize(
+    ("text", "width", "height", "fps", "telemetry"),
+    [
+        ({"rate": "29.97 fps, 60 tbr", "more": "  Stream #0:3(eng): Data: (gpmd / 0x1)\n"}, 1920, 1080, 29.97, 3),
+        ({"rate": "60 tbr", "more": "displaymatrix: rotation of -90.00 degrees"}, 1080, 1920, 60.0, None),
+        ({"rate": "1k fps", "more": "displaymatrix: rotation of 180.00 degrees"}, 1920, 1080, 1000.0, None),
+        ({"size": "16384x16"}, 16384, 16, 30.0, None),
+    ],
+)
+def test_a_video_is_described_by_ffmpegs_words(ffmpeg, text, width, height, fps, telemetry):
+    found = described(ffmpeg, **text)
+    assert (found.width, found.height, found.fps, found.telemetry) == (width, height, fps, telemetry)
+    assert found.seconds == pytest.approx(300 / fps)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ({"rate": ""}, "is a damaged video: copy it again"),
+        ({"size": "x"}, "damaged"),
+        ({"counted": ""}, "damaged"),
+        ({"counted": "frame=0"}, "damaged"),
+        ({"status": "1"}, "damaged"),
+        ({"rate": "30 fps, attached pic"}, "has no pictures"),
+        ({"rate": "1001 fps"}, "not a camera's video: 1920x1080 pixels, 1001 pictures"),
+        ({"rate": "0 fps"}, "not a camera's video"),
+        ({"size": "16385x1080"}, "not a camera's video: 16385x1080"),
+    ],
+)
+def test_a_file_that_is_no_cameras_video_is_refused(ffmpeg, text, words):
+    with pytest.raises(InputError, match=words):
+        described(ffmpeg, **text)
+
+
+def test_a_path_without_a_file_is_explained(tmp_path):
+    with pytest.raises(InputError, match="is a directory, not a video"):
+        video.open_video(tmp_path)
+    with pytest.raises(InputError, match=r"a\.mp4: there is no such file"):
+        video.open_video(tmp_path / "a.mp4")
+
+
+def test_file_name_is_no_protocol_and_opens_no_network():
+    assert video.input_of(Path("12:30.mp4")) == ["-protocol_whitelist", "file,pipe", "-i", "file:12:30.mp4"]
+
+
+def test_missing_packages_and_a_missing_ffmpeg_are_explained(monkeypatch):
+    import imageio_ffmpeg
+
+    def no_program():
+        raise RuntimeError("No ffmpeg exe could be found")
+
+    monkeypatch.setattr(imageio_ffmpeg, "get_ffmpeg_exe", no_program)
+    with pytest.raises(InputError, match="no ffmpeg for this system: install ffmpeg"):
+        video.ffmpeg()
+    for name in ("imageio_ffmpeg", "PIL"):
+        monkeypatch.setitem(sys.modules, name, None)
+        with pytest.raises(InputError, match=r"overlay needs imageio-ffmpeg and Pillow: .*\[video\]"):
+            video.ffmpeg()
+
+
+def test_pictures_are_written_to_ffmpeg(ffmpeg):
+    counted = []
+    video.write_video(Path("o.mp4"), ["-f", "rawvideo"], [b"one", b"two"], lambda: counted.append(1))
+    assert ffmpeg.read("pictures") == b"onetwo" and len(counted) == 2
+    assert ffmpeg.read("calls").split()[-4:] == [b"-y", b"-f", b"rawvideo", b"file:o.mp4"]
+
+
+@pytest.mark.parametrize("deaf", [False, True])
+@pytest.mark.parametrize(("words", "message"), [("one\nthe last \n\n", "the last$"), ("", "it does not say why")])
+def test_ffmpeg_that_fails_says_why(ffmpeg, words, message, deaf):
+    """A deaf ffmpeg ends before it has read the pictures."""
+    ffmpeg.answers(words=words, status="1", **({"deaf": ""} if deaf else {}))
+    with pytest.raises(InputError, match="ffmpeg has stopped: " + message):
+        video.write_video(Path("o.mp4"), ["-f", "rawvideo"], [bytes(1_000_000)] * 3)
+
+
+def test_ffmpeg_is_killed_after_an_interruption(ffmpeg):
+    def pictures():
+        yield b"1"
+        while not (ffmpeg.folder / "pictures").exists():  # until ffmpeg runs
+            pass
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        video.write_video(Path("o.mp4"), ["-f", "rawvideo"], pictures())
+    assert not ffmpeg.running
+
+
+# The gyro of a GoPro
+
+
+def item(name: bytes, kind: bytes, size: int, body: bytes) -> bytes:
+    return struct.pack(">4scBH", name, kind, size, len(body) // size) + body + bytes(-len(body) % 4)
+
+
+def packet(*items: bytes) -> bytes:
+    """Return a packet of a camera with one stream of these items."""
+    stream = item(b"STRM", b"\0", 1, b"".join(items))
+    return item(b"DEVC", b"\0", 1, item(b"DVNM", b"c", 1, b"camera") + item(b"STRM", b"s", 1, b"odd!") + stream)
+
+
+def scale(*values: int) -> bytes:
+    return item(b"SCAL", b"s", 2, struct.pack(f">{len(values)}h", *values))
+
+
+ROWS = struct.pack(">6h", 100, 200, 300, -100, 0, 50)
+GYRO = item(b"GYRO", b"s", 6, ROWS)
+
+
+@pytest.mark.parametrize(
+    ("items", "rates"),
+    [
+        ([scale(100), GYRO], [[1.0, 2.0, 3.0], [-1.0, 0.0, 0.5]]),
+        ([scale(1, 2, 4), GYRO], [[100.0, 100.0, 75.0], [-100.0, 0.0, 12.5]]),
+        ([GYRO], [[100.0, 200.0, 300.0], [-100.0, 0.0, 50.0]]),
+        ([scale(10), item(b"GYRO", b"s", 8, ROWS[:8])], [[10.0, 20.0, 30.0]]),  # of four axes, three are read
+        ([scale(10), item(b"GYRO", b"s", 4, ROWS)], None),  # two axes are not a gyro
+        ([item(b"STNM", b"c", 1, b"text!"), item(b"GYRO", b"?", 4, b"wxyz"), scale(100), GYRO[:14]], [[1.0, 2.0, 3.0]]),
+    ],
+)
+def test_a_gyro_is_divided_by_its_scale(items, rates):
+    found = [values.tolist() for values in gpmf.streams(packet(*items), b"GYRO")]
+    assert found == ([] if rates is None else [rates])
+
+
+@pytest.mark.parametrize(("kind", "form"), list(zip("bBsSlLjJfd", "bBhHiIqQfd")))
+def test_each_kind_of_number_is_read(kind, form):
+    body = struct.pack(f">3{form}", 1, 2, 100)
+    (found,) = gpmf.streams(packet(item(b"GYRO", kind.encode(), len(body), body)), b"GYRO")
+    assert found.tolist() == [[1.0, 2.0, 100.0]]
+
+
+def test_damaged_readings_are_numbers_or_nothing():
+    content = packet(scale(5), item(b"GYRO", b"s", 6, np.arange(30).astype(">i2").tobytes()))
+    changes = broken_logs.flip_bytes, broken_logs.cut_end, broken_logs.cut_a_piece, broken_logs.put_nul_bytes
+    for number in range(300):
+        chance = broken_logs.random.Random(number)
+        for values in gpmf.streams(chance.choice(changes)(content, chance), b"GYRO"):
+            assert values.ndim == 2 and values.shape[1] == 3
+
+
+def test_readings_of_a_packet_are_spread_over_its_time(ffmpeg):
+    """The second packet lasts no time, and the rates of the third are impossible. Times are in ticks of 1 ms."""
+    gyro = item(b"GYRO", b"f", 12, struct.pack(">12f", *[0.5] * 12))
+    good, absurd = packet(gyro), packet(item(b"GYRO", b"f", 12, struct.pack(">3f", 1e3, 0.0, 0.0)))
+    sizes = len(good), len(absurd)
+    listed = "#tb 0: 1/1000\n" + "".join(
+        f"0, 0, {begin}, {lasts}, {size}, 0xab\n"
+        for begin, lasts, size in ((1000, 2000, sizes[0]), (3000, 0, sizes[0]), (3000, 1000, sizes[1]))
+    )
+    film = described(ffmpeg, more="  Stream #0:3(eng): Data: (gpmd / 0x1)\n")
+    ffmpeg.answers(listed=listed)
+    (ffmpeg.folder / "packets").write_bytes(good + good + absurd)
+    found = gpmf.telemetry(film)
+    assert found is not None
+    assert found.t_s == pytest.approx([1.25, 1.75, 2.25, 2.75]) and found.rate_dps == pytest.approx(np.degrees(0.5))
+    for listed in ("x", "#tb 0: 1/1000\n0, no, list\n"):
+        ffmpeg.answers(listed=listed)
+        assert gpmf.telemetry(film) is None
+    assert gpmf.telemetry(described(ffmpeg)) is None  # without a stream of readings

@@ -1,0 +1,96 @@
+"""Boards with rides in flash or with a stream of readings, for the tests of `pull` and `record`."""
+
+import base64
+import signal
+import time
+import types
+
+from kickstand.rides import ride_paths
+from support import fake_board
+from support.recordings import ride_writer
+
+
+class RideBoard(fake_board.FakeBoard):
+    """A board with the firmware and a directory of rides."""
+
+    def __init__(self, root):
+        super().__init__(root)
+        root.mkdir(exist_ok=True)
+        self.settings = types.SimpleNamespace(VEHICLE="motorcycle", SD_SPI=None)
+        self.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: self.settings))
+        self.modules["kickstand.rides"] = types.SimpleNamespace(ride_paths=ride_paths)
+
+    def plug_in(self, monkeypatch):
+        monkeypatch.setattr("os.ilistdir", self.modules["os"].ilistdir, raising=False)
+        return fake_board.plug_in(monkeypatch, self)
+
+    def put(self, name, blocks):
+        path = self.root / "rides" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(b"".join(blocks))
+
+    def paths(self):
+        """Return all paths in the board's directory of rides."""
+        return sorted(path.relative_to(self.root / "rides").as_posix() for path in self.root.glob("rides/**/*"))
+
+
+class Stream(fake_board.Serial):
+    """A serial port with the output of a board that streams a ride.
+
+    end: the event after this output: a signal, bytes, an exception, or the seconds for which the computer sleeps.
+    last: the board's output after Ctrl-C.
+    """
+
+    def __init__(self, output, end=None, last=b""):
+        super().__init__()
+        self.data, self.end, self.last = output, end, last
+        self.now_s = self.asleep_s = 0.0
+
+    def inWaiting(self):
+        if not self.data and self.end is not None:
+            end, self.end = self.end, None
+            if isinstance(end, signal.Signals):
+                signal.raise_signal(end)
+            elif isinstance(end, bytes):
+                self.data = end
+            elif isinstance(end, float):
+                self.asleep_s = end
+            else:
+                raise end
+        return len(self.data)
+
+    def write(self, data):
+        super().write(data)
+        if data == b"\x03":
+            self.data += self.last + b"\x04\x04>"
+
+    def sleep(self, seconds):
+        self.now_s += seconds
+
+
+class StreamingBoard(fake_board.FakeBoard):
+    """A board whose app runs until the stream ends. Only waiting takes time."""
+
+    def __init__(self, root, stream):
+        super().__init__(root)
+        self.serial = stream
+
+    def exec_raw_no_follow(self, command):
+        self.resets += "machine.reset()" in command
+
+    def plug_in(self, monkeypatch):
+        stream = self.serial
+        monkeypatch.setattr(time, "monotonic", lambda: stream.now_s)
+        monkeypatch.setattr(time, "time", lambda: stream.now_s + stream.asleep_s)
+        monkeypatch.setattr(time, "sleep", stream.sleep)
+        return fake_board.plug_in(monkeypatch, self)
+
+
+def streamed(block):
+    """Return one block as usb_stream prints it."""
+    pieces = [block[begin : begin + 256] for begin in range(0, len(block), 256)]
+    return b"".join(base64.b64encode(piece) + b"\r\n" for piece in pieces) + b".\r\n"
+
+
+def half_seconds(count, **more):
+    return ride_writer.blocks(count, length=lambda _: 512, **more)

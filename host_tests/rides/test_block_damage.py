@@ -1,0 +1,100 @@
+"""A reader skips damaged blocks of a ride, and no others. It rejects blocks that no board has written."""
+
+import io
+import math
+import random
+import struct
+import threading
+from binascii import crc32
+
+import pytest
+from kickstand.calibration import store
+from kickstand.rides import block as block_format
+from kickstand_tools.rides import block_reader, ride_log, stream
+from support.recordings import broken_logs, ride_writer
+
+
+@pytest.fixture(scope="module")
+def data():
+    return ride_writer.blocks(3, length=lambda i: (512, 1024, 512)[i])[0]
+
+
+def test_file_cut_anywhere_in_its_last_block_keeps_the_others(data):
+    ride = data[0] + data[1]
+    for end in [*range(512, len(ride), 7), *range(len(ride) - 10, len(ride))]:
+        blocks, problems = block_reader.read(ride[:end])
+        assert [block.sequence for block in blocks] == [0], end
+        assert problems == ([] if end == 512 else [block_reader.CUT_SHORT]), end
+
+
+def test_any_damaged_byte_loses_only_its_block_and_is_reported(data):
+    for at in [*range(0, 160, 3), *range(160, 1024, 97), *range(1014, 1024)]:
+        damaged = bytearray(data[1])
+        damaged[at] ^= 0x41
+        blocks, problems = block_reader.read(data[0] + bytes(damaged) + data[2])
+        assert [block.sequence for block in blocks] == [0, 2], at
+        assert len(problems) == 1, at
+        assert at in (6, 7) or problems[0].endswith(" at byte 512")
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        (b"\xff" * 5000, "not of a ride at byte 0"),
+        (b"\0" * 4096, "cut short at byte 0"),
+        (b"t_s,ax_g\n0.0,1.0\n", "not of a ride at byte 0"),
+        (None, "damaged at byte 0"),
+    ],
+)
+def test_rubbish_before_a_block_is_skipped(content, problem, data):
+    blocks, problems = block_reader.read((content or data[1][:900]) + data[2])
+    assert [block.sequence for block in blocks] == [2] and problems == [problem]
+    assert block_reader.read(b"") == ([], [])
+    assert block_reader.read(b"x" * 40 + block_format.MAGIC) == ([], ["not of a ride at byte 0", "cut short"])
+
+
+def sealed(data):
+    """Add a valid check sum to these bytes, as an attacker would."""
+    return data[:-4] + struct.pack("<I", crc32(data[:-4]))
+
+
+def test_block_of_a_later_format_is_named(data):
+    later = sealed(data[0][:4] + b"\x09\0" + data[0][6:])
+    with pytest.raises(block_reader.BadBlock, match="format 9, this program reads 2"):
+        block_reader.parse(later)
+
+
+def test_block_with_impossible_values_is_bad(data):
+    good = data[1]
+    fields = struct.unpack_from(block_format.HEAD, good)
+    head, start = struct.calcsize(block_format.HEAD), struct.calcsize(block_format.HEAD) + store.BODY_LENGTH
+    # fields 7 to 9 are the units of force and rate, and the samples per second
+    forged = [struct.pack(block_format.HEAD, *fields[:i], 0, *fields[i + 1 :]) + good[head:] for i in (7, 8, 9)]
+    first = start - 4 * len(ride_writer.calibration().parameters())
+    for value in (math.nan, math.inf, 1e38):
+        forged += [good[:k] + struct.pack("<f", value) + good[k + 4 :] for k in range(first, start, 4)]
+    for content in forged:
+        with pytest.raises(block_reader.BadBlock, match="not decodable"):
+            block_reader.parse(sealed(content))
+
+
+@pytest.mark.parametrize("count", [60, pytest.param(600, marks=pytest.mark.long)])
+def test_accepted_block_can_be_written_and_shown(count, data, tmp_path):
+    """Every block that the reader accepts can be written as a log and shown live."""
+    head, chance, accepted = struct.calcsize(block_format.HEAD), random.Random(1), 0
+    for _ in range(count):
+        forged = bytearray(data[0])
+        for _ in range(chance.choice((1, 4, 40))):
+            forged[chance.randrange(head, len(forged) - 4)] = chance.choice((0, 255, chance.randrange(256)))
+        try:
+            block = block_reader.parse(sealed(bytes(forged)))
+        except block_reader.BadBlock:
+            continue
+        accepted += 1
+        ride_log.write(tmp_path / "ride.csv", [block])
+        stream.StreamLog(threading.Event(), lambda reading: None).write(io.StringIO(), iter([block]), [])
+    assert accepted > count / 20
+    for number in range(count // 4):
+        content = broken_logs.broken([b"".join(data)], number)[1]
+        blocks, problems = block_reader.read(content)
+        assert blocks or problems or not content

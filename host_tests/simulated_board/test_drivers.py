@@ -1,0 +1,192 @@
+"""The firmware's small drivers: the button, the SD card, an OLED's letters, and the differences between boards."""
+
+import errno
+import importlib
+import sys
+import types
+
+import pytest
+from kickstand_tools.simulated_board.clock import Clock
+from kickstand_tools.simulated_board.contacts import Button as Contact
+from kickstand_tools.simulated_board.fakes import chips
+from kickstand_tools.simulated_board.fakes.fake_machine import SPI, Pin
+from kickstand_tools.simulated_board.simulator import Board
+from support.board_access import level, on_board
+
+SHORT, LONG = "short", "long"
+SECTORS = bytes(range(256)) * 2, b"\x55" * 512, b"\xaa" * 512
+
+
+@pytest.mark.parametrize(
+    ("closed_ms", "events"),
+    [
+        ([(100, 400)], [(420, SHORT)]),
+        ([(100, 890)], [(910, SHORT)]),  # a press is long from 800 ms on
+        ([(100, 1500)], [(920, LONG)]),
+        ([(100, 300), (500, 1500), (1600, 1700)], [(320, SHORT), (1320, LONG), (1720, SHORT)]),
+        ([(100 + 20 * k, 110 + 20 * k) for k in range(5)] + [(400, 500)], [(520, SHORT)]),  # bounces are no presses
+        ([(100, 200), (210, 400)], [(420, SHORT)]),
+        ([(0, 1500), (1600, 1700)], [(1720, SHORT)]),  # a press that began before the firmware is ignored
+    ],
+)
+def test_presses_of_the_button(closed_ms, events):
+    def program(board):
+        from kickstand.board.button import LONG as long_press, Button
+
+        clock = Clock()
+        contact = Contact(clock)
+        for begin_ms, end_ms in closed_ms:
+            contact.turn(True, 1000 * begin_ms)
+            contact.turn(False, 1000 * end_ms)
+        clock.advance(0)
+        button = Button(types.SimpleNamespace(value=lambda: 0 if contact.closed else 1))
+        assert button.held() == (closed_ms[0][0] == 0)
+        result = []
+        for now_ms in range(0, 3000, 10):
+            clock.advance(1000 * now_ms - clock.now_us)
+            event = button.poll(now_ms)
+            if event:
+                result.append((now_ms, LONG if event == long_press else SHORT))
+        assert result == events
+
+    assert on_board(program)[0] == "returned"
+
+
+def on_card(program, removed=False, **kind):
+    """Run program(board) on a board with this SD card."""
+    board = Board(level)
+    board.fit_card(**kind)
+    vars(board.card)["removed"] = removed
+    try:
+        with board:
+            assert board.run(lambda: program(board), 100.0) == "returned"
+    finally:
+        sys.modules.pop("kickstand.board.spi_card", None)
+
+
+def opened():
+    from kickstand.board.spi_card import CheckedCard
+
+    return CheckedCard(SPI(0), Pin(17))
+
+
+def test_sectors_are_written_and_read_again():
+    def program(board):
+        card = opened()
+        card.writeblocks(7, SECTORS[0])
+        card.writeblocks(8, b"".join(SECTORS[1:]))
+        assert [board.card.data.get(number) for number in (6, 7, 8, 9, 10)] == [None, *SECTORS, None]
+        data = bytearray(1024)
+        card.readblocks(8, data)
+        assert bytes(data) == b"".join(SECTORS[1:]) and board.card.most_hz == 10_000_000
+        assert [card.ioctl(op, 0) for op in (4, 5)] == [4096, 512]
+
+    on_card(program, sectors=4096)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_rejected_sector_is_an_error_and_ends_the_write(count):
+    """The next write works again."""
+
+    def program(board):
+        card = opened()
+        board.card.rejects = 1
+        with pytest.raises(OSError) as raised:
+            card.writeblocks(7, b"".join(SECTORS[:count]))
+        assert raised.value.args[0] == errno.EIO and board.card.data == {}
+        card.writeblocks(7, b"".join(SECTORS[:count]))
+        assert [board.card.data[7 + i] for i in range(count)] == list(SECTORS[:count])
+
+    on_card(program)
+
+
+def test_a_card_may_be_busy_for_half_a_second_but_not_for_ever():
+    def program(board):
+        card = opened()
+        begin_us = board.clock.now_us
+        board.card.busy_next_s = 0.5
+        card.writeblocks(7, SECTORS[0])
+        assert 0.5e6 <= board.clock.now_us - begin_us < 0.6e6
+        board.card.stuck = True
+        begin_us = board.clock.now_us
+        with pytest.raises(OSError) as raised:
+            card.writeblocks(7, SECTORS[0] + SECTORS[1])
+        assert raised.value.args[0] == errno.ETIMEDOUT and 1.0e6 <= board.clock.now_us - begin_us < 2.5e6
+
+    on_card(program)
+
+
+PINS = types.SimpleNamespace(SD_SPI=0, SD_SCK=18, SD_MOSI=19, SD_MISO=16, SD_CS=17)
+
+
+@pytest.mark.parametrize(
+    ("kind", "pins", "reason"),
+    [
+        ({"driver": False}, {}, ("no-driver",)),
+        ({"removed": True}, {}, ("no-card", "no SD card")),
+        ({}, {"SD_CS": 99}, ("no-card",)),
+    ],
+)
+def test_any_fault_of_the_cards_driver_is_a_card_error(kind, pins, reason):
+    """Another error would restart the board again and again."""
+
+    def program(board):
+        from kickstand.board import sd_card
+        from kickstand.errors import CardError
+
+        with pytest.raises(CardError) as raised:
+            sd_card.mount(types.SimpleNamespace(**vars(PINS) | pins))
+        assert raised.value.args[: len(reason)] == reason
+
+    on_card(program, **kind)
+
+
+@pytest.fixture
+def port_of(monkeypatch):
+    """Return port_of(machine, use): the result of use(module) with the module `port`, as this board imports it."""
+
+    def load(machine, use=lambda port: types.SimpleNamespace(**vars(port))):
+        monkeypatch.setitem(chips.MACHINES, "tested", machine)
+        result = []
+
+        def program(board):
+            from kickstand.board import port
+
+            result.append(use(importlib.reload(port)))
+
+        try:
+            assert on_board(program, machine="tested")[0] == "returned"
+            return result[0]
+        finally:
+            assert on_board(program)[0] == "returned"  # the board of the other tests is a Pico
+
+    return load
+
+
+CLASSIC = (1, 3, 6, 7, 8, 9, 10, 11)
+
+
+@pytest.mark.parametrize(
+    ("chip", "taken"),
+    [
+        ("ESP32", CLASSIC),
+        ("ESP32-UNICORE", CLASSIC),
+        ("ESP32-PICO-D4", CLASSIC),
+        ("ESP32-D2WD", CLASSIC),
+        ("ESP32-S2", (19, 20)),
+        ("ESP32S3", (19, 20)),
+        ("ESP32C3", (18, 19)),
+        ("ESP32C6", (12, 13)),
+        ("ESP32H2", (26, 27)),
+        ("ESP32P4", ()),
+    ],
+)
+def test_pins_that_the_chip_needs_are_taken(chip, taken, port_of):
+    """An output on a pin that the chip itself needs would stop the board. Only a classic chip has pins without
+    outputs. An unknown board has no usual pins."""
+    port = port_of(f"Some board with {chip}")
+    assert port.IS_ESP32 and port.TAKEN_PINS == taken
+    assert port.INPUT_PINS == ((34, 35, 36, 37, 38, 39) if taken == CLASSIC else ())
+    assert (
+        port.SENSOR_PINS == port.LCD_PINS == port.GPS_PINS == (None, None) and port.BUTTON_PIN is port.WHEEL_PIN is None
+    )
