@@ -48,7 +48,7 @@ def driven(yaw_dps=0.0, speeds=(20.0, 19.0, 18.0), every_us=500_000, force=(0.0,
 
 
 @pytest.mark.parametrize(
-    ("given", "used"),
+    ("conditions", "used"),
     [
         ({"yaw_dps": 1.99}, True),
         ({"yaw_dps": -2.01}, False),
@@ -61,9 +61,9 @@ def driven(yaw_dps=0.0, speeds=(20.0, 19.0, 18.0), every_us=500_000, force=(0.0,
         ({"use": False}, False),
     ],
 )
-def test_an_interval_is_straight_fast_and_without_a_knock(given, used):
+def test_an_interval_is_straight_fast_and_without_a_knock(conditions, used):
     fit = Fit()
-    driven(**{"speeds": (20.0, 19.0, 17.0), **given}).regression.fit(fit, 0)
+    driven(**{"speeds": (20.0, 19.0, 17.0), **conditions}).regression.fit(fit, 0)
     assert (fit.total[0] > 0.0) is used
 
 
@@ -195,7 +195,7 @@ def test_the_quality_of_a_drive_by_numpy():
 
 
 @pytest.mark.parametrize(
-    ("drive", "given", "good", "speed", "mount"),
+    ("drive", "events", "good", "speed", "mount"),
     [
         ({"counted": 4}, {}, False, None, None),
         ({"counted": 5}, {}, True, None, None),
@@ -211,8 +211,8 @@ def test_the_quality_of_a_drive_by_numpy():
         ({}, {"angles": [0.0] * 3 + [31.0] * 3}, False, None, ("mount-moved", "forward")),
     ],
 )
-def test_faults_of_speed_and_mount_have_their_limits(drive, given, good, speed, mount):
-    quality = Drive(**drive).judge(**{"angles": [0.0] * 6, **given})
+def test_faults_of_speed_and_mount_have_their_limits(drive, events, good, speed, mount):
+    quality = Drive(**drive).judge(**{"angles": [0.0] * 6, **events})
     problems = [
         problem and (problem.code, *problem.values) for problem in (quality.speed_problem, quality.mount_problem)
     ]

@@ -6,6 +6,7 @@ page.
 
 import json
 import re
+import types
 
 import pytest
 from kickstand_tools.deploy import firmware_files
@@ -104,6 +105,32 @@ def test_config_with_more_than_settings_stays_with_the_rider(line, page, board):
     assert board.path("config.py").read_bytes() == own
 
 
+def test_a_board_of_a_shop_is_offered_by_its_name(line, page, board):
+    """Only boards with the same chip are offered. The firmware accepts their pins."""
+    look(line, board)
+    names = page.locator("#shop-board option").all_text_contents()
+    assert names == ["another board", "Seeed XIAO RP2040, RP2350", "Waveshare RP2040-Zero"]
+    page.select_option("#shop-board", "Seeed XIAO RP2040, RP2350")
+    assert page.input_value("[name=BUTTON_PIN]") == "2" and page.input_value("[name=SENSOR_I2C]") == "1"
+    text = line.rider.text("#config")
+    assert "used twice" not in text and page.is_enabled("#install")
+    assert "SENSOR_SDA = 6" in page.text_content("#text")
+    page.select_option("#shop-board", "another board")
+    assert page.input_value("[name=BUTTON_PIN]") == "" and "\nSENSOR_SDA" not in page.text_content("#text")
+
+
+def test_status_keeps_what_the_firmware_noticed_before_it_is_stopped(line, board):
+    """A soft reset removes the firmware's modules, before the status is asked."""
+    app, report, firmware = (types.ModuleType(name) for name in ("app", "status_report", "kickstand"))
+    vars(app)["worst"] = (1200, 3, ((1, 2, 3), 0.5))
+    vars(report)["noticed"] = None
+    vars(firmware).update(status_report=report, status=lambda *_: print("noticed", vars(report)["noticed"]))
+    board.modules["kickstand"] = firmware
+    vars(board.modules["sys"])["modules"] = {"kickstand.app": app}
+    line.plug_in(RawPrompt(board))
+    assert line.status() == "noticed ((1200, 3, ((1, 2, 3), 0.5)), None)"
+
+
 @pytest.mark.parametrize(
     ("name", "version", "platform", "words"),
     [
@@ -112,10 +139,8 @@ def test_config_with_more_than_settings_stays_with_the_rider(line, page, board):
         ("micropython", (1, 26, 1), "stm32", "runs on a Raspberry Pi Pico"),
     ],
 )
-def test_unsuitable_board_is_not_changed(line, page, board, name, version, platform, words):
-    implementation = board.modules["sys"].implementation
-    implementation.name, implementation.version = name, version
-    board.modules["sys"].platform = platform
+def test_unsuitable_board_is_not_changed(line, page, tmp_path, name, version, platform, words):
+    board = FakeBoard(tmp_path, name, version=version, platform=platform)
     assert words in look(line, board)
     assert page.is_hidden("#config") and board.written == [] and board.resets == 1
 

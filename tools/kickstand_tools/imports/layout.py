@@ -136,7 +136,7 @@ def _rows(lines: Sequence[str], separator: str) -> tuple[int, int, Grid] | None:
     """Return the number of rows, the number of numbers, and the grid for cells separated in this way. None if the lines
     do not fit."""
     split = [split_row(line, separator) for line in lines]
-    counts = [sum(bool(_NUMBER.fullmatch(cell) or MOMENT.fullmatch(cell)) for cell in cells) for cells in split]
+    counts = [_numbers_in(cells) for cells in split]
     widths = Counter(len(cells) for cells, count in zip(split, counts) if count >= FEWEST_CELLS)
     if not widths:
         return None
@@ -144,10 +144,6 @@ def _rows(lines: Sequence[str], separator: str) -> tuple[int, int, Grid] | None:
     rows = [k for k, count in enumerate(counts) if count >= FEWEST_CELLS and len(split[k]) == width]
     numbers = int(np.median([counts[k] for k in rows]))
     first = next(k for k, count in enumerate(counts) if count >= FEWEST_CELLS and len(split[k]) in widths)
-    while first and len(split[first - 1]) > 2 and len(split[first - 1]) in (*widths, width) and counts[first - 1]:
-        if any(cell and not _NUMBER.fullmatch(cell) for cell in split[first - 1][1:]):
-            break
-        first -= 1  # a row with few numbers, because its other cells are empty
     above = [k for k in range(first - 1, -1, -1) if lines[k].strip()]
     width, names = next(((w, k) for k in above[:3] for w in (width, *widths) if _has_names(lines[k], w)), (width, None))
     if names not in above[:1] and not (above and _all_units(split_row(lines[above[0]].lstrip(_MARKS), separator))):
@@ -155,6 +151,13 @@ def _rows(lines: Sequence[str], separator: str) -> tuple[int, int, Grid] | None:
     if len(rows) < 2 and names is None:
         return None
     return len(rows), numbers, Grid(names, first, separator, width)
+
+
+def _numbers_in(cells: list[str]) -> int:
+    """The number of numbers and times. Empty cells count in a wide row that has nothing else."""
+    count = sum(bool(_NUMBER.fullmatch(cell) or MOMENT.fullmatch(cell)) for cell in cells)
+    empty = cells.count("")
+    return len(cells) if len(cells) > 6 and count > 1 and count + empty == len(cells) else count
 
 
 def _has_names(line: str, width: int) -> bool:
