@@ -34,10 +34,10 @@ def corner(value, base=I):
     [
         ("version", 1, None, "version is missing"),
         ("version", 1, 2, "version 2"),
-        ("version", 1, True, ""),
+        ("version", 1, True, "version"),
         ("accel_offset_g", [0, 0, -0.499], [0, 0.5, 0], "offset of y is 0.5 g"),
         ("accel_offset_g", [0, 0, 0], None, "accel_offset_g is missing"),
-        ("accel_offset_g", [0, 0, 0], [0, 0, True], ""),
+        ("accel_offset_g", [0, 0, 0], [0, 0, True], "accel_offset_g"),
         ("accel_offset_g", [0, 0, 0], [float("nan"), 0, 0], "accel_offset_g has nan"),
         ("accel_offset_g", [0, 0, 0], [10**400, 0, 0], "accel_offset_g has 1000"),
         ("accel_slope", [0.801, 1.199, 1], 1.0, "accel_slope must be 3 numbers"),
@@ -47,16 +47,16 @@ def corner(value, base=I):
         ("trim_deg", -3.6, -4, "trim_deg is -4"),
         ("trim_deg", 3.6, 3.61, "trim_deg"),
         ("trim_deg", 0, "none", "trim_deg is 'none'"),
-        ("gyro_delay_s", 0.05, 0.051, ""),
-        ("gyro_delay_s", 0, True, ""),
-        ("accel_matrix", corner(1.15), corner(1.151), ""),
+        ("gyro_delay_s", 0.05, 0.051, "gyro_delay_s"),
+        ("gyro_delay_s", 0, True, "gyro_delay_s"),
+        ("accel_matrix", corner(1.15), corner(1.151), "accel_matrix"),
         ("accel_matrix", I, [1.0, 1.0, 1.0], "accel_matrix, row 1, must be 3 numbers"),
-        ("gyro_matrix", corner(0.85), corner(1.3), "gyro_matrix is 0.3 from the identity"),
+        ("gyro_matrix", [[1, -0.15, 0], *I[1:]], corner(1.3), "gyro_matrix is 0.3 from the identity"),
         ("gyro_matrix", I, I[:2], "gyro_matrix must be 3 rows of 3 numbers"),
         ("gyro_sigma", corner(0.05, ZERO), corner(0.051, ZERO), "gyro_sigma must be 0 to 0.05"),
         ("gyro_sigma", ZERO, corner(-1e-9, ZERO), "gyro_sigma must be 0 to 0.05"),
-        ("vehicle", "car", "bus", ""),
-        ("kickstand_side", "left", "top", ""),
+        ("vehicle", "car", "bus", "vehicle"),
+        ("kickstand_side", "left", "top", "kickstand_side"),
         ("vehicle_from_sensor", corner(0.9995), corner(0.99), "no rotation"),
         ("vehicle_from_sensor", TURNED, [*I[:2], [0, 0, -1]], "no rotation"),
         ("vehicle_from_sensor", TURNED, [[1, 0.01, 0], *I[1:]], "no rotation"),
@@ -90,7 +90,11 @@ def test_other_files_are_refused_by_name(tmp_path, content):
 
 def test_a_directory_a_missing_and_a_huge_file_are_refused(tmp_path):
     (tmp_path / "huge.json").write_bytes(b" " * 1_000_001)
-    for name, words in (("", ""), ("none.json", "make it with kickstand calibrate"), ("huge.json", "too large")):
+    for name, words in (
+        ("", "directory"),
+        ("none.json", "make it with kickstand calibrate"),
+        ("huge.json", "too large"),
+    ):
         with pytest.raises(InputError, match=words):
             read_calibration(tmp_path / name)
 
@@ -133,7 +137,8 @@ def test_a_written_file_reads_back_the_same(tmp_path):
     (tmp_path / "BOM.json").write_bytes(b"\xef\xbb\xbf" + (tmp_path / "CAL.json").read_bytes())
     for name in "CAL.json", "BOM.json":
         found = read_calibration(tmp_path / name)
-        assert found == complete() != CalibrationFile()
+        assert found.as_json() | {"mine": [1]} == complete().as_json()
+        assert CalibrationFile(found.accel_offset_g) != CalibrationFile()
         assert (found.vehicle, found.kickstand_side, found.gyro_delay_s) == ("motorcycle", "right", 0.0)
         assert found.trim_deg == -1.25
     data = json.loads((tmp_path / "CAL.json").read_text())

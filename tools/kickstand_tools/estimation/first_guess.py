@@ -30,7 +30,7 @@ MIN_LIKENESS = 0.5  # least correlation between leaning and turning; bikes have 
 MAX_PUSHED = 0.5
 # A car has a larger rms of the force to the side, also divided by the lean, and a smaller rms of lean. The rates are
 # about the force: in recorded drives the angle was at most 16 degrees. A leaning bike's rates are not, even in a bend
-# that is so long that the lean hardly changes. In less than CAR_S, the force to the side must also be that of the bends.
+# that is so long that the lean hardly changes. In less than CAR_S, the force to the side must also fit the yaw rate.
 CAR_G, CAR_PUSHED, CAR_LEAN, CAR_TILT = 0.045, 2.0, np.radians(5.0), np.radians(20.0)
 CAR_S, CAR_LIKENESS = 60.0, 0.35
 CONTRADICTS_S = 120.0  # less riding that no mounting explains is only not enough
