@@ -92,6 +92,23 @@ def test_outliers_weigh_less():
     assert robust[eq.SLIDING] == pytest.approx(np.hypot(1.0, 4.0 * np.sqrt(5.0) / 2.0))
 
 
+def test_roughness_follows_the_residuals():
+    """In a rough ride, the residuals have the rms 0.38 (process) and 0.5 (measurements)."""
+    residual = np.zeros((400, eq.ROWS))
+    residual[:, [of.LEAN, of.PITCH, *MOTION]], residual[:, [eq.SLIDING, eq.CLIMBING]] = 0.38, 0.5
+    for factor, misfit, roughness in (
+        (1.0, 1.0, 1.0),
+        (0.5, 1.0, 0.5),
+        (0.01, 1.0, 0.1),
+        (9.0, 1.0, 4.0),
+        (0.01, 3.0, 0.42),
+    ):
+        noise = noise_of(windows(400))
+        noise.misfit = np.full(400, misfit)
+        noise.estimate_roughness(factor * residual)
+        assert noise.roughness[200] == pytest.approx(roughness)
+
+
 def test_unbalance_follows_the_force_to_the_side():
     """A force of 0.011 g changes its sign every 10 s, so means over 3 s keep its size, except at a change of sign. Of
     an error that lasts for 3 s, the variance of a mean over 3 s keeps 2 / e."""
