@@ -42,7 +42,8 @@ FIRMWARE = {
     },
     "state": set(),
     "user_code": set(),
-    "start": {"app", "board", "console", "devices", "live", "settings", "ui.messages"},
+    "safe_mode": set(),
+    "start": {*("app", "board", "console", "devices", "live", "safe_mode", "settings"), "ui.messages"},
     "__init__": {"status_report"},
 }
 DRIVERS = {"board", "imu", "speed", "devices", "diagnosis", "start", "live.radio"}

@@ -48,21 +48,26 @@ def _held(button):
     return button.held()
 
 
-def main(loop=None):
+def main(loop=None, closed_ms=5000):
     """Run until Ctrl-C, power-off or a reset. An exception is reported on display and console, then the board restarts.
 
     Args:
         loop: a function that is called with the App instead of App.run(), or None. A simulation uses such a function to
             call App.begin() and App.step() later.
+        closed_ms: time for which the button must be held in safe mode until the display says that it is closed. 0 in a
+            simulation in which nobody can release the button meanwhile.
     """
     lcd = None
     try:
         chosen = settings.load()
         lcd = open_lcd(chosen)
-        if machine.reset_cause() == machine.PWRON_RESET and _held(open_button(chosen)):
-            print("Kickstand %s: safe mode, the button was held at power-up." % __version__)
-            _show(lcd, "Safe mode", "Ready for USB")
-            return
+        if machine.reset_cause() == machine.PWRON_RESET:
+            button = open_button(chosen)
+            if _held(button):
+                from .safe_mode import report_safe_mode  # imported here, because it is rarely needed
+
+                report_safe_mode(lcd, button, chosen.BUTTON_PIN, closed_ms)
+                return
         lcd.show("Kickstand", "starting")  # replace a lean that was shown before a reset
         run(chosen, lcd, loop)
     except SettingsError as error:

@@ -12,6 +12,7 @@ from .devices import open_bus, open_button, open_lcd, open_sensor
 from .diagnosis import MOTION_ADDRESSES, bus_line, fifo_fault, scan, show_wirings
 from .errors import SettingsError
 from .imu.mpu6050 import UnknownChip
+from .imu.other_chips import SUPPORTED
 from .settings import load
 from .ui import messages
 from .units import __version__, const
@@ -98,9 +99,35 @@ def _sensor(sensor, settings):
         who_am_i = 0
         fault, _ = sensor.explain(chip, error)
     if fault:
-        _print("Sensor", "%s", sentence(fault))
+        moved = None if who_am_i else _elsewhere(settings, "LCD", MOTION_ADDRESSES, SUPPORTED)
+        words = "it answers at 0x%02x on the wires of the display: connect it to SDA %d and SCL %d"
+        pins = settings.SENSOR_SDA, settings.SENSOR_SCL
+        _print("Sensor", "%s", words % ((moved,) + pins) if moved else sentence(fault))
     _bus("Sensor", settings, "SENSOR", MOTION_ADDRESSES)
     return who_am_i
+
+
+def _scan(settings, name, addresses):
+    """Return the wires of a bus and what diagnosis.scan() finds on it: (sda, scl, notice, devices)."""
+    sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
+    hz = getattr(settings, name + "_BUS_HZ") or LCD_HZ
+    return (sda, scl) + scan(sda, scl, lambda: open_bus(settings, name, hz), addresses)
+
+
+def _elsewhere(settings, name, addresses, wanted):
+    """Return the address at which a part that is missing on its own bus answers on the other bus, or None.
+
+    Args:
+        name: the beginning of the names of the other bus's settings.
+        addresses: the addresses of the part.
+        wanted: the name or the kind that other_chips.name_of() gives the part.
+    """
+    if settings.one_bus:
+        return None
+    for address, found, kind in _scan(settings, name, addresses)[3]:
+        if wanted in (found, kind):
+            return address
+    return None
 
 
 def _axes(sensor):
@@ -113,9 +140,7 @@ def _axes(sensor):
 
 def _bus(label, settings, name, addresses):
     """Print the devices on a bus, or the fault of its wires. Return the fault, a Notice or None."""
-    sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
-    hz = getattr(settings, name + "_BUS_HZ") or LCD_HZ
-    notice, devices = scan(sda, scl, lambda: open_bus(settings, name, hz), addresses)
+    sda, scl, notice, devices = _scan(settings, name, addresses)
     print(bus_line(label, sda, scl, devices))
     return notice
 
@@ -128,8 +153,15 @@ def _display(lcd, settings):
     if not (lcd.address and settings.one_bus):
         notice = _bus("Display", settings, "LCD", settings.LCD_ADDRESSES)
         if not lcd.address:
-            words = sentence(notice) if notice else "none answers: check wiring and LCD_ADDRESSES"
-            _print("Display", "%s", words)
+            moved = _elsewhere(settings, "SENSOR", settings.LCD_ADDRESSES, "display")
+            if moved:
+                words = "it answers at 0x%02x on the wires of the sensor: connect it to SDA %d and SCL %d, or set "
+                words += "LCD_SDA = %d and LCD_SCL = %d in config.py"
+                pins = settings.LCD_SDA, settings.LCD_SCL, settings.SENSOR_SDA, settings.SENSOR_SCL
+                _print("Display", words, moved, *pins)
+            else:
+                words = sentence(notice) if notice else "none answers: check wiring and LCD_ADDRESSES"
+                _print("Display", "%s", words)
 
 
 def _speed(settings):
@@ -168,7 +200,10 @@ def _worst(chip):
     judge, app = sys.modules.get("kickstand.lean.consistency"), sys.modules.get("kickstand.app")
     worst, odd = noticed or (app and app.worst, judge and judge.last_odd)
     if odd:
-        words = "the readings did not fit, again and again: %s. Sensor, alignment or mount: align again"
+        words = (
+            "the readings did not fit, again and again: %s. Check SIDE, the order of the presses and the mount, and \
+align again; then the sensor"
+        )
         _print("Sensor odd", words, MEASURED[odd])
     if worst:
         longest_us, places, (peaks, share) = worst

@@ -2,7 +2,6 @@
 map and the charts show the same moment."""
 
 import functools
-import json
 import re
 from dataclasses import replace
 
@@ -126,23 +125,6 @@ def test_a_lean_that_is_not_trusted_has_no_dot_on_the_map():
     assert min(dots["customdata"]) == pytest.approx(150.0, abs=1.0) and len(dots["x"]) < len(line["x"])
 
 
-def test_a_map_ends_before_the_poles():
-    points = points_of(track(lat_deg=np.linspace(84.0, 89.0, 301)))
-    assert points.lat_deg == 85.0 and np.nanmax(points.north_m) == pytest.approx(0.0)
-
-
-@pytest.mark.parametrize("place", [(52.5, 13.4), (-33.9, 151.2), (60.0, -0.01)])
-def test_tiles_match_the_track(place):
-    """The map's metres give the same tile as the formula of web maps for latitude and longitude."""
-    points = points_of(track(lat_deg=place[0] + np.arange(301) * 1e-5, lon_deg=place[1]))
-    tiles = page.tiles_at(points)
-    size, lat = tiles["world_m"] / 2**15, np.radians(points.lat_deg)
-    row = (1.0 - np.log(np.tan(lat) + 1.0 / np.cos(lat)) / np.pi) / 2.0 * 2**15
-    assert tiles["west_m"] / size == pytest.approx((points.lon_deg + 180.0) / 360.0 * 2**15, abs=1e-6)
-    assert tiles["north_m"] / size == pytest.approx(row, abs=1e-6) and tiles["most"] == 19
-    assert tiles["world_m"] == pytest.approx(40_030_174.0 * np.cos(lat), rel=1e-3)
-
-
 def test_a_page_has_a_map_if_there_is_a_track():
     """It loads nothing unless tiles are requested. One position is not a track."""
     plain, streets = page.page(track(), "", ""), page.page(track(), "", "", tiles=True)
@@ -154,46 +136,3 @@ def test_a_page_has_a_map_if_there_is_a_track():
     for bare in (track(lat_deg=single, lon_deg=single), track(lat_deg=np.nan)):
         html = page.page(bare, "", "")
         assert 'id="chart"' in html and 'id="map"' not in html and '"hovermode": "x"' not in html
-
-
-_POINT = """() => {
-  const k = Math.floor(map.data[0].x.length * 0.6), x = map._fullLayout.xaxis, y = map._fullLayout.yaxis;
-  return [x._offset + x.d2p(map.data[0].x[k]), y._offset + y.d2p(map.data[0].y[k]), map.data[0].customdata[k][0]];
-}"""
-
-
-@pytest.mark.long
-def test_in_a_browser_chart_and_map_show_the_same_moment(tmp_path, chromium):
-    pytest.importorskip("plotly")
-    page.draw(tmp_path / "ride.html", ride())
-    view = chromium.new_page(viewport={"width": 1300, "height": 800})
-    view.set_default_timeout(120_000)  # drawing is slow on a busy machine
-    requests, errors = [], []
-    view.on("request", lambda request: requests.append(request.url))
-    view.on("pageerror", lambda error: errors.append(str(error)))
-    view.goto((tmp_path / "ride.html").as_uri())
-    view.wait_for_function("map.layout.annotations[0].text != ''")
-    length, bar_end, (west, east) = view.evaluate(
-        "[map.layout.annotations[0].text, map.layout.shapes[1].x1, map.layout.xaxis.range]"
-    )
-    area, chart = view.locator("#map").bounding_box(), view.locator("#chart").bounding_box()
-    x, y, point_s = view.evaluate(_POINT)
-    words = view.locator("#here").text_content()
-    view.mouse.move(area["x"] + x, area["y"] + y)
-    view.wait_for_function("words => document.querySelector('#here').textContent !== words", arg=words)
-    in_map = view.locator("#here").text_content()
-    view.mouse.move(chart["x"] + 0.6 * chart["width"], chart["y"] + 180)
-    view.wait_for_timeout(300)
-    place = view.evaluate("[map.layout.shapes[0].xanchor, map.layout.shapes[0].yanchor]")
-    in_chart, tip = (view.locator(name).text_content() for name in ("#here", "#tip"))
-    view.close()
-    assert errors == [] and [url for url in requests if not url.startswith(("file:", "data:", "blob:"))] == []
-    assert length.endswith(" m") and (bar_end - 0.02) * (east - west) == pytest.approx(
-        float(length.split()[0]), rel=1e-6
-    )
-    assert in_map.split()[0] == f"0:{round(point_s):02}"
-    assert tip.split(",")[0] == in_chart.split()[0], "one moment has two times"
-    points, (minutes, seconds) = points_of(ride()), in_chart.split()[0].split(":")
-    k = np.argmin(np.hypot(points.east_m - place[0], points.north_m - place[1]))
-    assert points.t_s[k] == pytest.approx(60 * int(minutes) + int(seconds), abs=1.1)
-    assert json.dumps(place) != json.dumps([0, 0])

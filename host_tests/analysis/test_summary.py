@@ -41,15 +41,6 @@ def test_samples_are_averaged_over_each_stretch():
     assert spacing_s(course) == pytest.approx(0.01) and spacing_s(samples(1)) == 1.0
 
 
-def test_joined_parts_have_all_samples_and_empty_columns_no_memory():
-    parts = [samples(10, t_s=10.0 * k + np.arange(10), speed_mps=NAN if k else 5.0) for k in range(3)]
-    course = joined(iter(parts))
-    assert course.temp_c.strides == (0,) and len(course.temp_c) == 30
-    for field in fields(Channels):
-        columns = np.concatenate([getattr(part, field.name) for part in parts])
-        assert np.array_equal(getattr(course, field.name), columns, equal_nan=True), field.name
-
-
 def test_a_peak_keeps_the_first_of_the_largest_values():
     peak = Peak()
     for t_s, values, expected in (
@@ -111,28 +102,6 @@ def test_the_alignment_of_a_straight_ride_by_hand():
     assert angles.pitch_deg == pytest.approx(np.degrees(np.arcsin(0.05)), abs=0.01)
     assert angles.gravity_g == pytest.approx(np.hypot(1.0, tilt)) and angles.straight_s == pytest.approx(90.0)
     assert len(angles.forward_g) == 180
-
-
-@pytest.mark.parametrize(
-    ("name", "shows", "does_not"),
-    [
-        ("roll_deg", {"yaw_dps": 1.9}, {"yaw_dps": 2.1}),
-        ("roll_deg", {"seconds": 12.6}, {"seconds": 11.4}),  # including 2 s of standstill
-        ("yaw_deg", {"push_g": 0.06}, {"push_g": 0.04}),
-        ("pitch_deg", {"seconds": 63.0}, {"seconds": 61.0}),
-        ("pitch_deg", {}, {"stands": False}),
-        ("gravity_g", {}, {"stands": False}),
-    ],
-)
-def test_a_ride_shows_its_alignment_from_a_limit_on(name, shows, does_not):
-    def value(seconds=100.0, yaw_dps=0.0, push_g=0.2, stands=True):
-        n = round(seconds * 100)
-        still = np.zeros(n, dtype=bool)
-        still[[*range(100), *range(n - 100, n)]] = stands
-        push = np.where(np.arange(n) // 100 % 2, push_g, -push_g)
-        return getattr(quality(samples(n, forward_g=push, yaw_rate_dps=yaw_dps), still), name)
-
-    assert value(**shows) is not None and value(**does_not) is None
 
 
 def test_an_error_of_the_alignment_costs_lean():

@@ -6,6 +6,7 @@ import numpy as np
 from kickstand_tools.checks.cells import CellTable, LogCells
 from kickstand_tools.common.messages import sentence
 from kickstand_tools.logs.log import Log
+from kickstand_tools.signals import rotation_matrix
 from kickstand_tools.simulation.ride import SimulatedRide, ride
 
 
@@ -45,3 +46,19 @@ def simulated(profile: str) -> Log:
     readings, mps = made.readings[::4], np.full(len(made.time[::4]), np.nan)
     mps[::50] = made.truth["speed_mps"][::200]
     return Log(made.time[::4], readings[:, :3], readings[:, 4:], mps)
+
+
+def hand(seconds: float = 60.0, seed: int = 0, hz: int = 50) -> Log:
+    """Simulate a phone that is waved in the hand. The phone turns by up to 90 degrees and moves by a few decimetres."""
+    chance = np.random.default_rng(seed)
+    time = np.arange(0.0, seconds, 1.0 / hz)
+    waves = [chance.uniform(0.1, 0.7, (4, 3)), chance.uniform(0.0, 6.3, (4, 3)), chance.normal(0.0, 0.3, (4, 3))]
+    angle = np.sum(waves[2] * np.sin(2 * np.pi * waves[0] * time[:, None, None] + waves[1]), axis=1)
+    rates = np.diff(angle, axis=0, append=angle[-1:]) * hz
+    rotation = [np.eye(3)]
+    for turn in rotation_matrix(rates[:-1] / hz):
+        rotation.append(rotation[-1] @ turn)
+    moved = np.sin(2 * np.pi * 0.8 * time)[:, None] * chance.normal(0.0, 0.1, 3)
+    pushed = np.clip(np.diff(moved, n=2, axis=0, prepend=0, append=0) * hz * hz / 9.81, -1.0, 1.0)
+    force = np.einsum("nji,nj->ni", np.array(rotation), pushed + [0.0, 0.0, 1.0])
+    return Log(time, force + chance.normal(0.0, 0.01, force.shape), np.degrees(rates))

@@ -183,20 +183,6 @@ def test_the_file_system_fills_the_flash_and_keeps_files(name, start, end):
     assert system.read(built) == {path.lstrip("/"): content for path, content in files.items()}
 
 
-def test_a_stored_calibration_is_the_boards_own(tmp_path):
-    flash_image = pytest.importorskip("kickstand_emulator.flash_image")
-    from kickstand.calibration.parameters import Calibration
-    from kickstand.calibration.store import Store
-
-    calibration = Calibration()
-    calibration.aligned = True
-    calibration.gyro_bias[1] = 1.5
-    for name, content in flash_image.stored(calibration).items():
-        (tmp_path / name).write_bytes(content)
-    assert Store(0x68, 8, str(tmp_path)).load().gyro_bias[1] == 1.5
-    assert not Store(0x70, 8, str(tmp_path)).load().aligned  # another sensor's calibration is not used
-
-
 @pytest.fixture
 def cached(tmp_path, monkeypatch):
     """Make the tests' home directory the place of the image. Return the image's path."""
@@ -335,14 +321,3 @@ def test_an_absent_device_aborts_after_its_address(chip):
     assert controller.read_uint32(RAW_INTERRUPTS) & TX_EMPTY
     passed_bits(chip, controller, lambda raw: raw & STOP_SEEN)
     assert not bus.open
-
-
-def test_disabled_controller_frees_wires_but_a_reset_does_not(chip):
-    for act, held in ((lambda c: c.write_uint32(0x6C, 0), False), (lambda c: c.reset(), True)):
-        controller, bus = i2c(chip, Memory(sends=b"\x00\x00"))
-        controller.write_uint32(DATA, 1 << 8)
-        while not controller.reading():
-            controller.read_uint32(RAW_INTERRUPTS)
-        act(controller)
-        assert not bus.open and not controller.reading()
-        assert bus.stuck() is held

@@ -10,9 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 from kickstand.calibration.store import Store
-from kickstand.rides.block import BLOCK
-from kickstand.rides.flash_ring import PART_BLOCKS
-from kickstand.rides.ride_paths import part_path
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.rides import block_reader, ride_log
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, wait
@@ -190,20 +187,6 @@ def test_board_records_again_after_a_power_cut(at_prompt, operation):
     at_prompt.power_on()
     at_prompt.exec(f"{_FEED}{_START}feed({SAMPLES})\nrecorder.stop()\n", 20.0)
     assert len([*rides(at_prompt.files()).values()][-1]) >= 2
-
-
-@pytest.mark.esp32
-@pytest.mark.long
-def test_a_ride_removes_only_the_oldest_parts_that_it_needs():
-    parts = [part_path("rides", ride, number) for ride in (1, 2) for number in range(11)]
-    full_flash = dict.fromkeys(parts, bytes(PART_BLOCKS * BLOCK))
-    with esp32(leaning(20.0), modules("esp32") | calibrated() | full_flash) as device:
-        device.exec(f"{_FEED}{_START}feed({SAMPLES})\nrecorder.stop()", 30.0)
-        files = device.files()
-    removed = [path for path in parts if path not in files]
-    assert 0 < len(removed) < 11 and removed == parts[: len(removed)]
-    assert files.items() >= calibrated().items()
-    assert len(rides({"rides/3": files[part_path("rides", 3, 0)]})[3]) >= 2
 
 
 @pytest.mark.long

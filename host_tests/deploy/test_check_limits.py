@@ -1,10 +1,8 @@
 """The limits of `kickstand check`, from the data sheets of the MPU6050, and the figures in its messages."""
 
-import math
-
 import pytest
 from kickstand_tools.deploy import check_limits as limits
-from kickstand_tools.deploy.check_limits import BAD, GOOD, LOOK, SKIPPED
+from kickstand_tools.deploy.check_limits import BAD, GOOD, LOOK
 
 
 def finding(findings, what):
@@ -51,44 +49,6 @@ def test_sensor_at_rest(sensor, what, verdict, words):
     assert sensor or {one.verdict for one in findings} == {GOOD}
 
 
-@pytest.mark.parametrize(("dlpf", "accel_hz", "gyro_hz"), [(1, 184, 188), (2, 94, 98), (3, 44, 42), (4, 21, 20),
-                                                           (5, 10, 10), (6, 5, 5)])  # fmt: skip
-def test_noise_of_the_data_sheet_at_each_bandwidth(dlpf, accel_hz, gyro_hz):
-    """The noise density times the root of 1.57 times the bandwidth. Rounding to counts adds 0.3 counts."""
-    findings = at_rest(noise_g=0.0, noise_dps=(0.0,) * 3, dlpf=dlpf)
-    for what, density, hz, counts, unit, digits in (
-        ("noise, accelerometer y", 0.4, accel_hz, 4.096, "mg", 1), ("noise, gyro x", 0.005, gyro_hz, 65.5, "deg/s", 3),
-    ):  # fmt: skip
-        noise = math.hypot(density * math.sqrt(1.57 * hz), 0.3 / counts)
-        assert finding(findings, what)[1].startswith(f"{0:.{digits}f} {unit} (data sheet {noise:.{digits}f},")
-
-
-@pytest.mark.parametrize(("off_percent", "verdict"), [(13.9, GOOD), (-13.9, GOOD), (14.1, BAD), (-14.1, BAD)])
-def test_self_test_is_compared_with_the_factory_trim(off_percent, verdict):
-    """A trim code of 1 means a response of 25 x 131 counts. About y the response has the opposite sign."""
-    on = [0.0] * 3 + [100.0 + 3275.0 * sign * (1.0 + off_percent / 100.0) for sign in (1, -1, 1)]
-    findings = limits.self_test((1, 1, 1, 0), (100.0,) * 6, tuple(on))
-    assert [one.verdict for one in findings] == [SKIPPED] * 3 + [verdict] * 3
-    assert findings[3].words.startswith(f"{off_percent:+.1f} % off its factory trim (limit 14 %)")
-    assert ("damaged" in findings[3].words) is (verdict == BAD)
-
-
-@pytest.mark.parametrize(
-    ("registers", "trims"),
-    [
-        ((0b000_00001, 0b000_00001, 0b000_00001, 0b01_01_01), [1392.64] * 3 + [3275, -3275, 3275]),
-        ((0xFF, 0xFF, 0xFF, 0x3F), [4096 * 0.92] * 3 + [3275 * 1.046**30 * sign for sign in (1, -1, 1)]),
-        ((0, 0, 0, 0), [0.0] * 6),
-        ((0b001_00010, 0, 0, 0b00_00_10),
-         [4096 * 0.34 * (0.92 / 0.34) ** 0.1, 0, 4096 * 0.34 * (0.92 / 0.34) ** (1 / 30), 3275 * 1.046, 0, 0]),
-    ],
-)  # fmt: skip
-def test_factory_trim_is_that_of_the_register_map(registers, trims):
-    """RM-MPU-6000A rev 4.2, page 11: codes 1 to 31 mean 0.34 to 0.92 g, and 25 deg/s with 4.6 % more for each code. The
-    accelerometer's code has three bits from its own register and two from register 0x10."""
-    assert limits.factory_trims(registers) == pytest.approx(trims)
-
-
 SENSOR = ("MPU6050", 0x68, 0x68, 0x68, "", 0)
 NOT_MEASURED = "not measured: %d samples, %d overflows, %d failed transfers"
 
@@ -133,30 +93,3 @@ NOT_MEASURED = "not measured: %d samples, %d overflows, %d failed transfers"
 def test_limit_of_each_measurement(judge, values, what, verdict, words):
     observed = finding(limits.JUDGES[judge](*values), what)
     assert observed[0] == verdict and observed[1].startswith(words)
-
-
-LOOP = {"longest_us": 20_000, "places": 60, "overflows": 0, "lost": 0, "restarts": 0, "faults": "", "turns": 500,
-        "free": 16 * 1024, "lasts_ms": 365}  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("values", "verdicts"),
-    [
-        ({"longest_us": 99_900}, (GOOD, GOOD, GOOD)),
-        ({"longest_us": 100_100}, (LOOK, GOOD, GOOD)),
-        # half of the time in which the FIFO fills
-        ({"longest_us": 182_400}, (LOOK, GOOD, GOOD)),
-        ({"longest_us": 182_600}, (BAD, GOOD, GOOD)),
-        ({"overflows": 1}, (BAD, GOOD, GOOD)),
-        ({"lost": 1}, (GOOD, LOOK, GOOD)),
-        ({"restarts": 1}, (GOOD, GOOD, GOOD)),
-        ({"restarts": 2}, (GOOD, BAD, GOOD)),
-        ({"faults": "sensor-lost"}, (GOOD, BAD, GOOD)),
-        ({"free": 16 * 1024 - 1}, (GOOD, GOOD, LOOK)),
-        ({"free": 6 * 1024}, (GOOD, GOOD, LOOK)),
-        ({"free": 6 * 1024 - 1}, (GOOD, GOOD, BAD)),
-    ],
-)
-def test_running_lean_meter(values, verdicts):
-    assert tuple(one.verdict for one in limits.loop(**(LOOP | values))) == verdicts
-    assert limits.speed("", "", 0.0) == []

@@ -1,12 +1,11 @@
 """How a board is found, opened, asked and left. The computer's serial port and its clock are simulated."""
 
 import errno
-import threading
 from types import SimpleNamespace
 
 import pytest
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.deploy import board_console, connection
+from kickstand_tools.deploy import connection
 from mpremote.transport import TransportError
 from serial.tools import list_ports
 from support import command
@@ -101,13 +100,6 @@ def test_starting_board_gets_a_second_chance(port):
     assert port.opened == [("P", 10)] and port.closed == 1
 
 
-@pytest.mark.parametrize(("name", "silent_s"), [("P", 13.0), ("socket://x", 156.0)])
-def test_silent_board_is_abandoned_later_if_emulated(port, tmp_path, name, silent_s):
-    port.deaf = 9
-    command.refused(tmp_path, "status", "--port", name, words=f"no MicroPython answers on {name}: check that this is")
-    assert port.now_s == pytest.approx(silent_s, abs=0.2)
-
-
 @pytest.mark.parametrize(
     ("chatter", "message"),
     [
@@ -139,11 +131,6 @@ def test_error_of_the_connection_has_its_sentence(port, failure, message):
     assert port.closed == 1
 
 
-def test_lost_connection_has_other_words_on_a_page():
-    lost = connection.ConnectionLost("P", "x")
-    assert lost.line(page=True).startswith("connection lost: plug the board in")
-
-
 # Answers
 
 
@@ -161,18 +148,6 @@ def test_only_answers_of_the_expected_shape_are_accepted(text, shapes, fits):
         assert repr(connection.literal(text, *shapes)) == text.decode().strip()
     else:
         assert "makes no sense" in words(connection.literal, text, *shapes)
-
-
-def test_endless_answer_is_abandoned(port, monkeypatch):
-    monkeypatch.setattr(connection, "MOST_BYTES", 5000)
-    port.answers = [[b"x" * 9000]]
-    assert words(connection.status, "P").startswith("P: the board stopped answering")
-
-
-@pytest.mark.parametrize(("pause_s", "answers"), [(9.8, True), (10.2, False)])
-def test_answer_may_pause_for_ten_seconds(port, pause_s, answers):
-    port.answers = [NOTHING, [b"('micropyth", pause_s, b"on', '1.26.1', 'Pico')\x04\x04>"], (b"a\r\nb\r\n\r\n", b"")]
-    assert (connection.status("P") == "a\nb") if answers else "stopped answering" in words(connection.status, "P")
 
 
 @pytest.mark.parametrize(("wirings", "call"), [(False, b"kickstand.status()"), (True, b"kickstand.status(True)")])
@@ -229,40 +204,4 @@ def test_other_python_and_failing_programs_are_refused(port, tmp_path):
 
 # The lines of a running program
 
-AWAY = "the board stopped because this computer took nothing for %d s: keep it awake"
 SILENT, ENDLESS = "the board says nothing any more", "the program on the board does not end"
-END = b"\x04\x04>"
-
-
-@pytest.mark.parametrize(
-    ("pieces", "lines", "options"),
-    [
-        ([b"a\r\nb", b"b\n" + END], [b"a", b"bb"], {}),
-        ([b"a\n\x04Traceback\r\nOSError: 5\r\n\x04>"], [b"a", "the board reports OSError: 5"], {}),
-        ([b"a\n", 19.9, b"b\n" + END], [b"a", b"b"], {}),
-        ([b"a\n", 20.1, b"b\n" + END], [b"a", SILENT], {}),
-        ([b"a\n", (3.0,), 5.1, END], [b"a", AWAY % 3], {}),
-        ([b"a\n", (3.0,), 4.9, END], [b"a"], {}),
-        ([b"a\n", (0.9,), 5.1, END], [b"a"], {}),
-        ([(3.0,), 2.1, END], [SILENT], {"silent_s": 2.0}),
-        ([b"a\n" * 5, END], [b"a"] * 5, {"most_bytes": 13}),
-        ([b"a\n" * 5, END], [b"a"] * 5 + [ENDLESS], {"most_bytes": 12}),
-        ([b"x" * 60_000, b"x" * 40_000, b"\n" + END], [b"x" * 100_000], {}),
-        ([b"x" * 60_000, b"x" * 40_001, b"y", b"\n" + END], [ENDLESS], {}),
-        ([9.9, b"a\n\x04KeyboardInterrupt\x04>"], [b"a"], {"stopped": True}),
-        ([10.1, b"a\n" + END], [], {"stopped": True}),
-    ],
-)
-def test_lines_of_a_program_end_with_it_or_with_a_reason(port, pieces, lines, options):
-    port.answers = [pieces]
-    stopped = threading.Event()
-    if options.pop("stopped", False):
-        stopped.set()
-    received: list = []
-    with connection.connected("P") as (board, _):
-        try:
-            for line in board_console.lines(board, "code", **{"silent_s": 20.0, "stopped": stopped, **options}):
-                received.append(line)
-        except board_console.BrokenOff as reason:
-            received.append(str(reason))
-    assert received == lines and (b"\x03" in port.controls) is stopped.is_set()

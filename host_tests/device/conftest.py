@@ -1,7 +1,6 @@
 """Runs the whole device in the directory of a test, and prints its status."""
 
 import io
-import sys
 from contextlib import redirect_stdout
 
 import pytest
@@ -45,26 +44,22 @@ def status(tmp_path):
     """
 
     def lines(config=None, fit=None, world=rough, arguments=(), ride_s=0, **fitted):
-        imported = device_runs.take_firmware()  # so that an earlier run of the app is forgotten
-        try:
-            with (
-                device_plans.on_flash(tmp_path),
-                Board(world, **fitted) as board,
-                redirect_stdout(io.StringIO()) as out,
-            ):
-                import kickstand
-                from kickstand import start
+        with (
+            device_runs.FreshFirmware(),  # so that an earlier run of the app is forgotten
+            device_plans.on_flash(tmp_path),
+            Board(world, **fitted) as board,
+            redirect_stdout(io.StringIO()) as out,
+        ):
+            import kickstand
+            from kickstand import start
 
-                if fit:
-                    fit(board)
-                device_runs.write_config(config or {})
-                if ride_s:
-                    board.at(ride_s, ctrl_c)
-                    assert board.run(start.main, ride_s + 1) == "returned"
-                assert board.run(lambda: kickstand.status(*arguments), ride_s + 60.0) == "returned"
-        finally:
-            device_runs.take_firmware()
-            sys.modules.update(imported)
+            if fit:
+                fit(board)
+            device_runs.write_config(config or {})
+            if ride_s:
+                board.at(ride_s, ctrl_c)
+                assert board.run(start.main, ride_s + 1) == "returned"
+            assert board.run(lambda: kickstand.status(*arguments), ride_s + 60.0) == "returned"
         return out.getvalue().splitlines()
 
     return lines

@@ -1,12 +1,10 @@
 """The whole device on boards other than a Pico, with their pins and their I2C."""
 
-import sys
-
 import pytest
 from kickstand_tools.simulated_board.fakes import chips
 from kickstand_tools.simulated_board.simulator import Board
-from support import device_runs
 from support.board_access import level
+from support.device_runs import FreshFirmware
 
 PINS = {"SENSOR_SDA": 4, "SENSOR_SCL": 5, "LCD_SDA": 6, "LCD_SCL": 7, "BUTTON_PIN": 10}
 WIRED = {"sensor_pins": [4, 5], "lcd_pins": [6, 7], "button_pin": 10}
@@ -148,10 +146,5 @@ def test_stopped_watchdog_allows_an_open_console_for_days(machine):
         for _ in range(5 * 24):
             sleep_ms(3_600_000)
 
-    imported = device_runs.take_firmware()
-    try:
-        with Board(level, machine=machine) as board:
-            assert board.run(use_the_console, 1e6) == "returned"
-    finally:
-        device_runs.take_firmware()
-        sys.modules.update(imported)
+    with FreshFirmware(), Board(level, machine=machine) as board:
+        assert board.run(use_the_console, 1e6) == "returned"

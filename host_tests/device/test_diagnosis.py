@@ -2,6 +2,7 @@
 FIFO."""
 
 from collections import Counter
+from typing import Any
 
 import pytest
 from kickstand_tools.simulated_board.i2c import LOW, OPEN
@@ -11,7 +12,7 @@ from kickstand_tools.simulated_board.other_devices import Ds3231, Registers
 WHO_AM_I, PWR_MGMT_1 = 0x75, 0x6B
 BAROMETER, COMPASS, UNKNOWN = (0x77, {}), (0x1E, {}), (0x42, {})
 LSM6DSO = (0x6A, {0x0F: 0x6C})
-CLONE = {WHO_AM_I: 0x12, PWR_MGMT_1: 0x41}  # an unknown chip that looks like an MPU6050
+CLONE = {WHO_AM_I: 0x33, PWR_MGMT_1: 0x41}  # an unknown chip that looks like an MPU6050
 
 
 def clock(board):
@@ -63,7 +64,7 @@ CAUSES = {
         ("No MPU6050: 0x68", "answers 0xff"),
         "not an MPU6050 (it reads 0xff)",
     ),
-    "unknown": ([BAROMETER, (0x68, CLONE)], ("Unknown sensor", "WHO_AM_I 0x12"), "set ACCEPT_WHO_AM_I = 0x12"),
+    "unknown": ([BAROMETER, (0x68, CLONE)], ("Unknown sensor", "WHO_AM_I 0x33"), "set ACCEPT_WHO_AM_I = 0x33"),
 }
 
 
@@ -95,6 +96,33 @@ def test_shared_bus_is_listed_once(status):
 
 
 @pytest.mark.parametrize(
+    ("fit", "fitted", "sensor", "display"),
+    [
+        (None, {"one_bus": True}, "MPU6050", "0x27 on the wires of the sensor: connect it to SDA 6 and SCL 7, or set "),
+        (
+            None,
+            {"one_bus": True, "sensor_pins": (6, 7)},
+            "0x68 on the wires of the display: connect it to SDA 4",
+            "LCD",
+        ),
+        (
+            None,
+            {"sensor_pins": (6, 7), "lcd_pins": (4, 5)},
+            "0x68 on the wires of the display: connect it to SDA 4 and SCL 5",
+            "0x27 on the wires of the sensor: connect it to SDA 6 and SCL 7",
+        ),
+        (connected(), {}, "none answers on SDA 4, SCL 5", "LCD at 0x27"),
+    ],
+    ids=["both on the sensor's wires", "both on the display's wires", "exchanged", "no sensor"],
+)
+def test_status_says_where_a_module_on_the_other_wires_belongs(fit, fitted, sensor, display, status):
+    lines = status(fit=fit, **fitted)
+    for label, words in (("Sensor ", sensor), ("Display ", display)):
+        (text,) = [line for line in lines if line.startswith(label) and "bus" not in line[:13]]
+        assert words in text
+
+
+@pytest.mark.parametrize(
     ("number", "shown"),
     [(0x47, ("ICM-42688", "not supported")), (0x75, ("Sensor keeps no", "settings: broken"))],
 )
@@ -106,6 +134,14 @@ def test_accepted_chip_that_keeps_no_settings_is_named(number, shown, run, statu
     assert tuple(line.strip() for line in record.last) == shown
     assert record.first("wiring") == float("inf")
     assert number == 0x47 or "the wires are good" in "".join(status(config, fit))
+
+
+@pytest.mark.parametrize(
+    ("who_am_i", "name"), [(0x70, "MPU6500"), (0x19, "MPU6886"), (0x12, "ICM20602"), (0x11, "ICM20600")]
+)
+def test_relative_of_the_mpu6050_works(who_am_i, name, run, status):
+    assert display(run, lean=[[0, 25]], board={"who_am_i": who_am_i})[0].startswith("Raw   25°")
+    assert status(who_am_i=who_am_i)[2].startswith(f"Sensor       {name} (0x{who_am_i:02x})")
 
 
 def test_unknown_chip_works_if_it_is_accepted(run, status):
@@ -184,7 +220,7 @@ def test_transfers_that_fail_are_told_from_a_missing_sensor(on_board):
     def explained(board, settings):
         from kickstand.devices import open_sensor
 
-        sensor = open_sensor(settings)
+        sensor: Any = open_sensor(settings)
         notice, addresses = sensor.explain(sensor.chip, OSError(5))
         return notice.code, notice.values, addresses
 
@@ -198,11 +234,15 @@ class NeverFills(Fifo):
 
 
 class StaysFull(Fifo):
-    count = 1024
+    @property
+    def count(self):
+        return 1024
 
 
 class StandsStill(Fifo):
-    count = 14
+    @property
+    def count(self):
+        return 14
 
 
 class Repeats(Fifo):

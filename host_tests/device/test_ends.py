@@ -45,6 +45,16 @@ def test_ctrl_c_in_a_transfer_leaves_no_lean(after_us, run):
     assert "Ctrl-D starts it again" in record.console
 
 
+def test_display_at_another_address_is_found_without_a_loop(aligned, run, status):
+    """A backpack with a closed jumper: after Ctrl-C, in safe mode, after a refused setting, and in the status."""
+    board = {"lcd_address": 0x24}
+    plan = LEAN | {"board": board}
+    assert run(plan, fit=lambda board: board.at(4.0, ctrl_c)).last == STOPPED
+    assert run(plan | {"presses": [[0.0, 1.0]]}).last[0] == "Safe mode       "
+    assert run(plan | {"config": {"SIDE": "up"}}).last == ("config.py: wrong", "SIDE            ")
+    assert "Display      LCD at 0x24" in status(**board)
+
+
 @pytest.mark.usefixtures("aligned")
 def test_streamed_ride_ends_without_a_lean(boards, run):
     """`kickstand record` starts the app, not main.py."""

@@ -2,6 +2,7 @@
 
 import random
 import re
+from typing import Any
 
 import pytest
 from support import device_plans, engines
@@ -171,7 +172,7 @@ STATES = {
 
 
 def test_state_says_what_the_display_shows(aligned):
-    device = Device(device_plans.world_of({"lean": [[0, 25]]})[0])
+    device: Any = Device(device_plans.world_of({"lean": [[0, 25]]})[0])
     states = {}
     for at_s in STATES:
         device.board.at(at_s, lambda at_s=at_s: states.update({at_s: device.app.state()}))

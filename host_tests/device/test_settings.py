@@ -2,6 +2,7 @@
 
 import sys
 import types
+from typing import Any
 
 import pytest
 from kickstand import console
@@ -9,60 +10,39 @@ from kickstand.errors import CardError, Notice, Refusal, SettingsError, attempt,
 from kickstand_tools.simulated_board.simulator import Board
 from support.board_access import level
 
-GOOD = {
-    "SIDE": ("left", "right"),
-    "SAMPLE_HZ": (100, 125, 200),
-    "ACCEL_RANGE_G": (2, 4, 8, 16),
-    "GYRO_RANGE_DPS": (250, 500, 1000, 2000),
-    "DLPF": (3, 6),
-    "ACCEPT_WHO_AM_I": (None, 0x01, 0xFE),
-    "SENSOR_ADDRESS": (0x68, 0x69),
-    "SENSOR_BUS_HZ": (100_000, 400_000),
-    "DISPLAY": ("auto", "lcd", "ssd1306", "sh1106", "ssd1306-32"),
-    "OLED_CONTRAST": (0, 255),
-    "OLED_INVERTED": (True, False),
-    "LCD_ADDRESSES": ((8,), (0x77, 0x27)),
-    "LCD_WIRING": (1, 4),
-    "LCD_BUS_HZ": (None, 100_000, 400_000),
-    "WATCHDOG": (True, False),
-    "RECORD": (True, False),
-    "LIVE": (True, False),
-    "LIVE_PIN": (None, 100_000, 999_999),
-    "VEHICLE": ("motorcycle",),
-    "SPEED": (None, "gps", "wheel"),
-    "GPS_UART": (0, 2),
-    "GPS_BAUD": (4800, 115_200),
-    "PULSES_PER_METRE": (0.1, 100, 2.5),
-    "BUTTON_PIN": (0, 48),
-    "SD_SPI": (None,),
-}
-BAD = {
-    "SIDE": ("up", None),
-    "SAMPLE_HZ": (51, 200.0),
-    "ACCEL_RANGE_G": (3,),
-    "GYRO_RANGE_DPS": (300,),
-    "DLPF": (0, 7),
-    "ACCEPT_WHO_AM_I": (0x00, 0xFF),
-    "SENSOR_ADDRESS": (0x67, 0x6A),
-    "SENSOR_BUS_HZ": (99_999, 400_001),
-    "DISPLAY": ("oled",),
-    "OLED_CONTRAST": (-1, 256),
-    "LCD_ADDRESSES": ((), (7,), (0x78,), [0x27], 0x27),
-    "LCD_WIRING": (0, 5),
-    "LCD_BUS_HZ": (99_999, 400_001),
-    "LIVE_PIN": (99_999, 1_000_000),
-    "VEHICLE": ("bus",),
-    "SPEED": ("radar",),
-    "GPS_UART": (-1, 3),
-    "GPS_BAUD": (4799, 115_201),
-    "PULSES_PER_METRE": (0.09, 101, "2"),
-    "SD_SPI": (2,),
+# {name: (values within the limits, values beyond them)}
+LIMITS = {
+    "SIDE": (("left", "right"), ("up", None)),
+    "SAMPLE_HZ": ((100, 125, 200), (51, 200.0)),
+    "ACCEL_RANGE_G": ((2, 4, 8, 16), (3,)),
+    "GYRO_RANGE_DPS": ((250, 500, 1000, 2000), (300,)),
+    "DLPF": ((3, 6), (0, 7)),
+    "ACCEPT_WHO_AM_I": ((None, 0x01, 0xFE), (0x00, 0xFF)),
+    "SENSOR_ADDRESS": ((0x68, 0x69), (0x67, 0x6A)),
+    "SENSOR_BUS_HZ": ((100_000, 400_000), (99_999, 400_001)),
+    "DISPLAY": (("auto", "lcd", "ssd1306", "sh1106", "ssd1306-32"), ("oled",)),
+    "OLED_CONTRAST": ((0, 255), (-1, 256)),
+    "OLED_INVERTED": ((True, False), ()),
+    "LCD_ADDRESSES": (((8,), (0x77, 0x27)), ((), (7,), (0x78,), [0x27], 0x27)),
+    "LCD_WIRING": ((1, 4), (0, 5)),
+    "LCD_BUS_HZ": ((None, 100_000, 400_000), (99_999, 400_001)),
+    "WATCHDOG": ((True, False), ()),
+    "RECORD": ((True, False), ()),
+    "LIVE": ((True, False), ()),
+    "LIVE_PIN": ((None, 100_000, 999_999), (99_999, 1_000_000)),
+    "VEHICLE": (("motorcycle",), ("bus",)),
+    "SPEED": ((None, "gps", "wheel"), ("radar",)),
+    "GPS_UART": ((0, 2), (-1, 3)),
+    "GPS_BAUD": ((4800, 115_200), (4799, 115_201)),
+    "PULSES_PER_METRE": ((0.1, 100, 2.5), (0.09, 101, "2")),
+    "BUTTON_PIN": ((0, 48), ()),
+    "SD_SPI": ((None,), (2,)),
 }
 BAD_PINS = {"BUTTON_PIN": (-1, 49, None, "15"), "SENSOR_SDA": (-1, 49), "GPS_RX": (49,), "SD_MISO": (49,)}
 CARD = {"SD_SPI": 0, "SD_SCK": 18, "SD_MOSI": 19, "SD_MISO": 16, "SD_CS": 17}
 
 
-def settings(**config):
+def settings(**config) -> tuple[Any, Any]:
     """Return the Settings of a config.py with these values, and the SettingsError or None."""
     with Board(level):
         from kickstand.settings import Settings
@@ -73,21 +53,21 @@ def settings(**config):
             return error.settings, error
 
 
-@pytest.mark.parametrize("name", GOOD)
+@pytest.mark.parametrize("name", LIMITS)
 def test_value_within_the_limits_is_used(name):
-    for value in GOOD[name]:
+    for value in LIMITS[name][0]:
         values, error = settings(**{name: value})
         assert error is None and getattr(values, name) == value
 
 
-@pytest.mark.parametrize("name", [*BAD, *BAD_PINS])
+@pytest.mark.parametrize("name", [*LIMITS, *BAD_PINS])
 def test_value_beyond_the_limits_is_replaced(name):
     """The default replaces a wrong value. None replaces a wrong pin, because something else may be connected to the
     default pin."""
     default = getattr(settings()[0], name)
-    for value in (BAD | BAD_PINS)[name]:
+    for value in BAD_PINS.get(name) or LIMITS[name][1]:
         values, error = settings(**{name: value})
-        assert error is not None and (error.code, error.values[:2]) == ("not-allowed", (name, value))
+        assert (error.code, error.values[:2]) == ("not-allowed", (name, value))
         assert getattr(values, name) == (None if name in BAD_PINS else default)
 
 
@@ -109,7 +89,7 @@ def test_value_beyond_the_limits_is_replaced(name):
 )
 def test_settings_that_do_not_fit_together_are_named(config, code, values):
     _, error = settings(**config)
-    assert error is not None and (error.code, error.values[: len(values)]) == (code, values)
+    assert (error.code, error.values[: len(values)]) == (code, values)
 
 
 def test_other_names_and_a_complete_card_are_accepted():

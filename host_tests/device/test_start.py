@@ -6,7 +6,8 @@ import sys
 import pytest
 from kickstand.errors import StoreError, report
 from kickstand_tools.common import firmware_path
-from support import device_runs, mpy
+from support import mpy
+from support.device_runs import FreshFirmware, take_firmware
 
 INCOMPLETE, NO_MEMORY = ["Incomplete:     ", "flash it again  "], ["No memory for it", "restart it      "]
 RAW = {"lean": [[0, 25]]}
@@ -28,11 +29,10 @@ class Missing:
 def without():
     """Return without(name, error, times): the firmware is imported anew, and its module of this name raises the
     error."""
-    imported, hooks = device_runs.take_firmware(), list(sys.meta_path)
-    yield lambda name, error, times=-1: sys.meta_path.insert(0, Missing("kickstand." + name, error, times))
+    hooks = list(sys.meta_path)
+    with FreshFirmware():
+        yield lambda name, error, times=-1: sys.meta_path.insert(0, Missing("kickstand." + name, error, times))
     sys.meta_path[:] = hooks
-    device_runs.take_firmware()
-    sys.modules.update(imported)
 
 
 def frames_with(record, lines):
@@ -56,6 +56,13 @@ def test_button_held_at_power_on_starts_safe_mode(held_s, safe, charge_us, run):
         assert "safe mode" in record.console
     else:
         assert record.last[0].startswith("Raw")
+
+
+def test_closed_button_is_told_from_one_that_is_held(run):
+    record = run({**RAW, "presses": [[0.0, 1000.0]], "until": 30})
+    assert record.at(4.0) == ["Safe mode       ", "Ready for USB   "]
+    assert record.last == ("Button is closed", "check its wires ") and record.ends == ["returned"]
+    assert "The button on GPIO 15 stays closed" in record.console
 
 
 @pytest.mark.parametrize(
@@ -188,7 +195,7 @@ print(attempt(use), len(objects))
 def test_report_without_its_words_gives_its_code(without, on_board, capsys):
     """After a failure of flash or heap, the module with the words may not load."""
     on_board(lambda *_: report(StoreError("not-written", "EIO")))
-    device_runs.take_firmware()
+    take_firmware()
     without("console", ImportError)
     on_board(lambda *_: report(StoreError("not-written", "EIO")))
     assert capsys.readouterr().out == "calibration not saved: EIO; the old one is kept\nnot-written\n"

@@ -94,6 +94,7 @@ def test_last_run_has_its_worst_values(status):
     words = re.fullmatch(
         r"longest turn ([\d.]+) ms; places left in the FIFO, at the fewest: (\d+)", line(lines, "Since start")
     )
+    assert words
     assert 245.0 < float(words[1]) < 275.0 and 15 <= int(words[2]) <= 25
     assert line(lines, "Vibration") == (
         "largest force 0.5 0.3 0.8 g of 16; 0.00 % of the readings lost at the end of the range"
@@ -111,4 +112,6 @@ def test_reading_that_did_not_fit_is_named(status):
         return (reading[0] + 0.5 * (t_s > 12.0), *reading[1:])
 
     lines = status(world=shifted, ride_s=30.0)
-    assert line(lines, "Sensor odd").startswith("the readings did not fit, again and again: force to the left.")
+    assert line(lines, "Sensor odd").startswith(
+        "the readings did not fit, again and again: force to the left. Check SIDE"
+    )

@@ -52,7 +52,7 @@ def test_each_function_is_called(engine, run_user):
     record = run_user(COMPLETE, plan, engine)
     assert "setup left" in record.console and record.console.count("press 1") == 7
     assert re.search(r"lean 4 (True|False)", record.console)
-    trusted, lean, meter = re.search(r"lean 110 (\w+) (-?\d+) (-?\d+)", record.console).groups()
+    ((trusted, lean, meter),) = re.findall(r"lean 110 (\w+) (-?\d+) (-?\d+)", record.console)
     assert (trusted, lean) == ("True", meter) and abs(int(lean) + 30) < 4
     assert record.at(6.9)[0].startswith("My page") and record.at(6.9)[1].strip().isdigit()
     assert record.at(7.9)[0].startswith("Page two")

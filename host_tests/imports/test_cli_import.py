@@ -71,15 +71,18 @@ def test_report_reads_an_export_directly(tmp_path, name):
 
 
 def test_report_refuses_what_is_no_log(tmp_path):
-    """The export of RaceChrono is a single CSV file. A file of an unknown app is refused as a log."""
+    """The export of RaceChrono is a single CSV file. A table is refused with the reason that import prints."""
     (tmp_path / "r.csv").write_text(app_exports.racechrono(riding().every(4)))
-    (tmp_path / "any.csv").write_text(app_exports.any_table(riding().every(4)))
+    rest = app_exports.any_table(riding().every(4)).split("\n")[:120]
+    (tmp_path / "any.csv").write_text("\n".join(rest))
+    (tmp_path / "names.csv").write_text("t_s,ax_g\n" + "0,1\n" * 9)
     (tmp_path / "t.gpx").write_text("<?xml version='1.0'?>\n")
     command.write_cal(tmp_path / "A.cal.json")
     (tmp_path / "any").mkdir()
     for name, words in (
         ("r.csv", "s of riding: at least 30 s with bends are needed"),
-        ("any.csv", "has to go through kickstand import first"),
+        ("any.csv", "its noise at rest is"),
+        ("names.csv", "has to go through kickstand import first"),
         ("t.gpx", "t.gpx is a track: kickstand join adds it to a ride"),
         ("A.cal.json", "is not a log: give the ride, and a calibration with"),
         ("any", "any contains no recording"),

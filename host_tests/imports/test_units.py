@@ -103,7 +103,7 @@ def still(length, count=200):
 @pytest.mark.parametrize(
     ("length", "stated", "unit", "certain"),
     [
-        (1.0, "", "g", True), (1.29, "", "g", True), (1.31, "", "g", False), (1 / 1.31, "", "g", False),
+        (1.0, "", "g", True), (1.74, "", "g", True), (1.8, "", "g", False), (1 / 1.31, "", "g", False),
         (9.8, "m/s2", "m/s2", True), (9.8, "g", "m/s2", False), (1000.0, "", "mg", True), (1.2, "g", "g", True),
         (8192.0, "", "counts/8192", True), (8192.0, "counts", "counts/8192", True),
     ],

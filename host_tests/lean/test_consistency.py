@@ -43,6 +43,8 @@ def test_each_kind_of_misfit_is_found_in_its_time():
         (5.0, 20.0, {"up": 0.6}),
         (3.0, 11.0, {"sideways": 0.3}),
         (3.0, 11.0, {"pitch": radians(-20.0)}),
+        (3.0, 60.0, {"left": 0.6, "shaken": 0.5}),  # the limits grow with the spread
+        (3.0, 60.0, {"up": 0.42, "shaken": 0.5}),
         (1.0, 4.0, {"pitch": steep, "push": -steep}),  # the force of a slope is missing
         (1.0, 4.0, {"pitch": -steep, "push": steep}),
         (30.0, never, {"pitch": steep}),

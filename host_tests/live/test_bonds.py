@@ -12,24 +12,15 @@ def flash(tmp_path, monkeypatch):
     return tmp_path / PATH
 
 
-def test_keys_are_found_by_kind_and_key_or_by_their_index():
+def test_key_is_found_by_kind_and_name_or_by_index():
     bonds = Bonds("123456")
     assert bonds.get(1, 0, b"a") is None and bonds.get(1, 0, None) is None
-    assert bonds.put(1, memoryview(b"a"), memoryview(b"one"))
-    assert bonds.put(2, b"a", b"other kind")
-    assert bonds.put(1, b"b", b"two")
-    assert [bonds.get(1, 0, key) for key in (b"a", b"b", b"c")] == [b"one", b"two", None]
-    assert bonds.get(2, 0, b"a") == b"other kind"
+    for kind, name, value in ((1, b"a", b"old"), (2, b"a", b"other kind"), (1, b"b", b"two"), (1, b"a", b"one")):
+        assert bonds.put(kind, memoryview(name), memoryview(value))
+    assert [bonds.get(1, 0, name) for name in (b"a", b"b", b"c")] == [b"one", b"two", None]
     assert [bonds.get(1, index, None) for index in (0, 1, 2)] == [b"one", b"two", None]
-    assert bonds.get(2, 1, None) is None
-    assert bonds.put(1, b"a", b"newer") and bonds.get(1, 0, b"a") == b"newer"
-
-
-def test_a_key_can_be_deleted_once():
-    bonds = Bonds("123456")
-    bonds.put(1, b"a", b"one")
-    assert bonds.put(1, b"a", None) is True
-    assert bonds.put(1, b"a", None) is False
+    assert bonds.get(2, 0, b"a") == b"other kind" and bonds.get(2, 1, None) is None
+    assert [bonds.put(1, b"a", None), bonds.put(1, b"a", None)] == [True, False]  # None deletes the key
     assert bonds.get(1, 0, b"a") is None
 
 

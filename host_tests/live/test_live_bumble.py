@@ -1,5 +1,5 @@
-"""The whole device on a virtual radio. Board and phone both use bumble's Bluetooth LE stack. The central knows only
-what the published documents say."""
+"""The board on a virtual radio. Board and phone both use bumble's Bluetooth LE stack. The phone knows only what the
+published documents say."""
 
 import asyncio
 import collections
@@ -7,62 +7,69 @@ import functools
 
 import pytest
 from support import device_plans
-from support.device_runs import Device, world_of
-from support.radio_decoder import SERVICE, channels
+from support.device_runs import Device
+from support.radio_decoder import channels
 
 virtual_radio = pytest.importorskip("support.virtual_radio", reason="no bumble", exc_type=ImportError)
 
 CHRONO = 0x1FF8
-RATE, NOW, RIDE, BOARD = (SERVICE.replace("0000", f"000{number}", 1) for number in (2, 3, 4, 1))
 
 
 @pytest.fixture
-def on_air(tmp_path, monkeypatch, capsys):
-    """Return run(until_s, [(at_s, visit, pin), ...], **config), which returns the Centrals and the device's Record."""
-    monkeypatch.chdir(tmp_path)
-    made = []
-    browsers = asyncio._get_running_loop()  # playwright's idle event loop, if this process has used a browser
-    asyncio._set_running_loop(None)
+def on_air(tmp_path, capsys):
+    """Return run(plan, [(at_s, visit, pin), ...], machine, **config), which returns the Centrals and the Record."""
+    device_plans.align(tmp_path)
+    stations = []
 
-    def run(until_s, visits, machine="pico w", **config):
-        world, _ = world_of(device_plans.ALIGNED)
-        device = Device(world, machine=machine)
-        for press in device_plans.PRESSES:
-            device.board.press(*press)
+    def run(plan, visits, machine, **config):
+        device = Device(device_plans.world_of(plan)[0], machine=machine)
         air = virtual_radio.Air(device.board)
-        made.append(air)
+        stations.append(air)
         centrals = [virtual_radio.Central(air, pin).at(at_s, visit) for at_s, visit, pin in visits]
-        device.run({"LIVE": True, **config}, [until_s])
+        with device_plans.on_flash(tmp_path):
+            device.run({"LIVE": True, "SAMPLE_HZ": 100, **config}, [plan["until"]])
         return centrals, device_plans.Record(device.record(), capsys.readouterr().out)
 
-    yield run
-    for air in made:
-        air.close()
-    asyncio._set_running_loop(browsers)
+    with virtual_radio.only_loop():
+        yield run
+        for air in stations:
+            air.close()
 
 
 async def ask_racechrono(central):
-    """Like the app: find, subscribe, deny all, allow two. Then allow all at once."""
+    """Like the app: find, subscribe, deny all packets, allow two at two rates. Later deny all, and then allow all."""
     await central.connect(await central.find(CHRONO))
     await central.subscribe(CHRONO, 0x0001, "chrono")
-    await central.write(CHRONO, 0x0002, [0])
-    await asyncio.sleep(1)
-    begun = len(central.heard)
-    await central.write(CHRONO, 0x0002, [2, 0, 100, 0, 0, 0, 1])
-    await central.write(CHRONO, 0x0002, [2, 0, 40, 0, 0, 0, 2])
-    await asyncio.sleep(20)
+    counts = []
+    for seconds, *commands in (
+        (1, [0]),
+        (18, [2, 0, 100, 0, 0, 0, 1], [2, 0, 40, 0, 0, 0, 2], [2, 0, 40, 0, 0, 0, 77]),
+        (2, [0]),
+        (2, [1, 0, 100]),
+    ):
+        begin = len(central.heard)
+        for command in commands:
+            await central.write(CHRONO, 0x0002, command)
+        await asyncio.sleep(seconds)
+        counts.append(collections.Counter(data[0] for _, _, data in central.heard[begin:]))
     await central.leave()
-    return begun
+    return counts
 
 
-def test_racechrono_finds_the_board_filters_and_decodes(on_air):
-    (central,), record = on_air(44, [(20, ask_racechrono, None)], RECORD=True)
-    assert central.done.result() == 0  # the board sends nothing while the phone denies all packets
-    counts = collections.Counter(data[0] for _, _, data in central.heard)
-    assert counts.keys() == {1, 2} and 198 <= counts[1] <= 202 and 496 <= counts[2] <= 503
-    for t_s in (device_plans.LEFT_S, device_plans.RIGHT_S):
-        leans = [channels(data) for sent_s, _, data in central.heard if data[0] == 1 and sent_s <= t_s]
-        assert abs(leans[-1]["lean angle"] - record.lean_at(t_s)) <= 1
+def test_racechrono_finds_the_board_filters_and_decodes(on_air, on_the_road):
+    plan, times = on_the_road
+    (central,), record = on_air({**plan, "until": 30}, [(2.5, ask_racechrono, None)], "pico w", RECORD=True)
+    silent, two, ended, every = central.done.result()
+    assert silent == {} and two.keys() == {1, 2} and sum(ended.values()) <= 2
+    assert 178 <= two[1] <= 182 and 446 <= two[2] <= 453 and 18 <= every[1] <= 21 and every[1] == every[2]
+    values = {}
+    for t_s in times[:2]:
+        for sent_s, _, data in central.heard:
+            values.update(channels(data) if sent_s <= t_s else {})
+        assert abs(values["lean angle"] - record.lean_at(t_s)) <= 1
+        assert 0 < values["its standard deviation"] < 3 and values["1 while the lean is trusted"] == 1
+    assert -40 < values["yaw rate"] < -15 and 1.1 < values["vertical acceleration (specific force)"] < 1.5
+    assert abs(values["roll rate"]) < 8 and abs(values["longitudinal acceleration"]) < 0.2
     assert record.ends == ["off"]
 
 
@@ -81,10 +88,10 @@ async def press_in(central, pair=True):
 just_write = functools.partial(press_in, pair=False)
 
 
-def test_a_phone_must_enter_the_pin(on_air):
+def test_phone_must_enter_the_pin(on_air):
     """The Bluetooth stack enforces the PIN. A phone gets no packet without pairing, or with a wrong PIN."""
-    visits = [(20, just_write, None), (26, press_in, 314159), (34, press_in, 271828)]
-    (silent, wrong, right), _ = on_air(44, visits, machine="esp32", LIVE_PIN=271828)
+    visits = [(2, just_write, None), (8, press_in, 314159), (16, press_in, 271828)]
+    (silent, wrong, right), _ = on_air({"lean": [[0, 25]], "until": 24}, visits, "esp32", LIVE_PIN=271828)
     assert "INSUFFICIENT_" in str(silent.done.exception())
     assert wrong.done.exception() and not silent.heard and not wrong.heard
     assert right.done.exception() is None

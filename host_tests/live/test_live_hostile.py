@@ -1,23 +1,21 @@
-"""A phone connects, writes and disconnects at random, hundreds of times. Most writes are invalid. The device continues.
-
-test_live_micropython.py runs this test on MicroPython, where the heap in use must not grow.
-"""
+"""A phone connects, writes and disconnects at random, hundreds of times. Most writes are invalid. The device continues,
+and on MicroPython the heap in use does not grow. The file runs as a script there."""
 
 import gc
 import random
+import sys
 
 from kickstand_tools.simulated_board.radio import Radio
 from kickstand_tools.simulated_board.simulator import Board
-from kickstand_tools.simulation.scripted.sensor_errors import Sensor
-from support.device_runs import standing
+from support.board_access import rough
 from support.simulated_phones import PLACES, Phone
 
-WARM = 200  # number of acts until all modules are imported and every buffer has its final size
-ACTS = 400
+WARM = 100  # number of acts until all modules are imported and every buffer has its final size
+ACTS = 200
 GROWTH = 2048  # bytes of heap that the garbage collector may miss
 
 
-def used():
+def heap_bytes():
     """Return the bytes of MicroPython's heap in use, or 0 on CPython."""
     gc.collect()
     gc.collect()
@@ -34,18 +32,10 @@ class Forgetful(Phone):
         pass
 
 
-def nonsense(dice):
-    """Return the bytes of a random write: two commands with random arguments, or random bytes of any length."""
-    kind = dice.randrange(6)
-    if kind == 0:
-        return bytes([1, 0, dice.randrange(256)])
-    if kind == 1:
-        return bytes([2, dice.randrange(256), dice.randrange(256), 0, 0, 0, dice.randrange(6)])
-    return bytes([dice.randrange(256) for _ in range(dice.randrange(30))])
-
-
 def act(dice, phone, radio):
-    """Do one random act."""
+    """Do one random act. Half of the writes are commands with random arguments, half are random bytes."""
+    command = [[1, 0], [2, dice.randrange(256), 0, 0, 0, 0], []][dice.randrange(3)]
+    data = bytes(command + [dice.randrange(256) for _ in range(1 if command else dice.randrange(30))])
     kind = dice.randrange(12)
     if radio.phone is None:
         phone.connect(dice.randrange(256))
@@ -57,59 +47,70 @@ def act(dice, phone, radio):
         phone.read(dice.choice(sorted(PLACES)))
     elif kind == 3:  # a phone writes faster than the loop reads
         for _ in range(40):
-            phone.write("filter", nonsense(dice))
+            phone.write("filter", data)
     elif kind == 4:  # the phone disconnects and connects again between two passes of the loop
         phone.leave()
         radio.found = radio.found or b""
         phone.connect(dice.randrange(256))
     else:
-        phone.write(dice.choice(("filter", "rate", "now", "board")), nonsense(dice))
+        phone.write(dice.choice(("filter", "rate", "now", "board")), data)
 
 
-def test_random_acts_of_a_phone_do_no_harm():
-    # An ESP32's radio drops the packets that it cannot send. A Pico W's radio keeps the packets that it cannot send.
-    for drops in (True, False):
-        board = Board(Sensor(seed=3).world(standing([[0, 10]])))
-        board.radio = radio = Radio(board.clock, drops)
-        with board:
-            run(board, radio)
+def turns(board, app, count):
+    for _ in range(count):
+        app.turn()
+        board.clock.advance(10_000)
 
 
-def run(board, radio):
+def act_at_random(board, radio):
     from kickstand import devices
     from kickstand.app import App
     from kickstand.live import live, radio as live_radio
     from kickstand.settings import Settings
 
-    dice = random
-    dice.seed(7)
-    marks = []
+    random.seed(7)
+    settings = Settings(type("Config", (), {"LIVE": True}))
+    app = App(settings, devices.open_lcd(settings), devices.open_sensor(settings))
+    live.attach(live_radio.Radio(None), app)
+    phone = Forgetful(board)
+    used = 0
+    for count in range(WARM + ACTS):
+        if count == WARM:
+            used = heap_bytes()
+        act(random, phone, radio)
+        turns(board, app, random.randrange(1, 12))
+    assert heap_bytes() - used < GROWTH
+    if radio.phone is not None:
+        phone.leave()
+    turns(board, app, 110)
+    assert radio.found is not None  # the next phone can find the board
+    assert phone.connect() and phone.write("rate", b"\x28\x00")
+    turns(board, app, 50)
+    assert app.sensor.fault is None and len(phone.packets[0]) in (14, 20)
 
-    def go():
-        chosen = Settings(type("Config", (), {"LIVE": True}))
-        app = App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen))
-        live.attach(live_radio.Radio(None), app)
-        phone = Forgetful(board)
-        for count in range(WARM + ACTS):
-            if count == WARM:
-                marks.append(used())
-            act(dice, phone, radio)
-            assert len(getattr(app, "live").radio.inbox) <= live_radio.MOST_WRITES  # noqa: B009 set by attach()
-            for _ in range(dice.randrange(1, 12)):
-                app.turn()
-                board.clock.advance(10_000)
-        marks.append(used())
-        if radio.phone is not None:
-            phone.leave()
-        for _ in range(110):
-            app.turn()
-            board.clock.advance(10_000)
-        assert radio.found is not None  # the next phone can find the board
-        assert phone.connect() and phone.write("rate", b"\x28\x00")
-        for _ in range(50):
-            app.turn()
-            board.clock.advance(10_000)
-        assert app.sensor.fault is None and len(phone.packets[0]) in (14, 20)
 
-    assert board.run(go, 10_000.0) == "returned"
-    assert marks[1] - marks[0] < GROWTH, marks
+def run(drops):
+    """drops: True for the radio of an ESP32, which drops the packets that it cannot send. A Pico W's radio keeps
+    them."""
+    board = Board(rough)
+    board.radio = radio = Radio(board.clock, drops)
+    with board:
+        assert board.run(lambda: act_at_random(board, radio), 10_000.0) == "returned"
+
+
+if sys.implementation.name == "micropython":
+    run(True)
+    run(False)
+else:
+    from pathlib import Path
+
+    import pytest
+
+    @pytest.mark.parametrize("drops", [True, False])
+    def test_random_acts_of_a_phone_do_no_harm(drops):
+        run(drops)
+
+    def test_random_acts_take_no_heap_on_micropython():
+        from support.mpy import BOARD_HEAP, run_mpy
+
+        run_mpy(Path(__file__), heap=BOARD_HEAP)

@@ -1,10 +1,14 @@
 """Each field of each packet is as in the tables of firmware/docs/live.md, also at its limits."""
 
-import types
-
 import pytest
+from hypothesis import given, strategies as st
+from kickstand.calibration.parameters import Calibration
+from kickstand.lean.meter import LeanMeter
 from kickstand.live import packets
 from support.radio_decoder import channels, own
+
+NUMBERS = st.floats(-1e5, 1e5)
+VECTORS = st.lists(NUMBERS, min_size=3, max_size=3)
 
 
 @pytest.fixture
@@ -16,58 +20,78 @@ def test_racechrono_gets_each_number_back(buffer):
     size = packets.lean(buffer, -31.24, 1.16)
     assert channels(buffer[:size]) == pytest.approx({"lean angle": -31.2, "its standard deviation": 1.2})
     size = packets.motion(buffer, [0.0125, 1.25, -0.5], [1.0, -19.97, 30.0], True)
-    found = channels(buffer[:size])
-    assert found["longitudinal acceleration"] == pytest.approx(-0.5)
-    assert found["lateral acceleration (specific force)"] == pytest.approx(0.013)
-    assert found["vertical acceleration (specific force)"] == pytest.approx(1.25)
-    assert found["yaw rate"] == pytest.approx(-20.0) and found["roll rate"] == pytest.approx(30.0)
-    assert found["1 while the lean is trusted"] == 1
+    assert channels(buffer[:size]) == pytest.approx(
+        {
+            "longitudinal acceleration": -0.5,
+            "lateral acceleration (specific force)": 0.013,
+            "vertical acceleration (specific force)": 1.25,
+            "yaw rate": -20.0,
+            "roll rate": 30.0,
+            "1 while the lean is trusted": 1,
+        }
+    )
     size = packets.speed(buffer, 33.333)
     assert channels(buffer[:size]) == pytest.approx({"speed": 33.33})
 
 
-def test_our_page_gets_each_number_back(buffer):
-    state = packets.ALIGNED + packets.TRUSTED + packets.NO_READINGS
-    size = packets.now(buffer, 70_000, 12.345, 0.44, [0.5, 1.0, -0.25], [-1.0, 2.0, 3.0], None, state)
-    found = own("now", buffer[:size])
-    assert (found["time of the board"], found["lean"], found["its standard deviation"]) == (4464, 1235, 4)
-    assert (found["specific force to the left"], found["up"], found["forward"]) == (1024, 2048, -512)
-    rates = [found[name] for name in found if "about" in name]
-    assert rates == [-16, 32, 48] and found["speed"] is None and found["state"] == 67
-    meter = types.SimpleNamespace(
-        max_left_deg=41.26, max_right_deg=0.0, max_accel_g=0.4567, max_brake_g=0.9, trim_deg=-1.5
-    )
-    ride = own("ride", buffer[: packets.ride(buffer, 3, meter, 70_000)])
-    assert list(ride.values()) == [1, 3, 413, 0, 457, 900, -150, 65535]
+def test_packet_of_the_ride_has_maxima_and_lost_samples(buffer):
+    meter = LeanMeter(Calibration())
+    meter.max_left_deg, meter.max_accel_g, meter.max_brake_g = 41.26, 0.4567, 0.9
+    ride = own("ride", buffer[: packets.ride(buffer, 67, meter, 70_000)])
+    assert list(ride.values()) == [1, 67, 413, 0, 457, 900, 0, 65535]
 
 
-def test_too_large_values_are_limited_and_never_unknown(buffer):
-    size = packets.now(buffer, 0, 9999.0, 9999.0, [99.0, -99.0, 0.0], [9999.0, -9999.0, 0.0], 9999.0, 0)
-    found = own("now", buffer[:size])
-    assert None not in found.values()
-    assert (found["lean"], found["its standard deviation"], found["speed"]) == (32767, 254, 65534)
-    assert (found["specific force to the left"], found["up"]) == (32767, -32767)
+def test_unknown_values_are_unknown(buffer):
+    packet = own("now", buffer[: packets.now(buffer, 0, None, None, None, [1.0] * 3, None, 3)])
+    assert list(packet.values()) == [0, *[None] * 9, 3]
+
+
+def limited(value, scale, low, high):
+    return pytest.approx(min(max(scale * value, low), high), abs=0.51)
+
+
+@given(st.integers(0, 1 << 30), NUMBERS, NUMBERS, VECTORS, VECTORS, NUMBERS)
+def test_number_is_limited_and_never_unknown(ms, lean, sigma, force, rate, speed):
+    buffer = bytearray(20)
+    packet = own("now", buffer[: packets.now(buffer, ms, lean, sigma, force, rate, speed, 0)])
+    scales = [2048] * 3 + [16] * 3
+    assert list(packet.values()) == [
+        ms % 65536,
+        limited(lean, 100, -32767, 32767),
+        limited(sigma, 10, 0, 254),
+        *(limited(value, scale, -32767, 32767) for value, scale in zip([*force, *rate], scales, strict=True)),
+        limited(speed, 100, 0, 65534),
+        0,
+    ]
 
 
 @pytest.mark.parametrize(
-    ("data", "asked"),
+    ("data", "intervals"),
     [
+        ([0], [0, 0, 0]),
         ([1, 0, 100], [100, 100, 100]),
         ([1, 0, 0], [40, 40, 40]),  # an interval of 0 means as fast as possible
-        ([2, 3, 232, 0, 0, 0, 2], [0, 1000, 0]),
-        ([2, 0, 50, 0, 0, 0, 0], [0, 0, 0]),  # the request names a packet that does not exist
-        ([2, 0, 50, 1, 0, 0, 1], [0, 0, 0]),
+        ([2, 3, 232, 0, 0, 0, 2], [50, 1000, 70]),
+        ([2, 0, 50, 0, 0, 0, 0], [50, 60, 70]),  # the request names a packet that does not exist
+        ([2, 0, 50, 1, 0, 0, 1], [50, 60, 70]),
     ],
 )
-def test_commands_set_the_intervals(data, asked):
-    intervals = [0, 0, 0, 77]
-    assert packets.take_filter(bytes(data), intervals)
-    assert intervals == [*asked, 77]
+def test_filter_sets_the_intervals(data, intervals):
+    asked = [50, 60, 70, 77]
+    assert packets.take_filter(bytes(data), asked)
+    assert asked == [*intervals, 77]
 
 
 @pytest.mark.parametrize("data", [[], [0, 0], [1], [1, 0], [1, 0, 1, 0], [2, 0, 50, 0, 0, 1], [3], [255] * 20])
 def test_invalid_commands_change_nothing(data):
-    intervals = [40, 50, 60, 70]
-    assert not packets.take_filter(bytes(data), intervals)
-    assert intervals == [40, 50, 60, 70]
-    assert packets.take_rate(bytes(data), intervals) == (len(data) == 2)
+    asked = [40, 50, 60, 70]
+    assert not packets.take_filter(bytes(data), asked)
+    assert packets.take_rate(bytes(data), asked) == (len(data) == 2)
+    assert asked[:3] == [40, 50, 60] and asked[3] in (70, 256 * (data == [1, 0]), 40)
+
+
+@pytest.mark.parametrize(("data", "interval"), [([0, 0], 0), ([40, 0], 40), ([1, 0], 40), ([0, 1], 256)])
+def test_rate_sets_the_interval_of_our_page(data, interval):
+    asked = [40, 50, 60, 70]
+    assert packets.take_rate(bytes(data), asked)
+    assert asked == [40, 50, 60, interval]

@@ -16,8 +16,8 @@ from support.recordings import analysis_rides
 def replayed(log, cal, engine="cpython"):
     """Run `replay`. Return the table that it writes, and its printed output."""
     out = cal.with_name("LEAN.csv")
-    said = command.works("replay", log, "--calibration", cal, "--out", out, "--engine", engine)
-    return analysis_rides.table(out), said.err
+    result = command.works("replay", log, "--calibration", cal, "--out", out, "--engine", engine)
+    return analysis_rides.table(out), result.err
 
 
 def refused(log, cal, words, *more):
@@ -38,20 +38,20 @@ def ride(path, seconds=20.0, rate_hz=100, seed=0):
 
 def test_forces_and_rates_are_the_calibrated_and_turned_readings(tmp_path):
     log, cal = ride(tmp_path / "log.csv"), command.write_cal(tmp_path / "CAL.json")
-    got, _ = replayed(log, cal)
-    assert (got.dtype.names or ())[:6] == ("t_s", "lean_deg", "lean_formula_deg", "left_g", "up_g", "forward_g")
+    lean, _ = replayed(log, cal)
+    assert (lean.dtype.names or ())[:6] == ("t_s", "lean_deg", "lean_formula_deg", "left_g", "up_g", "forward_g")
 
-    given, parameters = analysis_rides.table(log), json.loads(cal.read_text())
+    readings, parameters = analysis_rides.table(log), json.loads(cal.read_text())
     matrix = np.array(parameters["vehicle_from_sensor"])
-    sensor = np.column_stack([given[name] for name in ("ax_g", "ay_g", "az_g")])
+    sensor = np.column_stack([readings[name] for name in ("ax_g", "ay_g", "az_g")])
     force = (sensor * parameters["accel_slope"] + parameters["accel_offset_g"]) @ matrix.T
-    rate = np.column_stack([given[name] for name in ("gx_dps", "gy_dps", "gz_dps")]) - parameters["gyro_bias_dps"]
+    rate = np.column_stack([readings[name] for name in ("gx_dps", "gy_dps", "gz_dps")]) - parameters["gyro_bias_dps"]
     rate = rate @ matrix.T
-    assert np.array_equal(got["t_s"], given["t_s"])
+    assert np.array_equal(lean["t_s"], readings["t_s"])
     for column, name in enumerate(("left_g", "up_g", "forward_g")):
-        assert np.max(np.abs(got[name] - force[:, column])) < 2e-5
-    assert np.max(np.abs(got["yaw_rate_dps"] - rate[:, 1])) < 2e-4
-    assert np.max(np.abs(got["roll_rate_dps"] - rate[:, 2])) < 2e-4
+        assert np.max(np.abs(lean[name] - force[:, column])) < 2e-5
+    for column, name in ((1, "yaw_rate_dps"), (2, "roll_rate_dps")):
+        assert np.max(np.abs(lean[name] - rate[:, column])) < 2e-4
 
 
 def with_speed(log, speed):
@@ -66,8 +66,8 @@ def with_speed(log, speed):
 def test_all_engines_give_the_same_lean(tmp_path):
     """The log has a speed once per second, which changes the lean. Some speeds are 0. In part of the log no lean is
     shown."""
-    plain, cal = ride(tmp_path / "log.csv", seconds=60), command.write_cal(tmp_path / "CAL.json", trim_deg=1.0)
-    log = with_speed(plain, [("0" if k % 1000 else "14.0") if k % 100 == 0 else "" for k in range(6000)])
+    plain, cal = ride(tmp_path / "log.csv", seconds=30), command.write_cal(tmp_path / "CAL.json", trim_deg=1.0)
+    log = with_speed(plain, [("0" if k % 1000 else "14.0") if k % 100 == 0 else "" for k in range(3000)])
     results = [replayed(log, cal, engine)[0] for engine in ("cpython", "micropython")]
     for name in replay_engine.COLUMNS:
         assert np.array_equal(np.isnan(results[0][name]), np.isnan(results[1][name])), name
@@ -76,43 +76,31 @@ def test_all_engines_give_the_same_lean(tmp_path):
     assert np.max(np.abs(results[0]["lean_deg"] - replayed(plain, cal)[0]["lean_deg"])) > 1.0
 
 
-def test_without_an_emulator_the_engine_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(image.importlib.util, "find_spec", lambda name: None)
+def test_an_engine_that_is_not_there_or_fails_is_reported_in_one_line(tmp_path, monkeypatch):
     log, cal = ride(tmp_path / "log.csv", seconds=1), command.write_cal(tmp_path / "CAL.json")
-    refused(log, cal, "-m pip install -e ", "--engine", "rp2040")
+    with monkeypatch.context() as patch:
+        patch.setattr(image.importlib.util, "find_spec", lambda name: None)
+        refused(log, cal, "-m pip install -e ", "--engine", "rp2040")
+    with monkeypatch.context() as patch:
+        patch.setattr(unix_port, "available", lambda: False)
+        refused(log, cal, "use --engine cpython", "--engine", "micropython")
+    if unix_port.available():
+        (tmp_path / "broken.py").write_text("raise ValueError('no such luck')\n")
+        monkeypatch.setattr(replay.replay_engine, "__file__", str(tmp_path / "broken.py"))
+        refused(log, cal, "ValueError: no such luck", "--engine", "micropython")
 
 
-def test_without_a_unix_port_the_engine_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(unix_port, "available", lambda: False)
-    log, cal = ride(tmp_path / "log.csv", seconds=1), command.write_cal(tmp_path / "CAL.json")
-    refused(log, cal, "use --engine cpython", "--engine", "micropython")
-
-
-@pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
-def test_a_fault_inside_micropython_is_reported_in_one_line(tmp_path, monkeypatch):
-    broken = tmp_path / "broken.py"
-    broken.write_text("raise ValueError('no such luck')\n")
-    monkeypatch.setattr(replay.replay_engine, "__file__", str(broken))
-    log, cal = ride(tmp_path / "log.csv", seconds=1), command.write_cal(tmp_path / "CAL.json")
-    refused(log, cal, "ValueError: no such luck", "--engine", "micropython")
-
-
-def test_an_unaligned_calibration_works_with_a_warning(tmp_path):
-    log = ride(tmp_path / "log.csv", seconds=1)
-    cal = command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=[[1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    lean, said = replayed(log, cal)
-    assert said.startswith("warning: ")
-    assert "is not aligned" in said
-    assert said.count("\n") == 1
-    assert len(lean) == 100
-
-
-def test_car_has_no_displayed_lean(tmp_path):
-    log, cal = ride(tmp_path / "log.csv", 5.0), command.write_cal(tmp_path / "CAL.json", vehicle="car")
-    lean, said = replayed(log, cal)
-    assert said.count("\n") == 1 and "a car's, whose display shows no lean" in said
-    assert np.all(np.isnan(lean["lean_sigma_deg"]))
-    assert not np.any(np.isnan(lean["forward_g"]))
+@pytest.mark.parametrize(
+    ("calibration", "words", "sigma"),
+    [
+        ({"vehicle_from_sensor": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}, "is not aligned", True),
+        ({"vehicle": "car"}, "a car's, whose display shows no lean", False),
+    ],
+)
+def test_a_calibration_without_a_lean_works_with_a_warning(calibration, words, sigma, tmp_path):
+    lean, warning = replayed(ride(tmp_path / "log.csv", 5.0), command.write_cal(tmp_path / "CAL.json", **calibration))
+    assert warning.startswith("warning: ") and words in warning and warning.count("\n") == 1 and len(lean) == 500
+    assert not np.any(np.isnan(lean["forward_g"])) and (sigma or np.all(np.isnan(lean["lean_sigma_deg"])))
 
 
 def test_the_trim_that_riding_found_is_used(tmp_path):
@@ -136,18 +124,18 @@ def test_times_of_the_log_are_kept_exactly(tmp_path):
         text = "\n".join([command.HEADER, *[f"{time},0.0,1.0,0.1,0,0,0" for time in times]]) + "\n"
         (tmp_path / "log.csv").write_text(text)
         replayed(tmp_path / "log.csv", cal)
-        tables.append(list(csv.reader((tmp_path / "LEAN.csv").open())))
+        tables.append(list(csv.reader((tmp_path / "LEAN.csv").read_text().splitlines())))
         assert [row[0] for row in tables[-1][1:]] == times
     assert [row[1:] for row in tables[0]] == [row[1:] for row in tables[1]]
 
 
 def test_lean_of_a_real_recording_matches_gravity(tmp_path, shared_data):
     """A person holds the bike upright, then leaned to one side, then to the other. Gravity gives the true lean."""
-    given = analysis_rides.table(shared_data / "hand-leaning.csv.gz")
+    readings = analysis_rides.table(shared_data / "hand-leaning.csv.gz")
 
     def mean(begin_s, end_s):
-        held = (given["t_s"] >= begin_s) & (given["t_s"] <= end_s)
-        return np.array([np.mean(given[name][held]) for name in ("ax_g", "ay_g", "az_g")])
+        inside = (readings["t_s"] >= begin_s) & (readings["t_s"] <= end_s)
+        return np.array([np.mean(readings[name][inside]) for name in ("ax_g", "ay_g", "az_g")])
 
     upright, first, second = mean(0.0, 0.9), mean(5.0, 6.0), mean(7.4, 7.9)
     matrix = [0.0] * 9

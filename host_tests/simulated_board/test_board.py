@@ -1,25 +1,12 @@
 """The simulated board: clock, power, watchdog, files, pins, timer, radio, and the fakes of MicroPython's modules."""
 
-import errno
-import io
-import os
-import sys
-import time
-
 import pytest
 from kickstand_tools.simulated_board.clock import Clock, PowerOff
 from kickstand_tools.simulated_board.fakes import fake_bluetooth, fake_machine, fake_time
-from kickstand_tools.simulated_board.fakes.fake_machine import I2C, UART, WDT, Pin, Timer
+from kickstand_tools.simulated_board.fakes.fake_machine import WDT, Pin
 from kickstand_tools.simulated_board.radio import EVENT_S, ROOM, Radio
 from kickstand_tools.simulated_board.simulator import Board
-from support.board_access import firmware, level, on_board, raised
-
-
-def number(function, *args):
-    """Return the number of the OSError that function(*args) raises."""
-    error = raised(function, *args)
-    assert isinstance(error, OSError)
-    return error.args[0]
+from support.board_access import level, on_board, raised
 
 
 def test_the_deadline_stops_the_clock_and_stays():
@@ -32,14 +19,6 @@ def test_the_deadline_stops_the_clock_and_stays():
     clock.set_deadline(None)
     clock.advance(1)
     assert clock.now_us == 501 and not issubclass(PowerOff, Exception)
-
-
-def test_a_paced_clock_follows_the_host():
-    begin_s = time.monotonic()
-    Clock(pace=4.0).advance(400_000)
-    paced_s = time.monotonic() - begin_s
-    Clock().advance(600_000_000)
-    assert 0.095 <= paced_s and time.monotonic() - begin_s - paced_s < 1.0
 
 
 def test_ticks_wrap_as_on_the_boards():
@@ -103,72 +82,6 @@ def test_watchdogs_and_what_stops_them():
         assert on_board(program, 100_000.0, port=port)[0] == outcome
 
 
-@firmware(2.0)
-def test_a_press_bounces_on_the_pin(board):
-    board.press(0.1, 0.2)
-    pin, changes, last = Pin(15, Pin.IN, Pin.PULL_UP), [], 1
-    while board.clock.now_us < 500_000:
-        value = pin.value()
-        if value != last:
-            changes.append(board.clock.now_us)
-            last = value
-        board.clock.advance(18)
-    down, up = ([t for t in changes if (t < 200_000) == first] for first in (True, False))
-    for begin_us, edges in ((100_000, down), (300_000, up)):
-        assert (
-            len(edges) > 2 and len(edges) % 2 and begin_us <= edges[0] < begin_us + 100 and edges[-1] < begin_us + 5000
-        )
-    board.press()
-    assert pin.value() == 0
-
-
-@firmware(10.0)
-def test_an_interrupt_comes_at_the_chosen_edge_only(board):
-    pin = Pin(board.button_pin, Pin.IN, Pin.PULL_UP)
-    for trigger, edges in (
-        (Pin.IRQ_FALLING, {0}), (Pin.IRQ_RISING, {1}), (Pin.IRQ_FALLING | Pin.IRQ_RISING, {0, 1}), (None, set()),
-    ):  # fmt: skip
-        levels = set()
-        handler = (lambda one, levels=levels: levels.add(board.pin_level(one.id))) if trigger else None
-        pin.irq(handler, *[trigger] if trigger else [])
-        board.press()
-        board.clock.advance(1_000_000)
-        assert levels == edges
-
-
-@firmware(10.0)
-def test_a_timer_calls_once_or_again_until_it_is_stopped(board):
-    calls = []
-    timer = Timer(period=10, mode=Timer.PERIODIC, callback=lambda one: calls.append(board.clock.now_us))
-    board.clock.advance(35_000)
-    assert calls == [10_000, 20_000, 30_000]
-    timer.init(freq=100, mode=Timer.ONE_SHOT, callback=lambda one: calls.append("once"))
-    board.clock.advance(50_000)
-    assert calls[3:] == ["once"]
-    timer.init(period=10, callback=calls.append)
-    timer.deinit()
-    board.clock.advance(50_000)
-    assert len(calls) == 4
-
-
-@firmware()
-def test_pins_are_those_of_the_controllers(board):
-    for wrong in (
-        lambda: I2C(0, sda=Pin(6), scl=Pin(7)),
-        lambda: I2C(0, sda=Pin(4), scl=Pin(7)),
-        lambda: UART(0, tx=Pin(8), rx=Pin(9)),
-        lambda: UART(1, tx=Pin(8), rx=Pin(8)),
-        lambda: Pin(60),
-        lambda: WDT(timeout=8389),
-    ):
-        assert isinstance(raised(wrong), ValueError)
-    assert isinstance(raised(Pin, None), TypeError)
-    uart = UART(1, tx=Pin(8), rx=Pin(9))
-    uart.write("a\n")
-    uart.write(b"b")
-    assert board.sent == b"a\nb" and uart.any() == 0 and uart.read(5) is None
-
-
 @pytest.mark.parametrize(
     ("machine", "pin", "outcome"),
     [("esp32", 6, "reset"), ("lora32", 11, "reset"), ("esp32", 12, "returned"),
@@ -186,41 +99,6 @@ def test_a_classic_esp32_crashes_if_a_flash_pin_is_driven(machine, pin, outcome)
     assert on_board(program, machine=machine)[0] == outcome
 
 
-def test_files_fail_while_their_fault_lasts(tmp_path):
-    path, other = tmp_path / "a.cal", tmp_path / "b"
-    path.write_text("text")
-
-    def program(board):
-        def read_file():
-            with open(path) as text, open(path, "rb") as data:
-                return text.read() + data.read().decode()
-
-        for fault, outcome in ((board.faults.file_error, None), (board.faults.file_empty, "")):
-            fault(".cal", board.clock.now_us / 1e6 + 0.1, 0.1)
-            assert read_file() == "texttext"
-            board.clock.advance(150_000)
-            assert isinstance(raised(read_file), OSError) if outcome is None else read_file() == outcome
-            board.clock.advance(100_000)
-            assert read_file() == "texttext"
-        board.faults.disk_full(board.clock.now_us / 1e6 + 0.1, 0.1)
-        board.clock.advance(150_000)
-        with open(other, "w") as file:
-            assert number(file.write, "x") == errno.ENOSPC
-        board.clock.advance(100_000)
-        with open(other, "w") as file:
-            assert file.write("x") == 1
-        board.faults.slow_flash(0.0, 100.0, 0.25)  # each new block of 4096 bytes takes its time
-        board.clock.advance(1)
-        begin_us = board.clock.now_us
-        with open(other, "wb") as file:
-            for count, blocks in ((10, 1), (4086, 1), (4097, 3)):
-                file.write(bytes(count))
-                assert board.clock.now_us - begin_us == 250_000 * blocks
-
-    assert on_board(program, 10.0)[0] == "returned"
-    assert open is io.open
-
-
 def test_the_power_is_cut_in_the_middle_of_a_file(tmp_path):
     def program(board):
         board.faults.cut_file(".cal", 3)
@@ -232,28 +110,6 @@ def test_the_power_is_cut_in_the_middle_of_a_file(tmp_path):
     outcome, board = on_board(program)
     assert (outcome, board.faults.files_cut) == ("off", 1)
     assert ((tmp_path / "a.txt").read_text(), (tmp_path / "a.cal").read_text()) == ("text", "abc")
-
-
-@firmware()
-def test_a_busy_processor_loses_time_several_times(board):
-    board.faults.busy(0.1, 0.05, times=2)
-    for us, now_us in ((99_000, 99_000), (2000, 150_000), (40_000, 230_000)):
-        board.clock.advance(us)
-        assert now_us <= board.clock.now_us < now_us + 15_000
-
-
-def test_the_real_modules_are_restored():
-    """CPython has no machine code: from Python 3.14 on, the types in viper code raise no error, but its results would
-    be wrong."""
-    modules = {name: sys.modules.get(name) for name in ("machine", "time", "os", "sys", "bluetooth", "esp32")}
-
-    def program(board):
-        assert hasattr(time, "ticks_ms") and hasattr(os, "ilistdir") and "esp32" in sys.modules
-        assert isinstance(raised(sys.modules["micropython"].viper, None), NameError)
-
-    assert on_board(program, machine="esp32")[0] == "returned"
-    assert {name: sys.modules.get(name) for name in modules} == modules
-    assert not hasattr(time, "ticks_ms") and not hasattr(os, "ilistdir")
 
 
 class Phone:
@@ -330,29 +186,3 @@ def test_a_phone_that_knows_the_pin_pairs_and_is_known_again():
     assert radio.give_pin(123456) and events[-1] == (30, 2, b"\x01\x02\x03\x04\x05\x06", b"\x00key")
     assert radio.read(second) == b""
     assert connected(True, secret=b"key", bond=True)[0].paired and not connected(True, secret=b"key")[0].paired
-
-
-@pytest.mark.parametrize("machine", ["pico w", "esp32"])
-def test_bluetooth_has_the_errors_of_the_ports(machine):
-    def program(board):
-        ble = fake_bluetooth.BLE()
-        assert hasattr(ble, "gap_passkey") == (machine == "esp32")
-        board.radio.fails = True
-        assert number(ble.active, True) == errno.ETIMEDOUT
-        board.radio.fails = False
-        assert number(ble.gap_advertise, 1) == errno.ENODEV
-        assert ble.active(True) and ble.active() and ble.config("mac") == (0, board.radio.address)
-        assert isinstance(raised(lambda: ble.config(colour=1)), ValueError)
-        assert (raised(lambda: ble.config(bond=True)) is None) == (machine == "esp32")
-        assert not ble.gap_disconnect(0) and isinstance(raised(ble.gatts_notify, None, 1), TypeError)
-        begin_us = board.clock.now_us
-        assert number(ble.gatts_notify, 0, 1) == errno.ENOTCONN
-        assert board.clock.now_us - begin_us == fake_bluetooth.NOTIFY_US
-        ble.gap_advertise(1, b"a", resp_data=b"b")
-        assert (board.radio.found, board.radio.named) == (b"a", b"b")
-        phone = Phone()
-        board.radio.connect(phone)
-        assert number(ble.gap_advertise, 1) == errno.ENOMEM
-        assert ble.gap_disconnect(0) and phone.drops == 1 and not ble.active(False)
-
-    assert on_board(program, machine=machine)[0] == "returned"

@@ -50,12 +50,6 @@ def test_where_bytes_are_stored(kind, settings, values, stored):
     assert {divmod(k, len(oled.ram) // 8): value for k, value in enumerate(oled.ram) if value} == stored
 
 
-def test_a_window_continues_on_the_next_page():
-    oled = new_oled("ssd1306", 0x20, 0)
-    send(oled, 0x40, *range(1, 130))
-    assert (oled.ram[127], oled.ram[128]) == (128, 129)
-
-
 def lit(oled):
     """Return the lit pixels as (row, column)."""
     return [
@@ -80,42 +74,6 @@ def test_a_pixel_is_where_the_settings_put_it(kind):
     ):
         commands(oled, *settings)
         assert lit(oled) == pixels, settings
-
-
-def test_a_picture_can_be_inverted_or_all_lit():
-    oled = new_oled("ssd1306", 0xA1, 0xC8, 0xB0, 0x00, 0x10)
-    send(oled, 0x40, 1)
-    commands(oled, 0xA7)
-    assert oled.inverted and len(lit(oled)) == 128 * 64 - 1 and (0, 0) not in lit(oled)
-    commands(oled, 0xA6, 0xA5)
-    assert len(lit(oled)) == 128 * 64
-    commands(oled, 0xA4, 0xAE)
-    assert lit(oled) == [] and not oled.backlight
-
-
-def test_one_byte_may_follow_a_control_byte():
-    """With the bit Co, each command or data byte has its own control byte."""
-    oled = new_oled()
-    send(oled, 0x80, 0xB3, 0x80, 0x02, 0x80, 0x10, 0xC0, 7, 0x40, 8, 9)
-    assert oled.ram[3 * 128 : 3 * 128 + 6] == bytes((0, 0, 7, 8, 9, 0))
-
-
-@pytest.mark.parametrize(
-    ("kind", "counts"),
-    [
-        ("ssd1306", {0x20: 1, 0x21: 2, 0x22: 2, 0x8D: 1, 0x26: 6, 0x27: 6, 0x29: 5, 0x2A: 5, 0xA3: 2, 0x2E: 0}),
-        ("sh1106", {0xAD: 1, 0x30: 0, 0x33: 0, 0xE0: 0, 0xEE: 0}),
-    ],
-)
-def test_each_command_has_the_arguments_of_the_data_sheet(kind, counts):
-    """After each command and its arguments, the next command is understood."""
-    for code, count in (counts | dict.fromkeys((0x81, 0xA8, 0xD3, 0xD5, 0xD9, 0xDA, 0xDB), 1)).items():
-        oled = Oled(Clock(), kind=kind)
-        commands(oled, code, *([0x12] * count), 0x45)
-        assert (oled.start_line, oled.unknown) == (5, 0), hex(code)
-    oled = Oled(Clock(), kind=kind)
-    commands(oled, 0x81, 0x77, 0xDA, 0x02, 0xFF)
-    assert (oled.contrast, oled.alternate, oled.unknown) == (0x77, False, 1)
 
 
 @pytest.mark.parametrize(("kind", "off", "contrast", "status"), [("ssd1306", 0x10, 0x7F, 3), ("sh1106", 0x8A, 0x80, 8)])
@@ -143,23 +101,6 @@ def test_power_supply_status_and_changes(kind, off, contrast, status):
     changes = oled.changes
     oled.power_off()
     assert not oled.on and oled.changes == changes + 1
-
-
-@pytest.mark.parametrize("end", [(9, 3), (3, 9), (9, 9), (0, 5), (5, 0)])
-def test_a_line_is_the_same_in_every_direction(end):
-    """A line that is mirrored at the picture's middle equals the line that is drawn to the mirrored end."""
-    width, height = end
-
-    def pixels(x, y):
-        canvas = framebuf.FrameBuffer(bytearray(32 * 4), 32, 32, framebuf.MONO_VLSB)
-        canvas.line(15, 15, x, y, 1)
-        return {(x, y) for x in range(32) for y in range(32) if canvas.pixel(x, y)}
-
-    line = pixels(15 + width, 15 + height)
-    assert {(15, 15), (15 + width, 15 + height)} <= line and len(line) == 1 + max(width, height)
-    for across, along in ((-1, 1), (1, -1), (-1, -1)):
-        mirrored = {(15 + across * (x - 15), 15 + along * (y - 15)) for x, y in line}
-        assert pixels(15 + across * width, 15 + along * height) == mirrored
 
 
 def text_of(memory, height=64):
@@ -202,20 +143,6 @@ def test_the_firmwares_pictures_are_read(page, recording, meter, lines):
     shown = []
     assert on_board(program)[0] == "returned"
     assert shown == lines
-
-
-@pytest.mark.parametrize(("height", "rows"), [(64, (8, 40)), (32, (0, 16))])
-def test_tall_letters_are_read_line_by_line(height, rows):
-    """A letter is twice as high as that of framebuf."""
-    memory = bytearray(1024)
-    canvas = framebuf.FrameBuffer(memory, 128, 64, framebuf.MONO_VLSB)
-    for text, top in zip(("Raw 0123456 +-", "%z{}~"), rows):
-        small = framebuf.FrameBuffer(bytearray(128), 128, 8, framebuf.MONO_VLSB)
-        small.text(text, 0, 0)
-        for y in range(16):
-            for x in range(128):
-                canvas.pixel(x, top + y, small.pixel(x, y // 2))
-    assert text_of(memory, height) == ["Raw 0123456 +-  ", "%z{}~           "]
 
 
 def test_a_dark_or_unknown_picture_has_no_text():

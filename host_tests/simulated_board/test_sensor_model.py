@@ -2,7 +2,7 @@
 
 import pytest
 from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.mpu6050 import START_UP_US, WAKE_US, Fifo, Mpu6050
+from kickstand_tools.simulated_board.mpu6050 import START_UP_US, WAKE_US, Mpu6050
 from support.board_access import counts, level, read, write
 
 DIVIDER, CONFIG, GYRO, ACCEL, FIFO_EN, USER, POWER = 0x19, 0x1A, 0x1B, 0x1C, 0x23, 0x6A, 0x6B
@@ -84,40 +84,6 @@ def test_temperature_of_each_chip(who_am_i, temp_c, count):
     assert counts(sensor(lambda t_s: level(t_s) if temp_c is None else (*level(t_s), temp_c), who_am_i))[3] == count
 
 
-@pytest.mark.parametrize(("dlpf", "delay_us"), [(1, 1900), (3, 4800), (6, 18_600)])
-def test_the_low_pass_delays(dlpf, delay_us):
-    """The force is the time in s, so 16384 counts per second."""
-    chip = sensor(lambda t_s: (t_s, -t_s, 1.0, 0.0, 0.0, 0.0), registers=((CONFIG, dlpf),))
-    chip.clock.advance(1_000_000)
-    sampled_us = chip.clock.now_us - chip.clock.now_us % 1000
-    assert abs(counts(chip)[0] - (sampled_us - delay_us) * 16384 / 1e6) <= 0.5
-
-
-@pytest.mark.parametrize(
-    ("config", "divider", "samples"),
-    [(1, 9, 100), (1, 0, 1000), (0, 79, 100), (0, 7, 1000), (6, 4, 200), (7, 15, 500)],
-)
-def test_samples_per_second(config, divider, samples):
-    """The gyro runs at 8 kHz without a low-pass, otherwise at 1 kHz."""
-    chip = filling(fifo_en=0x08, config=config, divider=divider)
-    chip.clock.advance(100_000)
-    assert waiting(chip) == pytest.approx(6 * samples / 10, abs=6)
-
-
-@pytest.mark.parametrize(
-    ("fifo_en", "size"), [(0x78, 12), (0x08, 6), (0x70, 6), (0xF8, 14), (0x10, 2), (0x80, 2), (0x50, 4), (0x00, 0)]
-)
-def test_a_frame_is_what_fifo_en_says(fifo_en, size):
-    """Bits of FIFO_EN: temperature, x, y, z of the gyro, accelerometer. The data is in the order of the registers."""
-    chip = filling(fifo_en=fifo_en, world=tilted)
-    chip.clock.advance(5000)
-    assert waiting(chip) == 5 * size
-    bits = [0x08] * 3 + [0x80, 0x40, 0x20, 0x10]
-    data = read(chip, 0x3B, 14)
-    chosen = [byte for k in range(7) if fifo_en & bits[k] for byte in data[2 * k : 2 * k + 2]]
-    assert read(chip, 0x74, size) == chosen
-
-
 @pytest.mark.parametrize(("who_am_i", "size", "frame"), [(0x68, 1024, 12), (0x70, 512, 12), (0x19, 1024, 14)])
 def test_overflow_loses_the_oldest_bytes_and_the_alignment(who_am_i, size, frame):
     chip = filling(who_am_i)
@@ -132,32 +98,6 @@ def test_overflow_loses_the_oldest_bytes_and_the_alignment(who_am_i, size, frame
     assert data[:2] == data[-2:]
 
 
-def test_the_count_is_latched_and_a_reset_acts_only_while_disabled():
-    chip = filling()
-    chip.clock.advance(30_000)
-    assert read(chip, 0x72) == [360 >> 8]
-    chip.clock.advance(30_000)
-    assert read(chip, 0x73) == [360 & 0xFF] and waiting(chip) == 720
-    write(chip, USER, 0x44)
-    assert waiting(chip) == 720 and read(chip, USER) == [0x40]
-    write(chip, USER, 0x04)
-    assert waiting(chip) == 0 and read(chip, USER) == [0]
-    chip.clock.advance(5000)
-    assert waiting(chip) == 0
-
-
-def test_a_fifo_loses_the_oldest_or_the_newest_bytes():
-    fifo = Fifo(4)
-    assert fifo.pop(2) == b"\0\0"
-    assert not fifo.push(b"abc") and not fifo.push(b"d") and fifo.count == 4
-    assert fifo.push(b"e") and fifo.pop(2) == b"bc"
-    assert fifo.push(b"xyz", keep_old=True) and fifo.pop(9) == b"dexyyyyyy"
-    assert fifo.count == 0 and fifo.pop() == b"y"
-    fifo.push(b"abc")
-    fifo.clear()
-    assert fifo.count == 0
-
-
 @pytest.mark.parametrize(("axis", "bit"), [(0, 0x80), (1, 0x40), (2, 0x20)])
 def test_the_self_test_adds_the_factory_trim(axis, bit):
     """Formulas of the register map, pages 10 and 11, with the trim codes 13, 17, 22 and 9, 14, 11."""
@@ -170,25 +110,3 @@ def test_the_self_test_adds_the_factory_trim(axis, bit):
         data = counts(chip)
         added = [accel * share if k == axis else gyro * share if k == 4 + axis else 0 for k in range(7) if k != 3]
         assert data[:3] + data[4:] == pytest.approx(added, abs=1)
-
-
-def test_faults_of_the_data():
-    chip = sensor()
-    for fault, world, data in ((0xFF, tilted, -1), ("freeze", level, -1), (None, level, 0)):
-        chip.override(fault)
-        chip.world = world
-        chip.clock.advance(10_000)
-        assert counts(chip)[:2] == [data, data]
-
-
-@pytest.mark.parametrize(
-    ("leaves", "power", "data"),
-    [("asleep", 0x40, 0), ("frozen", 0x40, 4096), ("default_ranges", 0x01, 8192), ("torn", 0x40, 0)],
-)
-def test_a_dip_of_the_supply(leaves, power, data):
-    chip = sensor(registers=((ACCEL, 0x08),))
-    assert counts(chip)[0] == 4096
-    chip.supply_dip(leaves)
-    chip.clock.advance(10_000)
-    assert (chip.peek(POWER), counts(chip)[0]) == (power, data)
-    assert chip.fifo.count == (14 if leaves == "torn" else 0)

@@ -1,10 +1,10 @@
-"""The simulated wires of I2C and SPI, with machine.I2C, SoftI2C and Pin: times, errors, faults, and a stuck bus."""
+"""The simulated wires of I2C and SPI, with machine.I2C, SoftI2C and Pin: times, errors, and a stuck bus."""
 
 import errno
 
 import pytest
 from kickstand_tools.simulated_board.fakes import fake_machine, fake_time
-from kickstand_tools.simulated_board.fakes.fake_machine import ADC, I2C, SPI, Pin, SoftI2C
+from kickstand_tools.simulated_board.fakes.fake_machine import I2C, SPI, Pin, SoftI2C
 from support.board_access import firmware, on_board, raised
 
 SENSOR, LCD = 0x68, 0x27
@@ -25,49 +25,6 @@ def read_byte(i2c, address=SENSOR):
     """Return the number of the error of a transfer, or "" without an error."""
     error = raised(i2c.readfrom_mem, address, 0x75, 1)
     return error.args[0] if error else ""
-
-
-@firmware()
-def test_transfers_fail_by_number_or_for_a_time(board):
-    i2c, faults = sensor_bus(), board.faults
-    for nth, during, code in (
-        (faults.nack, faults.nack_for, errno.EIO), (faults.timeout, faults.timeout_for, errno.ETIMEDOUT)
-    ):  # fmt: skip
-        board.sensor_bus.faults.clear()
-        nth(SENSOR)
-        assert [read_byte(i2c) for _ in range(3)] == [code, "", ""]
-        nth(SENSOR, 2, 2)
-        assert [read_byte(i2c) for _ in range(4)] == ["", code, code, ""]
-        nth(LCD)
-        assert read_byte(i2c) == "" and not board.sensor_bus.open
-        now_s = board.clock.now_us / 1e6
-        during(SENSOR, now_s + 0.1, 0.05)
-        for until_s, outcome in ((0.09, ""), (0.105, code), (0.14, code), (0.16, "")):
-            board.clock.advance(max(0, round((now_s + until_s) * 1e6) - board.clock.now_us))
-            assert read_byte(i2c) == outcome
-
-
-@firmware()
-def test_one_byte_is_corrupted_or_cut(board):
-    i2c = sensor_bus()
-    board.faults.corrupt(SENSOR, byte=1, mask=0x81)
-    assert [i2c.readfrom_mem(SENSOR, 0x1B, 2) for _ in range(2)] == [b"\x00\x81", b"\x00\x00"]
-    board.faults.corrupt(SENSOR, nth=2)
-    assert [i2c.readfrom_mem(SENSOR, 0x75, 1) for _ in range(3)] == [b"\x68", b"\x69", b"\x68"]
-    board.faults.cut(SENSOR, board.clock.now_us / 1e6, 2)
-    board.clock.advance(1)
-    errors = [raised(i2c.writeto_mem, SENSOR, 0x1B, b"\x08\x10\x18") for _ in range(2)]
-    assert [error and error.args for error in errors] == [(errno.EIO,), None] and not board.sensor_bus.open
-
-
-@firmware()
-def test_parts_are_unplugged_for_their_time(board):
-    i2c = sensor_bus()
-    board.faults.unplug_sensor(0.1, 0.1)
-    board.faults.unplug_lcd(0.1)
-    for until_s, plugged in ((0.09, (True, True)), (0.15, (False, False)), (0.25, (True, False))):
-        board.clock.advance(round(until_s * 1e6) - board.clock.now_us)
-        assert (read_byte(i2c) == "", LCD in board.lcd_bus.devices) == plugged
 
 
 @pytest.mark.parametrize(("machine", "pins", "code"), [("pico", (4, 5), errno.EIO), ("esp32", (21, 22), errno.ENODEV)])
@@ -98,40 +55,12 @@ def test_transfers_take_the_time_of_their_bits(board):
     assert board.clock.now_us - begin_us == 820
 
 
-@firmware()
-def test_missing_parts_read_as_open_inputs(board):
-    spi, data = SPI(0), bytearray(2)
-    spi.readinto(data)
-    assert spi.read(3) == b"\xff\xff\xff" and data == b"\xff\xff" and ADC(26).read_u16() == 0
-    for volts, code in ((1.65, 32767), (5.0, 65535)):
-        board.volts[26] = volts
-        assert ADC(Pin(26)).read_u16() == code
-
-
 def transfer_us(board, i2c, count, code):
     """Return the duration of a burst of `count` bytes. The burst must end with this error, or without one for None."""
     begin_us = board.clock.now_us
     error = raised(i2c.readfrom_mem_into, SENSOR, 0x3B, bytearray(count))
     assert (error.args[0] if error else None) == code, error
     return board.clock.now_us - begin_us
-
-
-@firmware(machine="esp32", i2c_driver="new")
-def test_the_new_driver_of_an_esp32_counts_ticks_of_10_ms(board):
-    for timeout, ticks in ((5000, 0), (9999, 0), (10_000, 1), (20_000, 2)):
-        i2c = I2C(0, sda=Pin(21), scl=Pin(22), timeout=timeout)
-        assert transfer_us(board, i2c, 14, None if ticks else errno.ENODEV) == (390 if ticks else 0)
-        board.faults.timeout(SENSOR)
-        assert transfer_us(board, i2c, 112, errno.ENODEV) // 10_000 == ticks
-        board.sensor_bus.faults.clear()
-
-
-@firmware(until_s=20.0, machine="esp32", i2c_driver="legacy")
-def test_an_esp32s_old_driver_waits_longer_than_the_watchdog(board):
-    i2c = I2C(0, sda=Pin(21), scl=Pin(22), timeout=5000)
-    assert transfer_us(board, i2c, 14, None) == 390
-    board.faults.timeout(SENSOR)
-    assert transfer_us(board, i2c, 112, errno.ETIMEDOUT) // 100_000 == 114
 
 
 @firmware(machine="esp32")
@@ -170,11 +99,6 @@ def test_interrupts_of_an_esp32_wait_for_the_end_of_a_transfer(machine, pulses_p
         assert during[0] <= count <= during[1] and after[0] <= len(late) <= after[1] and len(set(late)) <= 1
 
     check(program, machine=machine, sensor_pins=[4, 5])
-
-
-def test_a_bus_that_is_too_fast_for_the_display_is_reported():
-    for freq, one_bus, too_fast in ((400_000, True, True), (100_000, True, False), (400_000, False, False)):
-        assert check(lambda board: sensor_bus(freq), one_bus=one_bus).too_fast == too_fast  # noqa: B023 called at once
 
 
 @pytest.mark.parametrize("bits", [1, 5, 8])

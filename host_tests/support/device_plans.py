@@ -95,14 +95,21 @@ def world_of(plan):
 
 @contextlib.contextmanager
 def on_flash(flash):
-    """Make a directory the working directory and the first on the import path, as a board's flash is."""
+    """Make a directory the working directory and the first on the import path, as a board's flash is.
+
+    The app collects garbage often. Objects of earlier tests are excluded, because scanning them takes minutes.
+    """
     sys.path.insert(0, str(flash))
     importlib.invalidate_caches()
     writes_none, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+    gc.freeze()
     try:
-        with contextlib.chdir(flash):
+        with contextlib.chdir(flash), warnings.catch_warnings():
+            warnings.simplefilter("ignore", ResourceWarning)  # a board that loses its power closes no file
             yield
+            gc.collect()
     finally:
+        gc.unfreeze()
         sys.dont_write_bytecode = writes_none
         sys.path.remove(str(flash))
         for name in ("user", "config"):
@@ -116,19 +123,12 @@ def run(engine, flash, plan, capsys=None, fit=None):
     fit: fit(board) changes the board before power-on, on CPython only.
     """
     if engine == "cpython":
-        # Exclude the objects of earlier tests, because the app collects garbage often and scanning them takes minutes
-        gc.freeze()
-        try:
-            with on_flash(flash), warnings.catch_warnings():
-                warnings.simplefilter("ignore", ResourceWarning)  # a board that loses its power closes no file
-                answer = json.loads(json.dumps(device_runs.run_device(plan, fit, world_of(plan))))
-                gc.collect()
-        finally:
-            gc.unfreeze()
+        with on_flash(flash):
+            answer = json.loads(json.dumps(device_runs.run_device(plan, fit, world_of(plan))))
         return Record(answer, capsys.readouterr().out if capsys else "")
     heap = "8M" if "card" in plan else BOARD_HEAP
-    said = run_mpy(SCRIPT, heap=heap, stdin=json.dumps(plan), directory=flash)
-    console, _, answer = said.rstrip("\n").rpartition("\n")
+    output = run_mpy(SCRIPT, heap=heap, stdin=json.dumps(plan), directory=flash)
+    console, _, answer = output.rstrip("\n").rpartition("\n")
     return Record(json.loads(answer), console)
 
 

@@ -101,7 +101,7 @@ class Device:
     def __init__(self, world, **fitted):
         """world(t_s): the motion that the sensor measures. fitted: arguments of Board.
 
-        app: the App that runs, or None before it starts.
+        app: the App that runs, or None.
         """
         self.board = Board(world, **fitted)
         self.frames, self.ends = [], []
@@ -143,30 +143,32 @@ class Device:
         streams: True to start the app as `kickstand record` does.
         prompt_s: time in s at the prompt after the firmware has ended.
         """
+        self.board.every(FRAME_S, self._watch)
+        self.board.every(PRESS_EVERY_S, self._turn_page)
+        self.board.install()
+        try:
+            if self.board.poses:  # the firmware must be imported on this board
+                with FreshFirmware():
+                    self._run(config, off_s, streams, prompt_s)
+            else:
+                self._run(config, off_s, streams, prompt_s)
+            if self.ends[-1] == "returned":  # record what the display shows before the power is cut
+                self._watch()
+            self._turner.check()
+        finally:
+            self.app = None  # the board's clock would keep it
+            forget_config()
+            self.board.uninstall()
+
+    def _run(self, config, off_s, streams, prompt_s):
+        from kickstand import start
 
         def main():
             start.main(self._run_app)
             self.board.clock.advance(int(1e6 * prompt_s))
 
-        self.board.every(FRAME_S, self._watch)
-        self.board.every(PRESS_EVERY_S, self._turn_page)
-        self.board.install()
-        # The firmware must be imported on the board. First remove the modules that the host has imported.
-        imported = take_firmware() if self.board.poses else {}
-        try:
-            from kickstand import start
-
-            for until_s in off_s:
-                self._run_until(until_s, config, _stream if streams else main)
-            if self.ends[-1] == "returned":  # record what the display shows before the power is cut
-                self._watch()
-            self._turner.check()
-        finally:
-            forget_config()
-            self.board.uninstall()
-            if self.board.poses:
-                take_firmware()
-                sys.modules.update(imported)
+        for until_s in off_s:
+            self._run_until(until_s, config, _stream if streams else main)
 
     def _run_app(self, app):
         self.app = app
@@ -204,7 +206,7 @@ class Device:
 def write_config(settings):
     """Make config.py have these settings for the next boot. None: the file on the import path."""
     if settings is not None:
-        sys.modules["config"] = _config(settings)
+        sys.modules["config"] = _config(settings)  # type: ignore[assignment]
 
 
 def forget_config():
@@ -225,6 +227,17 @@ def _stream():
 
     chosen = settings.load()
     App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen), RideStream()).run()
+
+
+class FreshFirmware:
+    """A context manager in which the firmware is imported anew. At its end the earlier modules are back."""
+
+    def __enter__(self):
+        self._modules = take_firmware()
+
+    def __exit__(self, *_):
+        take_firmware()
+        sys.modules.update(self._modules)
 
 
 def take_firmware():

@@ -36,6 +36,17 @@ class BoardLoop(asyncio.SelectorEventLoop):
             self.run_forever()
 
 
+@contextlib.contextmanager
+def only_loop():
+    """Hide playwright's idle event loop, if this process has used a browser."""
+    browsers = asyncio._get_running_loop()
+    asyncio._set_running_loop(None)
+    try:
+        yield
+    finally:
+        asyncio._set_running_loop(browsers)
+
+
 def uuid_of(value):
     return core.UUID.from_16_bits(value) if isinstance(value, int) else core.UUID(value)
 
@@ -112,17 +123,13 @@ class Air:
         device = self.peripheral
         paired = bool(self.radio.config.get("mitm"))
         if paired:
-            delegate = _Pin(self._passkey, pairing.PairingDelegate.DISPLAY_OUTPUT_ONLY)
+            delegate = _Pin(self.radio.ask_pin, pairing.PairingDelegate.DISPLAY_OUTPUT_ONLY)
             device.pairing_config_factory = lambda _: pairing.PairingConfig(True, True, True, delegate)
         for service, characteristics in self.radio.services:
             made = [self._characteristic(*one) for one in characteristics]
             device.add_service(Service(uuid_of(service), made))
         device.on("connection", self._connected)
         await device.power_on()
-
-    def _passkey(self):
-        self.radio._tell(model.PASSKEY, 0, 3, 0)
-        return self.radio._passkey
 
     def _characteristic(self, kind, flags, handle):
         allowed = att.Attribute.Permissions.READABLE if flags & model.READ else att.Attribute.Permissions(0)

@@ -1,84 +1,54 @@
-"""The text of each page: units, signs, rounding, and 16 characters per line."""
+"""The text of each page: units, signs, rounding, and 16 characters per line. Also the page of a drive."""
 
-import types
+from typing import Any
 
 import pytest
 from kickstand.calibration.parameters import Calibration
-from kickstand.errors import Notice
-from kickstand.lean.meter import LeanMeter
+from kickstand.drive_alignment import alignment
+from kickstand.errors import Notice, Refusal
 from kickstand.ui import pages
+from panel import Panel, reading
 
-DEGREE = pages.DEGREE
-FULL = "#"
-
-
-def bar(lean_deg):
-    """Return the lean's bar as text.
-
-    "#" is a full cell and a space is an empty cell. "1" to "4" is a cell whose first 1 to 4 columns from the left are
-    filled. "a" to "d" is a cell whose first 1 to 4 columns from the right are filled.
-    """
-    names = {0x20: " ", 0xFF: FULL, **{i: str(i + 1) for i in range(4)}, **{4 + i: "abcd"[i] for i in range(4)}}
-    return "".join(names[code] for code in pages.lean_bar(lean_deg))
+D = pages.DEGREE
 
 
-@pytest.mark.parametrize("what", ["left", "up", "tilt"])
-def test_an_odd_sensor_is_reported_instead_of_its_lean(what):
-    code = "odd-pitch" if what == "tilt" else "odd-" + what
-    assert pages.unsure(code) == ("Lean  --", "sensor odd: " + what)
-    assert len(pages.unsure(code)[1]) <= 16
-
-
-def meter(**values):
-    return types.SimpleNamespace(**values)
-
-
-def measured(counts, calibrate=None):
-    """Return a meter after one reading. counts: the reading, with 4096 counts per g and 65.5 counts per deg/s."""
-    from array import array
-
-    calibration = Calibration()
-    if calibrate:
-        calibrate(calibration)
-    calibration.set_scale(4096, 65.5)
-    shown = LeanMeter(calibration)
-    shown.update_sum(array("i", counts), 1, 0)
+def meter(**values) -> Any:
+    shown = reading((0, 0, 0, 0, 0, 0, 0))
+    vars(shown).update(values)
     return shown
 
 
-def test_the_raw_page_shows_g_and_rates_in_the_sensors_axes():
-    counts = [2048, -4096, 1024, 0, 6550, -655, 131]
-    assert pages.raw(measured(counts)) == (" 0.50-1.00 0.25g", f" 100 -10   2 {DEGREE}/s")
-
-
-def test_the_raw_page_is_calibrated_and_not_turned():
-    def calibrate(calibration):
-        calibration.set_accel((0.1, 0.0, 0.0), (1.0, 1.0, 2.0))
-        calibration.gyro_bias[1] = 3.0
-        for i, value in enumerate((0, 1, 0, 0, 0, 1, 1, 0, 0)):
-            calibration.vehicle_from_sensor[i] = value
-
-    counts = [2048, -4096, 1024, 0, 6550, -655, 131]
-    assert pages.raw(measured(counts, calibrate)) == (" 0.60-1.00 0.50g", f" 100 -13   2 {DEGREE}/s")
-
-
 @pytest.mark.parametrize(
-    ("lean_deg", "line"),
+    ("page", "values", "lines"),
     [
-        (0.4, "Lean   0° "),
-        (0.5, "Lean   1° right"),
-        (-0.4, "Lean   0° "),
-        (-0.5, "Lean   1° left"),
-        (32.4, "Lean  32° right"),
-        (-32.6, "Lean  33° left"),
+        ("lean", {"lean_deg": 0.4}, f"Lean   0{D} "),
+        ("lean", {"lean_deg": 0.5}, f"Lean   1{D} right"),
+        ("lean", {"lean_deg": -0.4}, f"Lean   0{D} "),
+        ("lean", {"lean_deg": -32.6}, f"Lean  33{D} left"),
+        ("maxima", {"max_left_deg": 30.4, "max_right_deg": 41.5}, (f"Max left    30{D}", f"Max right   42{D}")),
+        ("maxima", {"max_left_deg": 30.6, "max_right_deg": 41.4}, (f"Max left    31{D}", f"Max right   41{D}")),
+        ("acceleration", {"forward": 0.312}, ("Accel    0.31 g", "pk +0.42 / -0.91")),
+        ("acceleration", {"forward": -0.004}, ("Accel    0.00 g", "pk +0.42 / -0.91")),
+        ("acceleration", {"forward": -0.006}, ("Brake    0.01 g", "pk +0.42 / -0.91")),
+        ("acceleration", {"forward": -0.85}, ("Brake    0.85 g", "pk +0.42 / -0.91")),
+        ("cornering", {"left": 0.31}, ("Left     0.31 g", "Up       1.02 g")),
+        ("cornering", {"left": -0.42}, ("Right    0.42 g", "Up       1.02 g")),
+        ("cornering", {"left": 0.006}, ("Left     0.01 g", "Up       1.02 g")),
+        ("cornering", {"left": 0.004}, ("Right    0.00 g", "Up       1.02 g")),
+        # Nicolae's formula at rest: the lean is arcsin(0.5 g)
+        ("formula", {"force": [0.5, 0.866, 0.0], "lean_deg": 12.4}, (f"Formula     30{D}", f"Filter      12{D}")),
     ],
 )
-def test_the_lean_is_rounded_and_has_its_side(lean_deg, line):
-    assert pages.lean(meter(lean_deg=lean_deg))[0] == line.replace("°", DEGREE)
+def test_lines_of_a_page(page, values, lines):
+    values = {"smooth_force": [values.pop("left", 0.0), 1.02, values.pop("forward", 0.0)]} | values
+    shown = getattr(pages, page)(
+        meter(max_accel_g=0.42, max_brake_g=0.91, **values) if page == "acceleration" else meter(**values)
+    )
+    assert shown == lines if isinstance(lines, tuple) else shown[0] == lines
 
 
 @pytest.mark.parametrize(
-    ("lean_deg", "shown"),
+    ("lean_deg", "bar"),
     [
         (0.0, "       a1       "),
         (1.5, "       a1       "),
@@ -93,24 +63,42 @@ def test_the_lean_is_rounded_and_has_its_side(lean_deg, line):
         (-75.0, "########1       "),
     ],
 )
-def test_a_column_of_the_bar_is_one_and_a_half_degrees(lean_deg, shown):
-    assert bar(lean_deg) == shown
+def test_a_column_of_the_bar_is_one_and_a_half_degrees(lean_deg, bar):
+    """ "#" is a full cell. "1" to "4" is a cell whose first columns from the left are filled, "a" to "d" from the
+    right."""
+    names = {0x20: " ", 0xFF: "#"} | {k: "1234abcd"[k] for k in range(8)}
+    assert "".join(names[code] for code in pages.lean(meter(lean_deg=lean_deg))[1]) == bar
 
 
 @pytest.mark.parametrize(
-    ("done", "total", "cells"), [(0, 100, 0), (1, 100, 0), (7, 100, 1), (50, 100, 8), (99, 100, 15), (100, 100, 16)]
+    ("done", "total", "cells"), [(0, 100, 0), (7, 100, 1), (50, 100, 8), (99, 100, 15), (300, 100, 16), (5, 0, 0)]
 )
 def test_progress_fills_sixteen_cells(done, total, cells):
     assert pages.progress_bar(done, total) == "\xff" * cells
 
 
-def test_progress_beyond_its_limits_fits_the_display():
-    assert pages.progress_bar(0, 0) == pages.progress_bar(5, 0) == ""
-    assert pages.progress_bar(300, 100) == "\xff" * 16
+def test_the_raw_page_is_calibrated_and_not_turned():
+    """With 4096 counts per g and 65.5 counts per deg/s."""
+    counts = [2048, -4096, 1024, 0, 6550, -655, 131]
+    assert pages.raw(reading(counts)) == (" 0.50-1.00 0.25g", f" 100 -10   2 {D}/s")
+    calibration = Calibration()
+    calibration.set_accel((0.1, 0.0, 0.0), (1.0, 1.0, 2.0))
+    turned = calibration.with_alignment((0, 1, 0, 0, 0, 1, 1, 0, 0), (0.0, 3.0, 0.0))
+    assert pages.raw(reading(counts, turned)) == (" 0.60-1.00 0.50g", f" 100 -13   2 {D}/s")
 
 
-def recorder(seconds, room_s):
-    return types.SimpleNamespace(seconds=lambda: seconds, room_s=lambda: room_s)
+def test_before_alignment_tilt_and_g_are_the_sensors_own():
+    """The page shows "Not aligned" and the next step in turn, for two seconds each."""
+    shown = meter(smooth_force=[0.5, 0.866, -0.25])
+    lines = [pages.not_aligned(shown, seconds, "todo") for seconds in range(5)]
+    assert lines == [(f"Raw   30{D} -0.25g", hint) for hint in ["Not aligned"] * 2 + ["todo"] * 2 + ["Not aligned"]]
+
+
+class Recorder:
+    """The two values of a recording that its page shows."""
+
+    def __init__(self, seconds, room_s):
+        self.seconds, self.room_s = (lambda: seconds), (lambda: room_s)
 
 
 @pytest.mark.parametrize(
@@ -119,82 +107,70 @@ def recorder(seconds, room_s):
         (0, None, ("Rec         0:00", "to USB")),
         (59, 0, ("Rec         0:59", "oldest is erased")),
         (60, 59, ("Rec         1:00", "room 0 min")),
-        (3661, 1140, ("Rec        61:01", "room 19 min")),
         (3661, 35_999, ("Rec        61:01", "room 599 min")),
         (3661, 36_000, ("Rec        61:01", "room 10 h")),
     ],
 )
 def test_recording_shows_its_duration_and_the_time_left(seconds, room_s, lines):
-    assert pages.recording(recorder(seconds, room_s)) == lines
+    assert pages.recording(Recorder(seconds, room_s)) == lines
 
 
-def test_a_recorded_line_has_its_star_in_the_last_column():
-    assert pages.recorded("Lean  32" + DEGREE) == "Lean  32" + DEGREE + "      *"
-    assert pages.recorded("x" * 15) == "x" * 15 + "*"
+def test_the_sensor_page_shows_each_count_for_two_seconds():
+    """The MPU6050 has 340 counts per degree, and 36.53 degrees at 0."""
+    panel = Panel()
+    sensor, chip = panel.sensor, panel.sensor.chip
+    shown = reading((0, 0, 0, -2730, 0, 0, 0), panel.app.calibration.value)
+    chip.overflows, sensor.restarts, chip.address = 3, 1, 0x69
+    words = ["6pos no  ali yes", "3 gaps 1 starts", "samples lost   7", "I2C address 0x69"]
+    for seconds in range(9):
+        assert pages.sensor_info(sensor, 7, shown, seconds) == (f"MPU6050   28.5{D}C", words[seconds // 2 % 4])
+    chip.overflows, sensor.restarts, chip.who_am_i = 12345, 678, 0x72
+    lines = [pages.sensor_info(sensor, 123456, shown, seconds) for seconds in (2, 4)]
+    assert [line2 for _, line2 in lines] == ["99 gaps 9 starts", "samples lost9999"] and lines[0][0][
+        :10
+    ] == "MPU6500 0 "
+    sensor.fault, sensor.found = Notice("no-sensor"), [0x27, 0x68, 0x77]
+    lines = [pages.sensor_info(sensor, 0, shown, seconds) for seconds in (1, 2, 3, 4)]
+    assert lines == [("No sensor", "check wiring")] + [("On its I2C bus:", "27 68 77")] * 2 + [
+        ("No sensor", "check wiring")
+    ]
 
 
-def test_maxima_are_rounded_each_on_its_line():
-    for left, right, words in ((30.4, 41.5, ("30", "42")), (30.6, 41.4, ("31", "41"))):
-        shown = pages.maxima(meter(max_left_deg=left, max_right_deg=right))
-        assert shown == (f"Max left    {words[0]}{DEGREE}", f"Max right   {words[1]}{DEGREE}")
+DONE = Notice("aligned", 0.4)
+BRAKE, SPEED = {"state": alignment.WAITING_FOR_BRAKING}, {"state": alignment.WAITING_FOR_SPEED}
 
 
 @pytest.mark.parametrize(
-    ("forward", "line"),
+    ("values", "result", "fault", "lines"),
     [
-        (0.312, "Accel    0.31 g"),
-        (-0.004, "Accel    0.00 g"),
-        (-0.006, "Brake    0.01 g"),
-        (-0.85, "Brake    0.85 g"),
+        (BRAKE, None, None, ("Brakings   2/5", "brake straight")),
+        ({"state": alignment.BRAKING}, None, None, ("Brakings   2/5", "braking...")),
+        ({"state": alignment.TURNING}, None, None, ("Brakings   2/5", "braking...")),  # at walking pace
+        ({"state": alignment.WAITING_FOR_STOP, "counted": 0}, None, None, ("Brakings   0/5", "stop needed")),
+        (SPEED, None, None, ("Align by drive", "waiting: speed")),
+        (SPEED, None, Notice("no-pulse"), ("Wheel: no pulse", "ride, or wiring?")),
+        (BRAKE, None, Notice("no-pulse"), ("Brakings   2/5", "brake straight")),
+        (BRAKE | {"counted": 6}, None, None, (f"Brake  6 +- 1.2{D}", "brake straight")),
+        (BRAKE | {"counted": 6, "quality_deg": 180.0}, None, None, (f"Brake  6 +-99.9{D}", "brake straight")),
+        ({"state": alignment.READY, "counted": 6}, None, None, ("Ready:", "stop to save it")),
+        (BRAKE | {"problem": Refusal("speed-negative")}, DONE, None, ("Speed negative", "Check its source")),
+        # The page shows the last result until new braking events count.
+        (BRAKE | {"counted": 0}, DONE, None, ("Aligned by drive", f"error about 0.4{D}")),
+        (BRAKE | {"counted": 1}, DONE, None, ("Brakings   1/5", "brake straight")),
+        (
+            {"state": alignment.READY, "counted": 6, "ready": True},
+            DONE,
+            None,
+            ("Aligned by drive", f"error about 0.4{D}"),
+        ),
     ],
 )
-def test_speeding_up_and_braking_have_their_words(forward, line):
-    shown = meter(smooth_force=[0.5, 0.9, forward], max_accel_g=0.42, max_brake_g=0.91)
-    assert pages.acceleration(shown) == (line, "pk +0.42 / -0.91")
+def test_each_state_of_a_drive_has_its_lines(values, result, fault, lines):
+    from kickstand.ui import drive_page
 
-
-@pytest.mark.parametrize(
-    ("left", "line"),
-    [(0.31, "Left     0.31 g"), (-0.42, "Right    0.42 g"), (0.006, "Left     0.01 g"), (0.004, "Right    0.00 g")],
-)
-def test_a_car_has_a_side_and_an_up(left, line):
-    assert pages.cornering(meter(smooth_force=[left, 1.02, 0.3])) == (line, "Up       1.02 g")
-
-
-def test_the_formula_is_shown_beside_the_filter():
-    shown = pages.formula(meter(lean_formula_deg=-7.6, lean_deg=12.4))
-    assert shown == (f"Formula     -8{DEGREE}", f"Filter      12{DEGREE}")
-
-
-def test_before_alignment_tilt_and_g_are_the_sensors_own():
-    """The page shows "Not aligned" and the next step in turn, for two seconds each."""
-    shown = meter(smooth_force=[0.5, 0.866, -0.25])
-    lines = [pages.not_aligned(shown, seconds) for seconds in range(5)]
-    assert {line for line, _ in lines} == {f"Raw   30{DEGREE} -0.25g"}
-    assert [hint for _, hint in lines] == ["Not aligned"] * 2 + ["On stand: press"] * 2 + ["Not aligned"]
-    assert pages.not_aligned(shown, 3, "Drive: brake")[1] == "Drive: brake"
-
-
-def test_the_sensor_page_of_a_fault_lists_the_devices():
-    sensor = types.SimpleNamespace(fault=Notice("no-sensor"), found=[0x27, 0x68, 0x77])
-    seen = [pages.sensor_info(sensor, 0, meter(), seconds) for seconds in range(5)]
-    fault, there = ("No sensor", "check wiring"), ("On its I2C bus:", "27 68 77")
-    assert seen == [fault, fault, there, there, fault]
-    sensor.found = []
-    assert pages.sensor_info(sensor, 0, meter(), 2) == ("On its I2C bus:", "nothing")
-
-
-def test_the_sensor_page_counts_gaps_starts_and_lost_samples():
-    """The page shows each count for two seconds."""
-    chip = types.SimpleNamespace(name="MPU6050", temperature_c=lambda counts: counts / 10.0, overflows=3, address=0x69)
-    calibration = types.SimpleNamespace(six_done=True, aligned=False)
-    shown = meter(reading=[1, 2, 3, 285, 5, 6, 7], calibration=calibration)
-    sensor = types.SimpleNamespace(chip=chip, restarts=1, fault=None)
-    seen = [pages.sensor_info(sensor, 0, shown, seconds) for seconds in range(9)]
-    assert {line1 for line1, _ in seen} == {f"MPU6050   28.5{DEGREE}C"}
-    words = ["6pos yes ali no", "3 gaps 1 starts", "samples lost   0", "I2C address 0x69"]
-    assert [line2 for _, line2 in seen] == [words[seconds // 2 % 4] for seconds in range(9)]
-    chip.overflows, sensor.restarts, chip.name = 12345, 678, "MPU6050 clone"
-    assert pages.sensor_info(sensor, 123456, shown, 2)[1] == "99 gaps 9 starts"
-    assert pages.sensor_info(sensor, 123456, shown, 4)[1] == "samples lost9999"
-    assert pages.sensor_info(sensor, 123456, shown, 0)[0] == f"MPU6050 c 28.5{DEGREE}C"
+    known = {"counted": 2, "problem": None, "ready": False, "quality_deg": 1.2} | values
+    drive: Any = Panel(SPEED="wheel").app.drive
+    drive.drive = type("Drive", (alignment.DriveAlignment,), known)(alignment.MOTORCYCLE)
+    drive.result = result
+    drive.speed.source.fault = lambda now_ms: fault
+    assert drive_page.lines(drive, 0) == lines

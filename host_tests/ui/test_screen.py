@@ -1,184 +1,193 @@
-"""The stack of views: the front view is shown and gets the press, and an ended view is removed at once."""
+"""Events and what the display then shows: notices, menu, faults, questions, and the ring of pages."""
 
-import types
+import sys
 
 import pytest
-from kickstand.errors import CaptureError, Notice
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand.errors import Notice
+from panel import LONG, SHORT, Panel
 
-SHORT, LONG = 1, 2  # as in board/button.py
-
-
-class Drive:
-    """Replaces alignment by driving. The alignment has a question until the rider answers."""
-
-    shown = False
-
-    def __init__(self):
-        self.message = None
-        self.answers = []
-
-    def answer(self, agreed):
-        self.answers.append(agreed)
-        self.message = None
+PAGES = ["lean", "maxima", "acceleration", "formula", "raw"]
+WHEEL = {"SPEED": "wheel", "PULSES_PER_METRE": 0.5}
+REST = ["Six positions", "Reset maxima", "Sensor info"]
 
 
-@pytest.fixture
-def drive():
-    return Drive()
+def entries(panel):
+    """Return the names of the menu's entries. The first entry follows the last."""
+    names = [panel.press(LONG)[0][1:]]
+    while (name := panel.press(SHORT)[0][1:]) != names[0]:
+        names.append(name)
+    panel.lines(panel.now_ms + 60_000)
+    return names
 
 
-@pytest.fixture
-def sensor():
-    chip = types.SimpleNamespace(accel_lsb_per_g=4096, gyro_lsb_per_dps=65.5, SATURATED=32700)
-    return types.SimpleNamespace(chip=chip, fault=None)
+class Live:
+    """The page of a phone's connection."""
+
+    def lines(self):
+        return "live", ""
+
+    def stop(self, now_ms):
+        pass
 
 
-@pytest.fixture
-def screen(sensor, drive):
-    """An aligned motorcycle's Screen, on a simulated board, for MicroPython's clock."""
-    meter = types.SimpleNamespace(fallen=False, trusted=True, lean_deg=12.0, suppressed_reason=None, odd=None)
-    meter.max_left_deg = meter.max_right_deg = 0.0
-    calibration = types.SimpleNamespace(aligned=True, value=None)
-    rides = types.SimpleNamespace(recorder=types.SimpleNamespace(active=False))
-    settings = types.SimpleNamespace(leans=True, SAMPLE_HZ=200, SIDE="left")
-    with Board(lambda t_s: (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 25.0)):
-        from kickstand.ui.screen import Screen
-
-        yield Screen(settings, sensor, None, meter, calibration, drive, rides)
-
-
-def first_line(screen, now_ms):
-    return screen.lines(now_ms)[0]
-
-
-def test_a_cancelled_alignment_gets_no_more_samples(screen):
-    """The alignment gets no sample even in the 100 ms until the next page is shown. In that time the last sample would
-    save the alignment."""
-    screen.press(LONG, 0)
-    screen.press(LONG, 100)
-    assert screen.wizard is not None
-    assert first_line(screen, 200) == "On the stand,"
-    screen.press(LONG, 300)
-    assert screen.wizard is None
-    assert first_line(screen, 300).startswith("Lean")
+@pytest.mark.parametrize(
+    ("config", "names"),
+    [
+        ({}, ["Align the bike", *REST, "Record ride", "Leave menu"]),
+        (WHEEL, ["Align the bike", *REST, "Align by drive", "Record ride", "Leave menu"]),
+        (WHEEL | {"VEHICLE": "car"}, ["Align by drive", *REST, "Record ride", "Leave menu"]),
+    ],
+)
+def test_the_entries_of_the_menu_and_their_order(config, names):
+    panel = Panel(**config)
+    assert entries(panel) == names
+    panel.screen.pages.own.append(lambda: ("", ""))
+    panel.screen.pages.live = Live()
+    panel.choose("Record ride")
+    assert entries(panel)[-4:] == ["Stop recording", "Own pages", "Stop Bluetooth", "Leave menu"]
 
 
-def test_a_menu_that_is_left_is_gone_at_once(screen):
-    screen.press(LONG, 0)
-    for k in range(6):
-        screen.press(SHORT, 100 * k)
-    assert "Leave menu" in first_line(screen, 600)
-    screen.press(LONG, 700)
-    assert first_line(screen, 700).startswith("Lean")
+def test_a_menu_counts_its_entries_and_ends_20_s_after_the_last_press():
+    panel = Panel()
+    assert panel.press(LONG, 0) == ("\x7eAlign the bike", "next 1/6 hold=ok")
+    assert panel.press(SHORT, 15_000) == ("\x7eSix positions", "next 2/6 hold=ok")
+    assert panel.lines(34_900)[0] == "\x7eSix positions" and panel.lines(35_000)[0].startswith("Lean")
+    assert panel.screen.menu is None
+    assert panel.choose("Leave menu")[0].startswith("Lean")
 
 
-def test_a_press_is_for_what_a_notice_covers(screen):
-    screen.notify(Notice("out-of-room", "28"), 0)
-    assert screen.lines(0) == ("Rec. stopped", "no room")
-    screen.press(SHORT, 100)
-    assert first_line(screen, 100).startswith("Max left")
+def test_the_menu_resets_maxima_and_records():
+    panel = Panel()
+    panel.meter.max_left_deg = 30.0
+    assert panel.choose("Reset maxima") == ("Maxima reset", "") == panel.lines(1999)
+    assert panel.lines(2000)[0].startswith("Lean") and panel.meter.max_left_deg == 0.0
+    assert panel.choose("Record ride")[0] == "Rec         0:00" and panel.screen.front.name == "notice"
+    panel.stand()
+    assert panel.lines(4000)[0] == "Lean   0°      *"  # only the first page shows that a ride is recorded
+    assert not panel.press(SHORT)[0].endswith("*")
+    assert panel.choose("Stop recording") == ("Recording ended", "")
+    assert not panel.app.rides.recorder.active
 
 
-def test_a_question_under_a_notice_is_not_answered_unread(drive, screen):
-    screen.notify(Notice("out-of-room", "28"), 0)
-    drive.message = Notice("other-side")
-    assert screen.lines(0)[0] == "Rec. stopped"
-    screen.press(LONG, 100)
-    assert drive.answers == []
-    assert first_line(screen, 100) == "Side was wrong?"
-    screen.press(LONG, 200)
-    assert drive.answers == [True]
+def test_a_recording_that_is_refused_says_why(monkeypatch):
+    panel = Panel()
+    monkeypatch.setitem(sys.modules, "kickstand.rides.recorder", None)
+    assert panel.choose("Record ride") == ("Incomplete:", "flash it again") and not panel.app.rides.recorder.active
 
 
-def test_a_fault_hides_the_pages_and_the_menu_the_fault(sensor, screen):
-    sensor.fault = Notice("sensor-lost")
-    assert screen.lines(0) == ("Sensor lost", "check wiring")
-    screen.press(SHORT, 100)
-    screen.press(LONG, 200)
-    assert "Align the bike" in first_line(screen, 200)
-    screen.press(LONG, 300)
-    assert screen.wizard is None
-    assert screen.lines(300) == ("Sensor lost", "check wiring")
-    sensor.fault = None
-    assert first_line(screen, 2400).startswith("Lean")
+def test_a_short_press_closes_the_sensor_info():
+    panel = Panel()
+    assert panel.choose("Sensor info")[0].startswith("MPU6050")
+    assert panel.press(LONG)[0].startswith("\x7e")  # the menu in front of the sensor's page
+    assert panel.lines(60_000)[0].startswith("MPU6050") and panel.screen.front.name == "info"
+    assert panel.press(SHORT)[0].startswith("Lean")
 
 
-def test_pages_of_the_owner_follow_the_last_page(screen):
-    screen.pages.own += [lambda: ("one", ""), lambda: ("two", "")]
-    screen._meter.trusted = False  # while the lean is not trusted, each page always shows the same lines
-    shown = []
-    from kickstand.ui import page_ring
-
-    ring = [page.__name__ for page in page_ring.MOTORCYCLE]
-    for k in range(len(ring) + 3):
-        line = first_line(screen, 100 * k)
-        shown.append((screen.pages.name, line))
-        screen.press(SHORT, 100 * k + 50)
-    assert [name for name, _ in shown] == [*ring, "own", "own", ring[0]]
-    assert [line for name, line in shown if name == "own"] == ["one", "two"]
+def test_a_press_is_for_what_a_notice_covers():
+    panel = Panel(**WHEEL)
+    panel.screen.notify(Notice("out-of-room", "28"), 0)
+    assert panel.lines() == ("Rec. stopped", "no room")
+    assert panel.press(SHORT, 100)[0].startswith("Max left")
+    panel.screen.notify(Notice("out-of-room", "28"), 200)
+    panel.app.drive.message = Notice("aligned", 0.4)
+    assert panel.lines(200)[0] == "Rec. stopped"
+    assert panel.press(LONG, 300) == ("Aligned by drive", "error about 0.4°")  # unread, so it is not answered
+    assert panel.screen.menu is None and panel.press(LONG)[0].startswith("Lean") and panel.app.drive.message is None
 
 
-def test_the_menu_shows_the_owners_pages_without_an_alignment(screen):
-    screen._calibration.aligned = False
-    screen.pages.own.append(lambda: ("one", "mine"))
-    screen.pages.show_own(0)
-    assert screen.lines(0) == ("one", "mine")
-    screen.press(SHORT, 100)
-    assert screen.pages._own_at is None
+@pytest.mark.parametrize(("event", "lines"), [(SHORT, "Lean"), (LONG, "Side corrected")])
+def test_a_question_goes_to_the_first_page_and_is_answered(event, lines):
+    """A long press agrees, which exchanges forward and backward, and left and right."""
+    panel = Panel(**WHEEL)
+    panel.walk(3)
+    panel.app.drive.message = Notice("other-side")
+    assert panel.lines() == ("Side was wrong?", "hold = fix")
+    assert panel.press(event)[0].startswith(lines)
+    assert panel.app.calibration.value.vehicle_from_sensor[0] == pytest.approx(-1.0 if event == LONG else 1.0)
 
 
-def test_only_the_first_page_shows_that_a_ride_is_recorded(screen):
-    screen._rides.recorder.active = True
-    assert [len(line) for line in screen.lines(0)] == [16, 16]
-    assert screen.lines(0)[0].endswith("*")
-    screen.press(SHORT, 100)
-    assert not screen.lines(200)[0].endswith("*")
+def test_a_fault_hides_the_pages_and_the_menu_the_fault():
+    panel = Panel()
+    panel.sensor.fault = Notice("sensor-lost")
+    lost = ("Sensor lost", "check wiring")
+    assert panel.lines() == lost == panel.press(SHORT)
+    for entry in ("Align the bike", "Six positions", "Record ride"):
+        assert panel.choose(entry) == lost and panel.screen.wizard is None
+        assert panel.screen.front.name == "notice" and panel.lines(panel.now_ms + 2000) == lost
+    assert panel.now_ms == 6000 and panel.choose("Sensor info") == ("On its I2C bus:", "nothing")
+    assert panel.lines(8000) == lost
+    panel.press(SHORT)
+    panel.sensor.fault = None
+    assert panel.lines()[0].startswith("Lean")
 
 
-def test_a_display_that_draws_gets_a_picture_of_the_first_page(screen):
-    assert len(screen.lines(0)) == 2
-    screen.pages.draws = True
-    assert len(screen.lines(100)) == 3
-    screen._meter.trusted = False
-    assert screen.lines(200)[:2] == ("Lean  --", "not sure yet")
-    assert len(screen.lines(200)) == 3
+@pytest.mark.parametrize(
+    ("config", "recording", "live", "own", "names"),
+    [
+        ({}, False, False, 0, PAGES),
+        ({}, True, False, 0, [*PAGES, "recording"]),
+        ({}, True, True, 2, [*PAGES, "live", "recording", "own", "own"]),
+        (WHEEL | {"VEHICLE": "car"}, False, False, 0, ["acceleration", "cornering", "raw", "drive"]),
+    ],
+)
+def test_short_presses_show_each_page_once(config, recording, live, own, names):
+    panel = Panel(**config)
+    if recording:
+        panel.app.rides.start()
+    panel.screen.pages.live = Live() if live else None
+    panel.screen.pages.own += [lambda: ("own", "")] * own
+    assert panel.walk(2 * len(names)) == 2 * names
+    if own:
+        assert panel.choose("Own pages") == ("own", "")
 
 
-def test_the_menu_asks_for_alignment_by_driving(drive, screen):
-    from kickstand.ui import page_ring
-
-    asked = []
-    drive.ask = lambda: asked.append(True)
-    screen.press(LONG, 0)
-    for k in range(10):
-        if "Align by drive" in first_line(screen, 100 * k):
-            break
-        screen.press(SHORT, 100 * k + 50)
-    screen.press(LONG, 1500)
-    assert asked == [True]
-    assert screen.pages._at == len(page_ring.MOTORCYCLE)  # the page that follows the motorcycle's pages
+def test_the_page_of_the_drive_follows_the_others_or_is_first():
+    panel = Panel(**WHEEL)
+    assert panel.choose("Align by drive")[0] == "Brakings   0/6" or panel.screen.pages.name == "drive"
+    assert panel.walk(2 * 6) == ["drive", *PAGES] * 2
 
 
-def test_the_problem_of_a_pose_is_known_until_the_next_pose(screen):
-    screen.press(LONG, 0)
-    screen.press(LONG, 100)
-    problem = CaptureError("moved")
-    screen.wizard._spoilt(problem, 200)
-    assert screen.wizard.problem is problem
-    assert screen.lines(300) == ("Moved!", "Hold it still")
-    screen.press(SHORT, 400)
-    assert screen.wizard.problem is None
+def test_before_an_alignment_the_page_of_the_drive_is_first():
+    panel = Panel(aligned=False, **WHEEL)
+    assert panel.lines()[1] == "Not aligned" and panel.lines(2000)[1] == "On stand: press"
+    panel.choose("Align by drive")
+    assert panel.screen.pages.name == "drive"
+    assert panel.press(SHORT, 6000) == ("Raw    0° +1.00g", "drive and brake")
+    assert panel.walk(2) == ["not_aligned", "drive"]
 
 
-def test_a_menu_ends_20_s_after_the_last_press(screen):
-    screen.press(LONG, 0)
-    screen.press(SHORT, 15_000)
-    assert first_line(screen, 34_900).startswith("\x7e")  # the code of the arrow before the chosen entry
-    assert first_line(screen, 35_000).startswith("Lean")
-    assert screen.menu is None
+def test_without_an_alignment_a_press_begins_it_and_own_pages_are_in_the_menu():
+    panel = Panel(aligned=False)
+    panel.screen.pages.own += [lambda: ("own", "")]
+    assert panel.choose("Own pages") == ("own", "") and panel.press(SHORT)[1] == "Not aligned"
+    assert panel.press(SHORT) == ("Stand: hold", "")
 
 
-def test_the_pages_use_a_short_press_and_leave_a_long_one(screen):
-    assert screen.pages.press(SHORT, 0) is True
-    assert screen.pages.press(LONG, 100) is False
+@pytest.mark.parametrize(
+    ("meter", "lines"),
+    [
+        ({}, ("Lean  12° right", True)),
+        ({"lean_deg": 65.0}, ("Lean  65° right", True)),
+        ({"lean_deg": -65.1}, ("Lean  --", "not sure yet")),
+        ({"suppressed_reason": "mount-moved"}, ("Lean  --", "mount has moved")),
+        ({"fallen": True}, ("Fallen over?", "Lean over 65°")),
+    ],
+)
+def test_a_lean_is_shown_only_if_it_is_trusted(meter, lines):
+    panel = Panel()
+    vars(panel.meter).update({"lean_deg": 12.0} | meter)
+    assert panel.lines() == lines or (panel.lines()[0], len(panel.lines()[1])) == (lines[0], 16)
+    panel.screen.pages.draws = True
+    assert len(panel.screen.lines(0)) == (2 if "fallen" in meter else 3)
+    panel.screen.pages.late = True
+    assert panel.lines()[0] == ("Fallen over?" if "fallen" in meter else "Lean  --")
+
+
+def test_a_display_that_draws_gets_pictures_of_three_pages():
+    panel = Panel()
+    panel.screen.pages.draws = True
+    counts = []
+    for _ in PAGES:
+        counts.append(len(panel.screen.lines(0)))
+        panel.press(SHORT)
+    assert counts == [3, 3, 3, 2, 2]

@@ -104,16 +104,6 @@ def test_config_with_more_than_settings_stays_with_the_rider(line, page, board):
     assert board.path("config.py").read_bytes() == own
 
 
-def test_each_board_has_its_own_default_pins(line, page, board):
-    """Until the page knows the board, it shows a Pico's pins."""
-    board.modules["sys"].implementation.__dict__["_machine"] = "Generic ESP32 module with ESP32"
-    board.modules["sys"].platform = "esp32"
-    look(line, board)
-    assert page.get_attribute("[name=BUTTON_PIN]", "placeholder") == "4"
-    choose(page, "BUTTON_PIN", "7")
-    assert "no pin of the chip" in line.rider.text("#fault-BUTTON_PIN")
-
-
 @pytest.mark.parametrize(
     ("name", "version", "platform", "words"),
     [
@@ -198,21 +188,6 @@ def test_the_form_has_every_setting(page):
     assert page.evaluate(zero) == ["0", "0"]
 
 
-def test_the_wiring_is_that_of_the_boards_own_pins(page):
-    """Each board also has a link to its own MicroPython, which opens a new tab."""
-    for board, pins in (
-        ("pico", ["GP4, pin 6", "GP5, pin 7", "GP6, pin 9", "GP7, pin 10", "GP15, pin 20"]),
-        ("esp32", [f"GPIO {number}" for number in (21, 22, 18, 19, 4)]),
-    ):
-        wired = page.locator(f".wired:has(img[src='./wiring_{board}.svg'])")
-        cells = wired.locator("td:last-child").all_text_contents()
-        assert [cell for cell in cells if "GND" not in cell and "3V3" not in cell] == pins
-    links = page.locator("a[href^='https:']").evaluate_all("all => all.map((one) => [one.href, one.target, one.rel])")
-    assert len({tuple(link) for link in links}) == len(links) == 10
-    assert all(link[1:] == ["_blank", "noopener"] for link in links)
-    assert links[0][0] == "https://micropython.org/download/RPI_PICO/"
-
-
 @pytest.mark.parametrize("name", ["install.html", "live.html"])
 def test_browser_without_serial_ports_is_told_so(chromium, address, name):
     """The message is at the top of the page. The page offers no action that needs a serial port. The page Install
@@ -235,25 +210,4 @@ def test_browser_without_serial_ports_is_told_so(chromium, address, name):
         assert page.eval_on_selector_all("main pre, main a:has(img)", wide) == 0, "cut at the right edge"
         assert rider.axe() == []
     assert rider.fits()
-    rider.context.close()
-
-
-def test_the_board_is_chosen_first_and_the_steps_around_it_open(chromium, address):
-    """On a phone and on a laptop, the button is on the first screen. A link to another step opens that step."""
-    rider = Rider(chromium, address + "install.html", **PHONE)
-    rider.page.evaluate("document.documentElement.dataset.serial = 'yes'")
-    page = rider.page
-    for kind, opened in ((PHONE, []), (LAPTOP, ["parts"])):
-        page.set_viewport_size(kind["viewport"])
-        page.reload()
-        button = page.locator("#look").bounding_box()
-        assert button["y"] + button["height"] < kind["viewport"]["height"] / 3 and rider.fits()
-        assert page.evaluate("document.documentElement.scrollHeight") < 2 * kind["viewport"]["height"]
-        steps = page.eval_on_selector_all("details.step", "all => all.filter((one) => one.open).map((one) => one.id)")
-        assert steps == opened
-    page.click("a[href='#micropython']")
-    assert page.is_visible("#micropython .steps")
-    page.goto(address + "install.html#calibrate")
-    page.reload()
-    assert page.is_visible("#calibrate picture")
     rider.context.close()

@@ -34,7 +34,8 @@ from ..units import const
 _OLED_ADDRESSES = const((0x3C, 0x3D))
 # 0x27 and 0x3F are the addresses of a backpack's PCF8574 and PCF8574A with all jumpers open
 ADDRESSES = (0x27, 0x3F) + _OLED_ADDRESSES
-_FAMILY = tuple(range(0x20, 0x27)) + tuple(range(0x38, 0x3C)) + (0x3E,)  # other addresses of a backpack
+_OWN_I2C = const(0x3E)  # address of a controller with I2C, see other_lcds.py
+_FAMILY = tuple(range(0x20, 0x27)) + tuple(range(0x38, 0x3C)) + (_OWN_I2C,)  # other addresses of a backpack
 LCD_HZ, OLED_HZ = 100_000, 400_000  # fastest clocks of a PCF8574 and of the OLEDs
 STOPPED = "Kickstand", "stopped"  # text of the display after the firmware has ended
 KINDS = ("auto", "lcd", "ssd1306", "sh1106", "ssd1306-32")
@@ -71,7 +72,6 @@ class Display:
         self._addresses = addresses
         self._look = contrast, inverted
         self._wiring = wiring
-        self._oled = False  # True if the driver is an Oled
         self._i2c = self._driver = None
         self._wanted = "", "", None
         self._status = bytearray(1)
@@ -96,8 +96,8 @@ class Display:
             if self.address is not None:
                 self._driver.tick(now_ms)
             elif self._probed_ms is None or ticks_diff(now_ms, self._probed_ms) >= self._wait_ms:
-                self._probed_ms = now_ms
-                self._probe()
+                first, self._probed_ms = self._probed_ms is None, now_ms
+                self._probe(first)
         except OSError:
             self.address = None
             self._probed_ms = now_ms
@@ -132,24 +132,29 @@ class Display:
             if interrupt:
                 interrupt(3)
 
-    def _probe(self):
-        """Look for the display at each address."""
+    def _probe(self, first):
+        """Look for the display at each address. The first search at power-on and the only search of flush() ask all
+        other addresses of a backpack too, the later searches one of them in turn."""
         if self._probes % _REOPEN_PROBES == 0:  # only at some searches, because freeing a stuck bus takes long
             self._i2c = self._reopen(self._bus_hz or LCD_HZ)
         self._probes += 1
         for address in self._addresses:
             if self._answers(address):
                 return
-        other = _FAMILY[self._probes % len(_FAMILY)]
-        if self._addresses is ADDRESSES and self._kind in ("auto", "lcd") and self._answers(other):
-            return
+        if self._addresses is ADDRESSES and self._kind in ("auto", "lcd"):
+            for k in range(len(_FAMILY) if first else 1):
+                if self._answers(_FAMILY[(self._probes + k) % len(_FAMILY)]):
+                    return
         # No display was found. A display that answers later has just been powered, and may be another display
         self._fresh = True
         self._wait_ms = _PROBE_MS
 
     def _answers(self, address):
         try:
-            self._i2c.readfrom_into(address, self._status)
+            if address == _OWN_I2C:  # a controller with I2C may not answer a read
+                self._i2c.writeto(address, b"\1")
+            else:
+                self._i2c.readfrom_into(address, self._status)
         except OSError:
             return False
         self._probes = 0
@@ -161,18 +166,31 @@ class Display:
 
     def _begin(self, address):
         oled = self._kind[0] == "s" or (self._kind == "auto" and address in _OLED_ADDRESSES)
-        if self._driver is None or self._oled != oled:
-            self._driver = None
-            if oled:
-                from .oled import Oled
+        if oled:
+            from .oled import Oled as Driver
 
-                self._driver = Oled(self._kind, *self._look)
-            else:
-                from .hd44780 import Lcd
+            arguments = (self._kind,) + self._look
+        else:
+            from .hd44780 import Lcd as Driver
 
-                self._driver = Lcd(self._wiring)
+            arguments = (self._wiring,)
+            # A PCF8574 puts this byte on its pins, where no wiring has E, and returns it. For an MCP23008 it is the
+            # number of a register that is 0
+            status = self._status
+            self._i2c.writeto(address, b"\1")
+            try:
+                self._i2c.readfrom_into(address, status)
+            except OSError:
+                status[0] = 0
+            if status[0] != 1 and (address == _OWN_I2C or not status[0]):
+                from . import other_lcds
+
+                Driver = other_lcds.OwnI2c if address == _OWN_I2C else other_lcds.Mcp23008
+        if type(self._driver) is not Driver:
+            self._driver = None  # frees its memory
+            self._driver = Driver(*arguments)
             self._driver.show(*self._wanted)
-            self._oled, self.draws = oled, self._driver.draws
+            self.draws = self._driver.draws
         hz = self._bus_hz or (OLED_HZ if oled else LCD_HZ)
         if hz != (self._bus_hz or LCD_HZ):
             self._i2c = self._reopen(hz)

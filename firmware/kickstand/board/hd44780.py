@@ -1,5 +1,5 @@
 """Driver for an HD44780 character display, 16x2 or larger, behind a PCF8574 port expander (the usual I2C backpack).
-display.py finds it and describes its methods.
+display.py finds it and describes its methods. other_lcds.py has the drivers of other character displays.
 
 Sources: data sheets Hitachi HD44780U (ADE-207-272) and NXP PCF8574. The driver uses the 4-bit mode. The driver sends
 the changed part of a line in two transfers: first dashes, then the text. A transfer of a whole line takes 6 ms at 100
@@ -13,12 +13,12 @@ from time import ticks_diff, ticks_ms
 
 from micropython import const
 
-# Index: LCD_WIRING - 1. Each row has the bits of RS, E and the backlight, then True if D4 to D7 are wired to P0 to P3
+# Index: LCD_WIRING - 1. Each row has the bits of RS, E and the backlight, then 4 minus the pin of D4
 WIRINGS = (
-    (0x01, 0x04, 0x08, False),  # the usual wiring: RS at P0, E at P2, backlight at P3
-    (0x40, 0x10, 0x00, True),  # MJKDZ, GY-IICLCD: RS at P6, E at P4, backlight at P7, on while P7 is low
-    (0x10, 0x40, 0x80, True),  # RS at P4, E at P6, backlight at P7
-    (0x01, 0x04, 0x00, False),  # like the first wiring, but the backlight is on while P3 is low
+    (0x01, 0x04, 0x08, 0),  # the usual wiring: RS at P0, E at P2, backlight at P3
+    (0x40, 0x10, 0x00, 4),  # MJKDZ, GY-IICLCD: RS at P6, E at P4, backlight at P7, on while P7 is low
+    (0x10, 0x40, 0x80, 4),  # RS at P4, E at P6, backlight at P7
+    (0x01, 0x04, 0x00, 0),  # like the first wiring, but the backlight is on while P3 is low
 )
 _LINE_ADDRESSES = (0x80, 0xC0)  # instruction "set DDRAM address" for the beginning of each line (table 6)
 _CGRAM_ADDRESS = const(0x40)  # instruction "set CGRAM address" (table 6)
@@ -65,7 +65,7 @@ class Lcd:
 
     def __init__(self, wiring=1):
         """wiring: number of the wiring in WIRINGS, from 1, like the setting LCD_WIRING."""
-        self._rs, self._e, self._light, self._low = WIRINGS[wiring - 1]
+        self._rs, self._e, self._light, self._shift = WIRINGS[wiring - 1]
         self._wanted = [bytearray(b" " * _COLUMNS), bytearray(b" " * _COLUMNS)]
         self._shown = [bytearray(_COLUMNS), bytearray(_COLUMNS)]
         self._texts = [_NO_TEXT, _NO_TEXT]  # the last text of each line, if it was a str
@@ -133,7 +133,7 @@ class Lcd:
 
     def _initialise(self, step):
         if step < len(_NIBBLES):
-            nibble = (_NIBBLES[step] >> 4 if self._low else _NIBBLES[step]) | self._light
+            nibble = _NIBBLES[step] >> self._shift | self._light
             self._i2c.writeto(self._address, bytes((nibble, nibble | self._e, nibble)))
         elif step == len(_NIBBLES):
             for command in _COMMANDS:
@@ -195,12 +195,8 @@ class Lcd:
         """Put a byte into _packed as two nibbles. Each nibble is sent with E high, then with E low, because the falling
         edge of E latches it."""
         packed, enable = self._packed, self._e
-        if self._low:
-            high = value >> 4 | control
-            low = value & 0x0F | control
-        else:
-            high = value & 0xF0 | control
-            low = value << 4 & 0xF0 | control
+        high = (value & 0xF0) >> self._shift | control
+        low = (value << 4 & 0xF0) >> self._shift | control
         packed[at] = high | enable
         packed[at + 1] = high
         packed[at + 2] = low | enable

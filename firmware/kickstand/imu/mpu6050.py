@@ -71,8 +71,10 @@ CHIPS = {
     0x74: ("MPU6515", 333.87, 21.0, True, 512, 0xF8),
     0x78: ("MPU6500 0x78", 333.87, 21.0, True, 512, 0xF8),
     0x98: ("ICM20689", 326.8, 25.0, True, 512, 0xF8),
-    # FIFO_EN has no bit for the temperature, which the chip always stores
+    # FIFO_EN has no bit for the temperature, which these chips always store
     0x19: ("MPU6886", 326.8, 25.0, True, 512, 0x18),
+    0x12: ("ICM20602", 326.8, 25.0, True, 1008, 0x18),
+    0x11: ("ICM20600", 326.8, 25.0, True, 1008, 0x18),
 }
 _NAME = const(0)
 _LSB_PER_C = const(1)

@@ -90,19 +90,27 @@ class Live:
         radio = self.radio
         if radio.changed:
             self._begin()
+            if not radio.written:  # forget what the last phone has written
+                radio.take_writes(radio.filter)
+                radio.take_writes(radio.rate)
             self._look_ms = now_ms
-        inbox = radio.inbox  # keep this list, because the interrupt may replace radio.inbox
-        while inbox:
-            self._hear(*inbox.pop(0))
+        if radio.written:
+            self._hear()
         if self.period_ms and ticks_diff(now_ms, self._due_ms) >= 0:
             self._send(now_ms)
         if ticks_diff(now_ms, self._look_ms) >= 0:
             self._look(now_ms)
 
-    def _hear(self, handle, data):
-        if handle == self.radio.filter and packets.take_filter(data, self._intervals):
-            self.asked = "RaceChrono"
-        elif handle == self.radio.rate and packets.take_rate(data, self._intervals):
+    def _hear(self):
+        radio = self.radio
+        radio.written = False
+        data = radio.take_writes(radio.filter)
+        while data:
+            length = packets.FILTER_LENGTHS.get(data[0], len(data))
+            if packets.take_filter(data[:length], self._intervals):
+                self.asked = "RaceChrono"
+            data = data[length:]
+        if packets.take_rate(radio.take_writes(radio.rate)[-2:], self._intervals):
             self.asked = "browser"
         self._ask()
 

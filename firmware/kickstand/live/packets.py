@@ -91,6 +91,9 @@ def _interval(data, start, form):
     return max(_FASTEST_MS, unpack_from(form, data, start)[0])
 
 
+FILTER_LENGTHS = {0: 1, 1: 3, 2: 7}  # first byte of a command to RaceChrono's filter: bytes of the command
+
+
 def take_filter(data, intervals):
     """Execute a command that RaceChrono has written to its filter.
 

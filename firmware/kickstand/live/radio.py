@@ -10,7 +10,7 @@ from . import packets
 # UUID of our own service. The service's characteristics have 0001 to 0004 in place of the first 0000.
 SERVICE = "7b6f0000-3c1e-4d5a-9a55-6b69636b7374"
 _ADVERTISE_US = const(150_000)
-MOST_WRITES = 16  # most writes that can wait for the loop; further writes are ignored
+_WRITES_BYTES = const(64)  # bytes of writes to a characteristic that can wait for the loop
 
 _CONNECTED, _DISCONNECTED, _WRITTEN, _GET_SECRET, _SET_SECRET, _PASSKEY = 1, 2, 3, 29, 30, 31
 _READ, _WRITE, _NOTIFY = 0x02, 0x08, 0x10
@@ -22,13 +22,16 @@ _DISPLAY_ONLY = 0  # tells the phone that the board shows the PIN, so the phone 
 class Radio:
     """Sends notifications to one phone, and keeps the phone's writes for the loop. Raises LiveError.
 
+    After an exception in the interrupt MicroPython would never call it again, so the interrupt raises nothing and
+    takes no heap except for keys: it sets attributes that exist, and the loop reads what the phone has written.
+
     Args:
         pin: six digits that must be entered on a phone, or None.
 
     Attributes:
         phone: the handle of the connected phone, or None.
         changed: True if the phone has connected or disconnected since the loop set it to False.
-        inbox: list of the phone's writes, each as (handle, bytes). The handle is `filter` or `rate`.
+        written: True if the phone has written to `filter` or `rate` since the loop set it to False.
         filter, rate, chrono, now, ride: the handles of the characteristics.
         name: the advertised name of the board.
     """
@@ -43,7 +46,8 @@ class Radio:
         self._bonds = None
         if pin is not None and not hasattr(ble, "gap_passkey"):
             raise LiveError("no-pairing")
-        self.phone, self.changed, self.inbox = None, True, []
+        self.phone, self.changed = None, True
+        self.written = False
         try:
             if pin is not None:
                 from .bonds import Bonds
@@ -69,6 +73,8 @@ class Radio:
         chrono = (uuid(0x0001), read | _NOTIFY), (uuid(0x0002), write)
         handles = ble.gatts_register_services(((uuid(0x1FF8), chrono), (uuid(SERVICE), own)))
         (self.chrono, self.filter), (board, self.rate, self.now, self.ride) = handles
+        for handle in self.filter, self.rate:
+            ble.gatts_set_buffer(handle, _WRITES_BYTES, True)
         mac = ble.config("mac")[1]
         self.name = "Kickstand %02X%02X" % (mac[4], mac[5])
         ble.config(gap_name=self.name)
@@ -78,20 +84,32 @@ class Radio:
         self._named = bytes([1 + len(self.name), 9]) + self.name.encode()
 
     def _irq(self, event, data):
-        if event == _WRITTEN:
-            if len(self.inbox) < MOST_WRITES:
-                self.inbox.append((data[1], self._ble.gatts_read(data[1])))
-        elif event == _CONNECTED or event == _DISCONNECTED:
-            self.phone = data[0] if event == _CONNECTED else None
-            self.changed = True  # set before the next lines, because they may run out of memory
-            self.inbox = []
-        elif event == _PASSKEY:
-            getattr(self._ble, "gap_passkey")(data[0], data[1], self._pin)  # noqa: B009 missing in the stubs of rp2
-        elif self._bonds and event == _GET_SECRET:
-            return self._bonds.get(*data)
-        elif self._bonds and event == _SET_SECRET:
-            return self._bonds.put(*data)
+        try:
+            if event == _WRITTEN:
+                self.written = True
+            elif event == _CONNECTED or event == _DISCONNECTED:
+                self.phone = data[0] if event == _CONNECTED else None
+                self.written = False
+                self.changed = True
+            elif event == _PASSKEY:
+                getattr(self._ble, "gap_passkey")(data[0], data[1], self._pin)  # noqa: B009 missing in the stubs of rp2
+            elif self._bonds and event == _GET_SECRET:
+                return self._bonds.get(*data)
+            elif self._bonds and event == _SET_SECRET:
+                return self._bonds.put(*data)
+        except Exception:  # without memory for a key the phone must enter the PIN again
+            pass
         return None
+
+    def take_writes(self, handle):
+        """Return the bytes that the phone has written to `filter` or `rate` since the last call, all writes in a row.
+
+        Set `written` to False before. Raises nothing: without memory the writes wait for the next call."""
+        try:
+            return self._ble.gatts_read(handle)
+        except (OSError, MemoryError):
+            self.written = True
+            return b""
 
     def advertise(self):
         """Advertise the board to the next phone. Return True on success."""

@@ -21,8 +21,8 @@ from ..units import const
 
 # Longest sentence in bytes. The standard allows 82 bytes, but receivers with many decimals exceed this length.
 _MAX_SENTENCE = const(100)
-# Most bytes read per pass of the loop. With a pass every 10 ms, this is twice the need of 10 fixes per second.
-_MAX_CHUNK = const(64)
+# Most bytes read per pass of the loop. With a pass every 10 ms, this is twice what arrives at 115,200 baud.
+_MAX_CHUNK = const(256)
 _SILENT_MS = const(3000)  # time without a byte, a sentence or a fix after which fault() reports it
 _LATE_MS = const(2000)  # a fix that is older when it arrives gives no speed
 _LOOK_MS = const(1500)  # time without a sentence with a speed after which other kinds of sentences are examined
@@ -38,6 +38,7 @@ _KMH_MPS = const(1.0 / 3.6)  # one km/h in m/s
 _DAY_MS = 86_401_000  # length of a day with a leap second
 # Valid years after 2000. A receiver sends an earlier date after a week rollover, or before it knows the date.
 _YEARS = (25, 79)
+_SPEEDS = (b"RMC", b"VTG")  # sentences with a speed
 _POSITIONS = (b"GGA", b"GLL", b"GNS")  # sentences without a speed that are reported before other kinds
 _UBX = b"\xb5b"  # the beginning of a u-blox binary message; class, number and a two-byte length follow
 _UBX_CLASSES = b"\x01\x02\x05\x06\x0a\x0b\x0d\x10\x13\x21\x27\x28"
@@ -60,6 +61,7 @@ class Gps:
     def __init__(self, uart):
         self._uart = uart
         self._line = b""  # the part of a sentence that has arrived so far
+        self._rest = b""  # what has arrived after the last speed, for the next poll()
         self._heard_ms = None  # ticks_ms() when the receiver last sent any byte
         # ticks_ms() of the last whole sentence, of the last sentence with a fix, and of the last _carry()
         self._sentence_ms = self._fix_ms = self._carried_ms = 0
@@ -89,29 +91,35 @@ class Gps:
         elif ticks_diff(now_ms, self._carried_ms) > _CARRY_MS:
             self._carry(now_ms)
         waiting = self._uart.any()
-        if not waiting:
+        if not (waiting or self._rest):
             return None
         if heard_ms is not None and ticks_diff(now_ms, heard_ms) > _SILENT_MS:
             self._begin(now_ms)
         self._heard_ms = now_ms
-        chunk = self._uart.read(min(waiting, _MAX_CHUNK)) or b""
+        chunk = self._uart.read(min(waiting, _MAX_CHUNK - len(self._rest))) or b""
+        if self._rest:
+            chunk, self._rest = self._rest + chunk, b""
         looks = ticks_diff(now_ms, self._sentence_ms) > _LOOK_MS
         if looks and _has_ubx(self._line + chunk):
             self._other = self._other or b"UBX"
-        speed = None
-        end = chunk.find(b"\n")
+        begin, end = 0, chunk.find(b"\n")
         while end >= 0:
-            new = self._sentence(self._line + chunk[:end], now_ms)
-            if new is not None:
-                speed = new
+            # A whole sentence of another kind is skipped here, because with many satellites most sentences are such
+            start = chunk.rfind(b"$", begin, end)
+            speed = None
+            if looks or self._line or chunk[start + 3 : start + 6] in _SPEEDS:
+                speed = self._sentence(self._line + chunk[begin:end], now_ms)
             self._line = b""
-            chunk = chunk[end + 1 :]
-            end = chunk.find(b"\n")
-        self._line += chunk
+            begin = end + 1
+            if speed is not None:
+                self._rest = chunk[begin:]
+                return speed
+            end = chunk.find(b"\n", begin)
+        self._line += chunk[begin:]
         beyond = len(self._line) - _MAX_SENTENCE
         if beyond > 0:  # the end of a line was lost, so keep only bytes that may begin the next line
             self._line = self._line[max(beyond, self._line.rfind(b"$")) :]
-        return speed
+        return None
 
     def _begin(self, now_ms):
         """Restart the time-outs."""
@@ -171,7 +179,7 @@ class Gps:
         """Return the speed in a line in m/s, or None if the line has no valid speed."""
         start = line.rfind(b"$")  # noise may precede the sentence
         kind = line[start + 3 : start + 6]
-        if start < 0 or kind not in (b"RMC", b"VTG"):
+        if start < 0 or kind not in _SPEEDS:
             if start >= 0 and ticks_diff(now_ms, self._sentence_ms) > _LOOK_MS:
                 self._look_at(line[start:])
             return None

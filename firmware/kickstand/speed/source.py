@@ -18,6 +18,7 @@ _NOISE_MPS = const(2.0)  # noise of a speed, by which a change of speed may exce
 _GIVE_UP_MS = const(3000)  # duration of rejected speeds that shows that the last accepted speed was wrong
 # Bytes of half a second at 9600 baud. This buffer is large enough while flash is written or the sensor is set up.
 _RX_BUFFER = const(512)
+_RX_PER_S = const(50)  # a faster receiver has a buffer of 0.2 s: 2304 bytes at 115,200 baud
 
 
 class Speed:
@@ -87,7 +88,8 @@ def _open_uart(settings):
     # Set TX too, although nothing is sent. The default TX of a Pico is one of the sensor's pins.
     try:
         tx, rx = Pin(pins[0]), Pin(pins[1])
-        return UART(settings.GPS_UART, settings.GPS_BAUD, tx=tx, rx=rx, rxbuf=_RX_BUFFER, timeout=0)
+        size = max(_RX_BUFFER, settings.GPS_BAUD // _RX_PER_S)
+        return UART(settings.GPS_UART, settings.GPS_BAUD, tx=tx, rx=rx, rxbuf=size, timeout=0)
     except ValueError as error:
         raise SettingsError("uart-pins", "GPS_TX / GPS_RX", *pins, settings.GPS_UART, str(error))
 

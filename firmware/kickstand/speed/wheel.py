@@ -10,8 +10,8 @@ else. In a storm the interrupt turns itself off, and poll() turns it on again la
 
 from time import ticks_add, ticks_diff, ticks_us
 
+import micropython
 from machine import Pin
-from micropython import alloc_emergency_exception_buf
 
 from ..errors import Notice
 from ..units import const
@@ -67,8 +67,10 @@ class Wheel:
         self._soft = not irq.get("hard")
         self._too_quick = None  # True while pulses are too fast for a soft interrupt; None before the first pulses
         self.problem = None
-        if not self._soft:
-            alloc_emergency_exception_buf(100)  # an exception in a hard interrupt cannot take heap for its report
+        # An exception in a hard interrupt cannot take heap for its report. MicroPython for Linux lacks the function
+        keep_room = getattr(micropython, "alloc_emergency_exception_buf", None)
+        if keep_room and not self._soft:
+            keep_room(100)
         self._listen()
 
     def _listen(self):

@@ -33,7 +33,15 @@ class Bridge:
         self._thread = threading.Thread(target=self._run, args=(plan, begin_s, directory), daemon=True)
         self._thread.start()
 
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._over = True
+        self._thread.join(20)
+
     def _run(self, plan, begin_s, directory):
+        previous = os.getcwd()
         os.chdir(directory)
         world, _ = world_of(plan)
         device = self.device = Device(world, machine="pico w")
@@ -46,6 +54,7 @@ class Bridge:
         with contextlib.suppress(SystemExit):
             device.run(plan["config"], [plan["until"]])
         air.close()
+        os.chdir(previous)
 
     def _look_whether_over(self):
         if self._over:
@@ -105,12 +114,8 @@ class Bridge:
 
     def drop(self):
         """Cut the connection."""
-        self.air.radio._clock.at(0, self.air.dropped)
+        self.device.board.clock.at(0, self.air.dropped)
 
     def silence(self, on):
         """Move the board out of reach, and back."""
         self.air.radio.away = on
-
-    def end(self):
-        self._over = True
-        self._thread.join(20)

@@ -43,7 +43,7 @@ def loop(orders, until_s):
         elif stopped:
             device.powered = stopped = device.resume(device.rest) != "off"
         else:
-            ended = board.run(main, until_s)
+            ended = board.run(lambda: main(closed_ms=0), until_s)
             device.powered, stopped = ended != "off", ended == "returned"
     return orders, json.loads(device.take())
 

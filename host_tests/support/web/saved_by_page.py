@@ -1,6 +1,5 @@
 """The files that the page Live offers to save, and the files that `kickstand record` would write."""
 
-import base64
 import io
 import threading
 
@@ -29,10 +28,3 @@ def recorded(blocks):
     assert recording.first
     write_calibration(calibration, ride_log.calibration(recording.first))
     return [log.getvalue().encode(), calibration.getvalue().encode()]
-
-
-def streamed(said):
-    """Return the blocks in the whole output of a board."""
-    begun = said.rindex(b"\x04", 0, said.index(b"\n.\r\n")) + 1
-    *whole, _ = said[begun:].partition(b"\r\n")[2].split(b".\r\n")  # the first line names the vehicle
-    return [b"".join(map(base64.b64decode, block.split())) for block in whole]

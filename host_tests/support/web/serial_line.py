@@ -1,4 +1,4 @@
-"""A serial port in the browser, connected to an emulated Pico in the test's own process.
+"""A serial port in the browser, connected to a board in the test's own process.
 
 Emulated time passes only while the page listens.
 """

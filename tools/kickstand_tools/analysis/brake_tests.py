@@ -35,7 +35,7 @@ def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
 def car_channels(log: Source, calibration: CalibrationFile) -> list[Channels]:
     """Return the channels of a car's log, in the vehicle's axes and without a lean. The list has one item per block."""
     found = []
-    for whole in read_blocks(log):
+    for whole in read_blocks(log, lines=False):
         block = whole.measured
         if len(block.time_us):
             lean: dict[str, Array] = {name: np.zeros(len(block.time_us)) for name in ("shown_g", "resting", "sure")}

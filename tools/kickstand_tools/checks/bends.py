@@ -1,12 +1,8 @@
-"""Checks in the bends of a motorcycle ride that the angular rates of a log are in deg/s and have the right sign.
+"""Checks in the bends of a motorcycle ride that the angular rates of a log are in deg/s.
 
 In a bend, the rate of a leaning bike about its own left axis is the yaw rate times the sine of the lean. The log's
-rates give the rate about left, the yaw rate and the lean. This shows two mistakes:
-
-* Rates in rad/s are 57 times too small. The product is then 57 x 57 times too small, but the rate about left only 57
-  times.
-* All rates have the opposite sign, or all axes are left-handed. The rate about left then has the opposite sign, but the
-  product keeps its sign.
+rates give the rate about left, the yaw rate and the lean. Rates in rad/s are 57 times too small. The product is then
+57 x 57 times too small, but the rate about left only 57 times.
 
 Logs of a parked vehicle are never judged. Logs of a car are never judged either, because a car does not lean.
 """
@@ -15,15 +11,12 @@ import numpy as np
 
 from ..common.messages import AT_REST, Message, Remedy, WrongAxes
 from ..signals import Array
-from ..signals.leaning import LIKENESS, WINDOW_S, leaning_of, leans, speed_in_radians, unrest
+from ..signals.leaning import WINDOW_S, leaning_of, speed_in_radians, unrest
 from .cells import CELL_S, LogCells
 
 KEPT_S, RIDING_S = 1800.0, 15.0  # the last KEPT_S are judged if they have RIDING_S of riding
 # The bike is riding if the standard deviation of its rates over MOVES_S is over MOVES times its 95th percentile.
 MOVES_S, MOVES = 1.6, 0.1
-# The gyro has the opposite sign if Leaning.share is under AGAINST and differs from 0 by over SURE standard deviations.
-# With the opposite sign, the share was -1.6 to -1.0.
-AGAINST, SURE = -0.5, 5.0
 # The calmest seconds are the share CALMEST of all seconds, but at least LEAST seconds. In calm_rates(), the standard
 # deviation CALM_G of the force counts as much as the standard deviation calm_rate of the rates.
 CALMEST, LEAST, CALM_G = 0.2, 3, 0.02
@@ -52,12 +45,12 @@ class LeftHanded(WrongAxes):
     text = "the rates turn the force the wrong way, so the lean is wrong"
     todo = Remedy(
         "are the axes left-handed (reverse one in both sensors) or the gyro of the opposite sign (reverse all its "
-        f"rates)? {AT_REST.capitalize()}"
+        f"rates)? The wrong one of the two exchanges left and right: try a lean to a known side. {AT_REST.capitalize()}"
     )
 
 
 def bends(cells: LogCells) -> Message | None:
-    """Return a notice if the rates seem to be in rad/s, or to have the opposite sign.
+    """Return a notice if the rates seem to be in rad/s.
 
     Returns None if the rates seem right, or if the log is not enough to judge them.
     """
@@ -76,12 +69,8 @@ def bends(cells: LogCells) -> Message | None:
     if bias is None:
         return None
     rate -= np.radians(bias)
-    found = leaning_of(rate, force, changes > moves)
-    speed = speed_in_radians(found)
-    if speed is not None:
-        return RatesInRadians(speed)
-    against = found.share < AGAINST and found.sigmas > SURE and found.likeness > LIKENESS
-    return LeftHanded() if against and leans(found) else None
+    speed = speed_in_radians(leaning_of(rate, force, changes > moves))
+    return None if speed is None else RatesInRadians(speed)
 
 
 def calm_bias(calm: Array) -> Array | None:

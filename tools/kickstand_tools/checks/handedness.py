@@ -21,24 +21,23 @@ import numpy as np
 from kickstand.units import AXES
 
 from ..common.messages import Message, Remedy, WrongAxes
-from ..signals import Array, Bools, Ints, stretches
-from .bends import LeftHanded, calm_rates
+from ..signals import Array
+from .bends import LeftHanded
 from .cells import CELL_S, LogCells
-from .turning import Turning, TurningFit
+from .turning import FAR_DPS, Turning, TurningFit, liveliest
 
-WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # short windows are used if the log has no long window without a gap
-MOST_WINDOWS = 10  # number of windows that are judged: the windows with the largest rates
-CALM_DPS = 2.0  # value of calm_rate for calm_rates(), in deg/s
-TRIED, STEPS = 4, 4  # number of exchanges that are fitted with their bias, and steps of the bias
+# Numbers of exchanges that are fitted with their bias, besides none and all axes reversed
+TRIED, TRIED_IF_WRONG = 4, 12
 
 # Another exchange must reduce the mean square of the residual force (g2) by this factor, or by FEW_CLEARLY in at most
 # FEW_WINDOWS windows. In correct logs the factor was at most 1.6 in windows of simulated and recorded rides.
 CLEARLY, FEW_WINDOWS, FEW_CLEARLY = 2.0, 3, 3.0
 # Least reduction of the mean square, for any factor. In a parked vehicle, drift reduces it by under 0.0002.
 LEAST_G2 = 0.001
-# An exchange is named if the residual of each other one is larger by this factor. Before, the residuals are multiplied
-# by PENALTY: all axes reversed (or none) are the likeliest mistake, then some axes reversed or two exchanged.
-NAMED = 1.3
+# An exchange is named if the residual of each other one is larger by this factor, or by FEW_NAMED in few windows.
+# Before, the residuals are multiplied by PENALTY: all axes reversed (or none) are the likeliest mistake, then some axes
+# reversed or two exchanged.
+NAMED, FEW_NAMED = 1.3, 1.8
 PENALTY = 1.0, 1.15, 1.3
 
 
@@ -112,8 +111,8 @@ def handedness(cells: LogCells) -> Message | None:
 
     Returns None if the axes seem right, or if the log is not enough to judge them.
     """
-    windows = liveliest(cells)
-    fits = None if windows is None else fit_exchanges(*windows)
+    found = liveliest(cells.force, cells.rate, cells.known, CELL_S)
+    fits = None if found is None else fit_exchanges(*found)
     if fits is None or not is_wrong(fits):
         return None
     best = likeliest(fits)
@@ -123,24 +122,38 @@ def handedness(cells: LogCells) -> Message | None:
     return LeftHanded() if reversed_all else RatesMisfit(*map(tuple, EXCHANGES[best].astype(int).tolist()))
 
 
-def fit_exchanges(turning: Turning, biases: list[Array]) -> dict[int, TurningFit]:
+def fit_exchanges(turning: Turning, guesses: list[Array]) -> dict[int, TurningFit]:
     """Fit the log's own axes, all axes reversed, and the exchanges that explain the forces best.
 
-    biases: first guesses of the gyro's bias. The gyro's bias is the same for each exchange, so the bias of the best fit
-        is tried for all.
+    If the log's own axes seem wrong, they are fitted again from more guesses, because the fit may have ended at the
+    rate of a long bend instead of the bias. If they still seem wrong, more exchanges are fitted, to name the right one.
+
+    guesses: guesses of the gyro's bias, each of shape (3), in deg/s. The bias is the same for each exchange, so the
+        bias of the best fit is tried for all.
     Returns the fits by their index in EXCHANGES.
     """
     fits: dict[int, TurningFit] = {}
 
-    def fit(rough: Array, guesses: list[Array]) -> None:
-        """rough: residual of each exchange for each guess, shape (48, guesses)."""
-        for k in {0, 1, *fits, *np.argsort(np.min(rough, axis=1))[:TRIED].tolist()}:
-            found = turning.fit(EXCHANGES[k], guesses[int(np.argmin(rough[k]))], STEPS)
-            fits[k] = min(fits.get(k, found), found, key=lambda each: each.cost)
+    def fit(k: int, bias: Array) -> None:
+        found = turning.fit(EXCHANGES[k], bias)
+        fits[k] = min(fits.get(k, found), found, key=lambda each: each.cost)
 
-    fit(np.column_stack([turning.rough(EXCHANGES, bias) for bias in biases]), biases)
-    bias = min(fits.values(), key=lambda each: each.cost).bias
-    fit(turning.rough(EXCHANGES, bias)[:, None], [bias])
+    def fit_best(biases: list[Array], tried: int) -> None:
+        rough = np.column_stack([turning.rough(EXCHANGES, bias) for bias in biases])
+        for k in {0, 1, *fits, *np.argsort(np.min(rough, axis=1))[:tried].tolist()}:
+            fit(k, biases[int(np.argmin(rough[k]))])
+
+    def best() -> Array:
+        return min(fits.values(), key=lambda each: each.cost).bias
+
+    fit_best(guesses, TRIED)
+    fit_best([best()], TRIED)
+    if is_wrong(fits):
+        for bias in [*guesses, *FAR_DPS]:
+            fit(0, bias)
+    if is_wrong(fits):
+        fit_best([best(), *guesses, *FAR_DPS], TRIED_IF_WRONG)
+        fit_best([best()], TRIED)
     return fits
 
 
@@ -155,34 +168,8 @@ def likeliest(fits: dict[int, TurningFit]) -> int | None:
     """Return the index in EXCHANGES of the exchange that is right; None if several may be right."""
     scores = {k: float(np.mean(fit.left)) * _penalty(EXCHANGES[k]) for k, fit in fits.items()}
     best, second = sorted(scores, key=lambda k: scores[k])[:2]
-    return best if scores[second] > NAMED * scores[best] else None
-
-
-def liveliest(cells: LogCells) -> tuple[Turning, list[Array]] | None:
-    """Return the windows of the log with the largest rates, and guesses of the gyro's bias; None without a window.
-
-    A phone has no bias. The other guesses are the median rates of the log and of its calmest seconds.
-    """
-    places = _windows(cells.known, WINDOW_S)
-    places = places if len(places) else _windows(cells.known, SHORT_WINDOW_S)
-    if not len(places):
-        return None
-    usual = np.median(cells.rate[cells.known], axis=0)
-    seconds = _windows(cells.known, 1.0)
-    calm = np.median(calm_rates(cells.force[seconds], cells.rate[seconds], CALM_DPS), axis=0)
-    turned = np.sum((cells.rate[places] - usual) ** 2, axis=(1, 2))
-    places = places[np.sort(np.argsort(-turned)[:MOST_WINDOWS])]
-    return Turning(cells.force[places], cells.rate[places], CELL_S), [np.zeros(3), usual, calm]
-
-
-def _windows(known: Bools, seconds: float) -> Ints:
-    """Find the windows of this many seconds without an unknown cell.
-
-    Returns the indices of the cells of each window, shape (windows, cells).
-    """
-    length = round(seconds / CELL_S)
-    starts = [k for begin, end in stretches(known) for k in range(begin, end - length + 1, length)]
-    return np.array(starts, dtype=int).reshape(-1, 1) + np.arange(length)
+    named = NAMED if len(fits[0].left) > FEW_WINDOWS else FEW_NAMED
+    return best if scores[second] > named * scores[best] else None
 
 
 def _penalty(exchange: Array) -> float:

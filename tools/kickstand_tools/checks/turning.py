@@ -13,20 +13,27 @@ direction, plus a little across it for a phone in a hand. The method of least sq
 and the gyro's bias, with a prior for V and the bias. The residual shows how well the rates fit the forces.
 """
 
+import itertools
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ..signals import Array, cross_matrix, rotation_matrix
+from ..signals import Array, Bools, Ints, cross_matrix, rotation_matrix, stretches
 
+WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # short windows are used if the log has no long window without a gap
+MOST_WINDOWS = 10  # number of windows that are fitted: the windows with the largest rates
+
+FAR_DPS = 10.0 * np.array(list(itertools.product((1.0, -1.0), repeat=3)))  # guesses of a large bias
+MERGED_S = 0.2  # cells are merged to this length
 KNOT_S = 2.5  # time between the knots of the velocity
 EVENED_S = 1.0  # time over which the rotated forces are averaged, to remove vibration
 FORCE_G = 0.1  # standard deviation of the noise of these means
 # Standard deviations of the prior: of the velocity along the vehicle's direction and across it, and of the gyro's bias.
 ALONG_MPS, ACROSS_MPS, BIAS_DPS = 30.0, 2.0, 10.0
 UP_G = 0.07  # standard deviation of the length of `up`, because of the accelerometer's errors
+STEPS = 5  # most steps that correct the bias
 MOST_DPS = 8.0  # largest change of the bias in one step
 SETTLED = 0.02  # the bias is found if a step reduces the cost by a smaller share
 SMALLER, LEAST_STEP = 0.3, 0.1  # a step that increases the cost is tried again, smaller
@@ -44,6 +51,49 @@ class TurningFit:
     left: Array
     bias: Array
     cost: float
+
+
+def liveliest(force: Array, rate: Array, known: Bools, cell_s: float) -> tuple["Turning", list[Array]] | None:
+    """Return the windows of a log with the largest rates, and guesses of the gyro's bias; None without a window.
+
+    A phone has no bias. In other logs, the median rate is a guess: most of a ride is nearly straight.
+
+    force: mean force of each cell, shape (n, 3), in g.
+    rate: mean rate of each cell, shape (n, 3), in deg/s.
+    known: False for the cells in gaps, shape (n).
+    cell_s: duration of a cell.
+    """
+    places = windows(known, round(WINDOW_S / cell_s))
+    places = places if len(places) else windows(known, round(SHORT_WINDOW_S / cell_s))
+    if not len(places):
+        return None
+    usual = np.median(rate[known], axis=0)
+    turned = np.sum((rate[places] - usual) ** 2, axis=(1, 2))
+    places = places[np.sort(np.argsort(-turned)[:MOST_WINDOWS])]
+    merged = (len(places), -1, round(MERGED_S / cell_s), 3)
+    force, rate = (np.mean(values[places].reshape(merged), axis=2) for values in (force, rate))
+    return Turning(force, rate, MERGED_S), [np.zeros(3), usual]
+
+
+def bias_dps(force: Array, rate: Array, known: Bools, cell_s: float) -> Array | None:
+    """Find the gyro's bias in a log without a standstill, shape (3), in deg/s; None if the log is too short.
+
+    For the parameters see liveliest().
+    """
+    found = liveliest(force, rate, known, cell_s)
+    if found is None:
+        return None
+    turning, guesses = found
+    return min((turning.fit(np.eye(3), guess) for guess in [*guesses, *FAR_DPS]), key=lambda fit: fit.cost).bias
+
+
+def windows(known: Bools, length: int) -> Ints:
+    """Find the windows of `length` cells without an unknown cell.
+
+    Returns the indices of the cells of each window, shape (windows, length).
+    """
+    starts = [k for begin, end in stretches(known) for k in range(begin, end - length + 1, length)]
+    return np.array(starts, dtype=int).reshape(-1, 1) + np.arange(length)
 
 
 class Turning:
@@ -70,14 +120,14 @@ class Turning:
                 left[k] = np.mean(fit.left + _WEIGHT * (np.linalg.norm(fit.up, axis=1) - 1.0) ** 2 / model.means)
         return left
 
-    def fit(self, exchange: Array, bias: Array, steps: int) -> TurningFit:
-        """Fit velocity, direction and bias for one exchange. bias: the first guess. steps: most steps of the bias."""
+    def fit(self, exchange: Array, bias: Array) -> TurningFit:
+        """Fit velocity, direction and bias for one exchange. bias: the first guess."""
         sign = float(np.sign(np.linalg.det(exchange)))
         force = _permuted(self._force, sign, exchange)
         model = _Model(sign, self._rate, bias, self._cell_s)
         fit, share = model.along_fit(force), 1.0
-        for _ in range(steps):
-            change = share * np.clip(model.bias_change(fit), -MOST_DPS, MOST_DPS)
+        for _ in range(STEPS):
+            change = share * np.clip(model.bias_change(force, fit), -MOST_DPS, MOST_DPS)
             other = _Model(sign, self._rate, model.bias + change, self._cell_s)
             better = other.along_fit(force)
             if better.cost < fit.cost:
@@ -99,8 +149,6 @@ _WEIGHT = (FORCE_G / UP_G) ** 2
 class _Fit:
     """The least squares in w windows for one bias. The velocity has k coefficients.
 
-    turned: the force, rotated to the axes at the beginning of the window, shape (w, n, 3).
-    moved: the averaged force without its mean, shape (w, m * 3).
     along_up: the direction of `up` before this fit, shape (w, 3), or 0 if its length was not used.
     found: the coefficients of the velocity, shape (w, k).
     inverse: the inverse of the normal equations, shape (w, k, k).
@@ -108,8 +156,6 @@ class _Fit:
     left, cost: see TurningFit.
     """
 
-    turned: Array
-    moved: Array
     along_up: Array
     found: Array
     inverse: Array
@@ -126,11 +172,11 @@ class _Model:
 
     def __init__(self, sign: float, readings: Array, bias: Array, cell_s: float) -> None:
         self.bias, self._sign, self._cell_s = bias, sign, cell_s
-        rate = sign * np.radians(readings - bias)
+        self._rate = rate = sign * np.radians(readings - bias)
         self._evened = round(EVENED_S / cell_s)
         self.means = rate.shape[1] // self._evened  # number of averaged forces in a window
         self._turn = _turn(rate, cell_s)
-        values, changes = _knots(rate.shape[1], cell_s)
+        self._functions = values, changes = _knots(rate.shape[1], cell_s)
         moving = self._turn @ cross_matrix(rate)
         # Derivatives of the averaged force by the coefficients, shape (w, m, 3, knots, 3)
         shape = len(rate), -1, self._evened, 3, 3
@@ -149,8 +195,7 @@ class _Model:
         before: an earlier fit, for the direction of the velocity, which is the same in all windows, and of `up`. None
             if unknown: then the velocity has any direction, and `up` any length.
         """
-        turned = np.einsum("wnij,wnj->wni", self._turn, force)
-        means = self._means(turned)
+        means = self._means(np.einsum("wnij,wnj->wni", self._turn, force))
         mean = np.mean(means, axis=1)
         moved = (means - mean[:, None]).reshape(len(force), -1)
         seen = np.einsum("wij,wi->wj", self._along, moved)
@@ -169,33 +214,38 @@ class _Model:
         squares -= np.sum(found * seen, axis=1)
         up = mean - np.einsum("wij,wj->wi", self._mean, found)
         cost = float(np.sum(squares) + (FORCE_G / BIAS_DPS) ** 2 * (self.bias @ self.bias))
-        return _Fit(turned, moved, along_up, found, inverse, up, squares / self.means, cost)
+        return _Fit(along_up, found, inverse, up, squares / self.means, cost)
 
     def along_fit(self, force: Array) -> _Fit:
         """Fit the velocity along one direction."""
         return self.fit(force, self.fit(force))
 
-    def bias_change(self, fit: _Fit) -> Array:
+    def bias_change(self, force: Array, fit: _Fit) -> Array:
         """Return the correction of the bias by one step of linear least squares, shape (3), in deg/s.
 
-        A change of the bias rotates the force by the integral of this change from the middle of the window.
+        The velocity is eliminated from the normal equations (Schur complement).
         """
+        found = fit.found.reshape(len(force), self._knots, 3)
+        speed, change = (np.einsum("kn,wkj->wnj", functions, found) for functions in self._functions)
+        force = force - (change + np.einsum("wnij,wnj->wni", cross_matrix(self._rate), speed)) / STANDARD_GRAVITY
+        force = np.einsum("wnij,wnj->wni", self._turn, force)
+        left = self._means(force)
+        # Derivatives by the bias. A change of the bias rotates the force by the integral of this change. It also
+        # changes the force that the bend needs.
         angle = np.cumsum(self._turn, axis=1) * self._cell_s
-        angle -= angle[:, angle.shape[1] // 2, None]
-        by_bias = self._means(-self._sign * np.radians(1.0) * cross_matrix(fit.turned) @ angle)
-        mean = np.mean(by_bias, axis=1)
-        by_bias = (by_bias - mean[:, None]).reshape(len(angle), -1, 3)
-        mixed = self._along.swapaxes(1, 2) @ by_bias
-        # The equation of the length of `up`
-        row, by = (np.einsum("wi,wij->wj", fit.along_up, matrix) for matrix in (self._mean, mean))
-        long = np.sum(fit.along_up * fit.up, axis=1) - np.any(fit.along_up, axis=1)
-        mixed = mixed + _WEIGHT * row[:, :, None] * by[:, None]
-        # Eliminate the velocities of the windows from the normal equations (Schur complement).
+        by = cross_matrix(force) @ angle - self._turn @ cross_matrix(speed / STANDARD_GRAVITY)
+        by = self._means(self._sign * np.radians(1.0) * by)
+        row = np.einsum("wi,wij->wj", fit.along_up, self._mean)
+        up, by_up = np.mean(left, axis=1), np.mean(by, axis=1)
+        long = np.sum(fit.along_up * up, axis=1) - 1.0
+        long_by = np.einsum("wi,wij->wj", fit.along_up, by_up)
+        left = (left - up[:, None]).reshape(len(left), -1)
+        by = (by - by_up[:, None]).reshape(len(left), -1, 3)
+        mixed = self._along.swapaxes(1, 2) @ by + _WEIGHT * row[:, :, None] * long_by[:, None]
+        square = np.sum(by.swapaxes(1, 2) @ by - mixed.swapaxes(1, 2) @ fit.inverse @ mixed, axis=0)
+        square += _WEIGHT * long_by.T @ long_by
+        vector = -np.einsum("wni,wn->i", by, left) - _WEIGHT * long @ long_by
         prior = (FORCE_G / BIAS_DPS) ** 2
-        square = np.sum(by_bias.swapaxes(1, 2) @ by_bias - mixed.swapaxes(1, 2) @ fit.inverse @ mixed, axis=0)
-        square += _WEIGHT * by.T @ by
-        left = fit.moved - np.einsum("wij,wj->wi", self._along, fit.found)
-        vector = np.einsum("wni,wn->i", by_bias, left) + _WEIGHT * long @ by
         return np.linalg.solve(square + prior * np.eye(3), vector - prior * self.bias)
 
     def _means(self, values: Array) -> Array:

@@ -7,11 +7,15 @@ package's pyproject.toml:
     laps = "my_package.laps:laps_command"
 
 If Kickstand has a command of the same name, that command is used. kickstand_fleet and kickstand_emulator add `fleet`
-and `emulate` in this way. A package is only imported if its command runs, or if the list of commands is printed.
+and `emulate` in this way. A package is only imported if its command runs. The list of commands reads the help line in
+the text of the module, because importing a package takes long.
 """
 
+import ast
 import traceback
+from importlib.machinery import PathFinder
 from importlib.metadata import EntryPoint
+from pathlib import Path
 
 import click
 
@@ -40,11 +44,40 @@ def command(entry_point: EntryPoint) -> click.Command:
 
 
 def help_line(entry_point: EntryPoint) -> str:
-    """Return the help line of a command. If the command cannot be loaded, return the reason."""
+    """Return the help line of a command: its short_help, or the first sentence of its docstring.
+
+    The module is loaded only if its text does not define the command as a function. If loading fails, return the
+    reason.
+    """
     try:
-        return command(entry_point).get_short_help_str(limit=80)
+        written = _written_help(entry_point)
+    except (AttributeError, OSError, SyntaxError, ValueError):  # the error of loading the module says more
+        written = None
+    try:
+        loaded = written or command(entry_point)
+        return loaded.get_short_help_str(limit=80)
     except InputError as error:
         return str(error)
+
+
+def _written_help(entry_point: EntryPoint) -> click.Command | None:
+    """Find the help of a command in the text of its module. Returns a command without options, or None."""
+    package, *names = entry_point.module.split(".")
+    spec = PathFinder.find_spec(package)
+    folders = spec and spec.submodule_search_locations
+    file = Path(folders[0], *names).with_suffix(".py") if folders and names else Path((spec and spec.origin) or "")
+    if not file.is_file():
+        return None
+    for node in ast.parse(file.read_bytes()).body:
+        if isinstance(node, ast.FunctionDef) and node.name == entry_point.attr:
+            calls = [call for call in node.decorator_list if ast.unparse(call).startswith("click.command(")]
+            keywords = [word for call in calls if isinstance(call, ast.Call) for word in call.keywords]
+            texts = {word.arg: ast.literal_eval(word.value) for word in keywords if word.arg in ("help", "short_help")}
+            if calls:
+                return click.Command(
+                    node.name, help=texts.get("help", ast.get_docstring(node)), short_help=texts.get("short_help")
+                )
+    return None
 
 
 def owner(error: Exception) -> str:
@@ -52,7 +85,11 @@ def owner(error: Exception) -> str:
 
     Returns the name of the package that added the running command, or "kickstand".
     """
-    packages = {entry_point.module.partition(".")[0]: _package(entry_point) for entry_point in entry_points().values()}
+    # The attribute `module` of an entry point raises an error if its value is invalid
+    tops = {
+        entry_point: entry_point.value.partition(":")[0].partition(".")[0] for entry_point in entry_points().values()
+    }
+    packages = {top: _package(entry_point) for entry_point, top in tops.items()}
     for frame, _ in traceback.walk_tb(error.__traceback__):
         package = packages.get(frame.f_globals.get("__name__", "").partition(".")[0], DISTRIBUTION)
         if package != DISTRIBUTION:
@@ -62,7 +99,7 @@ def owner(error: Exception) -> str:
 
 def _package(entry_point: EntryPoint) -> str:
     """Return the name of the distribution that contains an entry point."""
-    return entry_point.dist.name if entry_point.dist else entry_point.module
+    return entry_point.dist.name if entry_point.dist else entry_point.value
 
 
 def _refusal(entry_point: EntryPoint, why: str) -> InputError:

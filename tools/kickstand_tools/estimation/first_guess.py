@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ..checks.bends import LeftHanded, RatesInRadians
+from ..checks.bends import RatesInRadians
+from ..checks.turning import bias_dps
 from ..checks.units import SpeedStuck, SpeedUnit
 from ..common.errors import RefusedInput
 from ..common.messages import Message, Remedy
@@ -22,14 +23,19 @@ BETWEEN_S = 20.0  # a shorter time between two movements in a hand also counts a
 SURELY_S = 4.0  # a movement longer than this is certainly in a hand; a shorter movement may be riding or a fall
 SLOW_S = 4.0  # changes of lean slower than this are computed from the yaw rate, faster changes from the roll rate
 TURNS_S = 40.0  # the speed is computed from the bends within this time
-CALM_S = 1.0  # length of the calm stretches that show the gyro's bias if the ride has no standstill
 MIN_RIDING_S = 30.0
 MIN_LEAN = np.radians(3.0)  # a ride whose lean has a smaller rms does not show forward
 MIN_LIKENESS = 0.5  # least correlation between leaning and turning; bikes have over 0.75
 # Largest force to the side in bends, divided by the lean. Bikes have 0.1 to 0.2, due to the width of the tyres.
 MAX_PUSHED = 0.5
-CAR_G, CAR_LEAN = 0.045, np.radians(5.0)  # a car has a larger rms of the force to the side, and a smaller rms of lean
-STUCK_MPS = 0.5  # a log's speed is stuck if it changes by less than this
+# A car has a larger rms of the force to the side, also divided by the lean, and a smaller rms of lean. Its rates are
+# about the force: in recorded drives the angle was at most 16 degrees. A leaning bike's rates are not, even in a bend
+# that is so long that the lean hardly changes.
+CAR_G, CAR_PUSHED, CAR_LEAN, CAR_TILT = 0.045, 2.0, np.radians(5.0), np.radians(20.0)
+CONTRADICTS_S = 120.0  # less riding that no mounting explains is only not enough
+# A log's speed is stuck if it changes by less than STUCK_MPS, although the force along the vehicle changes the speed by
+# an rms of PUSHED_MPS.
+STUCK_MPS, PUSHED_MPS = 0.5, 1.5
 MAX_SPEED_FACTOR = 1.8  # largest factor between the log's speed and the speed from the bends
 # The prior of the speed from the bends is USUAL_MPS. The prior has the weight of bends with the yaw rate USUAL_RADPS.
 USUAL_MPS, USUAL_RADPS = 10.0, 0.14
@@ -64,6 +70,14 @@ class NotLeaning(Message):
     todo = Remedy(
         "with a speed in the log take kickstand calibrate drive --vehicle car", "this page aligns motorcycles only"
     )
+
+
+class SideUnsure(Message):
+    """The ride does not show to which side the bike leans: a long bend to one side looks the same if it is mirrored."""
+
+    code = "side-unsure"
+    text = "it does not show to which side the bike leans in the bends"
+    todo = Remedy("a ride with straights between bends to both sides is needed")
 
 
 class RideContradicts(Message):
@@ -166,28 +180,36 @@ def axes(w: Windows) -> Axes:
     if seconds < MIN_RIDING_S:
         raise RefusedInput(RideShort(seconds, MIN_RIDING_S))
     found = leaning_of(w.rate, w.force, riding)
-    _refuse_no_motorcycle(found, without_drift(w.force @ found.matrix[0]), riding)
-    _refuse_wrong_speed(w.known_speed[riding], found.rolled[riding], found.turned[riding])
+    _refuse_no_motorcycle(found, without_drift(w.force @ found.matrix[0]), _tilt(w, riding), riding)
+    pushed = without_drift(np.cumsum(w.force @ found.matrix[2]) * WINDOW_S * STANDARD_GRAVITY)
+    _refuse_wrong_speed(w.known_speed[riding], found.rolled[riding], found.turned[riding], pushed[riding])
     return Axes(found.matrix, bias)
 
 
 def _bias(w: Windows) -> Array:
     """Return the gyro's bias, shape (3), in rad/s: the median rate at rest.
 
-    Without a standstill it is the median rate in calm riding. Without calm riding it is the median rate in the whole
-    ride, because most of a ride is nearly straight.
+    Without a standstill it is the bias with which the rates explain the forces best. The median rate may be that of a
+    long bend, so it is used for short rides only.
     """
-    for over_s in (STILL_S, CALM_S):
-        places = _calm(w, over_s)
-        if np.any(places):
-            return np.median(w.rate[places], axis=0)
-    return np.median(averaged(w.rate, CALM_S), axis=0)
+    places = _calm(w, STILL_S)
+    if np.any(places):
+        return np.median(w.rate[places], axis=0)
+    found = bias_dps(w.force, np.degrees(w.rate), ~w.gap, WINDOW_S)
+    return np.median(w.rate[~w.gap], axis=0) if found is None else np.radians(found)
 
 
-def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: Bools) -> None:
-    """Raise RefusedInput if the ride is not a motorcycle's, has too little lean, or has left-handed rates.
+def _tilt(w: Windows, riding: Bools) -> float:
+    """Return the usual angle between force and rate while riding, in rad."""
+    force, rate = averaged(w.force, 2.0)[riding], averaged(w.rate, 2.0)[riding]
+    return float(np.arctan2(np.linalg.norm(np.cross(force, rate)), np.linalg.norm(np.sum(force * rate, axis=1))))
+
+
+def _refuse_no_motorcycle(found: Leaning, sideways: Array, tilt: float, riding: Bools) -> None:
+    """Raise RefusedInput if the ride is not a motorcycle's, or does not show lean and side.
 
     sideways: the force to the left without its slow changes, shape (n), in g.
+    tilt: see _tilt().
     """
     in_radians_mps = speed_in_radians(found)
     if in_radians_mps is not None:
@@ -195,27 +217,30 @@ def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: Bools) -> Non
     rolled, turned, sideways = found.rolled[riding], found.turned[riding], sideways[riding]
     lean, side = float(np.sqrt(np.mean(rolled**2))), float(np.sqrt(np.mean(sideways**2)))
     pushed = abs(float(sideways @ turned)) / max(abs(float(rolled @ turned)), 1e-30)
-    if pushed > MAX_PUSHED and side > CAR_G and lean < CAR_LEAN:
+    if pushed > CAR_PUSHED and side > CAR_G and lean < CAR_LEAN and tilt < CAR_TILT:
         raise RefusedInput(NotLeaning())
     if lean < MIN_LEAN:
         raise RefusedInput(NoBends(float(np.degrees(lean))))
     if pushed > MAX_PUSHED or found.likeness < MIN_LIKENESS:
-        raise RefusedInput(RideContradicts())
-    # A leaning bike that turns also rotates about its own left. The sign of this rotation shows the handedness.
+        enough = np.count_nonzero(riding) * WINDOW_S > CONTRADICTS_S
+        raise RefusedInput(RideContradicts() if enough else SideUnsure())
+    # A leaning bike that turns also rotates about its own left. The opposite sign of this rotation contradicts the side
+    # of the lean. The handedness itself is judged when the log is read.
     if found.share < 0.0:
-        raise RefusedInput(LeftHanded())
+        raise RefusedInput(SideUnsure())
 
 
-def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array) -> None:
+def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array, pushed: Array) -> None:
     """Raise RefusedInput if the log's speed is stuck or not in m/s.
 
     The log's speed is compared with the speed at which yaw rate and lean balance in the bends.
 
     known: the log's speed, in m/s; NaN without a speed.
+    pushed: the changes of speed by the force along the vehicle, in m/s.
     """
     if not len(known) or np.isnan(known[0]):
         return
-    if np.ptp(known) < STUCK_MPS:
+    if np.ptp(known) < STUCK_MPS and np.std(pushed) > PUSHED_MPS:
         raise RefusedInput(SpeedStuck(float(known[0])))
     expected = known * turned
     both = -float(expected @ rolled) * STANDARD_GRAVITY

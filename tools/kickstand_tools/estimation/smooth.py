@@ -128,9 +128,9 @@ def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None 
     True
     """
     notices: list[Message] = []
-    blocks = list(_checked_blocks(log, calibration, progress, notices))
-    time_s = np.concatenate([block.t_s for block, _ in blocks])
-    return SmoothedRide(time_s, *np.concatenate([found for _, found in blocks]).T, notices=notices)
+    blocks = [(block.t_s, values) for block, values in _checked_blocks(log, calibration, progress, notices)]
+    time_s, columns = (np.concatenate(parts) for parts in zip(*blocks))
+    return SmoothedRide(time_s, *columns.T, notices=notices)
 
 
 def smooth_to_csv(

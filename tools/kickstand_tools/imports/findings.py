@@ -45,7 +45,7 @@ REQUIRED = ("t", *ACCEL, *GYRO)
 OPTIONAL = ("speed", "lat", "lon", "temp")
 _KINDS = {  # kinds of sensors, by the words in their columns' names
     "linear": r"lin|user|withoutgravity|nograv",
-    "gravity": r"grav",
+    "gravity": r"^(?!.*(incl|with)).*grav",
     "other": r"mag|compass|orient|euler|quat|angle|roll|pitch|yaw|azimuth|^[bmqh]$|^mg?$|press|baro",
     "gyro": r"gyr|rot|omega|angular|angvel|^gy$|^as$|^[wr]$|rate$",
     "accel": r"acc|force|^ac$|^gf$|^f$|^a$",
@@ -64,6 +64,7 @@ _COUNTER = re.compile(r"^(no|nr|n|i|index|count|counter|record|sample|frame|id|r
 CALM_S = 0.5  # length of the moving window in which the motion is measured to find calm samples
 CALMEST = 0.2  # share of the samples that count as calm
 NEAR = 1.3  # a calm acceleration is within this factor of gravity, also with clones of the chip and on rough rides
+LEANT = 1.75  # in a long bend, even the calm acceleration is longer than gravity by this factor: 55 degrees of lean
 NOISE_DPS = 0.1  # standard deviation of a gyro at rest
 # Length of the mean acceleration, divided by the mean length of the accelerations. Without gravity the ratio is smaller
 # than this.
@@ -147,8 +148,8 @@ def find(sheet: Sheet) -> Findings:
     if lat is not None and lon is not None:
         findings.found |= {"lat": lat, "lon": lon}
     if speed is not None and time is not None and not speed.unit and lat is not None and lon is not None:
-        places = [sheet.columns.index(one.columns[0]) for one in (speed, lat, lon)]
-        speed.unit = unit_by_positions(sheet, sheet.times(sheet.columns.index(time.columns[0]), time.unit), *places)
+        at, *places = (sheet.columns.index(one.columns[0]) for one in (time, speed, lat, lon))
+        speed.unit = unit_by_positions(sheet, sheet.times(at, time.unit), places[0], places[1], places[2])
     if speed is not None:
         findings.found["speed"] = speed
     return findings
@@ -206,12 +207,16 @@ def _scales(sheet: Sheet) -> dict[str, str]:
     found: dict[str, str] = {}
     for key, text in _SCALE.findall(sheet.head):
         scale, kind = float(text), key[0].lower()
-        if key.lower().startswith("t"):
-            found["t"] = next((name for name, size in TIMES.items() if abs(size / 1e9 - scale) < 1e-3 * scale), "")
+        if kind == "t":
+            found["t"] = _time_unit_of(scale)
         elif scale > 0.0:
             counts = scale if key.lower().endswith("1g") else 1.0 / (np.degrees(scale) if kind == "g" else scale)
             found[kind] = f"counts/{counts:.6g}"
     return found
+
+
+def _time_unit_of(seconds: float) -> str:
+    return next((name for name, size in TIMES.items() if abs(size / 1e9 - seconds) < 1e-3 * seconds), "")
 
 
 def _mean_step(numbers: Array) -> float:
@@ -238,6 +243,50 @@ class _Triple:
     places: list[int]
     kind: str
     values: Array
+
+
+def completed(sheet: Sheet) -> Sheet:
+    """Complete columns that belong together: seconds and their fractions, axes that are in several rows, and the user's
+    acceleration and gravity."""
+    names = [plain(name) for name in sheet.columns]
+    scale = next((float(text) for key, text in _SCALE.findall(sheet.head) if key.lower() == "tscale"), 0.0)
+    if scale and not _time_unit_of(scale):
+        sheet.columns[0], sheet.cells[0] = f"{sheet.columns[0]} (s)", sheet.numbers(0) * scale
+    for fraction, size in _FRACTIONS.items():
+        k = next(
+            (k for k, name in enumerate(names) if k and name.removesuffix("s").endswith(fraction.removesuffix("s"))), 0
+        )
+        if k and re.search(r"secs?$|seconds?$|stamp$|time$", names[k - 1]) and names[k - 1] != names[k]:
+            whole, part = sheet.cells[k - 1], sheet.numbers(k)
+            if whole.dtype.kind == "i" and np.nanmin(part) >= 0.0 and np.nanmax(part) * size < 10**9:
+                part_ns = np.nan_to_num(part * size).astype(np.int64)
+                sheet.columns.append(f"time {sheet.columns[k - 1]} + {sheet.columns[k]} (ns)")
+                sheet.cells.append(whole.astype(np.int64) * 10**9 + part_ns)
+                break
+    threes = {three.kind: three for three in reversed(_find_triples(sheet))}
+    for three in threes.values():
+        if not np.any(np.all(np.isfinite(three.values), axis=1)):
+            _merge_rows(sheet, three)
+    if "linear" in threes and "gravity" in threes and "accel" not in threes:
+        total = threes["linear"].values + threes["gravity"].values
+        stated = stated_unit(sheet.columns[threes["linear"].places[0]])
+        sheet.columns += [f"total acceleration {axis}" + (f" ({stated})" if stated else "") for axis in "xyz"]
+        sheet.cells += list(total.T)
+    return sheet
+
+
+# The ends of names of columns with fractions of a second, and the ns of their unit
+_FRACTIONS = {"nsec": 1, "nanosec": 1, "nanosecond": 1, "usec": 1000, "microsecond": 1000, "msec": 10**6}
+_FRACTIONS |= {"millisecond": 10**6, "millis": 10**6}
+
+
+def _merge_rows(sheet: Sheet, three: _Triple) -> None:
+    """Fill axes that are in successive rows into the row of the last axis."""
+    starts = np.argmax(np.isfinite(three.values), axis=0)
+    ends = np.isfinite(three.values[:, int(np.argmax(starts))])
+    for place, column in zip(three.places, three.values.T):
+        row = np.maximum.accumulate(np.where(np.isfinite(column), np.arange(len(column)), 0))
+        sheet.cells[place] = np.where(ends, column[row], np.nan)
 
 
 def _find_triples(sheet: Sheet) -> list[_Triple]:
@@ -306,6 +355,9 @@ def _split_axis(name: str) -> Iterable[tuple[str, str]]:
     sensor, colon, bare = bare.rpartition(":")
     words = re.sub(r"axis|[\W_]+", " ", bare.lower()).split()
     sensor = plain(sensor) + (":" if colon else "")
+    if len(words) == 1:  # LongAcc, accLat
+        word = next((word for word in _AXES if words[0].startswith(word) or words[0].endswith(word)), "")
+        words = [word, words[0].replace(word, "", 1)] if word and word != words[0] else words
     for k, word in enumerate(words):
         rest = " ".join(words[:k] + words[k + 1 :])
         axis = word if word in ("x", "y", "z") else _AXES.get(word, "")
@@ -318,7 +370,7 @@ def _split_axis(name: str) -> Iterable[tuple[str, str]]:
         yield sensor + (head + last[:-1]).strip(), last[-1]
     elif len(whole) > 1 and whole[0] in "xyz":
         yield sensor + whole[1:], whole[0]
-    elif match := re.fullmatch(r"(.*?)(\d{1,2})", whole):
+    elif (match := re.fullmatch(r"(.*?)(\d{1,2})", whole)) and not bare.startswith("#"):
         yield sensor + match[1], match[2]
 
 
@@ -370,8 +422,9 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
     possible = [*kinds["accel"], *kinds["either"], *([] if kinds["accel"] else kinds[""])]
     without = kinds["linear"] or kinds["accel"]
     accel = _first_with_gravity(possible, seconds) or _first_with_gravity(kinds["linear"], seconds)
+    accel = accel or next((three for three in kinds["accel"] if not _is_linear(three, seconds)), None)
     exchanged = None if accel else _first_with_gravity(kinds["gyro"], seconds)
-    rates = _partner(accel, kinds["gyro"]) or next((three for three in unnamed if three is not accel), None)
+    rates = _partner(accel, kinds["gyro"]) or _partner(accel, [three for three in unnamed if three is not accel])
     if exchanged is not None and without:
         accel, rates = exchanged, without[0]
     if accel is None:
@@ -428,9 +481,19 @@ def _has_gravity(three: _Triple, seconds: Array | None, near: bool) -> bool:
     length = float(np.median(np.linalg.norm(values, axis=1)))
     if length <= 0.0 or float(np.percentile(means, 10.0)) < LINEAR * length:
         return False
-    if near and not any(1.0 / NEAR < length / gravity < NEAR for gravity in _gravities().values()):
+    most = NEAR if _are_whole(values) else LEANT  # raw counts differ by a factor of 2
+    if near and not any(1.0 / NEAR < length / gravity < most for gravity in _gravities().values()):
         return False
     return float(np.std(means)) / length < (0.25 if near else 0.02)
+
+
+def _is_linear(three: _Triple, seconds: Array | None) -> bool:
+    """True if the mean of the values over some seconds is short, because they do not contain gravity."""
+    values = three.values[np.all(np.isfinite(three.values), axis=1)]
+    if len(values) < 3:
+        return True
+    means = np.linalg.norm(moving_mean(values, _rows_in(10.0 * CALM_S, seconds, len(three.values))), axis=1)
+    return float(np.median(means)) < LINEAR * float(np.median(np.linalg.norm(values, axis=1)))
 
 
 def _rows_in(span_s: float, seconds: Array | None, count: int) -> int:
@@ -464,15 +527,16 @@ def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> Col
     whole = _are_whole(values)
     gravities = {name: size for name, size in _gravities().items() if whole or not name.startswith("counts")}
     near = min(gravities, key=lambda name: abs(np.log(length / gravities[name])))
-    off = max(length / gravities[near], gravities[near] / length)
     why = f"gravity at rest is {length:.4g} long"
     if counts_per(stated):
         gravities[stated] = counts_per(stated)
-    if stated in gravities and max(length / gravities[stated], gravities[stated] / length) < NEAR:
+    most = NEAR if whole else LEANT
+    if stated in gravities and 1.0 / NEAR < length / gravities[stated] < most:
         return ColumnFinding([], stated, f"{why}, as its name says")
     if near.startswith("counts"):
         why += f": raw counts of a sensor with {near.partition('/')[2]} counts (LSB) per g"
-    return ColumnFinding([], near, why, off < NEAR and stated in ("", near, "counts"))
+    certain = 1.0 / NEAR < length / gravities[near] < most and stated in ("", near, "counts")
+    return ColumnFinding([], near, why, certain)
 
 
 def _are_whole(values: Array) -> bool:
@@ -490,7 +554,9 @@ def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None
     by_fit = fit.unit_among(candidates)
     if stated in RATES or counts_per(stated):
         also = f", and so do the turns of gravity: {by_fit}" if by_fit == stated else ""
-        against = f", but gravity turns as by {by_fit}" if by_fit not in ("", stated) else ""
+        size = RATES.get(stated) or 1.0 / counts_per(stated)
+        apart = by_fit and not 0.7 < candidates[by_fit] / size < 1.4
+        against = f", but gravity turns as by {by_fit}" if apart else ""
         return ColumnFinding([], stated, f"its name says so{also}{against}", not against)
     if by_fit:
         return ColumnFinding([], by_fit, "in it the rates turn gravity as it turns")

@@ -62,6 +62,8 @@ def in_order(sensor: RecordedSensor, name: str) -> RecordedSensor:
     if len(sensor.time_ns) < 2:
         raise InputError(f"{name}: {sensor.name} has {len(sensor.time_ns)} samples: was it recorded?")
     time_ns, values = sensor.time_ns, sensor.values
+    if np.mean(np.diff(time_ns) < 0) > 1.0 - MOST_LATE:  # newest first
+        time_ns, values = time_ns[::-1], values[::-1]
     kept = ~_damaged(time_ns)
     time_ns, values = time_ns[kept], values[kept]
     late = np.maximum.accumulate(time_ns) - time_ns

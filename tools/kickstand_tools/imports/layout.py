@@ -126,7 +126,8 @@ def find_grid(lines: Sequence[str]) -> Grid | None:
     best: tuple[int, int, Grid] | None = None
     for separator in SEPARATORS:
         found = _rows(lines, separator)
-        if found is not None and (best is None or found[:2] > best[:2]):
+        compared = 1 if separator == " " else 2  # dates and zones contain blanks, so blanks need more rows to win
+        if found is not None and (best is None or found[:compared] > best[:compared]):
             best = found
     return None if best is None else best[2]
 
@@ -199,7 +200,7 @@ def _read(name: str, text: str, lines: Sequence[str], grid: Grid) -> Sheet:
         rows = (row for line in body.split("\n") if 0 < len(row := line.split()) <= width)
         cells, left_out = columns_of(rows, width), 0
     else:
-        cells, left_out = columns_of_text(body, grid.separator, width)
+        cells, left_out = columns_of_text(body, grid.separator, width, width)
     used = [k for k, values in enumerate(cells) if columns[k] or np.any(filled(values))]
     head = "\n".join(lines[: grid.first])
     return Sheet(name, [columns[k] or f"#{k + 1}" for k in used], [cells[k] for k in used], left_out, head)

@@ -16,7 +16,7 @@ from .findings import ACCEL, GYRO, OPTIONAL, REQUIRED, Findings
 from .layout import FEWEST_CELLS, joined_sheet, sheet_in
 from .rate_fit import fit_rates, turns_too_far
 from .recording import AppRecording, RecordedSensor, Sheet, Taken, plain, rate_hz, track_of, unit_in
-from .speeds import ImportSpeedUnit, unit_by_positions
+from .speeds import ImportPositions, ImportSpeedUnit, doubt_of_positions, unit_by_positions
 from .units import (
     ACCELERATIONS,
     ANGLES,
@@ -109,6 +109,11 @@ def read_mapped(
     gyro = _sensor(sheet, time_ns, places, units, "gyro", rates)
     lat, lon = (factor(units.get(key, "deg"), ANGLES, key) for key in ("lat", "lon"))
     speed, speed_unit, notices = _speed(sheet, time_ns, places, units, (lat, lon))
+    if "lat" in places and "lon" in places:
+        north, east = sheet.numbers(places["lat"]) * lat, sheet.numbers(places["lon"]) * lon
+        doubt = doubt_of_positions(time_ns, sheet.numbers(places.get("speed")), north, east)
+        if doubt:
+            notices.append(ImportPositions(sheet.named([places.pop("lat"), places.pop("lon")]), doubt))
     track = track_of(sheet, time_ns, speed, places.get("lat"), places.get("lon"), speed_unit, (lat, lon))
     temp_c = sheet.numbers(places["temp"]) if "temp" in places else None
     utc_ns = 0 if len(time_ns) and int(np.median(time_ns)) > EPOCH_NS else None
@@ -124,6 +129,7 @@ def table_in(files: list[RecordingFile]) -> MappedTable | None:
     together, return the largest."""
     largest = max(files, key=lambda file: len(file.text))
     sheet = sheet_in(largest)
+    sheet = sheet and findings.completed(sheet)
     found = None if sheet is None else findings.find(sheet)
     if len(files) > 1 and (found is None or found.lacking):
         joined = joined_sheet(files)
@@ -139,6 +145,7 @@ def sheet_of(files: list[RecordingFile], name: str, columns: Mapping[str, str]) 
     """The table with these columns, from one file or joined from several. name: for messages. Raises InputError."""
     wanted = [column.strip() for column in columns.values() if not column.strip().startswith("#")]
     sheet = sheet_in(files[0], wanted) if len(files) == 1 else joined_sheet(files)
+    sheet = sheet and findings.completed(sheet)
     if len(files) > 1 and (sheet is None or not set(wanted) <= set(sheet.columns)):
         raise InputError(f"{name} holds {len(files)} files: give --columns with one, such as {files[0].name}")
     if sheet is None:
@@ -171,7 +178,8 @@ def unknown(files: list[RecordingFile], source: str, table: MappedTable | None =
     several = f" (of {len(files)} files, the largest is {table.name})" if len(files) > 1 else ""
     columns, found = table.sheet.columns, table.findings
     shown = ", ".join(columns[:40]) + (", ..." if len(columns) > 40 else "")
-    if "gyro" in found.lacking and ("a" in found.found or found.remarks):
+    named = not all(name.startswith("#") for name in columns)
+    if "gyro" in found.lacking and ("a" in found.found or found.remarks or (named and not found.single)):
         return InputError(
             f"{source}: not a file of an app that is known{several}, and no gyro found in it: without one there is no "
             f"lean. Record the gyroscope as well. Its columns are {shown}"
@@ -183,6 +191,8 @@ def unknown(files: list[RecordingFile], source: str, table: MappedTable | None =
             f"{source}: not a file of an app that is known{several}, and no time found in it: write the time of each "
             "row, such as millis(), or switch the time stamps of the serial monitor on"
         )
+    if "speed" in found.found and not found.found["speed"].unit:
+        del found.found["speed"]  # its unit is unknown
     keys = [key for key in (*REQUIRED, *OPTIONAL) if key in (*REQUIRED, *found.columns)]
     given = [f"{key}={_column_as_typed(table, key)}" for key in keys]
     units = ",".join(f"{key}={name}" for key, name in found.units.items())
@@ -303,10 +313,10 @@ def _speed(
 
 def _place(sheet: Sheet, key: str, wanted: str) -> int:
     wanted = wanted.strip()
-    if re.fullmatch(r"#\d+", wanted) and 0 < int(wanted[1:]) <= len(sheet.columns):
-        return int(wanted[1:]) - 1
     if wanted in sheet.columns:
         return sheet.columns.index(wanted)
+    if re.fullmatch(r"#\d+", wanted) and 0 < int(wanted[1:]) <= len(sheet.columns):
+        return int(wanted[1:]) - 1
     place = sheet.place(wanted) if plain(wanted) else None
     if place is None:
         have = ", ".join(sheet.columns[:40])

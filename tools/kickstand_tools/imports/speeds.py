@@ -20,6 +20,32 @@ class ImportSpeedUnit(Message):
     todo = Remedy("add --units speed=km/h, mph or m/s", "write it in brackets behind that name, as in Speed (km/h)")
 
 
+class ImportPositions(Message):
+    """The positions are left out, because they are no degrees, or latitude and longitude are exchanged."""
+
+    columns: str
+    why: str
+
+    code = "import-positions"
+    text = "the positions in {columns} are left out: {why}"
+    todo = Remedy("name them with --columns lat=...,lon=... if they are right", "export them in degrees")
+
+
+def doubt_of_positions(time_ns: Nanoseconds, speed: Array, lat: Array, lon: Array) -> str:
+    """Return why positions are wrong, or "". Exchanged latitudes and longitudes show if their speed, compared with
+    `speed`, changes with the direction."""
+    if np.any(np.abs(lat) > 90.0) or np.any(np.abs(lon) > 180.0):
+        return "they are no degrees"
+
+    def spread(north: Array, east: Array) -> float:
+        moved = _moved_mps(time_ns, north, east)
+        fast = np.isfinite(moved) & (moved > 3.0) & (speed > 0.0)
+        return float(np.std(np.log(moved[fast] / speed[fast]))) if np.count_nonzero(fast) > 20 else np.nan
+
+    exchanged = np.all(np.abs(lon[np.isfinite(lon)]) <= 90.0) and spread(lon, lat) < 0.5 * spread(lat, lon)
+    return "latitude and longitude are exchanged" if exchanged and spread(lat, lon) > 0.05 else ""
+
+
 def unit_by_positions(
     sheet: Sheet,
     time_ns: Nanoseconds,

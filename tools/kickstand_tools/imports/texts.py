@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
+FEWEST_ROWS = 20  # JSON with fewer rows is something else, such as a calibration
 LOOKED_AT = 400  # lines used to find the decimal mark
 _MINUS = re.compile("[\u2010-\u2013\u2212\ufe63\uff0d](?=[0-9.,])")
 _BLANK = re.compile("(?<=[0-9])[\u00a0\u2009\u202f'](?=[0-9]{3})")  # separates thousands
@@ -55,7 +56,7 @@ def _rows_of_json(text: str) -> str:
         of_objects = [values for values in lists.values() if values and isinstance(values[0], dict)]
         found = max(of_objects, key=len) if of_objects else [dict(zip(lists, row)) for row in zip(*lists.values())]
     rows = [dict(_flat(row)) for row in found if isinstance(row, dict)]
-    if len(rows) < 2:
+    if len(rows) < FEWEST_ROWS:
         return text
     table = io.StringIO()
     writer = csv.DictWriter(table, list(dict.fromkeys(name for row in rows for name in row)), lineterminator="\n")

@@ -60,10 +60,11 @@ _TICKS = (621_355_968 * 10**9, 116_444_736 * 10**9, 0)  # 1970 in ticks since th
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 # A date in any order, a clock of 12 or 24 hours, and a zone. Date, hours and zone may be missing.
 MOMENT = re.compile(
-    r"\s*(?:(\d{1,4})[-/. ](\d{1,2}|[A-Za-z]{3})[A-Za-z]*[-/. ](\d{1,4})[T ,]+)?"
+    r"\s*(?:(\d{1,4}|[A-Za-z]{3,9})[-/. ]+(\d{1,2}|[A-Za-z]{3,9})[-/., ]+(\d{1,4})[T ,]+)?"
     r"(?:(\d{1,3})([:.]))?(\d{1,2})(?(5)\5|:)(\d{1,2})(?:[.,:](\d+))?\s*(?:([AaPp])\.?[Mm]\.?)?"
     r"\s*(Z|UTC|GMT|[+-]\d\d:?\d\d)?\s*"
 )
+_COMPACT = re.compile(r"^\s*(\d{4})(\d\d)(\d\d)[T_ ](\d\d)(\d\d)(\d\d)")
 _COUNTS = re.compile(r"(?:counts?|lsb|raw)/(\d+(?:\.\d+)?)")
 
 
@@ -121,7 +122,7 @@ def _moment(text: str) -> tuple[int, bool] | None:
     """Read a date and a clock, or a clock. A date without a zone is in UTC.
 
     Returns ns since 1970 and True, or ns since midnight and False. None for another text."""
-    match = MOMENT.fullmatch(text)
+    match = MOMENT.fullmatch(_COMPACT.sub(r"\1-\2-\3T\4:\5:\6", text))
     if match is None:
         return None
     first, month, last, hours, _, minutes, seconds, part, half, zone = match.groups()
@@ -139,10 +140,10 @@ def _moment(text: str) -> tuple[int, bool] | None:
 @functools.lru_cache
 def _days(first: str, month: str, last: str, month_first: bool) -> int | None:
     """The number of days from 1970 to a date; None for an impossible date, and after the year 2200."""
-    if month.isalpha():
-        month = str((*_MONTHS, month.lower()).index(month.lower()) + 1)
-    elif len(first) < 3 and (int(month) > 12 or month_first):
+    if first.isalpha() or (len(first) < 3 and month.isdigit() and (int(month) > 12 or month_first)):
         first, month = month, first
+    if month.isalpha():
+        month = str((*_MONTHS, month[:3].lower()).index(month[:3].lower()) + 1)
     year, day = (first, last) if len(first) > 2 else (last, first)
     try:
         days = (date(int(year) + 2000 * (len(year) < 3), int(month), int(day)) - date(1970, 1, 1)).days

@@ -57,7 +57,7 @@ class CellMotion:
 def motion(ride: Source, progress: Progress | None = None, notices: list[Message] | None = None) -> CellMotion:
     """The CellMotion of a log (see read_log). progress, notices: see read_blocks(). Raises InputError."""
     table, speed, positions = Cells(STEP_S), False, False
-    for block in read_blocks(ride, 2, progress, notices):
+    for block in read_blocks(ride, 2, progress, notices, lines=False):
         speed |= bool(np.any(np.isfinite(block.speed_mps)))
         positions |= bool(np.any(np.isfinite(block.lat_deg)))
         good = block.measured

@@ -74,11 +74,11 @@ def numbers_in(text: bytes, count: int) -> Array | None:
     return found if found.shape == (text.count(b"\n"), count) else None  # loadtxt skips empty lines
 
 
-def columns_of_text(text: str, separator: str, width: int) -> tuple[list[Cells], int]:
+def columns_of_text(text: str, separator: str, width: int, most: int = 0) -> tuple[list[Cells], int]:
     """Read CSV without a header.
 
-    A damaged row is left out. A row is damaged if its line is too long, or if it has more cells than `width` and more
-    than the first row. The missing cells of a short row are empty.
+    A damaged row is left out. A row is damaged if its line is too long, or if it has more than `most` cells. If `most`
+    is 0, a row may have `width` cells, or as many as the first row. The missing cells of a short row are empty.
 
     Returns:
         columns: the cells of each column.
@@ -86,7 +86,7 @@ def columns_of_text(text: str, separator: str, width: int) -> tuple[list[Cells],
 
     Raises InputError for a table that is too large.
     """
-    most, left_out = 0, 0
+    left_out = 0
 
     def whole() -> Iterator[list[str]]:
         nonlocal most, left_out

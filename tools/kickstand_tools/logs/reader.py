@@ -63,7 +63,7 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None,
     ['t_s', 'ax_g', 'ay_g', 'az_g', 'gx_dps', 'gy_dps', 'gz_dps', 'speed_mps', 'lat_deg', 'lon_deg', 'utc_s', 'temp_c']
     """
     notices: list[Message] = []
-    blocks = list(read_blocks(source, minimum, progress, notices, axes))
+    blocks = list(read_blocks(source, minimum, progress, notices, axes, lines=False))
     readings = np.concatenate([block.readings for block in blocks])
     return Log(
         np.concatenate([block.t_s for block in blocks]),
@@ -91,14 +91,14 @@ def read_blocks(
     Args:
         source, minimum, progress, axes: see read_log().
         notices: after the last block, notices about the log and its contradictions to `calibration` are appended.
-        lines: also keep the rows as CSV. The rows use most of a block's memory.
+        lines: also keep the rows as CSV, to write them again. The rows use most of a block's memory.
     """
     name, count = name_of(source), 0
     remarks: list[Message] = []
     checks, frozen, health = Checks(name), FrozenFinder(), SensorHealth()
     whole = source.source if isinstance(source, Stretch) else source
     total = len(whole.t_s) if isinstance(whole, Log) else total_bytes(whole)
-    for block in _unchecked(source, remarks):
+    for block in _unchecked(source, remarks, lines):
         if not count:
             check_units(name, block.time_us, block.readings[:, :3])
         count += len(block.time_us)
@@ -106,7 +106,6 @@ def read_blocks(
             raise InputError(
                 f"{name} has over {MOST_SAMPLES / 1e6:.0f} million samples: kickstand cut writes a part of it"
             )
-        block.lines = block.lines if lines else []
         block.frozen = frozen.mark(block.time_us, block.readings) | health.mark(block.time_us, block.readings)
         checks.add(block.measured)
         yield block
@@ -175,17 +174,18 @@ def _rereadable(source: File | Log) -> File | Log:
     return source if isinstance(source, (Path, str, Log)) else read_log(source)
 
 
-def _unchecked(source: Source, remarks: list[Message]) -> Iterator[Block]:
+def _unchecked(source: Source, remarks: list[Message], lines: bool = False) -> Iterator[Block]:
     """Return the blocks of a source. Their units and their number of samples are not checked yet.
 
     remarks: notices about the file are appended.
+    lines: see read_blocks().
     """
     if isinstance(source, Log):
         return _blocks_of(source)
     if not isinstance(source, Stretch):
-        return _parsed(source, name_of(source), remarks)
+        return _parsed(source, name_of(source), remarks, lines)
     stretch = _from_beginning(source)
-    return stretch.cut(_unchecked(stretch.source, remarks))
+    return stretch.cut(_unchecked(stretch.source, remarks, lines))
 
 
 def _blocks_of(log: Log) -> Iterator[Block]:
@@ -204,11 +204,12 @@ def _blocks_of(log: Log) -> Iterator[Block]:
         )
 
 
-def _parsed(source: File, name: str, remarks: list[Message]) -> Iterator[Block]:
+def _parsed(source: File, name: str, remarks: list[Message], lines: bool) -> Iterator[Block]:
     pieces = chunks(source, BLOCK_BYTES, remarks)
     first, packed = next(pieces, (b"", 0))
     names, rest = _header(name, first)
-    return even_blocks(_rows(itertools.chain([(rest, packed)], pieces), name, names, remarks), name, remarks)
+    rows = _rows(itertools.chain([(rest, packed)], pieces), name, names, remarks, lines)
+    return even_blocks(rows, name, remarks)
 
 
 def _header(name: str, first: bytes) -> tuple[list[str], bytes]:
@@ -225,7 +226,9 @@ def _header(name: str, first: bytes) -> tuple[list[str], bytes]:
         raise
 
 
-def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], remarks: list[Message]) -> Iterator[Block]:
+def _rows(
+    pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], remarks: list[Message], lines: bool
+) -> Iterator[Block]:
     """Yield the blocks with the times as recorded. Some times may be repeated."""
     places = {column: names.index(column) for column in COLUMNS + OPTIONAL if column in names}
     line, start_us, last_us = 1, None, None
@@ -250,7 +253,7 @@ def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], rema
             has_temp="temp_c" in places,
             start_s=start_us / 1e6,
             done=done,
-            lines=[line for line in text.decode().split("\n") if line.strip()],
+            lines=[line for line in text.decode().split("\n") if line.strip()] if lines else [],
             names=tuple(names),
             **{name: column[name] for name in TRACK},
         )

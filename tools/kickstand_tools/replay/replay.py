@@ -95,10 +95,9 @@ def replay(
     True
     """
     notices: list[Message] = []
-    blocks = list(replay_blocks(log, calibration, engine, progress, notices))
-    time_s = np.concatenate([block.t_s for block, _ in blocks])
-    columns = np.concatenate([results for _, results in blocks]).T
-    return LeanTable(time_s, *columns, notices=notices)
+    blocks = [(block.t_s, results) for block, results in replay_blocks(log, calibration, engine, progress, notices)]
+    time_s, columns = (np.concatenate(parts) for parts in zip(*blocks))
+    return LeanTable(time_s, *columns.T, notices=notices)
 
 
 def replay_to_csv(
@@ -147,7 +146,7 @@ def _replayed(
         meter = MeterAlong(calibration)
         return ((block, meter.columns(block.measured)) for block in blocks)
     run = _BY_RECORDS[engine] or plugins.part(plugins.ENGINES, engine)
-    return _by_records(run(_records(read_blocks(log), calibration), progress), blocks)
+    return _by_records(run(_records(read_blocks(log, lines=False), calibration), progress), blocks)
 
 
 def _with_frozen(block: Block, results: Array) -> Array:

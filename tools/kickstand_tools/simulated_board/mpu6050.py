@@ -46,6 +46,8 @@ VARIANTS = {  # by WHO_AM_I, for the same chips as CHIPS in firmware/kickstand/i
     0x78: Variant(0x40, 333.87, 21.0, True, 512, False),  # MPU6500 clone
     0x98: Variant(0x40, 326.8, 25.0, True, 512, False),  # ICM20689
     0x19: Variant(0x40, 326.8, 25.0, True, 1024, True),  # MPU6886
+    0x12: Variant(0x41, 326.8, 25.0, True, 1008, True),  # ICM20602
+    0x11: Variant(0x41, 326.8, 25.0, True, 1008, True),  # ICM20600
 }
 
 
@@ -217,6 +219,8 @@ class Mpu6050:
         if register == PWR_MGMT_1 and value & RESET:
             self.power_on()
             return
+        if register == FIFO_EN and self._variant.temperature_in_fifo:
+            value &= 0x18  # the other bits do not exist
         old = self._regs[register]
         self._regs[register] = value
         if register == PWR_MGMT_1:

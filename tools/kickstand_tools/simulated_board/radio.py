@@ -4,7 +4,14 @@ A phone is any object with the methods heard(handle, data) and dropped(). A phon
 write(), read() and give_pin() of the radio.
 """
 
+import sys
+
 from .clock import to_us
+
+if sys.implementation.name == "micropython":
+    from micropython import heap_lock, heap_unlock
+else:  # CPython cannot lock its heap
+    heap_lock = heap_unlock = int
 
 EVENT_S = 0.03  # time between two connection events, at which waiting notifications are sent
 ROOM = 12  # number of notifications that NimBLE keeps on an ESP32; btstack on a Pico W has no limit
@@ -43,6 +50,7 @@ class Radio:
         self.config = {}
         self.found = self.named = self.phone = None
         self.services, self.values, self.flags = [], {}, {}
+        self.buffers = {}  # {handle: (length, True if writes are appended)}
         self._waiting = []
         self._passkey = None
         self.paired = self.away = False
@@ -98,7 +106,24 @@ class Radio:
                 phone.heard(handle, data)
 
     def _tell(self, event, *data):
-        return self.irq(event, data) if self.irq else None
+        """Call the firmware's handler. Returns its result.
+
+        The heap may be full at any time, so the handler gets no heap except for keys. After an exception MicroPython
+        never calls the handler again (extmod/modbluetooth.c).
+        """
+        if not self.irq:
+            return None
+        needs_heap = event in (GET_SECRET, SET_SECRET)
+        try:
+            if not needs_heap:
+                heap_lock()
+            return self.irq(event, data)
+        except Exception:
+            self.irq = None
+            return None
+        finally:
+            if not needs_heap:
+                heap_unlock()
 
     # Called by a phone
 
@@ -129,10 +154,14 @@ class Radio:
         """Pair with the PIN that the rider typed into the phone. Returns True if it was right."""
         if not self.config.get("mitm"):
             return False
-        self._tell(PASSKEY, 0, _DISPLAY, 0)
-        if pin == self._passkey:
+        if pin == self.ask_pin():
             self.pair()
         return self.paired
+
+    def ask_pin(self):
+        """Ask the board for the PIN that a phone must enter. Returns it."""
+        self._tell(PASSKEY, 0, _DISPLAY, 0)
+        return self._passkey
 
     def pair(self):
         """Complete the pairing after the right PIN."""
@@ -144,7 +173,8 @@ class Radio:
         flags = self.flags[handle]
         if not flags & WRITE or (flags & WRITE_PAIRED and not self.paired):
             return False
-        self.values[handle] = bytes(data[:20])  # MicroPython stores at most 20 bytes
+        length, append = self.buffers.get(handle, (20, False))  # MicroPython stores at most 20 bytes without a buffer
+        self.values[handle] = ((self.values[handle] if append else b"") + bytes(data[:20]))[:length]
         self._tell(WRITTEN, 0, handle)
         return True
 

@@ -259,7 +259,7 @@ class PageDevice(Device):
     def _start(self):
         from kickstand.start import main
 
-        ended = self.board.run(lambda: main(self._hand_over), FOREVER_S)
+        ended = self.board.run(lambda: main(self._hand_over, closed_ms=0), FOREVER_S)
         self._stopped = ended == "returned" and self._app is None
         self._ended(ended)
         if self._app:

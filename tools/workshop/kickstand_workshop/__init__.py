@@ -2,5 +2,5 @@
 
 commands.py adds commands to `kickstand` by the entry points in pyproject.toml. bench/ measures what the firmware costs,
 and soak/ tests the firmware for hours. evaluation/ compares the firmware with other lean filters. pictures/ draws the
-pictures of the READMEs. mutants/ judges the tests.
+pictures of the READMEs.
 """

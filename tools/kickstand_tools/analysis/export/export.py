@@ -138,7 +138,7 @@ class _Whole:
 
 def _first_pass(log: Source) -> _Whole:
     start_s, seconds, speeds, places, starts_utc_s = 0.0, 0.0, [], [], []
-    for block in read_blocks(log):
+    for block in read_blocks(log, lines=False):
         start_s, seconds = block.start_s, float(block.t_s[-1])
         there = ~np.isnan(block.speed_mps)
         speeds.append(np.column_stack((block.t_s[there], block.speed_mps[there])))

@@ -75,8 +75,8 @@ def _is_ours(file: RecordingFile) -> bool:
     first = names_in(next(iter(file.first_lines(1)), ""))
     if _is_meta(file) or len(first) < 2 or not re.fullmatch(r"(.*\s)?time \(s\)", first[0], re.IGNORECASE):
         return False
-    known = [_AXIS.match(column) for column in first]
-    return any(known) or "latitude" in map(plain, first)
+    axes = [_AXIS.match(column) for column in first if re.search(r"\b[xyz]\b", column, re.IGNORECASE)]
+    return bool(axes and all(axes)) or "latitude" in map(plain, first)
 
 
 def _sensors(sheet: Sheet, stem: str, pauses: "_Pauses") -> Iterator[tuple[str, RecordedSensor]]:

@@ -73,8 +73,14 @@ class Ble:
     def gatts_register_services(self, services):
         return self._on().register(services)
 
+    def gatts_set_buffer(self, handle, length, append=False):
+        self._on().buffers[handle] = length, append
+
     def gatts_read(self, handle):
-        return self._on().values[handle]
+        data = self._on().values[handle]
+        if self._radio.buffers.get(handle, (20, False))[1]:
+            self._radio.values[handle] = b""
+        return data
 
     def gatts_write(self, handle, data, send_update=False):
         self._on().values[handle] = bytes(data)

@@ -32,8 +32,11 @@ class BLE:
     def gatts_write(self, handle, data):
         pass
 
+    def gatts_set_buffer(self, handle, length, append):
+        pass
+
     def gatts_read(self, handle):
-        return self._values[handle]
+        return self._values.pop(handle, b"")
 
     def gatts_notify(self, phone, handle, data):
         self.sent += 1

@@ -1,0 +1,98 @@
+"""No window of a correct recording is accused of a mistake, wherever it begins: a recording may begin in a long bend.
+
+A mistake is found where the window shows it, and the exchange of axes that is named is the right one."""
+
+import functools
+
+import numpy as np
+import pytest
+from kickstand_tools.checks.handedness import EXCHANGES
+from kickstand_tools.common.errors import RefusedInput
+from kickstand_tools.estimation.alignment import mounted_windows
+from kickstand_tools.estimation.first_guess import axes
+from kickstand_tools.logs.log import Log
+from kickstand_tools.logs.reader import read_log
+from kickstand_tools.simulation.files import positions
+from kickstand_tools.simulation.profiles import PROFILES
+from kickstand_tools.simulation.ride import ride
+
+MOUNTINGS = [exchange for exchange in EXCHANGES if np.linalg.det(exchange) > 0.0]
+NOT_ENOUGH = {"ride-short", "no-bends", "side-unsure"}  # refusals that accuse nothing
+BENDY = "sweeper", "corners", "hills"  # profiles whose windows were accused once
+WRONG = [matrix for matrix in EXCHANGES if not np.array_equal(matrix, np.eye(3))]
+
+
+@functools.cache
+def long_ride(profile: str, seconds: float) -> Log:
+    """Simulate a log with 50 samples per second, and one speed and one position per second."""
+    made = ride(profile, 8, seconds)
+    known = np.arange(len(made.time[::4])) % 50 == 0
+    speed, lat, lon = (
+        np.where(known, np.asarray(column)[::4], np.nan) for column in (made.truth["speed_mps"], *positions(made)[:2])
+    )
+    return Log(made.time[::4], made.readings[::4, :3], made.readings[::4, 4:], speed, lat_deg=lat, lon_deg=lon)
+
+
+def window(log: Log, chance: np.random.Generator) -> Log:
+    """Return 30 to 300 s of a log, as measured in another mounting, with or without speed and positions."""
+    seconds = min(np.exp(chance.uniform(np.log(30.0), np.log(300.0))), 0.99 * log.t_s[-1])
+    begin = chance.uniform(0.0, log.t_s[-1] - seconds)
+    part = log.part((log.t_s >= begin) & (log.t_s < begin + seconds))
+    mounting = MOUNTINGS[chance.integers(len(MOUNTINGS))]
+    accel, gyro = part.accel_g @ mounting.T, part.gyro_dps @ mounting.T
+    if chance.random() < 0.5:
+        return Log(part.t_s - begin, accel, gyro)
+    return Log(part.t_s - begin, accel, gyro, part.speed_mps, lat_deg=part.lat_deg, lon_deg=part.lon_deg)
+
+
+def accusations(log: Log) -> set[str]:
+    """Return the codes of the remarks on a log, and of the refusal of its alignment."""
+    codes = {notice.code for notice in read_log(log).notices}
+    try:
+        axes(mounted_windows(log))
+    except RefusedInput as refusal:
+        codes.add(refusal.code)
+    return codes - NOT_ENOUGH
+
+
+@pytest.mark.parametrize("profile", BENDY)
+def test_no_window_of_bends_is_accused(profile):
+    chance = np.random.default_rng(1)
+    for _ in range(6):
+        assert accusations(window(long_ride(profile, 200.0), chance)) == set()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("profile", PROFILES)
+def test_no_window_of_a_ride_is_accused(profile):
+    chance = np.random.default_rng(2)
+    for _ in range(12):
+        assert accusations(window(long_ride(profile, 640.0), chance)) == set()
+
+
+def test_no_window_of_a_recording_is_accused(shared_data):
+    """A car is named as a car."""
+    chance = np.random.default_rng(3)
+    for path in sorted(shared_data.glob("*.csv.gz")):
+        log = read_log(path)
+        for _ in range(2):
+            assert accusations(window(log, chance)) <= ({"not-leaning"} if "car" in path.name else set())
+
+
+@pytest.mark.parametrize("profile", ["street", *(pytest.param(p, marks=pytest.mark.long) for p in BENDY)])
+def test_mistakes_are_found_in_most_windows_and_named_right(profile):
+    chance = np.random.default_rng(4)
+    found = 0
+    for _ in range(6):
+        log, wrong = window(long_ride(profile, 200.0), chance), WRONG[chance.integers(len(WRONG))]
+        notices = read_log(Log(log.t_s, log.accel_g, log.gyro_dps @ wrong.T)).notices
+        assert len(notices) <= 1
+        for notice in notices:
+            found += 1
+            right = (
+                np.array_equal(wrong.T, -np.eye(3))
+                if notice.code == "left-handed"
+                else notice.values == tuple(map(tuple, wrong.T))
+            )
+            assert right or notice.code == "axes-misfit", (notice, wrong)
+    assert found >= 3

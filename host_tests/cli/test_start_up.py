@@ -1,0 +1,95 @@
+"""`kickstand --help` starts fast: it loads no other package's command, and nothing that computes."""
+
+import json
+import resource
+import subprocess
+import sys
+from importlib.metadata import EntryPoint
+
+import pytest
+from kickstand_tools.cli import main
+from kickstand_tools.cli.added import GROUP, help_line
+from support import command
+
+LOADED = """
+import json, sys
+from kickstand_tools.cli.main import main
+try:
+    main(["--help"])
+finally:
+    print(json.dumps(sorted(sys.modules)), file=sys.stderr)
+"""
+
+
+def test_help_loads_no_command_and_no_numpy():
+    done = subprocess.run([sys.executable, "-c", LOADED], capture_output=True, text=True, check=True)
+    loaded = set(json.loads(done.stderr))
+    assert "  fleet      Align many vehicles, find moved mounts, test their brakes." in done.stdout
+    heavy = {name for name in loaded if name.partition(".")[0] in ("numpy", "rich", "dask", "jinja2")}
+    leaves = {
+        name for name in loaded if name.startswith(("kickstand_fleet", "kickstand_emulator", "kickstand_workshop"))
+    }
+    assert heavy == leaves == set()
+    assert not {name for name in loaded if name.startswith("kickstand_tools.") and ".c" not in name}
+
+
+def processor_s(*arguments):
+    """Return the least processor time of four runs of Python, in s."""
+    times = []
+    for _ in range(4):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run([sys.executable, *arguments], stdout=subprocess.DEVNULL, check=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        times.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return min(times)
+
+
+@pytest.mark.long
+def test_help_takes_at_most_twice_the_time_of_its_libraries():
+    assert processor_s("-m", "kickstand_tools.cli", "--help") < 2.0 * processor_s("-c", "import click, rich.console")
+
+
+TEXTS = '''
+import click
+from click import command as decorator
+
+raise RuntimeError("it was loaded")
+
+
+@click.command(short_help="A short help.")
+@click.option("--more", help="Not this.")
+def short_command(more):
+    """A long help."""
+
+
+@click.command(help="A help. More of it.")
+def help_command():
+    """A docstring."""
+
+
+@click.command()
+@click.option("--more", help="Not this.", default=3)
+def docstring_command(more):
+    """The first sentence. The second one."""
+'''
+
+
+@pytest.mark.parametrize(
+    ("name", "line"), [("short", "A short help."), ("help", "A help."), ("docstring", "The first sentence.")]
+)
+def test_a_help_line_is_read_without_loading_its_module(tmp_path, monkeypatch, name, line):
+    (tmp_path / "lap_texts").mkdir()
+    (tmp_path / "lap_texts" / "__init__.py").write_text("raise RuntimeError")
+    (tmp_path / "lap_texts" / "commands.py").write_text(TEXTS)
+    monkeypatch.syspath_prepend(tmp_path)
+    assert help_line(EntryPoint("x", f"lap_texts.commands:{name}_command", GROUP)) == line
+
+
+def test_an_invalid_entry_point_does_not_hide_a_crash(tmp_path, monkeypatch):
+    info = tmp_path / "lap_timer-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: lap-timer\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[kickstand.commands]\nlaps = not an object!\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(main.COMMANDS, "report", (".no_such_module", ""))
+    assert ": a fault in kickstand, please report it" in command.run("report").err
