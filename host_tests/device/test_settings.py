@@ -83,6 +83,8 @@ def test_value_beyond_the_limits_is_replaced(name):
         ({**CARD, "SD_CS": None}, "card-pins", ("SD_CS",)),
         ({**CARD, "SD_CS": 15}, "pin-twice", ("",)),
         ({"SPEED": "gps", "GPS_RX": 15}, "pin-twice", ("",)),
+        ({"SENSOR_SDA": 2}, "i2c-pins", ("SENSOR_SDA", "SENSOR", 2, 5, 0)),
+        ({"LCD_SDA": 8, "LCD_SCL": 9}, "i2c-pins", ("LCD_SDA", "LCD", 8, 9, 1)),
         ({"SIDES": "left"}, "no-setting", ("SIDES",)),
         ({"side": "left"}, "no-setting", ("side",)),
     ],
@@ -117,20 +119,17 @@ def test_shared_bus_runs_at_the_slower_clock(config, hz):
 @pytest.mark.parametrize(
     ("name", "config", "code", "values"),
     [
-        ("SENSOR", {"SENSOR_SDA": 2}, "i2c-pins", ("SENSOR_SDA / SCL", "SENSOR", 2, 5, 0)),
-        ("LCD", {"LCD_SDA": 8, "LCD_SCL": 9}, "i2c-pins", ("LCD_SDA / SCL", "LCD", 8, 9, 1)),
         ("button", {"BUTTON_PIN": 47}, "no-such-pin", ("BUTTON_PIN", 47)),
         ("speed", {"SPEED": "gps", "GPS_RX": 11}, "uart-pins", ("GPS_TX / GPS_RX", 8, 11, 1)),
     ],
 )
 def test_pins_that_the_chip_cannot_use_are_named(name, config, code, values, on_board):
     def opened(board, settings):
-        from kickstand.devices import open_bus, open_button
+        from kickstand.devices import open_button
         from kickstand.speed.source import open_speed
 
-        others = {"button": open_button, "speed": open_speed}
         with pytest.raises(SettingsError) as refused:
-            others[name](settings) if name in others else open_bus(settings, name, 400_000)
+            {"button": open_button, "speed": open_speed}[name](settings)
         return refused.value.code, refused.value.values[: len(values)]
 
     assert on_board(opened, config) == (code, values)
