@@ -31,6 +31,7 @@ from .units import (
     NO_TIME,
     RATES,
     SPEEDS,
+    TIME_NAME,
     TIMES,
     counts_per,
     since_first_s,
@@ -50,7 +51,6 @@ _KINDS = {  # kinds of sensors, by the words in their columns' names
     "accel": r"acc|force|^ac$|^gf$|^f$|^a$",
     "either": r"^g$",
 }
-_TIME = re.compile(r"time|milli|micro|^(t|ts|ms|us|ns|s|sec|secs|seconds|elapsed\w*)$|epoch|utc|clock|stamp|^monitors$")
 # Words for an axis, longest first: of vehicles, and of web pages, whose alpha turns about z
 _AXES = {"longitudinal": "x", "inline": "x", "long": "x", "roll": "x", "beta": "x", "lateral": "y", "lat": "y"}
 _AXES |= {"pitch": "y", "gamma": "y", "vertical": "z", "vert": "z", "yaw": "z", "alpha": "z"}
@@ -160,7 +160,7 @@ def _time(sheet: Sheet) -> ColumnFinding | None:
     then the column with the finest steps."""
     usable = []
     for place, name in enumerate(sheet.columns):
-        named = bool(_TIME.search(plain(name.rpartition(":")[2])))
+        named = bool(TIME_NAME.search(plain(name.rpartition(":")[2])))
         stated = stated_unit(name) if stated_unit(name) in TIMES else ""
         values = sheet.cells[place]
         if not (named or stated) and values.dtype.kind == "O" and not MOMENT.fullmatch(str(values[0])):
@@ -264,7 +264,11 @@ def completed(sheet: Sheet) -> Sheet:
         if not np.any(np.all(np.isfinite(three.values), axis=1)):
             _merge_rows(sheet, three)
     if "linear" in threes and "gravity" in threes and "accel" not in threes:
-        total = threes["linear"].values + threes["gravity"].values
+        linear, gravity = threes["linear"].values, threes["gravity"].values
+        total, valid = linear + gravity, np.all(np.isfinite(gravity), axis=1)
+        if np.all(np.isnan(total)) and np.any(valid):  # in rows of their own
+            t_s = since_first_s(sheet.times(0, ""))
+            total = linear + np.column_stack([np.interp(t_s, t_s[valid], axis[valid]) for axis in gravity.T])
         stated = stated_unit(sheet.columns[threes["linear"].places[0]])
         sheet.columns += [f"total acceleration {axis}" + (f" ({stated})" if stated else "") for axis in "xyz"]
         sheet.cells += list(total.T)
@@ -331,7 +335,7 @@ def _side_by_side(sheet: Sheet) -> list[_Triple]:
     numeric = [
         place
         for place, name in enumerate(sheet.columns)
-        if _numeric(sheet, [place]) and not _TIME.search(plain(name)) and not _increasing(sheet, place)
+        if _numeric(sheet, [place]) and not TIME_NAME.search(plain(name)) and not _increasing(sheet, place)
         if np.nanstd(sheet.numbers(place)) > 0.0 and not _KNOWN.search(plain(name))
     ]
     runs = [numeric[k : k + 3] for k in range(0, len(numeric) - 2, 3)] if len(numeric) > 5 else []
@@ -368,7 +372,7 @@ def _split_axis(name: str) -> Iterable[tuple[str, str]]:
         yield sensor + (head + last[:-1]).strip(), last[-1]
     elif len(whole) > 1 and whole[0] in "xyz":
         yield sensor + whole[1:], whole[0]
-    elif (match := re.fullmatch(r"(.*?)(\d{1,2})", whole)) and not bare.startswith("#"):
+    elif (match := re.fullmatch(r"(.*?)(\d{1,2})", whole)) and (colon or not bare.startswith("#")):
         yield sensor + match[1], match[2]
 
 
@@ -419,7 +423,8 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
     unnamed, scales = [*kinds["either"], *kinds[""]], _scales(sheet)
     possible = [*kinds["accel"], *kinds["either"], *([] if kinds["accel"] else kinds[""])]
     without = kinds["linear"] or kinds["accel"]
-    accel = _first_with_gravity(possible, seconds) or _first_with_gravity(kinds["linear"], seconds)
+    accel = _first_with_gravity(possible, seconds)
+    accel = accel or next((three for three in kinds["linear"] if _has_gravity(three, seconds, near=True)), None)
     accel = accel or next((three for three in kinds["accel"] if not _is_linear(three, seconds)), None)
     exchanged = None if accel else _first_with_gravity(kinds["gyro"], seconds)
     rates = _partner(accel, kinds["gyro"]) or _partner(accel, [three for three in unnamed if three is not accel])

@@ -138,11 +138,10 @@ def table_in(files: list[RecordingFile]) -> MappedTable | None:
     together, return the largest."""
     largest = max(files, key=lambda file: len(file.text))
     sheet = sheet_in(largest)
-    sheet = sheet and findings.completed(sheet)
-    found = None if sheet is None else findings.find(sheet)
+    found = None if sheet is None else findings.find(findings.completed(sheet))
     if len(files) > 1 and (found is None or found.lacking):
         joined = joined_sheet(files)
-        of_all = None if joined is None else findings.find(joined)
+        of_all = None if joined is None else findings.find(findings.completed(joined))
         if joined and of_all and (found is None or len(of_all.lacking) < len(found.lacking)):
             return MappedTable(joined.name, joined, of_all, True)
     if sheet is None or found is None or not ({"a", "g"} & set(found.found) or len(sheet.columns) >= len(REQUIRED)):
