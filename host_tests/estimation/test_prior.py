@@ -19,12 +19,6 @@ def test_six_positions_make_the_accelerometer_certain():
     assert PRIOR.sigma[bike].tolist() == [0.3, 0.5, 0.06, 0.4, 0.035]
 
 
-def test_hypotheses_are_three_mounts_times_three_winds():
-    assert ALL.minus_two_log_prior.tolist() == [0.0, 8.0, 5.0, 1.0, 9.0, 6.0, 1.0, 9.0, 6.0]
-    assert np.degrees([ALL.turning, ALL.rolling]) == pytest.approx(np.repeat([[5, 5, 11], [5, 11, 11]], 3, 1) / 100)
-    assert ALL.pushed == pytest.approx([0.00052, 0.01047, 0.03142] * 3)
-
-
 def test_a_measured_gyro_is_not_estimated_again():
     sigma = np.full((3, 3), 0.003)
     sigma[0, 0] = 0.05

@@ -6,7 +6,6 @@ import textwrap
 from typing import Any
 
 import pytest
-from kickstand.errors import Notice
 from kickstand_tools.simulated_board.simulator import Board
 from support.board_access import level, on_board, write
 
@@ -135,31 +134,6 @@ def test_a_missing_or_unknown_chip_is_looked_for_every_50_ms(board, code):
     run = Run(fit, **board)
     assert [code for code in run.codes() if code != "starting"] == [code, None] and run.changes[0][0] < 0.01
     assert 1.2 < run.changes[-1][0] < 1.29 and run.changes[-1][2] == 1
-
-
-def test_the_fifo_is_tested_if_set_ups_do_not_help():
-    """The test runs at the third fault in a row, if each fault comes soon after a set-up. It runs only once, because it
-    takes 0.3 s. A sample ends the fault."""
-    calls = []
-
-    def explain(chip, error):
-        calls.append(error)
-        return Notice("sensor-fifo", "stays empty"), []
-
-    def dead_fifo(board):
-        push = board.sensor.fifo.push
-        board.at(1.0, lambda: vars(board.sensor.fifo).update(push=lambda *data, **kind: True))
-        board.at(2.5, lambda: vars(board.sensor.fifo).update(push=push))
-
-    run = Run(dead_fifo, explain=explain)
-    assert run.codes() == [*STARTED, "sensor-silent", "sensor-fifo", None] and calls == [None]
-    assert [restarts for time_s, _, restarts in run.changes if time_s < run.since("sensor-fifo")][-1] == 3
-
-    def slow(board):
-        for k in range(5):
-            board.at(1.0 + 1.5 * k, lambda: write(board.sensor, 0x6B, 0x41))
-
-    assert Run(slow, 9.0, lambda chip, error: 1 / 0).codes() == STARTED + ["sensor-silent", None] * 5
 
 
 def test_clipped_samples_are_skipped_and_a_faulty_axis_gives_none():
