@@ -70,3 +70,22 @@ def test_racechrono_finds_the_board_filters_and_decodes(on_air, on_the_road):
     assert -40 < values["yaw rate"] < -15 and 1.1 < values["vertical acceleration (specific force)"] < 1.5
     assert abs(values["roll rate"]) < 8 and abs(values["longitudinal acceleration"]) < 0.2
     assert record.ends == ["off"]
+
+
+async def pair_and_listen(central):
+    await central.connect(await central.find(CHRONO))
+    await central.subscribe(CHRONO, 0x0001, "chrono")
+    try:
+        await central.connection.pair()
+        await central.write(CHRONO, 0x0002, [1, 0, 100])
+    finally:
+        await asyncio.sleep(2)
+        await central.leave()
+
+
+def test_phone_must_enter_the_pin(on_air):
+    """The Bluetooth stack enforces the PIN. A phone gets no packet with a wrong PIN."""
+    visits = [(2, pair_and_listen, 314159), (10, pair_and_listen, 271828)]
+    (wrong, right), _ = on_air({"lean": [[0, 25]], "until": 18}, visits, "esp32", LIVE_PIN=271828)
+    assert wrong.done.exception() and not wrong.heard and right.done.exception() is None
+    assert 15 <= len([data for _, _, data in right.heard if data[0] == 1]) <= 25

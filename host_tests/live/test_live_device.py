@@ -80,16 +80,6 @@ def test_second_phone_waits_for_the_first(run):
     assert record.at(7.0)[1].split() == ["20", "packets/s"]
 
 
-def test_phone_out_of_reach_costs_only_its_packets(run):
-    """The queue of an ESP32 is full while the phone is out of reach."""
-    acts = ASK + [[5.0, "away", True], [9.0, "away", False]]
-    record = run({**STILL, "board": {"machine": "esp32"}, "until": 15}, acts)
-    (phone,) = record.phones
-    assert not of(phone, "now", 5.1, 8.9) and len(of(phone, "now", 9.5)) > 130
-    assert own("ride", latest(phone, "ride", 14.9))["samples lost"] == 0
-    assert record.lean_at(7.0) == 25
-
-
 def test_car_has_no_lean_and_its_speed(run):
     ride = [["straight", 3.0], ["accelerate", 12.0, 4.0], ["straight", 60.0]]
     record = run({"ride": ride, "gps": {}, "until": 14}, ASK + [[3.2, *ALL]], VEHICLE="car", SPEED="gps")

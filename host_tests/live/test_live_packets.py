@@ -79,10 +79,3 @@ def test_invalid_commands_change_nothing(data):
     assert not packets.take_filter(bytes(data), asked)
     assert packets.take_rate(bytes(data), asked) == (len(data) == 2)
     assert asked[:3] == [40, 50, 60] and asked[3] in (70, 256 * (data == [1, 0]), 40)
-
-
-@pytest.mark.parametrize(("data", "interval"), [([0, 0], 0), ([40, 0], 40), ([1, 0], 40), ([0, 1], 256)])
-def test_rate_sets_the_interval_of_our_page(data, interval):
-    asked = [40, 50, 60, 70]
-    assert packets.take_rate(bytes(data), asked)
-    assert asked == [40, 50, 60, interval]
