@@ -19,6 +19,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
 from ..common.errors import InputError
+from ..logs.csv_reader import as_text
 from ..signals import Array, moving_mean, moving_spread
 from .rate_fit import RateFit, fit_rates
 from .recording import Sheet, plain, unit_in
@@ -120,8 +121,12 @@ class Findings:
 
     @property
     def units(self) -> dict[str, str]:
-        """The units by "t", "a", "g" and "speed"."""
-        return {key: finding.unit for key, finding in self.found.items() if finding.unit}
+        """The units by "t", "a", "g" and "speed", and of single axes whose name has another unit."""
+        units = {key: finding.unit for key, finding in self.found.items() if finding.unit}
+        for axes, kinds in ((ACCEL, ACCELERATIONS), (GYRO, RATES)):
+            own = {axis: stated_unit(self.columns[axis]) for axis in axes if axis in self.columns}
+            units |= {axis: name for axis, name in own.items() if name in kinds and len(set(own.values())) > 1}
+        return units
 
     @property
     def reasons(self) -> str:
@@ -135,6 +140,8 @@ def find(sheet: Sheet) -> Findings:
     time = _time(sheet)
     if time is None:
         findings.lacking.append("time")
+        named = [name for name in sheet.columns if TIME_NAME.search(plain(name))]
+        findings.remarks += [f"its column {named[0]} does not increase like a time"] if named else []
     else:
         findings.found["t"] = time
     seconds = _seconds(sheet, time)
@@ -302,6 +309,11 @@ def _find_triples(sheet: Sheet) -> list[_Triple]:
         groups = ["xyz"] if set("xyz") <= set(axes) else _numbered(axes)
         for axes_of_one in groups:
             places = [axes[axis] for axis in axes_of_one]
+            if _kind(stem) in ("accel", "gyro", "either") and not _numeric(sheet, places):
+                cell = next((cell for place in places for cell in as_text(sheet.cells[place]) if cell), "")
+                sheet.unread = (
+                    f"its columns {', '.join(sheet.columns[k] for k in places)} hold no numbers ({cell[:20]!a})"
+                )
             if not used & set(places) and _numeric(sheet, places):
                 used |= set(places)
                 said = stated_unit(sheet.columns[places[0]])
@@ -441,6 +453,8 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
         of_accel.columns, findings.found["a"] = names, of_accel
         if exchanged is not None:
             of_accel.certain, of_accel.why = False, f"{of_accel.why}, so these columns are the accelerometer's"
+    if sheet.unread and (accel is None or rates is None):
+        findings.remarks.insert(0, sheet.unread)
     if rates is None:
         findings.lacking.append("gyro")
         return
