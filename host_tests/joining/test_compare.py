@@ -11,8 +11,8 @@ from kickstand_tools import api
 from kickstand_tools.calibration.file import write_calibration
 from kickstand_tools.joining import agreement
 from kickstand_tools.joining.clocks import Clocks
+from kickstand_workshop.evaluation.drawn_rides import drawn_ride
 from support import command
-from support.recordings.drawn_rides import drawn_ride
 
 LATER_S, SLOW, DELAY_S = 7.3, 80e-6, 0.04
 
