@@ -24,6 +24,7 @@ _FIRST, _LAST = 0x08, 0x77  # range of the addresses for devices (UM10204, table
 # Waiting time after switching a pull-up, in us. A bus may have at most 400 pF. An internal pull-up of 80 kOhm charges
 # this capacitance in 32 us.
 _SETTLE_US = 100
+_DISCHARGE_US = 1
 _SLOW_HZ = 100_000
 _TIMEOUT_US = 1000
 _INT_ENABLE = const(0x38)  # register map p. 27; bit 0 enables the signal that a sample is ready
@@ -50,6 +51,10 @@ def wire_fault(sda, scl):
 
 
 def _level(pin, pull):
+    if pull == Pin.PULL_DOWN:
+        # An RP2350 keeps a pin that was high at 2.2 V against its pull-down (erratum RP2350-E9), so pull it low first
+        Pin(pin, Pin.OUT, value=0).value()  # reading it takes the time until it is low
+        sleep_us(_DISCHARGE_US)
     pin = Pin(pin, Pin.IN, pull)
     sleep_us(_SETTLE_US)
     return pin.value()

@@ -120,6 +120,23 @@ def fill(settings, config, refusal):
     _check(settings, config)
 
 
+_WHICH_I2C = "set SENSOR_I2C and LCD_I2C to the I2C of their pins, or exchange SDA and SCL"
+
+
+def _check_i2c(settings):
+    """Raise SettingsError if the pins of a bus belong to the other I2C, or if both buses have the same I2C.
+
+    The I2C functions of an RP2040's pins repeat every four pins: SDA and SCL of I2C 0, then SDA and SCL of I2C 1 (data
+    sheet, section 1.4.3)."""
+    if not settings.one_bus and settings.SENSOR_I2C == settings.LCD_I2C:
+        raise SettingsError("one-i2c", "LCD_I2C", settings.LCD_I2C)
+    for name in ("SENSOR", "LCD"):
+        sda, scl, number = [getattr(settings, name + end) for end in ("_SDA", "_SCL", "_I2C")]
+        if (sda % 4, scl % 4) != (2 * number, 2 * number + 1):
+            settings.LCD_I2C = settings.LCD_SDA // 2 % 2  # the display can then show the refusal
+            raise SettingsError("i2c-pins", name + "_SDA", name, sda, scl, number, _WHICH_I2C)
+
+
 def _check(settings, config):
     for name in dir(config) if config else ():
         if name not in _NAMES and (name.isupper() or name.upper() in _NAMES):
@@ -135,8 +152,8 @@ def _check(settings, config):
         raise SettingsError("no-pins", missing[0], ", ".join(missing), port.MACHINE)
     if len({getattr(settings, name) for name in names}) != len(names):
         raise SettingsError("pin-twice", "", ", ".join(names))
-    if port.I2C_NUMBERED and not settings.one_bus and settings.SENSOR_I2C == settings.LCD_I2C:
-        raise SettingsError("one-i2c", "LCD_I2C", settings.LCD_I2C)
+    if port.I2C_NUMBERED:
+        _check_i2c(settings)
     if not settings.leans and settings.SPEED is None:
         raise SettingsError("needs-speed", "SPEED")
     fitting = MIN_DLPF[settings.SAMPLE_HZ]

@@ -23,6 +23,9 @@ MEASURED = {"odd-left": "force to the left", "odd-up": "force up", "odd-pitch": 
 _WIRINGS = const(4)  # number of values of LCD_WIRING
 _WIRING_MS = const(4000)  # time for which each wiring is shown
 _WATCH_MS = const(1400)  # time to set the sensor up and judge its axes twice
+# What the app noticed before a soft reset that removed it, as `kickstand status` sets it: the app's `worst` and the
+# `last_odd` of lean/consistency.py, or None
+noticed = None
 _TRIAL = "trial.tmp"  # a file that is written to measure the flash, and then removed
 
 
@@ -194,16 +197,16 @@ def _worst(chip):
     Args:
         chip: an Mpu6050.
     """
-    judge = sys.modules.get("kickstand.lean.consistency")
-    if judge and judge.last_odd:
+    judge, app = sys.modules.get("kickstand.lean.consistency"), sys.modules.get("kickstand.app")
+    worst, odd = noticed or (app and app.worst, judge and judge.last_odd)
+    if odd:
         words = (
             "the readings did not fit, again and again: %s. Check SIDE, the order of the presses and the mount, and \
 align again; then the sensor"
         )
-        _print("Sensor odd", words, MEASURED[judge.last_odd])
-    app = sys.modules.get("kickstand.app")
-    if app and app.worst:
-        longest_us, places, (peaks, share) = app.worst
+        _print("Sensor odd", words, MEASURED[odd])
+    if worst:
+        longest_us, places, (peaks, share) = worst
         words = "longest turn %.1f ms; places left in the FIFO, at the fewest: %d"
         _print("Since start", words, longest_us / 1000, places)
         words = "largest force %.1f %.1f %.1f g of %d; %.2f %% of the readings lost at the end of the range"

@@ -3,8 +3,6 @@
 Columns and signs follow the descriptions of the formats, which are named in the modules.
 """
 
-import importlib.util
-import time
 from dataclasses import fields
 from pathlib import Path
 
@@ -12,7 +10,7 @@ import numpy as np
 import pytest
 from kickstand_tools.analysis.channels import Channels, joined
 from kickstand_tools.analysis.export import export_columns, export_racechrono, export_vbo
-from kickstand_tools.analysis.export.export import RowsShare, export
+from kickstand_tools.analysis.export.export import export
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
@@ -68,15 +66,6 @@ def test_vbo_to_the_letter(tmp_path):
     assert text == expected("ride.vbo").replace("\n", "\r\n")
 
 
-def test_vbo_without_lean_speed_and_temperature(tmp_path):
-    bare = block(0.0, lean_deg=np.nan, speed_mps=np.nan, temp_c=np.nan, **NOWHERE)
-    lines = written(export_vbo.write, tmp_path / "x", bare).split("\r\n")
-    assert lines[12:14] == ["yaw-rate", "roll-rate"] and lines[16:18] == ["deg/s", "deg/s"]
-    assert "no speed in the log: velocity 0 stands for none" in lines[20:23]
-    row = "000 221320.00 +00000.000000 +00000.000000 000.000 000.00 +00000.00 -00.235 +00.346"
-    assert lines[-2] == row + " -2.345670E+00 +3.456780E+00"
-
-
 def test_vbo_fills_gaps_and_keeps_the_heading_at_standstill(tmp_path):
     """The vehicle goes north and then east, and then stands. At standstill the position moves by 0.8 mm."""
     ridden, stood = block(0.0, 1.0, 2.0), block(3.0, 4.0)
@@ -90,7 +79,6 @@ def test_vbo_fills_gaps_and_keeps_the_heading_at_standstill(tmp_path):
     assert rows[1].endswith(" +0.000000E+00") and not rows[0].endswith(" +0.000000E+00")
 
 
-RATE_HZ = 100.0
 SQUARE = CalibrationFile(aligned=True, vehicle="car")  # the sensor's axes are left, up, forward like the vehicle's
 
 
@@ -125,27 +113,6 @@ def test_a_left_turn_under_braking_has_the_signs_of_each_format(tmp_path):
     assert [float(row[f"{name}_rate_dps"]) for name in ("pitch", "yaw", "roll")] == pytest.approx([-5.0, 7.0, 9.0])
 
 
-@pytest.mark.parametrize("form", ["racechrono", "vbo"])
-@pytest.mark.parametrize(
-    ("start_s", "now_s", "first_s"),
-    [
-        (1e8, EVENING_S, 1e8),  # a time after 3 March 1973 is a Unix time
-        (1e8 - 1.0, EVENING_S, EVENING_S - 2.0),  # an earlier time counts from power-on
-        (0.0, EVENING_S + 0.985, EVENING_S - 2.0),  # the log begins 1.99 s before now, rounded to whole seconds
-        (0.0, 1.0, 0.0),  # if the computer's clock was never set, no time before 1970 is written
-    ],
-)
-def test_a_log_in_memory_without_a_clock_ends_now(tmp_path, monkeypatch, form, start_s, now_s, first_s):
-    monkeypatch.setattr(time, "time", lambda: now_s)
-    export(open_ride(braking_left(start_s=start_s), SQUARE), form, tmp_path / "out")
-    cells = table_of(tmp_path / "out", form)[0]
-    if form == "vbo":
-        seconds = int(cells[1][:2]) * 3600 + int(cells[1][2:4]) * 60 + float(cells[1][4:])
-        assert seconds == pytest.approx(first_s % 86400, abs=0.006)
-    else:
-        assert float(cells[0]) == pytest.approx(first_s, abs=0.006)
-
-
 def test_every_row_of_a_vbo_has_a_speed(tmp_path):
     """The log has a speed at 0.5 s and at 1.5 s. Between them the speed is interpolated."""
     speed = np.full(200, np.nan)
@@ -163,31 +130,6 @@ def test_every_row_of_a_vbo_has_a_speed(tmp_path):
 def test_vbo_has_at_most_100_rows_per_second(tmp_path, form, rows):
     assert export(open_ride(braking_left(400, 0.005), SQUARE), form, tmp_path / "out") == rows
     assert len(table_of(tmp_path / "out", form)) == rows
-
-
-@pytest.mark.parametrize("start_s", [1e8, 1e8 + 0.0043, 1e8 + 0.00065])
-@pytest.mark.parametrize(("form", "step_s", "columns"), [("racechrono", 0.001, (0, 3)), ("vbo", 0.01, (1,))])
-def test_no_time_is_written_twice(tmp_path, form, step_s, columns, start_s):
-    """Some samples are closer together than the smallest time step of the format."""
-    t_s = step_s * np.array([0.0, 0.96, 1.04, 2.5, 3.5, 4.5, 5.49, 5.51, 6.4, 7.0, 8.0, 9.96, 10.04, 10.5])
-    log = Log(t_s, np.tile([0.0, 1.0, 0.0], (len(t_s), 1)), np.zeros((len(t_s), 3)), start_s=start_s)
-    notices = []
-    count = export(open_ride(log, SQUARE), form, tmp_path / "out", notices=notices)
-    rows = table_of(tmp_path / "out", form)
-    assert len(rows) == count
-    for column in columns:
-        assert np.all(np.diff([float(row[column]) for row in rows]) > 0.0)
-    assert [notice for notice in notices if notice.code == "rows-share"] == [RowsShare(len(t_s), count, step_s)]
-
-
-def test_progress_and_notices_are_passed_on(tmp_path):
-    """The readings of the ride are frozen, which gives a notice."""
-    progress, notices = [], []
-    log = braking_left(3000)
-    log.gyro_dps[200::2] += 1e-4
-    ride = open_ride(log, SQUARE)
-    export(ride, "csv", tmp_path / "out", lambda *counts: progress.append(counts), notices)
-    assert progress == [(3000, 3000)] and [notice.code for notice in notices] == ["frozen-readings"]
 
 
 def test_parquet_has_the_same_columns_with_their_units(tmp_path):
@@ -241,18 +183,3 @@ def test_a_ride_that_cannot_be_exported_is_refused(short_ride, tmp_path, monkeyp
     Path("empty.csv").write_text(command.HEADER + "\n")
     analysis_rides.calibration(Path("flat.json"), aligned=False)
     command.refused(tmp_path, "export", *arguments, "--to", "csv", "--out", "out", words=words)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "module", "words"),
-    [
-        (("export", "--to", "parquet", "--out", "out"), "export.export", "Parquet needs pyarrow"),
-        (("export", "--to", "gpx", "--out", "out"), "export.export", "GPX needs gpxpy"),
-        (("plot", "--out", "pictures"), "plot.plot", "pictures need matplotlib and plotly"),
-    ],
-)
-def test_a_missing_library_is_named(short_ride, tmp_path, monkeypatch, arguments, module, words):
-    monkeypatch.chdir(tmp_path)
-    target = importlib.import_module(f"kickstand_tools.analysis.{module}")
-    monkeypatch.setattr(target, "find_spec", lambda name: None)
-    command.refused(tmp_path, arguments[0], short_ride, *arguments[1:], words=words)

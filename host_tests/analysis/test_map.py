@@ -2,7 +2,6 @@
 map and the charts show the same moment."""
 
 import functools
-import json
 import re
 from dataclasses import replace
 
@@ -33,8 +32,8 @@ def ride(lat_deg=52.5, lon_deg=13.4, gap=False):
     return overview(api.open_ride(log, ALIGNED))
 
 
-def points_of(seen):
-    points = track_map.map_points(seen)
+def points_of(ride_overview):
+    points = track_map.map_points(ride_overview)
     assert points is not None
     return points
 
@@ -88,8 +87,8 @@ def test_the_map_has_left_blue_right_orange_and_north_up():
 
 def track(n=301, step_s=1.0, vehicle="motorcycle", **columns):
     """Return a ride whose positions go north by 1.1 m per sample."""
-    places = {"lat_deg": 10.0 + np.arange(n) * 1e-5, "lon_deg": 8.0} | columns
-    return overview_of(samples(n, step_s=step_s, **places), vehicle=vehicle)
+    positions = {"lat_deg": 10.0 + np.arange(n) * 1e-5, "lon_deg": 8.0} | columns
+    return overview_of(samples(n, step_s=step_s, **positions), vehicle=vehicle)
 
 
 def test_a_track_is_in_metres_from_its_middle():
@@ -106,9 +105,9 @@ def test_a_track_is_in_metres_from_its_middle():
 
 @pytest.mark.parametrize(("vehicle", "lean"), [("motorcycle", True), ("car", False)])
 def test_the_points_of_a_map_have_time_lean_and_speed(vehicle, lean):
-    seen = track(lean_deg=np.arange(301) / 10.0, speed_mps=10.0, vehicle=vehicle)
-    points = points_of(seen)
-    line, dots = track_map.figure(points, seen)["data"]
+    ride_overview = track(lean_deg=np.arange(301) / 10.0, speed_mps=10.0, vehicle=vehicle)
+    points = points_of(ride_overview)
+    line, dots = track_map.figure(points, ride_overview)["data"]
     assert line["customdata"][0] == [0.0, 0.0, 36.0] and line["customdata"][-1][0] == pytest.approx(300.0, abs=1.0)
     assert dots["customdata"] == [row[0] for row in line["customdata"]] and len(dots["x"]) == len(line["x"])
     assert dots["customdata"] == pytest.approx(points.t_s, abs=0.051)
@@ -120,27 +119,10 @@ def test_the_points_of_a_map_have_time_lean_and_speed(vehicle, lean):
 
 
 def test_a_lean_that_is_not_trusted_has_no_dot_on_the_map():
-    seen = track(sure=np.where(np.arange(301) < 150, 0.0, 1.0))
-    line, dots = track_map.figure(points_of(seen), seen)["data"]
+    ride_overview = track(sure=np.where(np.arange(301) < 150, 0.0, 1.0))
+    line, dots = track_map.figure(points_of(ride_overview), ride_overview)["data"]
     assert line["customdata"][0][1] is None and line["customdata"][-1][1] == 0.0
     assert min(dots["customdata"]) == pytest.approx(150.0, abs=1.0) and len(dots["x"]) < len(line["x"])
-
-
-def test_a_map_ends_before_the_poles():
-    points = points_of(track(lat_deg=np.linspace(84.0, 89.0, 301)))
-    assert points.lat_deg == 85.0 and np.nanmax(points.north_m) == pytest.approx(0.0)
-
-
-@pytest.mark.parametrize("place", [(52.5, 13.4), (-33.9, 151.2), (60.0, -0.01)])
-def test_tiles_match_the_track(place):
-    """The map's metres give the same tile as the formula of web maps for latitude and longitude."""
-    points = points_of(track(lat_deg=place[0] + np.arange(301) * 1e-5, lon_deg=place[1]))
-    tiles = page.tiles_at(points)
-    size, lat = tiles["world_m"] / 2**15, np.radians(points.lat_deg)
-    row = (1.0 - np.log(np.tan(lat) + 1.0 / np.cos(lat)) / np.pi) / 2.0 * 2**15
-    assert tiles["west_m"] / size == pytest.approx((points.lon_deg + 180.0) / 360.0 * 2**15, abs=1e-6)
-    assert tiles["north_m"] / size == pytest.approx(row, abs=1e-6) and tiles["most"] == 19
-    assert tiles["world_m"] == pytest.approx(40_030_174.0 * np.cos(lat), rel=1e-3)
 
 
 def test_a_page_has_a_map_if_there_is_a_track():
@@ -154,46 +136,3 @@ def test_a_page_has_a_map_if_there_is_a_track():
     for bare in (track(lat_deg=single, lon_deg=single), track(lat_deg=np.nan)):
         html = page.page(bare, "", "")
         assert 'id="chart"' in html and 'id="map"' not in html and '"hovermode": "x"' not in html
-
-
-_POINT = """() => {
-  const k = Math.floor(map.data[0].x.length * 0.6), x = map._fullLayout.xaxis, y = map._fullLayout.yaxis;
-  return [x._offset + x.d2p(map.data[0].x[k]), y._offset + y.d2p(map.data[0].y[k]), map.data[0].customdata[k][0]];
-}"""
-
-
-@pytest.mark.long
-def test_in_a_browser_chart_and_map_show_the_same_moment(tmp_path, chromium):
-    pytest.importorskip("plotly")
-    page.draw(tmp_path / "ride.html", ride())
-    view = chromium.new_page(viewport={"width": 1300, "height": 800})
-    view.set_default_timeout(120_000)  # drawing is slow on a busy machine
-    requests, errors = [], []
-    view.on("request", lambda request: requests.append(request.url))
-    view.on("pageerror", lambda error: errors.append(str(error)))
-    view.goto((tmp_path / "ride.html").as_uri())
-    view.wait_for_function("map.layout.annotations[0].text != ''")
-    length, bar_end, (west, east) = view.evaluate(
-        "[map.layout.annotations[0].text, map.layout.shapes[1].x1, map.layout.xaxis.range]"
-    )
-    area, chart = view.locator("#map").bounding_box(), view.locator("#chart").bounding_box()
-    x, y, point_s = view.evaluate(_POINT)
-    words = view.locator("#here").text_content()
-    view.mouse.move(area["x"] + x, area["y"] + y)
-    view.wait_for_function("words => document.querySelector('#here').textContent !== words", arg=words)
-    in_map = view.locator("#here").text_content()
-    view.mouse.move(chart["x"] + 0.6 * chart["width"], chart["y"] + 180)
-    view.wait_for_timeout(300)
-    place = view.evaluate("[map.layout.shapes[0].xanchor, map.layout.shapes[0].yanchor]")
-    in_chart, tip = (view.locator(name).text_content() for name in ("#here", "#tip"))
-    view.close()
-    assert errors == [] and [url for url in requests if not url.startswith(("file:", "data:", "blob:"))] == []
-    assert length.endswith(" m") and (bar_end - 0.02) * (east - west) == pytest.approx(
-        float(length.split()[0]), rel=1e-6
-    )
-    assert in_map.split()[0] == f"0:{round(point_s):02}"
-    assert tip.split(",")[0] == in_chart.split()[0], "one moment has two times"
-    points, (minutes, seconds) = points_of(ride()), in_chart.split()[0].split(":")
-    k = np.argmin(np.hypot(points.east_m - place[0], points.north_m - place[1]))
-    assert points.t_s[k] == pytest.approx(60 * int(minutes) + int(seconds), abs=1.1)
-    assert json.dumps(place) != json.dumps([0, 0])

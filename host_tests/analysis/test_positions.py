@@ -1,13 +1,11 @@
 """Exported positions are read back by the rules of the programs that use the files."""
 
 import functools
-from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.analysis.channels import downsampled
 from kickstand_tools.analysis.export import export_gpx
 from kickstand_tools.logs.csv_lines import write_log
 from kickstand_tools.signals import EARTH_M
@@ -123,21 +121,6 @@ def test_the_time_of_the_satellites_is_preferred(tmp_path, form, start_s, from_s
         assert f"{clock:%d/%m/%Y}" in out.read_text()
     if form == "vbo":
         assert vbo_rows(out)["time"][0] == pytest.approx(float(f"{clock:%H%M%S.%f}"), abs=0.02)
-
-
-def test_a_track_without_satellite_time_uses_the_logs_time(tmp_path):
-    bare = replace(log(1.2e9), utc_s=np.full(len(log().t_s), np.nan))
-    last_s = log(1.2e9).t_s[np.isfinite(bare.lat_deg)][-1]
-    assert points_of(exported("gpx", tmp_path, bare))[-1].time.timestamp() == pytest.approx(1.2e9 + last_s, abs=2e-3)
-
-
-def test_the_last_position_of_a_stretch_is_kept():
-    """The positions are on both sides of the meridian of 180 degrees, so their mean would be across the earth."""
-    few = log().part(log().t_s < 0.1)
-    few.lon_deg[:] = np.nan
-    few.lat_deg[:], few.lon_deg[3:6], few.utc_s[2] = -10.0, (179.9999, -179.9999, -179.9998), START_S
-    (mean,) = downsampled(api.open_ride(few, ALIGNED).blocks(), 1.0)
-    assert (mean.lat_deg[0], mean.lon_deg[0], mean.utc_s[0]) == (-10.0, -179.9998, START_S)
 
 
 def test_the_command_writes_a_track_or_gives_the_reason(tmp_path):

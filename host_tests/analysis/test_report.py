@@ -12,23 +12,18 @@ from kickstand_tools.analysis import report
 from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.plot import picture
 from kickstand_tools.analysis.ride import open_ride
-from kickstand_tools.checks.bends import LeftHanded
-from kickstand_tools.checks.log import Mirrored
 from kickstand_tools.checks.mount import ForwardExchanged, UpOff
-from kickstand_tools.estimation.smooth import PoseOff
 from kickstand_tools.simulation.scripted import script
 from rich.console import Console
-from roads import Road
-from small_rides import STOP, overview_of, quality_of, samples
+from small_rides import STOP, overview_of, samples
 from support import command
 from support.recordings import analysis_rides
 
 EXCHANGED = ForwardExchanged(False, "left", 0.0)
-NAN = np.nan
 
 
-def rows_of(seen):
-    return {name: (value, time) for name, value, time in report.words(seen).ride}
+def rows_of(ride_overview):
+    return {name: (value, time) for name, value, time in report.words(ride_overview).ride}
 
 
 def test_the_rows_of_a_report():
@@ -57,11 +52,11 @@ def test_the_rows_of_a_report():
     ],
 )
 def test_uncertain_and_missing_time_is_reported(times_s, rows):
-    seen = overview_of(samples(1000))
-    seen.summary.not_sure_s, seen.summary.missing_s, seen.summary.frozen_s = times_s
-    words = {name: value for name, (value, _) in rows_of(seen).items()}
+    ride_overview = overview_of(samples(1000))
+    ride_overview.summary.not_sure_s, ride_overview.summary.missing_s, ride_overview.summary.frozen_s = times_s
+    words = {name: value for name, (value, _) in rows_of(ride_overview).items()}
     assert {name: words[name] for name in ("Lean not sure", "No readings", "Readings frozen") if name in words} == rows
-    assert report.as_data(seen)["lean_unsure_s"] == times_s[0]
+    assert report.as_data(ride_overview)["lean_unsure_s"] == times_s[0]
 
 
 @pytest.mark.parametrize(
@@ -86,102 +81,10 @@ def test_the_row_of_a_stop():
     assert (other[1], other[-1]) == ("72.0*", "0.2 right")
 
 
-def braked():
-    """Return a course whose speed falls to a stop, while the force says nothing."""
-    road = Road((5.0, 0.0), (5.0, 4.0), (3.0, 0.0), (4.0, -5.0), (5.0, 0.0))
-    speed = np.full(len(road.t_s), NAN)
-    speed[::10] = road.mps[::10]
-    return road.channels(speed_mps=speed, forward_g=0.0 * road.t_s)
-
-
 SLOW, FAST, BLIND = samples(1000, speed_mps=5.0), samples(1000, speed_mps=20.0), samples(1000)
 
 
-@pytest.mark.parametrize(
-    ("course", "how", "remark"),
-    [
-        (BLIND, {"stops": [STOP]}, ""),
-        (BLIND, {"stops": [replace(STOP, speed_from="integrated")]},
-         "* no speed in the log: integrated from the acceleration"),
-        (BLIND, {"riding_s": 10.1}, "Stops: not known, the log has no speed."),
-        (BLIND, {"riding_s": 10.0}, "No stop from over 10 km/h found."),
-        (SLOW, {}, "No stop from over 10 km/h found."),
-        (SLOW, {"notices": [EXCHANGED]}, "Stops: not known, see the warning."),
-        (braked(), {}, "The speed falls to a stop, the force says otherwise: is the calibration this ride's?"),
-    ],
-)  # fmt: skip
-def test_the_remark_about_the_stops(course, how, remark):
-    assert report.words(overview_of(course, **how)).remark == remark
-
-
-GOOD = "Alignment: good. "
 RIDE, DRIVE = "; calibrate ride takes it out", "; calibrate ride or drive takes it out"
-
-
-@pytest.mark.parametrize(
-    ("angles", "how", "parts"),
-    [
-        ((0.1, None, 1.0), {}, ["^Alignment: good. It seems off by roll [+]0.1°, yaw [+]1.0°, which costs less than "
-                                "0.25° of lean.$"]),
-        ((0.1, None, 1.0, 1.0), {}, [GOOD, "At rest the force is 1.000 g: right, 0.02 g from 1 are allowed.$"]),
-        ((0.1, None, 1.0, 0.981), {}, [": right, 0.02 g"]),
-        ((0.1, None, 1.0, 1.021), {}, ["At rest the force is 1.021 g and not 1: kickstand calibrate six"]),
-        ((0.1, None, 1.0, 0.979), {}, ["and not 1: kickstand"]),
-        ((None, None, None), {}, ["^Alignment: not enough straight riding to know how far it is off."]),
-        ((-0.04, None, 2.04), {}, ["roll [+]0.0°, yaw [+]2.0°"]),  # never -0.0
-        # A roll costs the part over 3.5 degrees; a yaw or pitch of 2 degrees costs 0.10 or 0.17 degrees
-        ((3.4, None, 4.0), {}, [GOOD]),
-        ((3.9, None, 0.0), {}, ["seems off by roll [+]3.9°, yaw [+]0.0°[.]"]),
-        ((0.0, 1.0, 2.0), {}, [GOOD]),
-        ((0.0, 2.0, 2.0), {}, ["seems off"]),
-        ((None, 0.0, 0.0), {}, ["seems off"]),
-        ((0.0, None, None), {}, ["seems off"]),
-        ((0.0, None, 4.7), {}, [GOOD]),
-        ((0.0, None, 4.9), {}, [f"yaw [+]4.9°. Yaw usually costs about 0.3° of lean{RIDE}."]),
-        ((0.0, None, 9.0), {"speed": 20.0}, [f"Yaw usually costs about 0.5° of lean{DRIVE}"]),
-        ((0.0, -3.0, 0.0), {}, ["Pitch usually costs about 0.3° of lean; calibrate ride takes it out, or"]),
-        # A pose on the kickstand is more than 4 degrees from upright
-        ((4.1, None, 9.0), {"speed": 20.0}, [": was it held upright[?].*Roll usually costs about 0.6° of lean"]),
-        ((-4.1, None, 9.0), {"speed": 20.0}, [": was it held upright[?]"]),
-        ((4.1, None, 9.0), {}, [": were the poses swapped[?]"]),
-        ((-4.1, None, 9.0), {"speed": 20.0, "notices": [EXCHANGED]}, [": were the poses swapped[?]$"]),
-        ((4.1, None, 9.0), {"speed": 20.0, "vehicle": "car"}, ["yaw [+]9.0°[.]$"]),  # a car has no lean
-        ((0.1, None, 1.0), {"notices": [PoseOff(2.0)]}, ["^Alignment: it seems off"]),
-        # In a mirrored log the angles look right, although left and right are exchanged
-        ((0.1, None, 1.0), {"notices": [UpOff(30.0, False)]}, ["^Alignment: not judged, see the warning.$"]),
-        ((0.1, None, 1.0), {"notices": [Mirrored()]}, ["not judged"]),
-        ((0.1, None, 1.0), {"notices": [LeftHanded()]}, ["not judged"]),
-    ],
-)  # fmt: skip
-def test_the_alignment_in_words(angles, how, parts):
-    course = samples(1000, speed_mps=how.pop("speed", NAN)) if "speed" in how else BLIND
-    words = report.words(overview_of(course, quality_of(*angles), **how)).alignment
-    for part in parts:
-        assert re.search(part, words), words
-
-
-def test_remedies_on_a_page_name_its_buttons():
-    words = report.words(overview_of(BLIND, quality_of(0.0, None, 9.0, 1.05)), on_page=True).alignment
-    assert words.endswith("and not 1: the six positions of the sensor take that out.") and "kickstand " not in words
-
-
-def test_the_figures_of_a_report_are_rounded():
-    lean = np.where(np.arange(1000) > 500, 33.33333, 0.0)
-    seen = overview_of(samples(1000, lean_deg=lean, speed_mps=12.34567), stops=[STOP], riding_s=5.55)
-    seen.summary.missing_s, seen.summary.frozen_s = 1.0, 0.3
-    data = report.as_data(seen)
-    expected = {
-        "ride": "trip/RIDE.csv", "vehicle": "motorcycle", "lean": "live", "duration_s": 9.99, "samples": 1000,
-        "missing_s": 0.7, "frozen_s": 0.3, "max_right_deg": {"value": 33.3333, "time_s": 5.01}, "max_left_deg": None,
-        "max_speed_mps": {"value": 12.3457, "time_s": 0.0}, "beyond_30_deg_s": 4.99, "beyond_40_deg_s": 0.0,
-        "alignment": {"roll_deg": 0.1, "pitch_deg": None, "yaw_deg": 1.0, "gravity_g": 1.0, "straight_s": 30.0},
-        "lean_cost": {"roll_deg": 0.0, "pitch_deg": None, "yaw_deg": 0.05}, "remark": "", "remarks": [],
-    }  # fmt: skip
-    assert {name: data[name] for name in expected} == expected
-    assert data["stops"][0]["distance_m"] == 30.04 and data["stops"][0]["duration_s"] == 2.5
-    car = report.as_data(overview_of(samples(100), vehicle="car"))
-    assert {"lean", "max_left_deg", "lean_cost"}.isdisjoint(car)
-    assert report.as_data(overview_of(samples(100), smoothed=True))["lean"] == "smoothed"
 
 
 def test_contradictions_hide_figures():
@@ -194,9 +97,9 @@ def test_contradictions_hide_figures():
     assert set(data["alignment"].values()) == set(data["lean_cost"].values()) == {None}
 
 
-def terminal(seen):
+def terminal(ride_overview):
     console = Console(width=80, record=True, file=io.StringIO())
-    console.print(report.page(seen))
+    console.print(report.page(ride_overview))
     return console.export_text().splitlines()
 
 
@@ -230,28 +133,6 @@ def test_the_command_reports_a_ride(short_ride, monkeypatch):
     assert re.search(r"^ *0:\d\d +5\d\.\d +2\.\d\d +2\d\.\d( +\d+\.\d\d){2} +\d+ +0\.\d (left|right) *$", text, re.M)
 
 
-@pytest.mark.parametrize(
-    ("matrix", "vehicle", "words"),
-    [
-        (
-            [[-1, 0, 0], [0, 1, 0], [0, 0, -1]],
-            "motorcycle",
-            "forward and backward are exchanged: calibrate two --side right?",
-        ),
-        ([[-1, 0, 0], [0, 1, 0], [0, 0, -1]], "car", "exchanged: calibrate drive again?"),
-        ([[0, 0, 1], [0, 1, 0], [-1, 0, 0]], "motorcycle", "The speed falls to a stop, the force says otherwise"),
-        ([[1, 0, 0], [0, 0, 1], [0, -1, 0]], "motorcycle", "the calibration's up is"),
-    ],
-)
-def test_a_calibration_of_another_mount_is_noticed(short_ride, tmp_path, matrix, vehicle, words):
-    cal = analysis_rides.calibration(
-        tmp_path / "changed.json", vehicle_from_sensor=matrix, kickstand_side="left", vehicle=vehicle
-    )
-    done = command.works("report", short_ride, "--calibration", cal, "--live")
-    assert words in " ".join((done.err + done.out).split()) and not re.search(r"^ *0:\d\d +5\d\.\d ", done.out, re.M)
-    assert ("Max left" in done.out) == (vehicle == "motorcycle")
-
-
 def test_without_a_speed_stops_are_marked(tmp_path):
     text = command.works("report", analysis_rides.short(tmp_path, rate_hz=50)).out
     assert re.search(r" 5\d\.\d\* ", text) and "* no speed in the log: integrated" in text
@@ -283,9 +164,9 @@ def test_the_shortest_log_is_reported_and_drawn(tmp_path):
     pytest.importorskip("matplotlib")
     pytest.importorskip("plotly")
     log = command.still(tmp_path / "log.csv", (0, 1, 0), seconds=0.02)
-    seen = overview(open_ride(log, analysis_rides.calibration(tmp_path / "log.cal.json")))
-    assert "all of it standing" in report.words(seen).too_little
-    picture.draw(tmp_path / "x.png", seen)
+    ride_overview = overview(open_ride(log, analysis_rides.calibration(tmp_path / "log.cal.json")))
+    assert "all of it standing" in report.words(ride_overview).too_little
+    picture.draw(tmp_path / "x.png", ride_overview)
 
 
 def test_plot_refuses_files_as_directories(short_ride, tmp_path):

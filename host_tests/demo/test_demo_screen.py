@@ -9,7 +9,7 @@ from kickstand_tools.common import unix_port
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.demo import keyboard, user_program
 from kickstand_tools.demo.score import Score, State, table
-from kickstand_tools.demo.screen import bike, lean_text, oled_lines, screen
+from kickstand_tools.demo.screen import bike, oled_lines, screen
 from rich.console import Console
 
 STATE: State = {
@@ -101,11 +101,6 @@ def test_each_pixel_of_an_oled_has_its_dot():
         assert ord(lines[7][5]) == 0x2800 + dot and "".join(lines).count("\u2800") == 64 * 16 - 1
 
 
-def test_a_lean_of_zero_has_no_side():
-    assert [lean_text(lean) for lean in (-12.34, 0.04, -0.04, 7.0)] == ["12.3° left", "0.0°", "0.0°", "7.0° right"]
-    assert [lean_text(lean, 0) for lean in (-12.34, 0.6, 0.4)] == ["12° left", "1° right", "0°"]
-
-
 def scored(*states):
     score = Score()
     for phase, lean_deg, shown in states:
@@ -130,31 +125,6 @@ def test_the_score_compares_each_turn_by_hand():
         ["all", "4", "-10.0", "-10.0", "1.9", "-3.0"],
     ]
     assert lines_of(table(scored())) == ["The lean was not shown yet."]
-
-
-@pytest.mark.parametrize(
-    ("part", "phases"),
-    [
-        ("standing", ("kickstand", "upright", "moving", "wait")),
-        ("rolling in and out", ("roll in", "roll out", "roll")),
-        ("straight on", ("straight", "accelerate", "brake")),
-    ],
-)
-def test_each_phase_belongs_to_a_part_of_the_score(part, phases):
-    assert list(scored(*((phase, 5.0, "Lean   5° right") for phase in phases))) == [part, "all"]
-
-
-@pytest.mark.parametrize(
-    ("text", "keys"),
-    [
-        ("bB\x1b[D\x1b[Cq", ["b", "B", "left", "right", "q"]),
-        ("\x1bOC\x1bODd", ["right", "left", "d"]),
-        ("\xe0K\xe0Ma", ["left", "right", "a"]),  # Windows
-        ("\x1b[A1\xe0H2\0;3\x1bOB4\x1b", ["1", "2", "3", "4", "\x1b"]),  # other special keys are dropped
-    ],
-)
-def test_typed_text_is_split_into_keys(text, keys):
-    assert keyboard.split(text) == keys
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")

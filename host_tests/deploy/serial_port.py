@@ -13,7 +13,7 @@ class SerialPort:
         the end of the connection.
     chatter: what the board sends again and again instead of its prompt. None means that it has a prompt.
     deaf: how many requests for the prompt the board ignores.
-    refusal: the error that opening the port raises, or None.
+    refusal: the error that opening the port raises until ready_s, or None.
     programs, controls: the programs and the control characters that were sent.
     """
 
@@ -24,6 +24,7 @@ class SerialPort:
         self.chatter: bytes | None = None
         self.deaf = 0
         self.refusal: Exception | None = None
+        self.ready_s = 1e9
         self.programs: list[bytes] = []
         self.controls = b""
         self.opened: list[tuple[str, float]] = []
@@ -35,7 +36,7 @@ class SerialPort:
 
     def open(self, name: str, timeout: float = 0, **_options: Any) -> "SerialPort":
         self.opened.append((name, timeout))
-        if self.refusal:
+        if self.refusal and self.now_s < self.ready_s:
             raise self.refusal
         return self
 

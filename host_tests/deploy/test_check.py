@@ -7,7 +7,7 @@ import pytest
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.deploy import check
 from kickstand_tools.simulated_board.i2c import OPEN
-from kickstand_tools.simulated_board.mpu6050 import FIFO_COUNTH, FIFO_COUNTL, PWR_MGMT_1, Fifo
+from kickstand_tools.simulated_board.mpu6050 import FIFO_COUNTH, FIFO_COUNTL, Fifo
 from kickstand_tools.simulated_board.other_devices import Registers
 from support import command
 from support.checked_board import CheckedBoard, part
@@ -111,15 +111,12 @@ DEFECTS = {
     "gyro z biased": ("bias, gyro z", changed(5, lambda value, t_s: value + 45), None),
     "accelerometer off": ("bias, accelerometer", changed(2, lambda value, t_s: value + 0.6), None),
     "hot": ("temperature", lambda t_s: (*REST(t_s)[:6], 95.0), None),
-    "self-test of gyro y": ("self-test, gyro y", REST, model(self_test=[1, 1, 1, 1, 0.7, 1])),
     "sample clock": ("sample clock", REST, model(clock_error=0.05)),
-    "FIFO stays empty": ("FIFO", REST, model(_queue=lambda: None)),
     "FIFO stays full": ("FIFO", REST, answered(lambda at, value, n: {FIFO_COUNTH: 4, FIFO_COUNTL: 0}.get(at, value))),
     "FIFO of half the size": ("FIFO under load", REST, model(fifo=Fifo(512))),
     "transfers fail": ("I2C errors", REST, some_nacks("sensor", 150)),
     "wrong answers": ("I2C errors", REST, answered(lambda at, value, n: value ^ 16 * (at == 0x75 and n % 300 == 0))),
     "standby": ("sensor", REST, answered(lambda at, value, n: 0x07 if at == PWR_MGMT_2 else value)),
-    "asleep": ("sensor", REST, answered(lambda at, value, n: value | 0x40 if at == PWR_MGMT_1 else value)),
     "no sensor": ("sensor", REST, lambda board: board.remove_sensor()),
     "another chip": ("sensor", REST, replaced_by(lambda board: Registers(0x68, {WHO_AM_I: 0x47}))),
     "an open wire": ("sensor", REST, lambda board: setattr(board.sensor_bus, "sda_wire", OPEN)),
@@ -128,7 +125,6 @@ DEFECTS = {
     "a display with a bad contact": ("display", REST, some_nacks("lcd", 40)),
     "button stuck": ("button", REST, lambda board: setattr(board.button, "closed", True)),
     "slow flash": ("flash", REST, faulty("slow_flash", (0, 1e6, 0.6))),
-    "full flash": ("flash", REST, faulty("disk_full", (0, 1e6))),
     "busy": ("longest turn", REST, faulty("busy", *((5 + k, 0.25) for k in range(80)))),
 }  # fmt: skip
 OFTEN = ("gyro x dead", "gyro y noisy", "gyro z biased", "FIFO of half the size", "transfers fail", "standby",
@@ -207,68 +203,3 @@ def test_board_that_cannot_be_checked_is_refused(port, error, words):
     with pytest.raises(InputError, match=words):
         check.check("P")
     assert b"machine.reset()" in port.programs[-1]
-
-
-# The order of the measurements, with a board that answers with fixed values
-
-
-def measured(**values):
-    """Return the measurements that a check calls, in their order, and its findings by their names."""
-    calls, answers = [], {
-        "board": ("1", "n", "1.2", "s", ""), "button": (False, True, True, 100, 2, 3), "flash": ((9, 8), 0, 99, ""),
-        "sensor": ("MPU6050", 0x68, 0x68, 0x68, "", 0), "i2c": (9, 0, 0, 90),
-        "fifo": ("", 1024, 300, 700, 700, True, 1), "self_test": ((0, 0, 0, 0), (0.0,) * 6, (0.0,) * 6),
-        "noise": (600, (0.0, 0.0, 4096.0, 0.0, 0.0, 0.0, 0.0), (4.0,) * 7, (500,) * 7, 4096, 65.5, 25.0, 0),
-        "clock": (1200, 6_000_000, 200, 0, 0), "display": (0x27, False, 20, 20, ""), "speed": ("", "", 0.0),
-        "loop": (9000, 30, 0, 0, 1, "", 99, 50_000),
-    } | values  # fmt: skip
-
-    def ask(code):
-        if "settings.DLPF" in code:
-            return "3\n"
-        call = code.rpartition("print(repr(")[2].partition("))\n")[0]
-        value = answers.get(call.partition("(")[0])
-        if isinstance(value, Exception):
-            raise value
-        calls.extend([call] if value else [])
-        return f"noise\n{value!r}\n"
-
-    return calls, {finding.what: finding for finding in check.measured(ask, lambda text: None)}
-
-
-def test_check_measures_in_its_order():
-    calls, findings = measured()
-    assert calls == [
-        "board(parts)", "button(parts, 30000)", "sensor(parts)", "i2c(parts, 10000)", "flash(parts)", "fifo(parts, 1)",
-        "self_test(parts)", "noise(parts, 3)", "clock(parts, 6)", "display(parts, 20)", "speed(parts)",
-        "loop(parts, 15)",
-    ]  # fmt: skip
-    assert "(limit 365, when the FIFO is full)" in findings["flash"].words
-
-
-@pytest.mark.parametrize(
-    ("values", "left_out", "what", "verdict"),
-    [
-        ({"sensor": ("", 0, 0, 0, "no", 0)}, {"i2c", "fifo", "self_test", "noise", "clock"}, "sensor", check.BAD),
-        ({"sensor": ("MPU6500", 0x70, 0x68, 0x68, "", 0)}, {"self_test"}, "self-test", check.SKIPPED),
-        ({"fifo": ("stands still", 0, 300, 0, 0, True, 1)}, {"noise", "clock"}, "FIFO", check.BAD),
-        ({"flash": ((9, 150), 0, 99, "")}, {"fifo(parts, 1)"}, "flash", check.GOOD),
-        ({"flash": ((9, 149), 0, 99, "")}, {"fifo(parts, 0)"}, "flash", check.GOOD),
-        ({"flash": ((9,), 0, 99, "full")}, {"fifo(parts, 1)"}, "flash", check.BAD),
-        ({"clock": check.GuestFailed("OSError: 5")}, {"clock"}, "sample clock", check.BAD),
-        # half of the 300 ms in which the FIFO fills
-        ({"loop": (151_000, 1, 0, 0, 1, "", 9, 50_000)}, set(), "longest turn", check.BAD),
-        ({"loop": (149_000, 1, 0, 0, 1, "", 9, 50_000)}, set(), "longest turn", check.LOOK),
-    ],
-)
-def test_check_leaves_out_what_cannot_be_measured(values, left_out, what, verdict):
-    calls, findings = measured(**values)
-    names = {call.partition("(")[0] for call in calls}
-    assert not left_out & {*calls, *names} and findings[what].verdict == verdict
-    assert len(names) == 12 - len([name for name in left_out if "(" not in name])
-
-
-@pytest.mark.parametrize("answer", [(1, 2), "x", ("a", "b", "c", "d"), float("nan")])
-def test_answer_that_is_no_measurement_is_refused(answer):
-    with pytest.raises(InputError, match="the board's answer to i2c makes no sense: plug it in again"):
-        measured(i2c=answer)

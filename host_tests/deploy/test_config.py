@@ -1,5 +1,8 @@
 """Which config.py a board gets: the check of it in a process that poses as the board, for each kind of board."""
 
+import re
+from pathlib import Path
+
 import pytest
 from kickstand_tools.deploy import config_check
 from kickstand_tools.simulated_board.fakes import chips
@@ -62,6 +65,7 @@ def test_settings_behind_a_mark_differ_from_the_default(tmp_path, port, esp32):
     assert judge_in_a_process(path, port, machine).unused == lines + [f"{path}, line 7: BUTTON_PIN = 2"] * (not esp32)
 
 
+XIAO = "SENSOR_SDA = 6\nSENSOR_SCL = 7\nLCD_SDA = 0\nLCD_SCL = 1\nBUTTON_PIN = 2\n"
 SD = "SD_SPI = {}\nSD_SCK = 12\nSD_MOSI = 13\nSD_MISO = 14\nSD_CS = 27\n"
 PINS = "BUTTON_PIN = 0\nSENSOR_SDA = 2\nSENSOR_SCL = 4\nLCD_SDA = 5\nLCD_SCL = 14\n"
 
@@ -72,6 +76,15 @@ PINS = "BUTTON_PIN = 0\nSENSOR_SDA = 2\nSENSOR_SCL = 4\nLCD_SDA = 5\nLCD_SCL = 1
         ("pico", "BUTTON_PIN = 4\n", "a pin is used twice"),  # on a Pico pin 4 is the sensor's SDA
         ("pico 2", "BUTTON_PIN = 4\n", "a pin is used twice"),
         ("esp32", "BUTTON_PIN = 4\n", None),
+        # the pins that are marked SDA and SCL on a XIAO RP2040 belong to I2C 1
+        ("xiao rp2040", XIAO, "line 1: SENSOR_SDA = 6 and SENSOR_SCL = 7 do not belong to I2C 0 (set SENSOR_I2C and"),
+        (
+            "xiao rp2040",
+            XIAO + "SENSOR_I2C = 1\n",
+            "SENSOR_I2C and LCD_I2C are both 1",
+        ),
+        ("xiao rp2040", XIAO + "SENSOR_I2C = 1\nLCD_I2C = 0\n", None),
+        ("pico", "SENSOR_SDA = 5\nSENSOR_SCL = 4\n", "SENSOR_SDA = 5 and SENSOR_SCL = 4 do not belong to I2C 0"),
         # on an ESP32 the number is a slot of machine.SDCard; slots 0 and 1 are not SPI
         *(("pico", SD.format(spi), None if spi < 2 else "SD_SPI = 2, but it must be") for spi in (0, 1, 2)),
         *(("esp32", SD.format(spi), None if spi > 1 else "SD_SPI = 1, but it must be") for spi in (1, 2, 3)),
@@ -91,6 +104,43 @@ def test_config_is_checked_for_the_board(machine, content, words, board, config)
     else:
         command.works("flash", "--config")
         assert board.path("config.py").read_text() == content
+
+
+SETTINGS = ("SENSOR_SDA", "SENSOR_SCL", "LCD_SDA", "LCD_SCL", "BUTTON_PIN")
+# The boards of the table in settings.md, by their names in MicroPython. PICO-D4 and D2WD have their flash on 16 and 17.
+SHOPS = {
+    "Seeed XIAO RP2040, RP2350": "Seeed XIAO RP2350 with RP2350", "Waveshare RP2040-Zero": "RP2040-Zero with RP2040",
+    "Seeed XIAO ESP32C3": "XIAO with ESP32-C3", "Seeed XIAO ESP32C5": "XIAO with ESP32-C5",
+    "Seeed XIAO ESP32S3": "XIAO with ESP32-S3",
+    "M5Stack Atom Lite (ESP32-PICO-D4)": "M5Stack ATOM with ESP32-PICO-D4",
+}  # fmt: skip
+
+
+def test_pins_for_boards_of_shops_are_accepted(tmp_path):
+    page = (Path(__file__).resolve().parents[2] / "firmware" / "docs" / "settings.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[1:-1] for line in page.splitlines() if line.startswith("| ") and line.count("|") == 7]
+    pins = {row[0].strip(): row for row in rows if row[0].strip() in SHOPS}
+    assert pins.keys() == SHOPS.keys()
+    for board, machine in SHOPS.items():
+        numbers = re.findall(r"\d+", re.sub(r"\([^)]*\)", "", ",".join(pins[board][1:4])))
+        lines = [f"{name} = {number}" for name, number in zip(SETTINGS, numbers, strict=True)]
+        path = tmp_path / "config.py"
+        path.write_text("\n".join(lines + re.findall(r"\w+_I2C = \d", pins[board][4])))
+        assert judge_in_a_process(path, "esp32" if "ESP32" in machine else "rp2", machine).fault is None, board
+
+
+@pytest.mark.parametrize(
+    ("machine", "pins"),
+    [("M5Stack ATOM with ESP32-PICO-D4", (16, 17)), ("Generic ESP32 module with ESP32-D2WD", (17, 16)),
+     ("ESP32C5 module with ESP32-C5", (13, 14)), ("Generic ESP32P4 module with ESP32-P4", (24, 25))],
+)  # fmt: skip
+def test_pins_that_the_chip_itself_needs_are_refused(machine, pins, tmp_path):
+    path = tmp_path / "config.py"
+    for number in pins:
+        path.write_text(f"SENSOR_SDA = {number}\nSENSOR_SCL = 21\nLCD_SDA = 22\nLCD_SCL = 19\nBUTTON_PIN = 23\n")
+        assert f"line 1: SENSOR_SDA = {number}, but it must be" in str(judge_in_a_process(path, "esp32", machine).fault)
+    path.write_text('SPEED = "gps"\n')  # the usual pins of a GPS receiver are 16 and 17
+    assert judge_in_a_process(path, "esp32", machine).fault
 
 
 _LOAD = """

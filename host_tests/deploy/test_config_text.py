@@ -43,25 +43,6 @@ def test_values_are_read_as_they_are_written():
     assert config_text.lines("a\r\nb\rc\n\n") == ["a", "b", "c", ""]
 
 
-@pytest.mark.parametrize(
-    ("text", "wanted", "result"),
-    [
-        ("A = 1  # é\nB = 2\n", {"A": "5"}, "A = 5  # é\nB = 2\n"),
-        ("A = (\n 1,\n)  # x\nB = 2\n", {"A": "5"}, "A = 5  # x\n\n\nB = 2\n"),
-        ("A = (\n 1,\n)\nB = 2\n", {"A": None, "B": "3"}, "# A = (\n#  1,\n# )\nB = 3\n"),
-        ("A = 1\n", {"A": None}, "# A = 1\n"),
-        ("A = 1\n", {"B": "2"}, "A = 1\nB = 2\n"),
-        ("A = 1\n", {"B": None, "A": "1"}, "A = 1\n"),
-        ("# A = 1  # x\n# AB = 1\n", {"A": "7"}, "A = 7  # x\n# AB = 1\n"),
-        ("A = 1\r\nB = 2", {"B": "3"}, "A = 1\nB = 3\n"),
-        # lines are counted as Python counts them
-        *((f"# a{mark}b\nA = 1\n", {"A": "2"}, f"# a{mark}b\nA = 2\n") for mark in "\f\v\x85\u2028"),
-    ],
-)
-def test_values_are_written_into_a_config(text, wanted, result):
-    assert config_text.with_values(text, wanted) == result
-
-
 @given(strategies.recursive(strategies.integers() | strategies.booleans() | strategies.none() | strategies.text(
     strategies.characters(codec="ascii")), lambda inner: strategies.tuples(inner, inner), max_leaves=4))  # fmt: skip
 def test_every_value_is_read_back(value):

@@ -1,18 +1,16 @@
 """How a board is found, opened, asked and left. The computer's serial port and its clock are simulated."""
 
 import errno
-import os
-import threading
 from types import SimpleNamespace
 
 import pytest
-import serial
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.deploy import board_console, connection
+from kickstand_tools.deploy import connection
 from mpremote.transport import TransportError
 from serial.tools import list_ports
 from support import command
 
+NOTHING = b"(None, None)\r\n", b""  # what a board has noticed whose firmware has not run
 PICO_NAME = b"('micropython', '1.26.1', 'Pico')\r\n"
 
 
@@ -43,20 +41,35 @@ def connect(failure=None):
         ([("b", 0x0403, 1), ("a", 0x2E8A, 5)], "several boards found: a (Raspberry Pi), b (FTDI): name one with"),
     ],
 )
-def test_only_board_is_found_by_its_vendor(monkeypatch, devices, outcome):
+def test_only_board_is_found_by_its_vendor(monkeypatch, port, devices, outcome):
     ports = [SimpleNamespace(device=name, vid=vendor, pid=product) for name, vendor, product in devices]
     monkeypatch.setattr(list_ports, "comports", lambda: ports)
     if len(outcome) == 1:
         assert connection.find_port() == outcome
     else:
         assert words(connection.find_port).startswith(outcome)
+        assert (port.now_s > 0.0) is outcome.startswith("no board")
+
+
+def test_restarting_board_is_waited_for(monkeypatch, port):
+    """With and without its name. After 6 s the command gives up."""
+    board = SimpleNamespace(device="P", vid=0x2E8A, pid=5)
+    monkeypatch.setattr(list_ports, "comports", lambda: [board] if port.now_s >= 5.0 else [])
+    assert connection.find_port() == "P" and port.now_s == pytest.approx(5.0, abs=0.3)
+    port.ready_s = port.now_s + 5.0
+    for error in (OSError(errno.ENOENT, ""), OSError(errno.EBUSY, "")):
+        port.refusal, port.ready_s = error, port.now_s + 5.0
+        assert connect() == "P"
+        port.ready_s = port.now_s + 9.0
+        words(connect)
+        assert port.now_s == pytest.approx(port.ready_s - 3.0, abs=0.3)
 
 
 @pytest.mark.parametrize(
     ("error", "name", "message"),
     [
         (ValueError("odd"), "P", "P is not a port: odd"),
-        (OSError(errno.EBUSY, ""), "P", "P is in use: close the other program"),
+        (OSError(errno.EBUSY, ""), "P", "P is in use: close the other program that has it open; on Linux ModemManager"),
         (OSError(errno.EAGAIN, ""), "P", "P is in use"),
         (OSError("PermissionError(13)"), "P", "P is in use"),
         (OSError(errno.EACCES, ""), "P", "no permission for P: on Linux join the group dialout"),
@@ -78,28 +91,6 @@ def test_port_that_opens_at_the_second_attempt_is_reported(port):
     assert port.closed == 1
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("/dev/tty-no-such-port", "there is no port /dev/tty-no-such-port"),
-        ("socket://127.0.0.1:1", "nothing listens at socket://127.0.0.1:1"),
-        ("telepathy://board", "is not a port"),
-    ],
-)
-def test_missing_port_is_refused_by_the_command(tmp_path, name, message):
-    command.refused(tmp_path, "flash", "--port", name, words=message)
-
-
-@pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals are of Unix")
-def test_port_of_another_program_is_in_use(tmp_path):
-    parent, child = os.openpty()
-    name = os.ttyname(child)
-    with serial.Serial(name, exclusive=True):
-        command.refused(tmp_path, "flash", "--port", name, words=f"{name} is in use")
-    for descriptor in (parent, child):
-        os.close(descriptor)
-
-
 # The prompt
 
 
@@ -107,13 +98,6 @@ def test_starting_board_gets_a_second_chance(port):
     port.deaf = 1
     assert connect() == "P" and port.now_s == pytest.approx(3.0, abs=0.1)
     assert port.opened == [("P", 10)] and port.closed == 1
-
-
-@pytest.mark.parametrize(("name", "silent_s"), [("P", 13.0), ("socket://x", 156.0)])
-def test_silent_board_is_abandoned_later_if_emulated(port, tmp_path, name, silent_s):
-    port.deaf = 9
-    command.refused(tmp_path, "status", "--port", name, words=f"no MicroPython answers on {name}: check that this is")
-    assert port.now_s == pytest.approx(silent_s, abs=0.2)
 
 
 @pytest.mark.parametrize(
@@ -147,11 +131,6 @@ def test_error_of_the_connection_has_its_sentence(port, failure, message):
     assert port.closed == 1
 
 
-def test_lost_connection_has_other_words_on_a_page():
-    lost = connection.ConnectionLost("P", "x")
-    assert lost.line(page=True).startswith("connection lost: plug the board in")
-
-
 # Answers
 
 
@@ -171,24 +150,29 @@ def test_only_answers_of_the_expected_shape_are_accepted(text, shapes, fits):
         assert "makes no sense" in words(connection.literal, text, *shapes)
 
 
-def test_endless_answer_is_abandoned(port, monkeypatch):
-    monkeypatch.setattr(connection, "MOST_BYTES", 5000)
-    port.answers = [[b"x" * 9000]]
-    assert words(connection.status, "P").startswith("P: the board stopped answering")
-
-
-@pytest.mark.parametrize(("pause_s", "answers"), [(9.8, True), (10.2, False)])
-def test_answer_may_pause_for_ten_seconds(port, pause_s, answers):
-    port.answers = [[b"('micropyth", pause_s, b"on', '1.26.1', 'Pico')\x04\x04>"], (b"a\r\nb\r\n\r\n", b"")]
-    assert (connection.status("P") == "a\nb") if answers else "stopped answering" in words(connection.status, "P")
-
-
 @pytest.mark.parametrize(("wirings", "call"), [(False, b"kickstand.status()"), (True, b"kickstand.status(True)")])
 def test_status_is_printed_and_the_board_restarts(port, wirings, call):
-    port.answers = [(PICO_NAME, b""), (b"a \xc2\xb0\r\nb\r\n\r\n", b""), (b"", b"")]
+    port.answers = [NOTHING, (PICO_NAME, b""), (b"a \xc2\xb0\r\nb\r\n\r\n", b""), (b"", b"")]
     assert connection.status("P", wirings) == "a \u00b0\nb"
-    assert port.programs[1] == b"import kickstand\n" + call and b"machine.reset()" in port.programs[2]
+    assert port.programs[2] == b"import kickstand\n" + call and b"machine.reset()" in port.programs[3]
     assert port.now_s == pytest.approx(2.0, abs=0.2) and port.closed == 1  # until the board's port is back
+
+
+@pytest.mark.parametrize(
+    ("answer", "noticed"),
+    [
+        ((b"((9000, 30, ((4, 5, 6), 0.25)), 'odd-up')", b""), b"((9000, 30, ((4, 5, 6), 0.25)), 'odd-up')"),
+        ((b"(None, 'odd-up')", b""), b"(None, 'odd-up')"),
+        ((b"rubbish", b""), None),
+        ((b"", b"MemoryError: "), None),
+    ],
+)
+def test_status_keeps_what_the_firmware_has_noticed(port, answer, noticed):
+    """A soft reset removes the firmware's modules, so the command asks before it. An older firmware has nothing."""
+    port.answers = [answer, (PICO_NAME, b""), (b"a", b""), (b"", b"")]
+    assert connection.status("P") == "a"
+    assert noticed is None or b"status_report.noticed = " + noticed + b"\n" in port.programs[2]
+    assert (b"noticed" in port.programs[2]) is (noticed is not None)
 
 
 @pytest.mark.parametrize(
@@ -204,7 +188,7 @@ def test_status_is_printed_and_the_board_restarts(port, wirings, call):
     ],
 )
 def test_failing_status_is_explained_and_the_board_restarts(port, error, message):
-    port.answers = [(PICO_NAME, b""), (b"", error), (b"", b"")]
+    port.answers = [NOTHING, (PICO_NAME, b""), (b"", error), (b"", b"")]
     assert words(connection.status, "P").startswith(message)
     assert b"machine.reset()" in port.programs[-1]
 
@@ -220,40 +204,4 @@ def test_other_python_and_failing_programs_are_refused(port, tmp_path):
 
 # The lines of a running program
 
-AWAY = "the board stopped because this computer took nothing for %d s: keep it awake"
 SILENT, ENDLESS = "the board says nothing any more", "the program on the board does not end"
-END = b"\x04\x04>"
-
-
-@pytest.mark.parametrize(
-    ("pieces", "lines", "options"),
-    [
-        ([b"a\r\nb", b"b\n" + END], [b"a", b"bb"], {}),
-        ([b"a\n\x04Traceback\r\nOSError: 5\r\n\x04>"], [b"a", "the board reports OSError: 5"], {}),
-        ([b"a\n", 19.9, b"b\n" + END], [b"a", b"b"], {}),
-        ([b"a\n", 20.1, b"b\n" + END], [b"a", SILENT], {}),
-        ([b"a\n", (3.0,), 5.1, END], [b"a", AWAY % 3], {}),
-        ([b"a\n", (3.0,), 4.9, END], [b"a"], {}),
-        ([b"a\n", (0.9,), 5.1, END], [b"a"], {}),
-        ([(3.0,), 2.1, END], [SILENT], {"silent_s": 2.0}),
-        ([b"a\n" * 5, END], [b"a"] * 5, {"most_bytes": 13}),
-        ([b"a\n" * 5, END], [b"a"] * 5 + [ENDLESS], {"most_bytes": 12}),
-        ([b"x" * 60_000, b"x" * 40_000, b"\n" + END], [b"x" * 100_000], {}),
-        ([b"x" * 60_000, b"x" * 40_001, b"y", b"\n" + END], [ENDLESS], {}),
-        ([9.9, b"a\n\x04KeyboardInterrupt\x04>"], [b"a"], {"stopped": True}),
-        ([10.1, b"a\n" + END], [], {"stopped": True}),
-    ],
-)
-def test_lines_of_a_program_end_with_it_or_with_a_reason(port, pieces, lines, options):
-    port.answers = [pieces]
-    stopped = threading.Event()
-    if options.pop("stopped", False):
-        stopped.set()
-    received: list = []
-    with connection.connected("P") as (board, _):
-        try:
-            for line in board_console.lines(board, "code", **{"silent_s": 20.0, "stopped": stopped, **options}):
-                received.append(line)
-        except board_console.BrokenOff as reason:
-            received.append(str(reason))
-    assert received == lines and (b"\x03" in port.controls) is stopped.is_set()

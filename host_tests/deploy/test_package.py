@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 from kickstand_tools.common import firmware_path
-from kickstand_tools.common.errors import extra
 from kickstand_tools.deploy import firmware_files
 from kickstand_tools.web.documents import documents
 from support import command
@@ -100,13 +99,3 @@ def test_wheel_installed_in_a_fresh_venv_works(wheel, tmp_path):
     command.works("simulate", "--profile", "street", "--seconds", 60, "--out", ride)
     command.works("calibrate", "two", ride / "KICKSTAND.csv", ride / "UPRIGHT.csv", "--out", ride / "RIDE.cal.json")
     assert run("report", "ride/RIDE.csv") == command.works("report", ride / "RIDE.csv").out
-
-
-def test_advice_to_install_keeps_the_checkout_editable():
-    """The documents say `pip install -e`. Without -e, `flash --config` would copy the config.py in site-packages, which
-    the rider has never edited."""
-    pages = [path for name in ("*.md", "*/README.md", "*/docs/*.md", ".github/*.md") for path in ROOT.glob(name)]
-    text = "\n".join(path.read_text(encoding="utf-8") for path in pages)
-    lines = re.findall(r"pip install\b(?! esptool).*", text) + [extra("rides")]
-    assert len(lines) >= 4
-    assert all("pip install -e " in line for line in lines)

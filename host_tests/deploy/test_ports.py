@@ -14,7 +14,6 @@ from pathlib import Path
 
 import pytest
 from kickstand_tools.deploy import bytecode, firmware_files
-from support import device_plans
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
@@ -140,16 +139,3 @@ def test_only_port_py_knows_the_port():
     }
     assert names.pop("port.py")
     assert not any(names.values()), names
-
-
-def test_device_works_on_an_esp32(tmp_path):
-    """The ESP32's default pins differ from the Pico's. The error number for a device that does not answer differs
-    too."""
-    faults = [["unplug_sensor", [2.0, 1.0]], ["unplug_lcd", [4.0, 0.5]]]
-    plan = {"lean": [[0, 25]], "board": {"machine": "esp32"}, "faults": faults, "until": 6}
-    record = device_plans.run("cpython", tmp_path, plan)
-    assert record.at(1.9)[0].startswith("Raw   25°")
-    assert record.first("No sensor", 2.0) < 2.5
-    assert record.at(3.6)[0].startswith("Raw   25°")
-    assert record.at(4.4) == [" " * 16] * 2
-    assert record.at(5.5)[0].startswith("Raw   25°")

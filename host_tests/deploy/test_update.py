@@ -138,14 +138,6 @@ def test_interrupted_update_starts_nothing_and_is_repeatable():
     assert result.copied_bytes == 3 + 3000 + 3 + 3000 + 3000 and not result.config_differs
 
 
-def test_progress_counts_each_byte_once():
-    board, steps = board_with({}), []
-    flash.install(board, flash.prepare(board, SMALL_NEW), lambda *step: steps.append(step))
-    total = sum(map(len, SMALL_NEW.values()))
-    assert steps[-1] == ("copying main.py", total, total) and [count for _, count, _ in steps][:2] == [3, 7]
-    assert [count for _, count, _ in steps] == sorted(count for _, count, _ in steps)
-
-
 def versions():
     rows = [("nothing", ".mpy", "rp2"), ("flat .mpy", ".mpy", "esp32"), ("nested .mpy", ".py", "rp2")]
     rest = [(version, ending, port) for port in PORTS for ending in (".mpy", ".py")

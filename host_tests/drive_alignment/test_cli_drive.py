@@ -136,7 +136,7 @@ def refused(tmp_path, words, *arguments):
 
 
 @pytest.mark.parametrize(
-    ("method", "words", "legs", "given"),
+    ("method", "words", "legs", "options"),
     [
         ("improved", "no speed: record a column speed_mps", around(1), {"speed": False}),
         ("published", "no speed: record a column speed_mps", around(1), {"source": {"silent": (-1.0, 1e9)}}),
@@ -146,9 +146,9 @@ def refused(tmp_path, words, *arguments):
         ("published", "2.5 s late", around(6), {"source": {"late_s": 2.5}}),
     ],
 )
-def test_unusable_drives_are_refused(tmp_path, method, words, legs, given):
+def test_unusable_drives_are_refused(tmp_path, method, words, legs, options):
     """test_drive_alignment.py tests the other refusals of the improved method."""
-    refused(tmp_path, words, record(tmp_path / "drive.csv", legs, **given), "--method", method)
+    refused(tmp_path, words, record(tmp_path / "drive.csv", legs, **options), "--method", method)
 
 
 def test_unusable_logs_are_refused(tmp_path):

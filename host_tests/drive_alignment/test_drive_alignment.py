@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from kickstand.drive_alignment import alignment, speed_check, verdict
+from kickstand.drive_alignment import alignment, verdict
 from kickstand.drive_alignment.quality import PITCH_DEG, ROLL_DEG
 from kickstand_tools.signals import rotation_vector
 from support import driving_runs, engines
@@ -129,47 +129,11 @@ def test_camber_at_the_stops_does_not_reach_forward(method, yaw_deg):
     assert total < max(2.3, 1.1 * abs(yaw))
 
 
-def test_the_state_is_the_next_step_of_the_driver():
-    legs = [[2.0, 1.0, 0.0], [2.0, -1.0, 0.0], *around(2), [8.0, 1.5, 0.0], [4.0, -2.0, 15.0], *around(6, stands=False)]
-    states = drive(legs)["states"]
-    assert alignment.DriveAlignment("car").state == alignment.WAITING_FOR_SPEED
-    assert states[:2] == [alignment.WAITING_FOR_STOP, alignment.WAITING_FOR_BRAKING]
-    assert set(states[2:]) == {
-        alignment.WAITING_FOR_BRAKING,
-        alignment.BRAKING,
-        alignment.TURNING,
-        alignment.READY,
-    }
-    assert drive(legs, vehicle="motorcycle", bias=[0.0] * 3)["states"][0] == alignment.WAITING_FOR_BRAKING
-
-
-@pytest.mark.parametrize(
-    ("silent_s", "state"), [(4.9, alignment.WAITING_FOR_BRAKING), (5.2, alignment.WAITING_FOR_SPEED)]
-)
-def test_a_speed_is_stale_after_5_s(silent_s, state):
-    bike = alignment.DriveAlignment("motorcycle")
-    bike.measure_speed(9.0)
-    for _ in range(round(silent_s * 10)):
-        bike.update([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], 100_000)
-    assert bike.state == state
-
-
-@pytest.mark.parametrize(
-    ("source", "fine"),
-    [
-        ({"every_s": 1.0, "step": 1 / 3.6}, True),
-        ({"late_s": 0.9 * speed_check.MAX_LAG_S}, True),
-        ({"late_s": 1.1 * speed_check.MAX_LAG_S}, False),
-        ({"scale": 1.1 / speed_check.MIN_FORCE_RATIO}, False),
-        ({"scale": 0.9 / speed_check.MAX_FORCE_RATIO}, False),
-    ],
-)
-def test_only_usable_speeds_align(source, fine):
+@pytest.mark.parametrize("source", [{"every_s": 1.0, "step": 1 / 3.6}, {"late_s": 1.7}, {"scale": 1.25}])
+def test_a_coarse_or_late_speed_aligns(source):
     result = drive(around(), source=source)
-    assert result["ready"] is fine, result.get("refused")
-    if fine:
-        assert abs(errors(result, MOUNT)[0]) < 0.5
-        assert result["lag"] == pytest.approx(source.get("late_s", 0.0), abs=0.15)
+    assert result["ready"] and abs(errors(result, MOUNT)[0]) < 0.5
+    assert result["lag"] == pytest.approx(source.get("late_s", 0.0), abs=0.15)
 
 
 @pytest.mark.parametrize(
@@ -192,52 +156,33 @@ def test_a_mount_that_moved(axis, degrees, from_s, words):
     assert words is None or words in engines.words(result)
 
 
-@pytest.mark.parametrize("silent_s", [200.0, pytest.param(500.0, marks=pytest.mark.long)])
-def test_brakings_count_after_any_late_first_speed(silent_s):
-    """The history's time counter wraps around every nine minutes. The vehicle speeds up only in bends."""
-    legs = [[silent_s, 0.0, 0.0], *around(6)]
-    result = drive(legs, source={"every_s": 1.0, "silent": (-1.0, silent_s)})
-    assert result["counted"] == 6 and result["ready"]
-
-
-def test_a_silent_source_is_not_a_stuck_one():
-    """The vehicle drives in stop-and-go traffic through a straight tunnel. The receiver gives a speed only before and
-    after the tunnel."""
-    tunnel = [[seconds, acceleration, 0.0] for seconds, acceleration, _ in around(6, pause_s=3.0, stands=False)]
-    begin, length = (sum(leg[0] for leg in legs) for legs in (around(3), tunnel))
-    source = {"every_s": 1.0, "silent": (begin, begin + length)}
-    result = drive([*around(3), *tunnel, *around(4)], source=source)
-    assert alignment.REFUSED not in result["states"] and result["ready"], result
+def fed(vehicle, brakings, lost=range(0)):
+    """Pass a drive to an alignment whose sensor is mounted as PLAIN. lost: samples that are missing in each 25 s."""
+    source, gap_us = driving_runs.SpeedSource(), 0
+    for k, (force, rate, speed) in enumerate(driving_runs.samples(around(brakings), "motorcycle")):
+        value = source.step_to(speed)
+        if k % 2500 in lost:
+            gap_us += 10_000
+            continue
+        vehicle.update(force, rate, 10_000 + gap_us)
+        gap_us = 0
+        if value is not None:
+            vehicle.measure_speed(value)
+    vehicle.finish()
+    return vehicle
 
 
 def test_nothing_is_joined_across_missing_samples():
     """Samples are missing for 1.5 s in every 25 s, and the vehicle is still aligned."""
-    car, source, gap_us = alignment.DriveAlignment("car"), driving_runs.SpeedSource(), 0
-    for k, (force, rate, speed) in enumerate(driving_runs.samples(around(8))):
-        value = source.step_to(speed)
-        if 100 < k % 2500 < 250:
-            gap_us += 10_000
-            continue
-        car.update(force, rate, 10_000 + gap_us)
-        gap_us = 0
-        if value is not None:
-            car.measure_speed(value)
-    assert car.ready
-    forward = car.quality.fit.forward
+    bike = fed(alignment.DriveAlignment("motorcycle", PLAIN[3:6], [0.0] * 3), 8, range(101, 250))
+    assert bike.ready
+    forward = bike.quality.fit.forward
     assert np.degrees(np.arctan2(forward[0], forward[2])) == pytest.approx(0.0, abs=0.3)
 
 
 @functools.cache
 def straight_drive(brakings):
-    """Return the DriveAlignment of a motorcycle that has driven this number of braking events, mounted as PLAIN."""
-    bike, source = alignment.DriveAlignment("motorcycle", PLAIN[3:6], [0.0] * 3), driving_runs.SpeedSource()
-    for force, rate, speed in driving_runs.samples(around(brakings), "motorcycle"):
-        bike.update(force, rate, 10_000)
-        value = source.step_to(speed)
-        if value is not None:
-            bike.measure_speed(value)
-    bike.finish()
-    return bike
+    return fed(alignment.DriveAlignment("motorcycle", PLAIN[3:6], [0.0] * 3), brakings)
 
 
 @pytest.mark.parametrize(

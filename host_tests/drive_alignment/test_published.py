@@ -18,7 +18,6 @@ from array import array
 import numpy as np
 import pytest
 from kickstand.errors import AlignmentError
-from kickstand.units import GAP_US
 from kickstand_tools.calibration.published import (
     BACKWARD,
     UP,
@@ -108,17 +107,6 @@ def test_the_dispersion_by_hand(turned):
     assert circular_dispersion([turned]) == pytest.approx(0.0, abs=1e-12)
 
 
-def test_directions_without_a_mean_have_the_largest_dispersion():
-    """The dispersion d is limited to 9.9. Two directions at -a and a with tan a = 4 would give d = tan^2 a = 16. Two
-    opposite directions have no mean direction."""
-    wide = (1 + 4j) / 17**0.5
-    assert circular_dispersion([wide, wide.conjugate()]) == 9.9
-    assert circular_dispersion([1.0, -1.0]) == 9.9
-    # with tan a = 3, d = 9 is below the limit
-    far = (1 + 3j) / 10**0.5
-    assert circular_dispersion([far, far.conjugate()]) == pytest.approx(9.0, rel=1e-9)
-
-
 class Drive:
     """A drive with a sample every 10 ms and a speed every `every_s` seconds. The drive begins with 6 s at rest."""
 
@@ -181,22 +169,6 @@ def test_forward_is_along_the_sum_of_the_brakings_forces():
     assert drive.matrix == pytest.approx(MOUNT, abs=1e-6)
 
 
-def test_a_longer_braking_counts_for_more():
-    """The method adds ten means of the force per second, in g. One event has the levelled force (0.18, -0.24) for 4 s,
-    two events have (0, -0.3) for 2 s each.
-
-    The sum to the left is 40 x 0.18 = 7.2. The sum to the back is 40 x 0.24 + 2 x 20 x 0.3 = 21.6. The sum therefore
-    points atan(1 / 3) to the left of backward.
-    """
-    drive = Drive()
-    drive.brake((0.18, 1.0, -0.24), seconds=4.0, mps2=-0.24 * G)
-    drive.brake()
-    drive.brake()
-    braking = MOUNT.T @ [1 / 10**0.5, 0.0, -3 / 10**0.5]
-    assert drive.matrix @ braking == pytest.approx([0.0, 0.0, -1.0], abs=1e-6)
-    assert drive.matrix[1] == pytest.approx(MOUNT[1], abs=1e-6)
-
-
 BRAKINGS = [
     # (seconds, m/s2, forces, counted, turned)
     (2.0, -0.99, [BRAKES], 0, 0),  # a deceleration below 1 m/s2 is not braking, whatever the force is
@@ -220,28 +192,6 @@ def test_which_braking_counts(seconds, mps2, forces, counted, turned):
     drive = Drive()
     drive.brake(*forces, seconds=seconds, mps2=mps2)
     assert (drive.alignment.counted, drive.alignment.turned) == (counted, turned)
-
-
-def lost_samples(drive):
-    drive.alignment.update((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), GAP_US + 1)
-
-
-def lost_speeds(drive):
-    for _ in range(230):
-        drive.alignment.update((np.array(BRAKES) @ MOUNT).tolist(), (0.0, 0.0, 0.0), 10_000)
-
-
-@pytest.mark.parametrize("lost", [lost_samples, lost_speeds])
-def test_a_braking_with_a_gap_is_dropped_and_earlier_ones_stay(lost):
-    drive = Drive()
-    drive.brake()
-    drive.reach_15_mps()
-    drive.go(BRAKES, 2.0, -0.3 * G)
-    lost(drive)
-    drive.go(STEADY, 3.0)
-    assert (drive.alignment.counted, drive.alignment.turned) == (1, 0)
-    drive.brake()
-    assert drive.alignment.counted == 2
 
 
 def test_brakings_before_the_first_stop_do_not_count():

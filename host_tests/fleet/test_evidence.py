@@ -67,69 +67,10 @@ def test_a_motorcycle_has_no_force_to_the_left_and_no_sway():
     assert not driven.sway.any() and driven.weight == pytest.approx([1.0] * 20)
 
 
-def test_the_fourth_term_is_the_change_of_the_yaw_rate():
-    """The yaw rate at an end is a mean over 0.2 s. It jumps 0.04 s after an end, so this mean has 0.3 of the jump."""
-    driven = intervals(log_of(20.0, 10.0, lambda t_s: np.clip(t_s - 10.0, 0.0, 4.0) * 2.0))
-    assert driven.terms[11:13, 3] == pytest.approx(np.radians(2.0), rel=0.01)
-    assert driven.terms[[0, 8, 17, 19], 3] == pytest.approx(0.0, abs=1e-6)
-    driven = intervals(log_of(20.0, 10.0, lambda t_s: np.where(t_s > 10.05, 2.0, 0.0)))
-    assert driven.terms[9:11, 3] == pytest.approx(np.radians([0.6, 1.4]), rel=0.02)
-
-
-@pytest.mark.parametrize(
-    ("kind", "speed", "yaw_dps", "weight"),
-    [
-        ("car", 0.0, 0.0, 0.3),  # a standstill has a smaller weight
-        ("car", 1.0, 0.0, 1.0),
-        ("motorcycle", 0.0, 0.0, 0.0),
-        ("motorcycle", 1.99, 0.0, 0.0),  # the rider may have a foot on the ground
-        ("motorcycle", 2.01, 0.0, 1.0),
-        ("car", lambda t_s: 0.15 * (np.round(t_s) % 2), 0.0, 0.0),  # creeping is neither standing nor driving
-        ("car", lambda t_s: 0.07 * (np.round(t_s) % 2), 0.0, 0.3),  # changes under 0.01 g are noise
-        ("car", 4.0, 20.0, 0.5),  # a tight turn counts less
-        ("car", 1.0, 20.0, 0.8),  # below 2 m/s the turn is computed with 2 m/s
-    ],
-)
-def test_weights_of_slow_intervals_and_tight_turns(kind, speed, yaw_dps, weight):
-    assert intervals(log_of(20.0, speed, yaw_dps), kind).weight[5:15] == pytest.approx(weight, rel=0.03, abs=1e-9)
-
-
-@pytest.mark.parametrize(("every_s", "count"), [(0.2, 10), (0.5, 10), (0.88, 5), (0.92, 10), (2.0, 5), (4.0, 0)])
-def test_speeds_are_used_every_0_9_seconds_up_to_a_limit(every_s, count):
-    assert len(intervals(log_of(10.0, every_s=every_s)).t_s) == count
-
-
 def test_a_late_speed_belongs_to_an_earlier_time():
     log = log_of(20.0, lambda t_s: np.clip(t_s - 10.0, 0.0, 5.0))
     driven = intervals(Log(log.t_s, log.accel_g, log.gyro_dps, np.roll(log.speed_mps, 25), name="late"), lag_s=0.5)
     assert driven.t_s[0] == pytest.approx(0.5) and driven.force[:, 2] == pytest.approx(driven.terms[:, 1], abs=0.002)
-
-
-@pytest.mark.parametrize(("missing_s", "used"), [(0.0, True), (0.08, True), (0.7, False)])
-def test_an_interval_needs_nine_tenths_of_its_samples(missing_s, used):
-    log = log_of(60.0)
-    present = (log.t_s < 20.3) | (log.t_s >= 20.3 + missing_s)
-    part = Log(log.t_s[present], log.accel_g[present], log.gyro_dps[present], log.speed_mps[present], name="gap")
-    assert np.any(np.abs(intervals(part).t_s - 20.5) < 0.3) == used
-
-
-@pytest.mark.parametrize("reach_s", [9.0, 11.0])
-def test_the_vertical_is_the_mean_force_over_20_seconds(reach_s):
-    log = log_of(60.0, 10.0, 5.0)
-    outside = np.abs(log.t_s - 30.0) > reach_s
-    log.accel_g[:] = np.where(outside[:, None], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0])
-    c, bend = intervals(log).terms[30, 2], 10.0 * np.radians(5.0) / G
-    assert c == pytest.approx(bend, rel=0.02) and (c < 0.9999 * bend) == (reach_s < 10.0)
-
-
-def test_the_sway_is_a_short_mean_minus_a_longer_mean():
-    """The means are over 3 and 15 samples of 0.02 s. A single sample of 1 g remains as three of 1/3 - 1/15, and as 12
-    of -1/15. Below 2 m/s the sway is not used."""
-    squares = 3.0 * (1.0 / 3.0 - 1.0 / 15.0) ** 2 + 12.0 / 15.0**2
-    for speed, size in ((10.0, 0.02 * squares), (1.9, 0.0)):
-        log = log_of(20.0, speed)
-        log.accel_g[np.argmin(np.abs(log.t_s - 10.5)), 0] += 1.0
-        assert intervals(log).sway[10] == pytest.approx(np.diag([size, 0.0, 0.0]), rel=0.01, abs=1e-12)
 
 
 def test_blocks_are_sums_over_eight_seconds_of_one_log():
@@ -147,20 +88,6 @@ def test_blocks_are_sums_over_eight_seconds_of_one_log():
     nothing = evidence.blocks([])
     assert (nothing.square.shape, nothing.product.shape, nothing.sway.shape) == ((0, 4, 4), (0, 4, 3), (0, 3, 3))
     assert moved.find_moves([]) == []
-
-
-def test_errors_of_the_road_are_correlated_over_150_m():
-    """The blocks are the normal equations of least squares with correlated errors. Each interval has an error of its
-    own with the variance 1 / weight. The error of the road has the variance 1 and decreases with the distance."""
-    rng, count = np.random.default_rng(5), 40
-    t_s = 3.0 + np.cumsum(rng.uniform(0.9, 1.5, count))
-    speed, weight = rng.uniform(0.0, 40.0, count), rng.uniform(0.2, 2.0, count)
-    terms, force = rng.normal(size=(count, 4)), rng.normal(size=(count, 3))
-    blocks = evidence.blocks([evidence.Intervals(t_s, force, terms, weight, speed, np.zeros((count, 3, 3)))])
-    along_m = np.cumsum(speed * np.diff(t_s, prepend=t_s[0]))
-    errors = np.diag(1.0 / weight) + np.exp(-np.abs(along_m[:, None] - along_m) / 150.0)
-    assert np.sum(blocks.square, axis=0) == pytest.approx(terms.T @ np.linalg.solve(errors, terms))
-    assert np.sum(blocks.product, axis=0) == pytest.approx(terms.T @ np.linalg.solve(errors, force))
 
 
 def coefficients_of(left_g=1.0):

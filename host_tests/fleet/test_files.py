@@ -55,15 +55,6 @@ def test_a_mark_in_a_store_has_the_etag_or_a_time(store, info, mark):
     assert files.identities(["failing:///a/b.csv"]) == {"failing:///a/b.csv": mark}
 
 
-def test_a_mark_on_this_computer_has_size_and_time(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_text("one")
-    os.utime(path, ns=(5, 5))
-    assert files.identities([str(path), "a\0b"]) == {str(path): "3-5", "a\0b": ""}
-    os.utime(path, ns=(6, 6))
-    assert files.identities([str(path)]) == {str(path): "3-6"}
-
-
 @pytest.mark.parametrize("error", [FileNotFoundError("x"), PermissionError(errno.EACCES, "no\n  right")])
 @pytest.mark.parametrize(
     ("action", "missing", "what"),
@@ -108,12 +99,3 @@ NAMES = ["x" * 256, "x" * 257, 100 * "\u4e2d", "hid", ".hid", "..", "a/b", "con"
 def test_file_names_are_unique_and_portable(names):
     assert len(set(names)) == len(names)
     assert all(len(name.encode()) < 150 and name.isascii() and "/" not in name for name in names)
-
-
-def test_a_long_name_is_cut_and_keeps_whole_characters():
-    assert files.folder_value("x" * 100) == "x" * 100 and len(files.folder_value("x" * 101)) == 111
-    assert files.folder_value("x" * 98 + "\u00e4").startswith("x" * 98 + "-")
-    stems = [files.file_stem("..a", *exact) for exact in (["x", "y"], ["xy"], ["x", "y", ""])]
-    assert len(set(stems)) == 3 and stems[0].startswith("a-")
-    assert plot.file_name(".hid", "")[0] != "." and plot.file_name("bus 12", "front").startswith("bus%2012%20front-")
-    assert len({plot.file_name(*names) for names in (("bus 12", ""), ("bus", "12"), ("bus 12", "front"))}) == 3

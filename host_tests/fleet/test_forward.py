@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from exact import FORWARD, LEFT, MOUNT, UP, drive_intervals
-from fleet_drives import drive, result_of, turn_of, yaw_deg
+from exact import MOUNT, drive_intervals
+from fleet_drives import yaw_deg
 from kickstand_fleet import evidence
 from kickstand_fleet.forward import Forward, find_forward
 from kickstand_tools.calibration.drive import UP_DEG, DriveFit, fit_logs, usable
@@ -42,15 +42,6 @@ def test_the_halves_of_the_driving_are_compared(turn_deg):
     assert forward_of(*pair).halves_deg == pytest.approx(6.0, abs=0.05)
 
 
-@pytest.mark.parametrize(("axis", "of_forward"), [(UP, True), (LEFT, False), (FORWARD, False)])
-def test_the_jackknife_sees_one_odd_block(axis, of_forward):
-    """One of eight blocks is turned by 4 degrees. Without it the mean is 0, without another block it is 4/7 degrees."""
-    result = forward_of(drive_intervals(64.0, 4.0, axis, from_s=56.0, speed=1e3))
-    odd = 7.0 / 8.0 * np.sum(np.array([0.5] + [4.0 / 7.0 - 0.5] * 7) ** 2)
-    assert result.sigma_deg == pytest.approx(np.sqrt(0.09 + odd * of_forward), rel=0.05)
-    assert result.attitude_deg == pytest.approx(np.sqrt(0.09 + UP_DEG**2 + odd), rel=0.05)
-
-
 @pytest.mark.parametrize(
     ("sigma", "halves", "sure"), [(1.49, -3.9, True), (1.51, 0.0, False), (0.1, -4.1, False), (0.1, 4.1, False)]
 )
@@ -70,49 +61,6 @@ def test_a_short_drive_has_the_alignment_of_the_firmware(halves_deg):
     assert result.frame == pytest.approx(MOUNT)
     assert (result.sigma_deg, result.halves_deg) == (pytest.approx(0.5), halves_deg or 0.0)
     assert result.attitude_deg == pytest.approx(np.hypot(0.5, UP_DEG))
-
-
-@pytest.mark.parametrize(
-    ("yaw", "quality_deg", "share", "variance"),
-    [
-        (0.0, 0.0, 0.5, 0.75 * 0.09),  # both have the variance 0.09 deg^2, and half of their errors are common
-        (0.5, 0.0, 0.5, 0.75 * 0.09),  # up to two standard deviations apart
-        (1.0, 0.0, 0.5, 0.75 * 0.09 * (1.0 / 0.6) ** 2),
-        (1.0, np.sqrt(0.27), 0.2, 0.64 * 0.09 + 0.04 * 0.36 + 0.32 * 0.5 * 0.18),
-    ],
-)
-def test_the_mean_with_the_firmware_is_weighted_by_variance(yaw, quality_deg, share, variance):
-    """Up is the firmware's."""
-    theirs = turn_of(yaw, UP) @ turn_of(2.0, FORWARD) @ MOUNT
-    result = forward_of(drive_intervals(64.0, speed=1e3), device=device_of(theirs, quality_deg))
-    assert result.frame[1] == pytest.approx(theirs[1])
-    assert np.degrees(np.arcsin(result.frame[2] @ theirs[0])) == pytest.approx(yaw * (1.0 - share), abs=0.03)
-    assert result.sigma_deg == pytest.approx(np.sqrt(variance), rel=0.02)
-    assert result.attitude_deg == pytest.approx(np.hypot(result.sigma_deg, UP_DEG), rel=0.01)
-
-
-def test_whole_logs_show_forward_better_than_the_device():
-    """Buses brake gently about ten times. With these seeds the device's forward has an error of about a degree."""
-    device, whole = [], []
-    for seed in (101, 102, 106, 109):
-        log, sensor = drive(seed, "bus", 150.0)
-        fit = fit_logs([log], None, "car")
-        result = find_forward([evidence.intervals(log, "car", fit.lag_s or 0.0, fit.bias_dps)], fit)
-        assert result and result.sigma_deg < 0.7
-        device.append(yaw_deg(fit.calibration.vehicle_from_sensor, sensor.mount))
-        whole.append(yaw_deg(result.frame, sensor.mount))
-        assert abs(whole[-1]) < 2.0 * result.sigma_deg
-    assert np.sqrt(np.mean(np.square(device))) > 0.95 and np.sqrt(np.mean(np.square(whole))) < 0.75
-
-
-@pytest.mark.parametrize(("seed", "doubt"), [(138, "uncertain"), (114, "parts-differ")])
-def test_a_sure_forward_overrides_the_doubt_of_the_device(tmp_path, seed, doubt):
-    log, sensor = drive(seed, "bus", 150.0)
-    assert fit_logs([log], None, "car").reason == doubt
-    result = result_of(tmp_path, log)
-    row = result.alignment
-    assert (row["status"], row["reason"], row["message"]) == ("aligned", "", "") and result.brake_tests
-    assert abs(yaw_deg(row["vehicle_from_sensor"], sensor.mount)) < 0.8
 
 
 # Matrices from the sensor's axes to the vehicle's, with the rows left, up, forward, measured with the recordings' own

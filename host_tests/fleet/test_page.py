@@ -8,7 +8,6 @@ from kickstand_fleet.manifest import Period
 from kickstand_fleet.period import failed
 from kickstand_fleet.show import plot
 from kickstand_fleet.show.page import Glance
-from kickstand_fleet.show.panel import Panel, ticks
 
 DAY_S = 86_400.0
 
@@ -113,74 +112,8 @@ def test_a_page_without_results_or_with_one_test():
     assert " 10 hours" in words_of(glance_of(result(driven_s=10.4 * 3600.0)).page(1))
 
 
-def test_the_table_ends_after_2000_vehicles():
-    glance = glance_of(*(result(f"v{k}", status="refused" if k > 2006 else "aligned") for k in range(2010)))
-    html = glance.page(2010).partition("<h2>Vehicles</h2>")[2]
-    assert re.findall(r"<td>(v\d+)</td>", html) == ["v2007", "v2008", "v2009", *(f"v{k}" for k in range(1997))]
-    assert "The first 2,000 of 2,010; all are in alignments.parquet." in html
-
-
-def test_a_histogram_counts_every_value():
-    """Values above the scale are in the last bar."""
-    html = glance_of(*(result(quality_deg=quality) for quality in (0.03, 0.04, 0.05, 1.59, 9.0))).page(5)
-    bars = re.findall(r'<rect[^>]* height="([\d.]+)"[^>]* fill="var\(--truth\)"', html)
-    assert len(bars) == 2 and float(bars[0]) / float(bars[1]) == pytest.approx(1.5, abs=0.01)
-
-
-def dots(svg):
-    """Return the places of the dots as an array of x and y (down)."""
-    return np.array(re.findall(r"M([\d.]+) ([\d.]+)h0", str(svg)), dtype=float)
-
-
 def texts(svg):
     return re.findall(r"<text[^>]*>([^<]*)</text>", str(svg))
-
-
-def panel(across=(0.0, 10.0), along=(0.0, 4.0), **options):
-    return Panel(5.0, 7.0, 300.0, 200.0, across, along, "a title", "across", "along", **options)
-
-
-def test_dots_and_bars_are_on_linear_scales_within_the_panel():
-    drawn = panel((0.0, 3.0))
-    drawn.dots([(0.0, 0.0), (1.0, 1.0), (3.0, 4.0)], "red")
-    drawn.bars([0.0, 1.0, 2.0, 3.0], [1.0, 0.0, 4.0], "green")  # a value of 0 has no bar
-    drawn.line([(1.0, 1.0)], "blue")
-    svg = str(drawn.svg())
-    (x0, y0), (x1, y1), (x2, y2) = dots(svg)
-    assert 5.0 < x0 < x1 < x2 < 305.0 and 207.0 > y0 > y1 > y2 > 7.0
-    assert (x1 - x0) / (x2 - x0) == pytest.approx(1 / 3, abs=0.001)
-    assert (y0 - y1) / (y0 - y2) == pytest.approx(0.25, abs=0.001)
-    bars = re.findall(r'<rect x="([\d.]+)" y="([\d.]+)" width="([\d.]+)" height="([\d.]+)" fill="green"', svg)
-    (first, _, wide, low), (third, top, _, high) = np.array(bars, dtype=float)
-    assert high == pytest.approx(y0 - y2, abs=0.1) and low == pytest.approx(y0 - y1, abs=0.1)
-    assert (
-        top == pytest.approx(y2, abs=0.1)
-        and x0 < first < first + wide < x1
-        and third - first == pytest.approx(2 * (x1 - x0), abs=0.2)
-    )
-    assert "blue" not in svg
-
-
-def test_the_axes_have_round_numbers_and_their_words():
-    assert texts(panel().svg()) == ["a title", "across", "along", "0", "5", "10", "0", "1", "2", "3", "4"]
-    assert texts(panel(words="day {:g}".format).svg())[3:6] == ["day 0", "day 5", "day 10"]
-    flat = panel((3.0, 3.0), (0.0, 0.0))  # an axis without length
-    flat.dots([(3.0, 0.0)], "red")
-    assert len(dots(flat.svg())) == 1 and texts(flat.svg())[3] == "3"
-
-
-@pytest.mark.parametrize(
-    ("first", "last", "count", "values"),
-    [
-        (0.0, 10.0, 5, [0, 2, 4, 6, 8, 10]),
-        (-0.21, 0.21, 4, [-0.2, 0.0, 0.2]),
-        (0.0, 100.0, 4, [0, 50, 100]),
-        (3.0, 3.0, 4, [3.0]),
-        (0.5, 4.5, 4, [1, 2, 3, 4]),
-    ],
-)
-def test_ticks_are_round_and_within_the_axis(first, last, count, values):
-    assert ticks(first, last, count) == values
 
 
 def test_the_picture_says_how_well_the_vehicle_is_aligned():
@@ -189,19 +122,6 @@ def test_the_picture_says_how_well_the_vehicle_is_aligned():
         "forward known to 0.5\u00b0, the whole alignment to 1.2\u00b0, 31 events, 7 stops, speed 0.3 s late",
     ]
     assert texts(plot.draw(result(message="a reason")))[:2] == ["bus 12", "a reason"]
-
-
-@pytest.mark.parametrize(
-    ("kind", "left"), [("car", ((0.2, 0.21), (0.0, 0.02))), ("motorcycle", ((0.1, 0.21), (-0.3, 0.02)))]
-)
-def test_measured_forces_are_over_the_expected_ones(kind, left):
-    """The two scales of a panel are equal. A motorcycle has no force to the left, so it is over the change of speed."""
-    places = dots(plot.draw(result(kind=kind)))
-    assert len(places) == 4
-    for (first, second), ((x0, y0), (x1, y1)) in zip((places[:2], places[2:]), (((0.1, 0.11), (-0.3, -0.29)), left)):
-        across, down = second - first
-        assert across / (x1 - x0) * (y1 - y0) == pytest.approx(-down, rel=0.1, abs=1.0)
-        assert np.sign([across, down]).tolist() == [np.sign(x1 - x0), -np.sign(y1 - y0)]
 
 
 @pytest.mark.long

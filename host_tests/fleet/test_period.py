@@ -53,17 +53,6 @@ def test_a_move_has_its_log_its_time_and_its_angle(fleet, results, trouble):
         assert f"{turned}before {log}: give {log} and the logs after it another mount" in message
 
 
-@pytest.mark.parametrize(("degrees", "axis"), [(5.5, (1, 0.3, 0)), (8.0, (0.2, 1, 0.3))])
-def test_small_turn_between_two_logs_is_found(tmp_path, degrees, axis):
-    first, sensor = drive(21)
-    sensor.mount = turn_of(degrees, axis) @ sensor.mount
-    result = result_of(tmp_path, first, drive(22, sensor=sensor)[0])
-    (row,) = result.moved
-    assert result.alignment["reason"] == "mount-moved"
-    turn = [row[f"about_{name}_deg"] for name in ("left", "up", "forward")]
-    assert turn == pytest.approx(degrees * np.array(axis) / np.linalg.norm(axis), abs=2.5)
-
-
 def test_an_aligned_drive_has_its_numbers_and_its_picture(tmp_path):
     log, sensor = drive(21)
     result = result_of(tmp_path, log)
@@ -136,15 +125,6 @@ def test_a_bad_log_costs_its_own_row_only(fleet, results):
     assert result.alignment["status"] == "aligned" and result.brake_tests
 
 
-def test_log_with_parts_left_out_is_reported_and_counts(periods, tmp_path):
-    path = tmp_path / "cut.csv"
-    path.write_bytes(Path(periods[0].paths[0]).read_bytes()[:-9] + bytes(50))
-    result = work_on_period(Period("v", "", "car", (str(path), *periods[0].paths[1:])))
-    assert (result.alignment["status"], result.alignment["logs_left_out"]) == ("aligned", 0)
-    assert {row["reason"] for row in result.errors} == {"nul-end", "cut-line"}
-    assert all(row["log"] == str(path) for row in result.errors)
-
-
 def test_a_vehicle_without_any_log_has_an_error(tmp_path):
     """A log that was read but refused makes it refused. Names that are not UTF-8 are printable."""
     for name in ("bad", "bad\udcff"):
@@ -180,17 +160,6 @@ def test_no_error_stops_a_fleet(monkeypatch, error, reason, words):
     result = work_on_period(NO_FILE)
     assert (result.alignment["status"], result.alignment["reason"]) == ("error", reason)
     assert words in result.errors[0]["message"]
-
-
-@pytest.mark.parametrize(
-    ("code", "reason"), [(errno.ENOSPC, "disk-full"), (errno.EDQUOT, "disk-full"), (errno.EIO, "not-finished")]
-)
-def test_signals_that_cannot_be_written_cost_only_themselves(periods, store, code, reason):
-    store.fail("signals", OSError(code, os.strerror(code)))
-    result = work_on_period(periods[0], "failing:///out/signals")
-    assert result.alignment["status"] == "aligned" and result.brake_tests
-    assert {row["reason"] for row in result.errors} == {reason}
-    assert [row["log"] for row in result.errors] == list(periods[0].paths)
 
 
 def test_signals_are_along_vehicle_axes_in_one_file_per_day(tmp_path):

@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from kickstand_fleet import run
 from kickstand_fleet.manifest import Period, by_pattern
 from kickstand_fleet.run import run_fleet
 from kickstand_fleet.tables import TABLES, schema
@@ -90,50 +89,6 @@ def test_a_run_that_ends_early_keeps_its_results(workers, tmp_path, error):
     assert run_fleet(absent(5), tmp_path).new == 2
 
 
-class Clock:
-    now_s = 1000.0
-
-    def monotonic(self):
-        return self.now_s
-
-
-@pytest.mark.parametrize(
-    ("takes_s", "counts"),
-    [
-        (0.5, [2, 4, 6, 8, 10, 12, 12]),  # each task takes 10 s, and tables are written at most every 15 s
-        (2.0, [2, 7, 12, 12]),  # writing takes a twentieth of the time: after 2 s there is a pause of 40 s
-    ],
-)
-def test_tables_are_written_seldom(workers, tmp_path, monkeypatch, takes_s, counts):
-    clock, write_results, written = Clock(), run.write_results, []
-
-    def slow(directory, results, expected):
-        clock.now_s += takes_s
-        written.append(write_results(directory, results, expected).count)
-
-    def ten_seconds():
-        clock.now_s += 10.0
-
-    monkeypatch.setattr(run, "time", clock)
-    monkeypatch.setattr(run, "write_results", slow)
-    workers.after = ten_seconds
-    run_fleet(absent(12), tmp_path)
-    assert written == counts
-
-
-def test_log_replaced_during_the_run_is_processed_again(workers, tmp_path):
-    log = tmp_path / "drive.csv"
-    log.write_text("no log")
-    period = Period("v", "", "car", (str(log), "none.csv", "memory://none.csv"))
-    workers.after = lambda: log.write_text("another log")
-    run_fleet([period], tmp_path / "out")
-    (row,) = (row for row in table(tmp_path / "out", "errors") if row["reason"] == "changed")
-    assert (row["log"], row["message"]) == (str(log), f"{log} has changed during the run: run the command again")
-    workers.after = lambda: None
-    again = run_fleet([period], tmp_path / "out")
-    assert again.new == 1 and "changed" not in {row["reason"] for row in table(tmp_path / "out", "errors")}
-
-
 @pytest.mark.parametrize("size", [300, 1500, 5000, 9000, 15_000])
 def test_a_disk_of_any_size_loses_no_finished_row(periods, results, workers, tmp_path, size):
     """The size of each file is limited, so that the journal, a picture, a table or the page does not fit."""
@@ -169,24 +124,6 @@ def test_a_full_store_keeps_the_row_and_ends_the_run(periods, workers, results, 
     assert run_fleet(periods[:1], OUT, with_signals=signals).new == 0
 
 
-def test_signals_of_equally_named_logs_have_separate_files(periods, workers, tmp_path):
-    from pyarrow import parquet
-
-    content = Path(periods[0].paths[0]).read_bytes()
-    paths = [tmp_path / folder / "drive.csv" for folder in ("d1", "d2")]
-    for path in paths:
-        path.parent.mkdir()
-        path.write_bytes(content)
-    logs = tuple(map(str, paths))
-    mounts = [Period("v", "", "car", logs), Period("v", "second", "car", logs[:1])]
-    outcome = run_fleet(mounts, tmp_path / "out", with_signals=True)
-    assert (outcome.seen.statuses["aligned"], outcome.seen.errors) == (2, 0)
-    written = sorted((tmp_path / "out" / "signals").rglob("*.parquet"))
-    assert len(written) == 3 and sum("second" in path.name for path in written) == 1
-    assert len({parquet.ParquetFile(path).metadata.num_rows for path in written}) == 1
-    assert len({row["plot"] for row in table(tmp_path / "out")}) == 2
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has names that are no UTF-8")
 def test_file_name_that_is_not_utf8_is_processed(workers, tmp_path):
     for name in (b"/a.csv", b"/b\xff.csv"):
@@ -212,10 +149,3 @@ def test_the_command_says_what_it_found(periods, results, workers, fleet, tmp_pa
     again = command.works("fleet", fleet.manifest, "--out", tmp_path)
     assert "mounted sensors: 9, 7 of them finished earlier\n" in again.out
     assert "1 earlier results were damaged and are recomputed\n" in again.err
-
-
-def test_the_command_says_that_finished_work_is_kept(workers, tmp_path):
-    (tmp_path / "MANIFEST.csv").write_text("vehicle,path,kind\nv,none.csv,car\n")
-    workers.outcomes = {"v": KeyboardInterrupt()}
-    stopped = command.run("fleet", tmp_path / "MANIFEST.csv", "--out", tmp_path / "out")
-    assert stopped.status == 130 and "finished work is kept: run the same command again to resume\n" in stopped.err

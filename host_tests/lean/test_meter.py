@@ -30,14 +30,6 @@ def test_a_meter_takes_sums_of_counts():
     near(degrees(shown.rate[2]), 131 / 3 / 65.5, 0.01)
 
 
-def test_the_first_g_is_shown_at_once_also_after_a_gap():
-    shown = meter(leans=False)
-    for left, forward, dt_us in ((0.1, 0.3, 10_000), (-0.1, -0.3, 600_000)):
-        shown.update((left, 0.9, forward, 25.0, 0.0, 0.0, 0.0), dt_us)
-        near(shown.smooth_force[2], forward, 1e-12)
-        near(shown.smooth_force[0], left, 1e-12)
-
-
 def test_the_shown_g_is_smooth():
     """An aligned motorcycle has no smoothed forces left and up."""
     for aligned, leans, all_axes in ((True, False, True), (False, False, True), (True, True, False)):
@@ -94,12 +86,6 @@ def test_after_the_poses_the_first_bend_shows_its_lean():
     assert not ride(shown, 1.0, 15.0, lean_deg=30.0).trusted  # the bike moves right after the poses
 
 
-def test_a_car_shows_its_g_however_it_stands():
-    shown = nose_up(ride(meter(leans=False), 1.0), 0.0, 25.0)
-    shown.distrust("mount-moved")
-    assert shown.trusted and shown.lean_deg == 0.0
-
-
 def test_a_bike_that_lies_on_its_side_for_a_second_has_fallen():
     for sign in (1.0, -1.0):
         lying = sign * 80.0
@@ -112,13 +98,6 @@ def test_a_bike_that_lies_on_its_side_for_a_second_has_fallen():
         assert ride(shown, 0.7, lean_deg=lying).fallen
         shown.restart()
         assert not shown.fallen and shown.lean_deg == 0.0
-
-
-def test_the_lean_of_a_fall_is_no_maximum():
-    shown = ride(roll(ride(meter(), 3.0), 0.0, 63.0), 0.2, lean_deg=63.0)
-    near(shown.max_right_deg, 63.0, 0.5)  # the lean is extrapolated by the delay of the low-pass
-    roll(shown, 63.0, 85.0)
-    assert shown.lean_deg > 80.0 and shown.max_right_deg < 65.0
 
 
 def test_maxima_are_the_largest_values_until_a_reset():
@@ -218,15 +197,3 @@ def test_the_delay_of_the_low_pass_is_compensated():
             shown.update(reading(*force_and_rate(0.6 * (k + 1), roll_dps=60.0)), DT_US)
     near(late.lean_deg - prompt.lean_deg, 60.0 * 0.02, 0.01)
     near(prompt.lean_deg, 6.0, 0.2)
-
-
-def test_a_negative_speed_is_ignored():
-    measured, alone = meter(), meter()
-    for shown in (measured, alone):
-        ride(speed_up(ride(shown, 3.0), 0.0, 20.0, 6.0), 1.0, speed_mps=20.0)
-    measured.measure_speed(-1.0)
-    for shown in (measured, alone):
-        ride(shown, 1.0, speed_mps=20.0)
-    assert measured.speed_mps == alone.speed_mps
-    measured.measure_speed(0.0)  # a speed of 0 is valid
-    assert ride(measured, 1.0, speed_mps=20.0).speed_mps < alone.speed_mps - 0.5

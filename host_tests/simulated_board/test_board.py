@@ -1,16 +1,12 @@
 """The simulated board: clock, power, watchdog, files, pins, timer, radio, and the fakes of MicroPython's modules."""
 
-import os
-import sys
-import time
-
 import pytest
 from kickstand_tools.simulated_board.clock import Clock, PowerOff
 from kickstand_tools.simulated_board.fakes import fake_bluetooth, fake_machine, fake_time
-from kickstand_tools.simulated_board.fakes.fake_machine import I2C, UART, WDT, Pin, Timer
+from kickstand_tools.simulated_board.fakes.fake_machine import WDT, Pin
 from kickstand_tools.simulated_board.radio import EVENT_S, ROOM, Radio
 from kickstand_tools.simulated_board.simulator import Board
-from support.board_access import firmware, level, on_board, raised
+from support.board_access import level, on_board, raised
 
 
 def test_the_deadline_stops_the_clock_and_stays():
@@ -23,14 +19,6 @@ def test_the_deadline_stops_the_clock_and_stays():
     clock.set_deadline(None)
     clock.advance(1)
     assert clock.now_us == 501 and not issubclass(PowerOff, Exception)
-
-
-def test_a_paced_clock_follows_the_host():
-    begin_s = time.monotonic()
-    Clock(pace=4.0).advance(400_000)
-    paced_s = time.monotonic() - begin_s
-    Clock().advance(600_000_000)
-    assert 0.095 <= paced_s and time.monotonic() - begin_s - paced_s < 1.0
 
 
 def test_ticks_wrap_as_on_the_boards():
@@ -94,53 +82,6 @@ def test_watchdogs_and_what_stops_them():
         assert on_board(program, 100_000.0, port=port)[0] == outcome
 
 
-@firmware(10.0)
-def test_an_interrupt_comes_at_the_chosen_edge_only(board):
-    pin = Pin(board.button_pin, Pin.IN, Pin.PULL_UP)
-    for trigger, edges in (
-        (Pin.IRQ_FALLING, {0}), (Pin.IRQ_RISING, {1}), (Pin.IRQ_FALLING | Pin.IRQ_RISING, {0, 1}), (None, set()),
-    ):  # fmt: skip
-        levels = set()
-        handler = (lambda one, levels=levels: levels.add(board.pin_level(one.id))) if trigger else None
-        pin.irq(handler, *[trigger] if trigger else [])
-        board.press()
-        board.clock.advance(1_000_000)
-        assert levels == edges
-
-
-@firmware(10.0)
-def test_a_timer_calls_once_or_again_until_it_is_stopped(board):
-    calls = []
-    timer = Timer(period=10, mode=Timer.PERIODIC, callback=lambda one: calls.append(board.clock.now_us))
-    board.clock.advance(35_000)
-    assert calls == [10_000, 20_000, 30_000]
-    timer.init(freq=100, mode=Timer.ONE_SHOT, callback=lambda one: calls.append("once"))
-    board.clock.advance(50_000)
-    assert calls[3:] == ["once"]
-    timer.init(period=10, callback=calls.append)
-    timer.deinit()
-    board.clock.advance(50_000)
-    assert len(calls) == 4
-
-
-@firmware()
-def test_pins_are_those_of_the_controllers(board):
-    for wrong in (
-        lambda: I2C(0, sda=Pin(6), scl=Pin(7)),
-        lambda: I2C(0, sda=Pin(4), scl=Pin(7)),
-        lambda: UART(0, tx=Pin(8), rx=Pin(9)),
-        lambda: UART(1, tx=Pin(8), rx=Pin(8)),
-        lambda: Pin(60),
-        lambda: WDT(timeout=8389),
-    ):
-        assert isinstance(raised(wrong), ValueError)
-    assert isinstance(raised(Pin, None), TypeError)
-    uart = UART(1, tx=Pin(8), rx=Pin(9))
-    uart.write("a\n")
-    uart.write(b"b")
-    assert board.sent == b"a\nb" and uart.any() == 0 and uart.read(5) is None
-
-
 @pytest.mark.parametrize(
     ("machine", "pin", "outcome"),
     [("esp32", 6, "reset"), ("lora32", 11, "reset"), ("esp32", 12, "returned"),
@@ -169,20 +110,6 @@ def test_the_power_is_cut_in_the_middle_of_a_file(tmp_path):
     outcome, board = on_board(program)
     assert (outcome, board.faults.files_cut) == ("off", 1)
     assert ((tmp_path / "a.txt").read_text(), (tmp_path / "a.cal").read_text()) == ("text", "abc")
-
-
-def test_the_real_modules_are_restored():
-    """CPython has no machine code: from Python 3.14 on, the types in viper code raise no error, but its results would
-    be wrong."""
-    modules = {name: sys.modules.get(name) for name in ("machine", "time", "os", "sys", "bluetooth", "esp32")}
-
-    def program(board):
-        assert hasattr(time, "ticks_ms") and hasattr(os, "ilistdir") and "esp32" in sys.modules
-        assert isinstance(raised(sys.modules["micropython"].viper, None), NameError)
-
-    assert on_board(program, machine="esp32")[0] == "returned"
-    assert {name: sys.modules.get(name) for name in modules} == modules
-    assert not hasattr(time, "ticks_ms") and not hasattr(os, "ilistdir")
 
 
 class Phone:

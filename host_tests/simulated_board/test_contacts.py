@@ -3,7 +3,6 @@
 import pytest
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.contacts import Button, Wheel
-from kickstand_tools.simulated_board.fakes import chips
 from kickstand_tools.simulated_board.gps import Gps, sentence
 
 
@@ -32,18 +31,6 @@ def test_a_button_bounces_for_4_ms_and_then_stays():
     assert changes == press()[1] != press(2)[1]
 
 
-def test_presses_now_follow_each_other():
-    clock = Clock()
-    button = Button(clock)
-    clock.advance(5000)
-    for _ in range(2):
-        button.press(None, 100_000)
-    closings = [time_us for time_us, level in edges(button, clock, 1_000_000) if level == 0]
-    assert closings[0] == 5000 and min(time_us for time_us in closings if time_us > 200_000) == 5000 + 250_000
-    button.press(None, 1000)  # after the earlier presses, a press begins at once
-    assert edges(button, clock, 1_000_001)[0] == (1_000_000, 0)
-
-
 def test_a_capacitor_holds_the_pin_low():
     clock = Clock()
     button = Button(clock)
@@ -52,22 +39,6 @@ def test_a_capacitor_holds_the_pin_low():
     assert [button.low(pulled_us) for pulled_us in (800, 700, 0)] == [True, False, False]
     button.closed = True
     assert button.low(0)
-
-
-@pytest.mark.parametrize(
-    ("speed", "per_metre", "count"), [(10.0, 0.5, 5), (20.0, 0.5, 10), (10.0, 2.0, 20), (0.02, 50.0, 0)]
-)
-def test_a_wheel_closes_once_per_turn(speed, per_metre, count):
-    """The contact is closed for a tenth of the way between two pulses. At first the magnet is half a turn away."""
-    clock = Clock()
-    changes = edges(Wheel(clock, lambda t_s: speed, per_metre), clock, 1_000_000)
-    closed, opened = ([time_us for time_us, level in changes if level == k] for k in (0, 1))
-    assert abs(len(closed) - count) <= 1 and (len(closed) > 0) == (count > 0)
-    if count:
-        way_us = 1e6 / (speed * per_metre)
-        assert closed[0] == pytest.approx(way_us / 2.0, rel=0.02)
-        assert closed[1] - closed[0] == pytest.approx(way_us, rel=0.01)
-        assert opened[0] - closed[0] == pytest.approx(0.1 * way_us, rel=0.01)
 
 
 def test_a_wheel_follows_its_speed_bounces_breaks_and_picks_up_noise():
@@ -115,28 +86,3 @@ def test_a_receiver_sends_each_fix_late_and_byte_by_byte():
     assert first.startswith("$GNRMC,115940.20,A,4807.03800,N,01131.00000,E,3.888")
     assert faster[0][0] == pytest.approx(0.25, abs=0.02) and not any("VTG" in line for _, line in faster)
     assert len(faster) in (12, 14)
-
-
-@pytest.mark.parametrize(
-    ("name", "pins", "missing", "controllers", "bluetooth"),
-    [
-        ("pico", (0, 29), (30,), 2, False),
-        ("pico w", (0, 29), (30,), 2, True),
-        ("pico 2", (0, 29), (30,), 2, False),
-        ("esp32", (0, 16, 23, 25, 27, 32, 39), (24, 28, 31, 40), 2, True),
-        ("esp32 spiram", (15, 18), (16, 17), 2, True),
-        ("s2", (0, 21, 33, 46), (22, 32, 47), 2, False),
-        ("s3", (0, 21, 33, 48), (22, 32, 49), 2, True),
-        ("s3 of 1.25", (0, 21, 33, 48), (22, 32, 49), 2, True),
-        ("c3", (0, 10, 18, 21), (11, 17, 22), 1, True),
-        ("c6", (0, 23), (24,), 1, True),
-        ("h2", (0, 5, 8, 14, 22, 27), (6, 7, 15, 21, 28), 2, True),
-    ],
-)
-def test_pins_and_parts_of_each_chip(name, pins, missing, controllers, bluetooth):
-    machine = chips.MACHINES[name]
-    assert set(pins) <= chips.pins_of(machine) and not set(missing) & chips.pins_of(machine)
-    assert (chips.i2c_controllers(machine), chips.has_bluetooth(machine)) == (controllers, bluetooth)
-    classic = name.startswith("esp32")
-    assert chips.flash_pins(machine) == (frozenset(range(6, 12)) if classic else frozenset())
-    assert chips.inputs_only(machine) == (frozenset(range(34, 40)) if classic else frozenset())

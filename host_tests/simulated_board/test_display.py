@@ -105,25 +105,6 @@ def test_an_lcd_gets_only_the_changed_part_of_a_line(board, display):
         assert len(sent) == count, (line, len(sent))
 
 
-def test_a_picture_is_drawn_again_only_for_other_values():
-    drawings = []
-
-    def draw(canvas, width, label):
-        drawings.append((width, label))
-        canvas.fill_rect(0, 0, width, 8, 1)
-
-    def program(board):
-        display = open_display(board)
-        for width in (3, 3, 5):
-            display.show("a", "b", (draw, width, "x"))
-            turns(board, display, 60)
-            assert display.draws and board.lcd.pixels()[0] == 0xFF << 8 - width & 0xFF
-        check_lines(board, display, OLD)
-
-    run(program, display="ssd1306")
-    assert drawings == [(3, "x"), (5, "x")]
-
-
 @on_each((None, 100_000))
 def test_after_any_unplug_it_returns_and_shows_nothing_old(board, display):
     for gap_turns, gone_ms in ((0, 1), (0, 50), (5, 1), (40, 1)):
@@ -258,40 +239,6 @@ def test_character_displays_without_a_pcf8574_are_driven():
         run(program)
 
 
-@on_each()
-def test_a_replaced_display_is_detected(board, display):
-    for kind in OLEDS + ("lcd", "lcd", "sh1106"):
-        board.change_display(kind)
-        check_lines(board, display, NEW, 200)
-
-
-@on_each(kinds=("ssd1306",))
-def test_a_status_that_is_never_on_leaves_no_oled_dark(board, display):
-    board.lcd.read_byte = lambda: 0xFF
-    board.remove_lcd()
-    board.fit_lcd()
-    check_lines(board, display, NEW, 200)
-    assert board.lcd.on
-
-
-def test_no_status_leaves_an_oled_dark():
-    """The driver recognises the two kinds of controller by their status. The driver sends the supply commands of both
-    kinds to every controller. If the driver mistakes one kind for the other, the picture is only two columns off."""
-    for kind in OLEDS:
-        for identity in range(16):
-
-            def program(board, identity=identity):
-                board.lcd.identity = identity
-                display = open_display(board)
-                display.show(*OLD)
-                turns(board, display, 60)
-                assert board.lcd.backlight and board.lcd.unknown == 0, identity
-                sure = {"ssd1306": (1, 3, 6, 15), "sh1106": (0, 8, 12)}[board.lcd.kind]
-                assert identity not in sure or board.lcd.text() == as_text(OLD), identity
-
-            run(program, display=kind)
-
-
 def test_a_panel_of_32_rows_shows_both_lines():
     """Two lines of letters with 16 rows fill the display. The picture moves down by one or two rows. The last rows of
     the letters are blank, so nothing is lost."""
@@ -327,22 +274,6 @@ def test_the_rows_of_a_larger_display_are_blanked():
         assert board.lcd.ddram[0x14] == 0x20
 
     run(program)
-
-
-@on_each(kinds=OLEDS)
-def test_an_oled_is_rewritten_every_ten_seconds_and_moves(board, display):
-    noise = board.lcd.ram[200] ^ 0xFF
-    board.lcd.ram[200] = noise
-    turns(board, display, 800)
-    assert board.lcd.ram[200] == noise
-    turns(board, display, 210)
-    assert board.lcd.ram[200] != noise
-    starts = []
-    for _ in range(25):
-        turns(board, display, 1010)
-        starts.append(board.lcd.start_line)
-        assert board.lcd.on and board.lcd.text() == as_text(OLD) and board.lcd.unknown == 0
-    assert set(starts) == {0, 1, 2} and sum([starts[k] != starts[k - 1] for k in range(1, 25)]) == 4
 
 
 @on_each()

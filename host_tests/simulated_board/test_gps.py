@@ -2,7 +2,7 @@
 
 from kickstand_tools.simulated_board.gps import sentence
 from kickstand_tools.simulated_board.simulator import Board
-from speed_runs import DAYS, Wire, drive, later
+from speed_runs import Wire, drive
 from support.board_access import level
 
 DATE = 26 << 9 | 11 << 5 | 21  # 21 November 2026, in the form of Gps.place()
@@ -140,17 +140,6 @@ def test_dates_of_the_calendar_and_0_for_others():
     assert fixes(rmc(date=""))[0] == no_date == (10000, [0, NOON_MS, 288703800, 69100000])
 
 
-def test_midnight_at_ten_fixes_per_second():
-    times = ["235959.%d0" % k for k in range(5, 10)] + ["000000.%d0" % k for k in range(5)]  # noqa: UP031
-    dates = ["311226"] * 5 + ["010127"] * 5
-    text = "".join([rmc("4807.0000%d,N" % k, time=times[k], date=dates[k]) for k in range(10)])  # noqa: UP031
-    places = [place for _, place in fixes(text, 40, 50, 60)]
-    last, first = 26 << 9 | 12 << 5 | 31, 27 << 9 | 1 << 5 | 1
-    assert [place[:3] for place in places] == [
-        [last, 86399500 + 100 * k, 288700000 + k] if k < 5 else [first, 100 * k - 500, 288700000 + k] for k in range(10)
-    ]
-
-
 def hear(gps, wire, text, at_ms):
     """Poll twice, because one poll reads a part of the sentence. Return the speed or None."""
     wire.data = text.encode()
@@ -175,20 +164,6 @@ def test_a_delayed_fix_is_rejected_or_has_its_age():
         ):
             speed = hear(gps, wire, rmc(time=f"1200{second:02}.00"), at_ms)
             assert (None if speed is None else gps.age_ms) == age_ms, second
-
-
-def test_a_receiver_whose_clock_jumps_is_late_for_seconds_only():
-    with Board(level):
-        from kickstand.speed.gps import Gps
-
-        for jump in (-6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6):
-            wire = Wire()
-            gps = Gps(wire)
-            for k in range(30):
-                second = 10 + k + (jump if k >= 10 else 0)
-                speed = hear(gps, wire, rmc(time=f"1200{second:02}.00"), 1000 * k + 20 * (k % 3))
-                if k < 10 or k >= 22 or jump > 0:
-                    assert speed is not None and 0 <= gps.age_ms <= 40, (jump, k, gps.age_ms)
 
 
 def test_an_old_position_is_not_returned_as_new():
@@ -263,21 +238,6 @@ def test_a_receiver_that_sends_something_else_is_named():
         assert fault_of(data) == ("gps-other", name), data
     assert fault_of(gga.replace(b"545", b"546")) == fault_of(bytes(range(256))) == ("gps-garbled",)
     assert fault_of(gga + rmc(status="V").encode()) == ("gps-no-fix",)
-
-
-def test_a_receiver_stays_silent_for_days():
-    """After 6.2 days ticks_diff() is negative."""
-    with Board(level):
-        from kickstand.speed.gps import Gps
-
-        for days in DAYS:
-            wire = Wire()
-            gps = Gps(wire)
-            assert hear(gps, wire, rmc(), 1000)
-            for k in range(1, int(24 * days)):
-                gps.poll(later(k / 24))
-                fault = gps.fault(later(k / 24))
-                assert fault and fault.code == "gps-silent", (days, k)
 
 
 def test_a_fast_receiver_with_many_satellites_loses_no_speed():

@@ -2,7 +2,6 @@
 
 import pytest
 from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.glyphs import drawn, rom
 from kickstand_tools.simulated_board.lcd import Lcd
 
 RS, RW, E, LIGHT = 0x01, 0x02, 0x04, 0x08
@@ -40,17 +39,6 @@ def write(lcd, text, *commands):
     return lcd
 
 
-def status(lcd):
-    """Read the busy flag and the address counter."""
-    halves = []
-    lcd.write_byte(0xF0 | LIGHT | RW)
-    for _ in range(2):
-        lcd.write_byte(0xF0 | LIGHT | RW | E)
-        halves.append(lcd.read_byte() & 0xF0)
-        lcd.write_byte(0xF0 | LIGHT | RW)
-    return halves[0] | halves[1] >> 4
-
-
 def test_rs_must_be_stable_before_e_rises():
     """A letter whose RS rises together with E arrives as a command (tAS of the data sheet)."""
     lcd = new_lcd()
@@ -61,28 +49,6 @@ def test_rs_must_be_stable_before_e_rises():
         lcd.clock.advance(90)
     assert lcd.text()[0] == " " * 16
     assert write(lcd, "A", 0x80).text()[0].startswith("A")
-
-
-@pytest.mark.parametrize(
-    ("lines", "begin", "direction", "after"),
-    [
-        (2, 0x00, 0x06, 0x01),
-        (2, 0x27, 0x06, 0x40),  # at the end of the first line
-        (2, 0x67, 0x06, 0x00),  # at the end of the second line
-        (2, 0x40, 0x04, 0x27),  # backwards
-        (2, 0x00, 0x04, 0x67),
-        (1, 0x27, 0x06, 0x28),
-        (1, 0x4F, 0x06, 0x00),
-        (1, 0x00, 0x04, 0x4F),
-    ],
-)
-def test_the_address_counter_wraps_at_the_ends_of_lines(lines, begin, direction, after):
-    lcd = write(new_lcd(lines), "x", direction, 0x80 | begin)
-    lcd.clock.advance(100)
-    assert status(lcd) == after
-    send(lcd, 0x80 | begin, 0x14 if direction == 0x06 else 0x10)  # the command that moves the cursor
-    lcd.clock.advance(100)
-    assert status(lcd) == after
 
 
 @pytest.mark.parametrize(
@@ -170,30 +136,3 @@ def test_other_backpacks_have_other_pins(wiring, rs, enable, light, lit, data):
     assert lcd.text()[0][0] == "A" and lcd.backlight
     lcd.write_byte((1 - lit) << light)
     assert not lcd.backlight and lcd.read_byte() == (1 - lit) << light
-
-
-@pytest.mark.parametrize(
-    ("rows", "letter"),
-    [
-        ([0] * 8, " "),
-        ([0x1F] * 8, "█"),
-        ([0] * 7 + [0x1F], "▁"),
-        ([0] * 4 + [0x1F] * 4, "▄"),
-        ([0x10] * 8, "▎"),
-        ([0x1E] * 8, "▊"),
-        ([0x01] * 8, "▕"),
-        ([0x0F] * 8, "▐"),
-        ([0x04] * 8, "|"),
-        ([0, 0x18, 0x18, 0x18, 0x18, 0x18, 0, 0], "▍"),  # a bar of five rows
-        ([0, 0x18, 0x18, 0x18, 0x18, 0, 0, 0], "?"),
-        ([0x10, 0x18] * 4, "?"),
-        ([0xE0] * 8, " "),  # a row has only five dots
-    ],
-)
-def test_patterns_look_like_letters(rows, letter):
-    assert drawn(rows) == letter
-
-
-def test_the_letters_of_the_rom():
-    codes = (0x41, 0x5C, 0x7D, 0x7E, 0x7F, 0x80, 0xA0, 0xA1, 0xDF, 0xFF, 0x1F)
-    assert "".join(map(rom, codes)) == "A¥}→←  ?°█ "

@@ -50,12 +50,6 @@ def test_where_bytes_are_stored(kind, settings, values, stored):
     assert {divmod(k, len(oled.ram) // 8): value for k, value in enumerate(oled.ram) if value} == stored
 
 
-def test_a_window_continues_on_the_next_page():
-    oled = new_oled("ssd1306", 0x20, 0)
-    send(oled, 0x40, *range(1, 130))
-    assert (oled.ram[127], oled.ram[128]) == (128, 129)
-
-
 def lit(oled):
     """Return the lit pixels as (row, column)."""
     return [
@@ -80,31 +74,6 @@ def test_a_pixel_is_where_the_settings_put_it(kind):
     ):
         commands(oled, *settings)
         assert lit(oled) == pixels, settings
-
-
-def test_one_byte_may_follow_a_control_byte():
-    """With the bit Co, each command or data byte has its own control byte."""
-    oled = new_oled()
-    send(oled, 0x80, 0xB3, 0x80, 0x02, 0x80, 0x10, 0xC0, 7, 0x40, 8, 9)
-    assert oled.ram[3 * 128 : 3 * 128 + 6] == bytes((0, 0, 7, 8, 9, 0))
-
-
-@pytest.mark.parametrize(
-    ("kind", "counts"),
-    [
-        ("ssd1306", {0x20: 1, 0x21: 2, 0x22: 2, 0x8D: 1, 0x26: 6, 0x27: 6, 0x29: 5, 0x2A: 5, 0xA3: 2, 0x2E: 0}),
-        ("sh1106", {0xAD: 1, 0x30: 0, 0x33: 0, 0xE0: 0, 0xEE: 0}),
-    ],
-)
-def test_each_command_has_the_arguments_of_the_data_sheet(kind, counts):
-    """After each command and its arguments, the next command is understood."""
-    for code, count in (counts | dict.fromkeys((0x81, 0xA8, 0xD3, 0xD5, 0xD9, 0xDA, 0xDB), 1)).items():
-        oled = Oled(Clock(), kind=kind)
-        commands(oled, code, *([0x12] * count), 0x45)
-        assert (oled.start_line, oled.unknown) == (5, 0), hex(code)
-    oled = Oled(Clock(), kind=kind)
-    commands(oled, 0x81, 0x77, 0xDA, 0x02, 0xFF)
-    assert (oled.contrast, oled.alternate, oled.unknown) == (0x77, False, 1)
 
 
 @pytest.mark.parametrize(("kind", "off", "contrast", "status"), [("ssd1306", 0x10, 0x7F, 3), ("sh1106", 0x8A, 0x80, 8)])

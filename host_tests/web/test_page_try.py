@@ -179,62 +179,6 @@ def test_a_phones_first_screen_has_all_for_the_first_minute(visit):
 
 
 @pytest.mark.long
-def test_a_phone_leans_the_motorcycle_if_it_has_motion_data(visit):
-    rider = visit(**PHONE)
-    page = rider.page
-    rider.reads("Raw")
-    page.tap("#tilt")
-    page.wait_for_selector("#tilt-said:has-text('does not say how it is held')")
-    assert page.get_attribute("#tilt", "aria-pressed") == "false"
-    phone = rider.context.new_cdp_session(page)
-
-    def tilt(gamma):
-        phone.send("DeviceOrientation.setDeviceOrientationOverride", {"alpha": 0, "beta": 40, "gamma": gamma})
-
-    tilt(3)
-    page.tap("#tilt")
-    page.wait_for_function("document.querySelector('#tilt').ariaPressed === 'true'")
-    assert page.get_attribute("#pose [value=ride]", "aria-pressed") == "true"
-    page.wait_for_timeout(200)
-    tilt(23)
-    page.wait_for_function("document.querySelector('#lean-out').value === '20° right'")
-    page.wait_for_function("seen.last.lean_deg > 15")
-
-
-@pytest.mark.long
-def test_every_step_of_the_guide_has_its_room(visit, files):
-    """A longer text must not move the parts of the page below it. The texts come from the guide's source. No text is
-    below the choice of the display."""
-    guide = files["guide.mjs"].decode()
-    pages = re.findall(r'^  \w+: "(.{20,})",$', guide, re.M)
-    steps = [text for pair in re.findall(r'"([^"\n]{25,})"|`([^`]{25,})`', guide) for text in pair if text]
-    steps += [text.replace("${PAGES[kind]}", page) for text in steps for page in pages if "${PAGES[kind]}" in text]
-    assert len(steps) > 40
-    rider = visit("index.html")
-    rider.reads("Raw")
-    for width, height in (1440, 900), (1000, 700), (844, 390), (640, 900), (512, 844), (390, 844), (360, 640):
-        rider.page.set_viewport_size({"width": width, "height": height})
-        assert rider.fits(), width
-        long, words = rider.page.evaluate(
-            ROOM,
-            steps,
-        )
-        assert long == [], width
-        choice = rider.page.locator("#kind").bounding_box()
-        beside = rider.page.locator("#press-help").bounding_box()["y"] < choice["y"] + choice["height"]
-        assert words <= choice["x"] or not beside or width > height, width
-
-
-@pytest.mark.long
-def test_motorcycle_is_seen_in_the_dark(visit):
-    """Mirrors, frame and tyre differ in colour from the road behind them."""
-    rider = visit(color_scheme="dark", **LAPTOP)
-    rider.page.wait_for_selector(".mirror")
-    road, *parts = rider.page.evaluate(COLOURS)
-    assert all(sum(part) - sum(road) > 130 for part in parts), (road, parts)
-
-
-@pytest.mark.long
 def test_a_foreign_script_does_not_run(visit):
     """The page itself works under its policy. Most other tests switch the policy off."""
     rider = visit(policy=True, **LAPTOP)

@@ -90,17 +90,3 @@ def test_silent_connections_do_not_hold_the_page():
         for _ in range(100):
             connect()
         assert answer_to(port, b"GET / HTTP/1.0\r\n\r\n").endswith(b"the page")
-
-
-def test_trickling_connections_are_ended_for_others(monkeypatch, capsys):
-    """The clients send a byte before each time-out, but never a whole request."""
-    monkeypatch.setattr(serve, "MOST", 4)
-    monkeypatch.setattr(serve, "FULL_S", 0.1)
-    with serving() as port, contextlib.ExitStack() as opened:
-        clients = [opened.enter_context(socket.create_connection((serve.HOST, port))) for _ in range(4)]
-        for _ in range(4):
-            for client in clients:
-                with contextlib.suppress(OSError):
-                    client.sendall(b"x")
-            assert answer_to(port, b"GET / HTTP/1.0\r\n\r\n").endswith(b"the page")
-    assert "Traceback" not in capsys.readouterr().err

@@ -116,6 +116,39 @@ def test_each_board_gets_its_own_machine_code(files):
     assert len(machine_code) == 4 and {name for name in modules if name.endswith("_viper.mpy")} == machine_code
 
 
+@pytest.mark.parametrize(
+    ("board", "settings"),
+    [
+        ("Seeed XIAO RP2040, RP2350", {"SENSOR_SDA": "6", "SENSOR_SCL": "7", "LCD_SDA": "0", "SENSOR_I2C": "1"}),
+        ("Seeed XIAO ESP32C3", {"LCD_SDA": "4", "LCD_SCL": "5", "BUTTON_PIN": "10"}),
+    ],
+)
+def test_the_page_install_knows_the_boards_of_the_manual(files, board, settings):
+    boards = json.loads(files["boards.json"])
+    assert settings.items() <= boards[board].items()
+    assert all(
+        {"SENSOR_SDA", "SENSOR_SCL", "LCD_SDA", "LCD_SCL", "BUTTON_PIN"} <= set(pins) for pins in boards.values()
+    )
+
+
+@pytest.mark.parametrize(
+    ("described", "names"),
+    [
+        ("Raspberry Pi Pico with RP2040, MicroPython 1.26.1", ["Seeed XIAO RP2040, RP2350", "Waveshare RP2040-Zero"]),
+        ("Generic ESP32C3 module with ESP32C3", ["Seeed XIAO ESP32C3"]),
+        ("Generic ESP32-S3 module with ESP32-S3", ["Seeed XIAO ESP32S3"]),
+        ("Generic ESP32 module with ESP32", ["M5Stack Atom Lite (ESP32-PICO-D4)"]),
+        ("Generic S2 module with ESP32S2", []),
+    ],
+)
+def test_a_board_is_offered_for_its_chip(node, described, names):
+    script = """async ({ names, described }) => {
+      const { sameChip } = await import(PAGE + "/install/boards.mjs");
+      return names.filter((name) => sameChip(name, described));
+    }"""
+    assert node(script, {"names": list(site.shop_boards()), "described": described}) == names
+
+
 def test_archives_have_what_the_pages_import_and_no_more(files):
     numpy = archive(files, "numpy/numpy.zip")
     assert "numpy/__init__.py" in numpy and not any(f"/{part}/" in name for name in numpy for part in ("tests", "f2py"))

@@ -6,9 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.lcd import Lcd
-from kickstand_tools.web.device import STATE, WHOLE_TICKS, PageDevice, display
+from kickstand_tools.web.device import STATE, PageDevice
 from page_drive import ALIGN, RIDE, SHORT, Drive
 from support.mpy import run_mpy
 from support.web import page_repeated
@@ -84,17 +82,6 @@ def test_a_first_visit_is_recorded_every_20_ms(board):
         assert any(round(value, digits - 1) != value for value in values)
 
 
-def test_a_display_that_keeps_changing_is_sent_now_and_then(board):
-    """Usually a display is sent only if it has not changed for 20 ms."""
-
-    def change():
-        board.board.lcd.changes += 1
-
-    board.board.every(0.01, change)
-    sent = [k for k, tick in enumerate(ticks(board, 1.0)) if "display" in tick]
-    assert sent[0] == WHOLE_TICKS == 10 and max(b - a for a, b in itertools.pairwise(sent)) <= 11
-
-
 def test_wire_power_and_display_may_be_pulled(board):
     board.run_to(2.0)
     for fitted in (False, False, True, True):
@@ -117,17 +104,6 @@ def test_wire_power_and_display_may_be_pulled(board):
         board.order("display", kind)
         shown = last(ticks(board, board.board.clock.now_us / 1e6 + 3.0), "display")
         assert shown["lit"] and len(shown.get("pixels", [])) == pixels and shown["text"][0].startswith("Raw")
-
-
-@pytest.mark.parametrize(("held_s", "pressed_s"), [(0.0, 0.1), (0.05, 0.1), (0.3, 0.3)])
-def test_a_press_lasts_at_least_100_ms(board, held_s, pressed_s):
-    board.run_to(1.0)
-    pressed_at_s = board.order("button", True)
-    board.run_to(pressed_at_s + held_s)
-    board.order("button", False)
-    for at_s, closed in ((pressed_s - 0.02, True), (pressed_s + 0.02, False)):
-        board.run_to(pressed_at_s + at_s)
-        assert board.board.button.closed is closed
 
 
 def test_time_goes_on_in_safe_mode(board):
@@ -161,18 +137,6 @@ def test_the_supply_is_cut_during_one_save(board):
     board.order("cut_save", False)
     align(board)
     assert board.powered
-
-
-@pytest.mark.parametrize(("on", "two_lines", "letter"), [(False, False, 32), (True, False, 32), (True, True, 65)])
-def test_characters_are_sent_only_of_a_display_that_is_on(on, two_lines, letter):
-    lcd = Lcd(Clock())
-    lcd.ddram[0] = ord("A")
-    lcd.on, lcd.two_lines = on, two_lines
-    assert display(lcd)["codes"] == [[letter] + [0x20] * 15, [0x20] * 16]
-    lcd.ddram[:16] = b"Lean 12\xdf left   "
-    assert display(lcd)["cgram"] == [0] * 64
-    if two_lines:
-        assert display(lcd)["shown_deg"] == -12.0
 
 
 # On MicroPython

@@ -73,13 +73,13 @@ class BackgroundAlignment:
         self._restart()
 
     def _restart(self):
-        old = self._meter.calibration
+        current = self._meter.calibration
         # use one calibration for all samples of this drive, even if another calibration is saved meanwhile
-        self._calibration = old
-        trusted = self._leans and old.aligned and not self._asked
-        up = old.vehicle_from_sensor[3:6] if trusted else None
-        self.drive = DriveAlignment(MOTORCYCLE if self._leans else CAR, up, _KNOWN_BIAS if old.aligned else None)
-        self.shown = self.shown or not (self._leans or old.aligned)
+        self._calibration = current
+        trusted = self._leans and current.aligned and not self._asked
+        up = current.vehicle_from_sensor[3:6] if trusted else None
+        self.drive = DriveAlignment(MOTORCYCLE if self._leans else CAR, up, _KNOWN_BIAS if current.aligned else None)
+        self.shown = self.shown or not (self._leans or current.aligned)
         self.result = None
         self._clear_sums()
 
@@ -229,37 +229,37 @@ class BackgroundAlignment:
         if code in _QUESTIONS:
             self._meter.distrust(None)
         if agreed and code == STAND_SIDE:
-            old = self._meter.calibration
-            turned = matrix(old.vehicle_from_sensor)
+            current = self._meter.calibration
+            turned = matrix(current.vehicle_from_sensor)
             turn_round(turned)
             if self._save(turned, -self._meter.trim_deg):
                 self.message = Notice("side-fixed")
                 self._meter.reset_maxima()
 
-    def _adopt(self, new):
+    def _adopt(self, is_new):
         """Save the drive's alignment.
 
         Args:
-            new: True for a new alignment, which resets trim and maxima. False for a refinement.
+            is_new: True for a new alignment, which resets trim and maxima. False for a refinement.
         """
-        found = matrix()
-        self.drive.matrix(found)
-        if not self._save(found, 0.0 if new else self._meter.trim_deg):
+        aligned = matrix()
+        self.drive.matrix(aligned)
+        if not self._save(aligned, 0.0 if is_new else self._meter.trim_deg):
             return
         self.result = Notice("aligned", self.drive.quality_deg)
-        if new:
+        if is_new:
             self.message = self.result
             self._asked = False
             self._meter.reset_maxima()
 
     def _save(self, vehicle_from_sensor, trim_deg):
         """Save an alignment. Return True on success. On failure return False and set `message` to the reason."""
-        old, used = self._meter.calibration, self._calibration
+        current, used = self._meter.calibration, self._calibration
         # The bias of `used` was subtracted from the drive's rates. The drive measured the remaining bias. The sum of
         # both is the gyro's bias.
         bias = [used.gyro_bias[i] + self.drive.standing.bias[i] for i in range(3)]
         try:
-            self._active.refine(old.with_alignment(vehicle_from_sensor, bias, trim_deg, True))
+            self._active.refine(current.with_alignment(vehicle_from_sensor, bias, trim_deg, True))
         except StoreError as problem:
             self._say(problem)
             return False

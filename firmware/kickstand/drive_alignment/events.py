@@ -186,8 +186,8 @@ class DrivingEvents:
 
     def measure_speed(self, speed_mps, time_us):
         """Take a new speed and its time on the history's clock."""
-        before = self._waiting[-1] if self._waiting else self._before
-        if len(self._waiting) < _MAX_WAITING and difference(time_us, before[1]) >= MIN_INTERVAL_US:
+        previous = self._waiting[-1] if self._waiting else self._before
+        if len(self._waiting) < _MAX_WAITING and difference(time_us, previous[1]) >= MIN_INTERVAL_US:
             self._waiting.append((speed_mps, time_us))
 
     @property
@@ -202,24 +202,24 @@ class DrivingEvents:
             use: True if the gyro's bias is known. If not, the interval is not used, because straight driving and bends
                 cannot be distinguished.
         """
-        before, before_us = self._before
+        begin_mps, begin_us = self._before
         speed, time_us = self._before = self._waiting.pop(0)
-        length_us = difference(time_us, before_us)
+        length_us = difference(time_us, begin_us)
         if length_us > MAX_INTERVAL_US:
             self._forget_interval()
         seconds = length_us * 1e-6
-        mean = 0.5 * (before + speed)
-        change = speed - before
+        mean = 0.5 * (begin_mps + speed)
+        change = speed - begin_mps
         change_g = change / STANDARD_GRAVITY
         use = use and mean > _MIN_SPEED_MPS
         straight = self._straight
         force, best_force = [0.0] * 3, None
         end = self._end
         for lag in range(LAGS):
-            known = self._history.at(end, time_us - lag * LAG_STEP_US)
+            valid = self._history.at(end, time_us - lag * LAG_STEP_US)
             begin = self._ends[lag]
             straight[lag] = False
-            if known and self._known[lag] and use:
+            if valid and self._known[lag] and use:
                 for i in range(3):
                     force[i] = difference(end[i], begin[i]) * 1e-6
                 yaw_dps = difference(end[3], begin[3]) * 1e-5 / seconds
@@ -231,7 +231,7 @@ class DrivingEvents:
                     self.regression.add(lag, seconds, change_g, curve_g, force)
             for i in range(COLUMNS):
                 begin[i] = end[i]
-            self._known[lag] = known
+            self._known[lag] = valid
             yield
         if self._finder.update(change, seconds, straight):
             yield from self._end_event()
@@ -269,6 +269,6 @@ def _peak(values, i):
     values[i] must be the largest value. The result is from -0.5 to 0.5."""
     if i == 0 or i == len(values) - 1:
         return 0.0
-    before, at, after = values[i - 1], values[i], values[i + 1]
-    bend = before - 2.0 * at + after
-    return 0.5 * (before - after) / bend if bend < 0.0 else 0.0
+    lower, peak, upper = values[i - 1], values[i], values[i + 1]
+    bend = lower - 2.0 * peak + upper
+    return 0.5 * (lower - upper) / bend if bend < 0.0 else 0.0

@@ -78,14 +78,14 @@ class ForceHistory:
             i = (i - step) % SIZE
             if difference(self._times[i], time_us) < 0:
                 i = self._newest
-        before = (i - 1) % SIZE
-        while difference(self._times[before], time_us) > 0:
-            i = before
-            before = (i - 1) % SIZE
-        begin = self._times[before]
+        previous = (i - 1) % SIZE
+        while difference(self._times[previous], time_us) > 0:
+            i = previous
+            previous = (i - 1) % SIZE
+        begin = self._times[previous]
         share = difference(time_us, begin) / difference(self._times[i], begin)
         for k in range(COLUMNS):
             column = self._columns[k]
-            start = column[before]
+            start = column[previous]
             out[k] = (start + round(share * difference(column[i], start))) & MASK
         return True

@@ -82,28 +82,30 @@ class DriveParts:
 
     def compare(self):
         """Compare the two parts of each split, as a generator of short steps."""
-        one, two = [0.0] * 7, [0.0] * 7
+        first, second = [0.0] * 7, [0.0] * 7
         for split in range(1, self.count):
-            self._sum(one, 0, split)
+            self._sum(first, 0, split)
             yield
-            self._sum(two, split, self.count)
+            self._sum(second, split, self.count)
             yield
-            if one[5] >= _MIN_S and two[5] >= _MIN_S:
-                self.roll_deg = max(self.roll_deg, degrees(abs(one[2] / one[5] - two[2] / two[5])))
-                self.pitch_deg = max(self.pitch_deg, degrees(abs(one[3] / one[5] - two[3] / two[5])))
-            if self.count < _MIN_BLOCKS or one[4] < _MIN_WEIGHT or two[4] < _MIN_WEIGHT:
+            if first[5] >= _MIN_S and second[5] >= _MIN_S:
+                self.roll_deg = max(self.roll_deg, degrees(abs(first[2] / first[5] - second[2] / second[5])))
+                self.pitch_deg = max(self.pitch_deg, degrees(abs(first[3] / first[5] - second[3] / second[5])))
+            if self.count < _MIN_BLOCKS or first[4] < _MIN_WEIGHT or second[4] < _MIN_WEIGHT:
                 continue
-            angle_one, angle_two = atan2(one[0], one[1]), atan2(two[0], two[1])
-            scatter = self._scatter(angle_one, 0, split)
+            first_angle, second_angle = atan2(first[0], first[1]), atan2(second[0], second[1])
+            scatter = self._scatter(first_angle, 0, split)
             yield
-            scatter += self._scatter(angle_two, split, self.count)
+            scatter += self._scatter(second_angle, split, self.count)
             yield
             freedom = self.count - 2  # two degrees of freedom less, because the scatter is about two means
-            variance = STRETCH_DEG * STRETCH_DEG * (one[6] / (one[4] * one[4]) + two[6] / (two[4] * two[4]))
-            sampled = blend_prior(scatter / one[4] / freedom, one[4], freedom)
-            sampled += blend_prior(scatter / two[4] / freedom, two[4], freedom)
+            variance = (
+                STRETCH_DEG * STRETCH_DEG * (first[6] / (first[4] * first[4]) + second[6] / (second[4] * second[4]))
+            )
+            sampled = blend_prior(scatter / first[4] / freedom, first[4], freedom)
+            sampled += blend_prior(scatter / second[4] / freedom, second[4], freedom)
             variance += sampled
-            difference_deg = degrees(angle_between(angle_one, angle_two))
+            difference_deg = degrees(angle_between(first_angle, second_angle))
             if difference_deg > self.sigmas * sqrt(variance):
                 self.sigmas = difference_deg / sqrt(variance)
                 self.forward_deg = difference_deg

@@ -116,8 +116,8 @@ class DrivingQuality:
             level = vector(part.level[0], part.level[1], part.level[2])
             yield
             if (yield from regression.fitting(part, lag, half, blocks)):
-                other = atan2(dot(left, part.forward), dot(forward, part.forward))
-                self.halves_deg = degrees(angle_between(angle, other))
+                second_angle = atan2(dot(left, part.forward), dot(forward, part.forward))
+                self.halves_deg = degrees(angle_between(angle, second_angle))
                 yield
                 self._decide(ratios / weights, angle_deg(level, part.level))
 

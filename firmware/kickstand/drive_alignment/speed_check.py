@@ -99,12 +99,12 @@ class SpeedCheck:
             force: mean force, 3 values in g.
             yaw_dps: mean absolute yaw rate in deg/s.
         """
-        before, self._force_before = self._force_before, list(force)
+        previous, self._force_before = self._force_before, list(force)
         turning = max(yaw_dps, self._yaw_dps_before) > _TURNING_DPS
         self._yaw_dps_before = yaw_dps
-        if before is None or self._speed is None or turning:
+        if previous is None or self._speed is None or turning:
             return
-        d0, d1, d2 = force[0] - before[0], force[1] - before[1], force[2] - before[2]
+        d0, d1, d2 = force[0] - previous[0], force[1] - previous[1], force[2] - previous[2]
         self._seconds += 1
         if sqrt(d0 * d0 + d1 * d1 + d2 * d2) > _LIVELY_G:
             self._lively_seconds += 1

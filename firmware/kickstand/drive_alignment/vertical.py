@@ -195,8 +195,8 @@ class Vertical:
         Args:
             level: the vertical of all straight driving, from its Fit, 3 values.
         """
-        before = self._standing.up if self.is_car else self._from_pose
-        change_deg = 0.0 if before is None else angle_deg(before, level)
+        standing_up = self._standing.up if self.is_car else self._from_pose
+        change_deg = 0.0 if standing_up is None else angle_deg(standing_up, level)
         if change_deg > MAX_CHANGE_DEG:
             return AlignmentError("mount-moved", "since-standing" if self.is_car else "since-upright", change_deg)
         return None

@@ -192,8 +192,8 @@ def gyro_variances(sigma, r):
                 total += (r[3 * i + a] * r[3 * j + b] * sigma[3 * a + b]) ** 2
         return total
 
-    found = variance(0, 0) + variance(1, 1), variance(0, 1), variance(2, 0), variance(2, 1), variance(2, 2)
-    return [min(found[k], SIGMA_START[SCALE_LEFT + k] ** 2) for k in range(5)]
+    variances = variance(0, 0) + variance(1, 1), variance(0, 1), variance(2, 0), variance(2, 1), variance(2, 2)
+    return [min(variances[k], SIGMA_START[SCALE_LEFT + k] ** 2) for k in range(5)]
 
 
 def forces(model, means, roll_acceleration, force_error, dive=0.0):

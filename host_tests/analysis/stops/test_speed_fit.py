@@ -22,66 +22,6 @@ def part_of(road: Road, every: int, scale=1.0, off_mps=0.0, late_s=0.0):
     return ride.part(ride.t_s < STOP_S + 2.5)
 
 
-def conditioned(part, speed, acceleration, delay_s):
-    """Compute the estimated speed as the mean of a normal distribution, conditioned on the measured speeds.
-
-    The errors have these standard deviations:
-
-    * the scale of the integrated speed: 1 %.
-    * the delay of the log's speed: 0.05 s.
-    * the error of the acceleration due to the road's slope: 0.05 m/s2 at the end of the part. Backwards from there this
-      error is a random walk of 0.1 m/s2 per root second. The error is linear between points half a second apart.
-    * each measured speed: 0.05 m/s.
-    """
-    time = part.t_s
-    values = np.flatnonzero(~np.isnan(part.speed_mps))
-    values = values[time[values] - delay_s >= BEGIN_S - 4.0 - 1e-6]
-    wanted = np.array([int(np.argmin(np.abs(time - (time[value] - delay_s)))) for value in values])
-    count = int(np.ceil((time[-1] - min(time[wanted[0]], BEGIN_S) + 0.5) / 0.5 - 1e-9))
-    knots = time[-1] - 0.5 * np.arange(count)
-    back = np.arange(count)
-    covariance = 0.05**2 + 0.1**2 * 0.5 * np.minimum(back[:, None], back[None, :])
-    slopes = []  # how an acceleration error at each point changes the speed of each sample
-    for k in range(count):
-        hat = np.interp(-time, -knots, np.eye(count)[k])
-        steps = np.append(np.diff(time) * (hat[1:] + hat[:-1]) / 2.0, 0.0)
-        slopes.append(np.cumsum(steps[::-1])[::-1])
-    slopes = np.array(slopes).T
-    full = np.zeros((len(time), count + 2))
-    full[:, 0], full[:, 1:-1] = speed, slopes
-    design = full[wanted]
-    n = 5  # the acceleration is averaged over 0.2 s, which is five samples on each side
-    design[:, -1] = [-np.mean(np.pad(acceleration, n, mode="edge")[k : k + 2 * n + 1]) for k in wanted]
-    prior = np.zeros((count + 2, count + 2))
-    prior[0, 0], prior[-1, -1], prior[1:-1, 1:-1] = 0.01**2, 0.05**2, covariance
-    gain = prior @ design.T @ np.linalg.inv(design @ prior @ design.T + 0.05**2 * np.eye(len(design)))
-    return speed + full @ (gain @ (part.speed_mps[values] - speed[wanted]))
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"every": 50},
-        {"every": 10, "scale": 1.05},
-        {"every": 50, "scale": 0.97, "off_mps": 0.3},
-        {"every": 25, "late_s": 0.3},
-        {"every": 50, "late_s": 0.5, "off_mps": -0.4},
-    ],
-)
-@pytest.mark.parametrize("delay_s", [0.0, 0.4])
-def test_fit_is_the_conditional_mean(wrong, delay_s):
-    part = part_of(braking(20.0, 5.0), **wrong)
-    acceleration = STANDARD_GRAVITY * part.forward_g
-    integrated = np.concatenate(([0.0], np.cumsum((acceleration[1:] + acceleration[:-1]) / 2.0 / RATE_HZ)))
-    begin = int(np.searchsorted(part.t_s, BEGIN_S))
-    fitted = fitted_speed(part, begin, integrated, acceleration, delay_s)
-    assert fitted is not None
-    want = conditioned(part, integrated, acceleration, delay_s)
-    shown = slice(begin - 50, None)
-    assert fitted[shown] == pytest.approx(want[shown], abs=1e-6)
-    assert np.max(np.abs(fitted[shown] - integrated[shown])) > 0.01 or wrong == {"every": 50}
-
-
 def test_fit_needs_several_speeds_during_braking():
     part = part_of(braking(20.0, 5.0), 50)
     acceleration = STANDARD_GRAVITY * part.forward_g
@@ -118,23 +58,3 @@ def test_delay_of_the_speed_is_found(late_s, every_s):
 @pytest.mark.parametrize("late_s", [-0.7, 1.7])
 def test_impossible_delay_of_the_speed_is_ignored(late_s):
     assert speed_delay_s(waves(late_s=late_s)) == 0.0
-
-
-@pytest.mark.parametrize(
-    ("shows", "does_not"),
-    [
-        ({"seconds": 30.0}, {"seconds": 29.0}),  # thirty speeds are needed
-        ({"seconds": 30.0, "every_s": 0.5}, {"seconds": 29.0, "every_s": 0.5}),  # two speeds in a second count as one
-        # the change of the speeds must be 0.5 m/s rms; it is 0.66 s times the amplitude of the acceleration
-        ({"size_mps2": 0.80}, {"size_mps2": 0.70}),
-    ],
-)
-def test_delay_needs_enough_changing_speeds(shows, does_not):
-    assert speed_delay_s(waves(late_s=0.4, **shows)) == pytest.approx(0.4, abs=0.02)
-    assert speed_delay_s(waves(late_s=0.4, **does_not)) == 0.0
-
-
-def test_without_any_force_there_is_no_delay():
-    ride = waves(late_s=0.4)
-    ride.forward_g[:] = 0.01
-    assert speed_delay_s(ride) == 0.0

@@ -12,10 +12,7 @@ from kickstand_tools.analysis.stops.brake_test import (
     find_stops,
     mfdd_mps2,
     plausible,
-    stops_by_speed,
-    stops_of,
 )
-from kickstand_tools.analysis.stops.standstill import standing
 from roads import RATE_HZ, REST_S, Road, braking
 
 REST = (REST_S, 0.0)
@@ -140,17 +137,6 @@ def test_the_start_of_braking_is_found(engine_mps2, hard, earlier_s):
     assert REST_S + 6.0 + 3.0 + 4.0 - stop.start_s == pytest.approx(earlier_s, abs=0.025)
 
 
-def test_rebound_of_the_fork_does_not_change_the_end():
-    """Below a fiftieth of the initial speed, a constant deceleration is assumed. From 60 m/s a stop takes 12 s."""
-    road = braking(60.0, 5.0)
-    ride = road.channels()
-    end = int(np.argmax(road.rests & (road.t_s > 20.0)))
-    ride.forward_g[end - 6 : end] += 0.1 * np.array([1.0, -1.0, -1.0, 1.0, 1.0, -1.0])
-    stop = one_stop(ride)
-    assert stop.stop_s == pytest.approx(REST_S + 15.0 + 4.0 + 12.0, abs=1e-6)
-    assert stop.distance_m == pytest.approx(360.0 + 60.0 * 0.12, abs=0.002)
-
-
 def test_jerk_is_the_steepest_change_of_the_force():
     """The deceleration rises to 6 m/s2 at 10 m/s3, stays constant, and falls at 20 m/s3, which is the larger jerk."""
     t = np.arange(0.0, 30.0, 1.0 / RATE_HZ)
@@ -216,14 +202,6 @@ def test_slopes_dives_and_bends_do_not_change_the_figures(changed, heading_deg):
     assert np.sign(np.round(stop.side_m, 3)) == np.sign(heading_deg)
 
 
-@pytest.mark.parametrize(("samples", "counts"), [(10, 0), (11, 1)])
-def test_a_brief_standstill_shows_no_slope(samples, counts):
-    """The road falls by 10 %."""
-    still = (USUAL.t_s >= 18.0 - 1e-6) & (USUAL.t_s < 18.0 + samples / RATE_HZ - 1e-6)
-    stops = stops_of(USUAL.channels(forward_g=FORCE - 0.1), still)
-    assert [stop.mfdd_mps2 for stop in stops] == pytest.approx([5.0 - 2.5 / 11] * counts, rel=0.002)
-
-
 def test_the_deviation_from_the_straight_line_is_right():
     """The bike turns left at 0.5 deg/s for 4 s. The deviation is the integral of (20 - 5 t) sin(0.5 deg/s t)."""
     yaw = np.where((USUAL.t_s >= 14.0) & (USUAL.t_s < 18.0), 0.5, 0.0)
@@ -234,14 +212,6 @@ def test_the_deviation_from_the_straight_line_is_right():
     # In a turn of 40 degrees, only a speed in the log proves a stop
     assert find_stops(USUAL.channels(yaw_rate_dps=20.0 * yaw)) == []
     assert len(find_stops(with_speed(USUAL, yaw_rate_dps=20.0 * yaw))) == 1
-
-
-def test_the_straight_line_is_the_direction_just_before_braking():
-    """In the first tenth of a second the vehicle turns by half a degree, so the mean is a quarter of a degree off."""
-    begin = 14.0 - 0.12
-    turning = np.where((USUAL.t_s > begin - 0.01) & (USUAL.t_s < begin + 0.09), 5.0, 0.0)
-    side_m = one_stop(USUAL.channels(yaw_rate_dps=turning)).side_m
-    assert side_m == pytest.approx(42.4 * np.sin(np.radians(0.25)), rel=0.25)
 
 
 @pytest.mark.parametrize(("off_g", "counts"), [(0.11, True), (0.15, False)])
@@ -267,28 +237,3 @@ def test_the_speed_in_the_log_corrects_the_integral():
     assert one_stop(USUAL.channels(forward_g=1.03 * FORCE)).mfdd_mps2 == pytest.approx(5.15, rel=0.003)
     stop = one_stop(with_speed(USUAL, forward_g=1.03 * FORCE))
     assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.003) and stop.initial_speed_mps == pytest.approx(20.0, rel=0.002)
-
-
-@pytest.mark.parametrize(
-    ("road", "every", "counts"),
-    [
-        (braking(20.0, 1.45), 50, False),
-        (braking(20.0, 1.55), 50, True),  # the speed falls by more than 1.5 m/s2
-        (braking(2.7, 4.0), 5, False),  # from over 10 km/h
-        (Road(REST, (5.0, 4.0), (3.0, 0.0), (4.0, -4.0), (8.0, -0.5), REST), 50, True),
-        (Road(REST, (10.0, 4.0), (3.0, 0.0), (4.0, -9.0), (16.0, -0.25), REST), 50, False),  # the last 15 s count
-    ],
-)
-def test_a_hard_stop_is_shown_by_the_speed_alone(road, every, counts):
-    assert stops_by_speed(with_speed(road, every)) is counts
-
-
-@pytest.mark.parametrize(("age_s", "stands"), [(2.9, True), (3.1, False)])
-def test_an_old_speed_shows_no_standstill(age_s, stands):
-    """The log's only speed is 0 m/s. Three seconds later the vehicle may be moving again."""
-    road = Road((10.0, 0.0), (20.0, 0.5))
-    road.rests[:] = False
-    ride = road.channels()
-    ride.speed_mps[50] = 0.0
-    still = standing(ride)
-    assert not still[:50].any() and still[round((1.0 + age_s) * RATE_HZ)] == stands

@@ -120,16 +120,16 @@ def fit_drive(
     >>> ride = simulate_ride("city", seed=3, seconds=240.0)
     >>> log = Log.from_readings(ride.readings, ride.rate_hz)
     >>> log.speed_mps[::200] = ride.truth["speed_mps"][::200]  # once per second
-    >>> found = fit_drive([log], vehicle="motorcycle")
-    >>> found.used >= 5, found.quality_deg < 3.0, found.calibration.vehicle_from_sensor.shape
+    >>> fit = fit_drive([log], vehicle="motorcycle")
+    >>> fit.used >= 5, fit.quality_deg < 3.0, fit.calibration.vehicle_from_sensor.shape
     (True, True, (3, 3))
     """
     refuse_same_file(logs)
-    given = [usable(read_log(source), len(logs) > 1) for source in logs]
-    found = fit_logs(given, calibration, vehicle, method, progress, on_event)
-    if found.refusal:
-        raise found.refusal
-    return found
+    usable_logs = [usable(read_log(source), len(logs) > 1) for source in logs]
+    fit = fit_logs(usable_logs, calibration, vehicle, method, progress, on_event)
+    if fit.refusal:
+        raise fit.refusal
+    return fit
 
 
 def fit_logs(
@@ -141,25 +141,25 @@ def fit_logs(
     on_event: Callable[[DriveEvent], None] | None = None,
 ) -> DriveFit:
     """Run fit_drive() on logs from usable(). A refusal is not raised, but is in the result with the counts."""
-    before = calibration or CalibrationFile()
-    poses = before.aligned and before.vehicle != CAR
+    earlier = calibration or CalibrationFile()
+    poses = earlier.aligned and earlier.vehicle != CAR
     kind = vehicle or (MOTORCYCLE if poses else CAR)
-    up = before.vehicle_from_sensor[1].tolist() if kind == MOTORCYCLE and poses else None
+    up = earlier.vehicle_from_sensor[1].tolist() if kind == MOTORCYCLE and poses else None
     steps = Steps(progress, 2 * sum(len(log.t_s) for log in logs))
     # A first pass finds the gyro's bias at a stop. Then the driving before the first stop also counts.
-    stood = standing(logs, before, steps)
-    known = stood.stops or calibration is not None
-    alignment = METHODS[method](kind, up, list(stood.bias) if known else None)
+    stood = standing(logs, earlier, steps)
+    measured = stood.stops or calibration is not None
+    alignment = METHODS[method](kind, up, list(stood.bias) if measured else None)
     watch = DriveWatch(alignment, on_event)
-    feed(alignment, logs, before, steps, watch)
+    feed(alignment, logs, earlier, steps, watch)
     matrix = array("f", [0.0] * 9)
     # The bias from `standing` is a calibrated rate. The calibration file needs the bias as a reading.
-    bias = before.gyro_bias_dps + np.linalg.solve(before.gyro_matrix, alignment.standing.bias)
-    refusal, result = None, before
+    bias = earlier.gyro_bias_dps + np.linalg.solve(earlier.gyro_matrix, alignment.standing.bias)
+    refusal, result = None, earlier
     try:
         alignment.matrix(matrix)
         result = replace(
-            before,
+            earlier,
             gyro_bias_dps=bias,
             vehicle_from_sensor=np.array(matrix),
             aligned=True,
@@ -173,7 +173,7 @@ def fit_logs(
     improved = alignment if isinstance(alignment, DriveAlignment) else None
     pose_check = None
     if improved and up is not None and not refusal:
-        posed = before.vehicle_from_sensor.ravel().tolist()
+        posed = earlier.vehicle_from_sensor.ravel().tolist()
         pose_check = PoseCheck(verdict.compare(improved, posed), verdict.yaw_deg(improved.quality.fit, posed))
     return DriveFit(
         result,

@@ -65,7 +65,7 @@ def drive_bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterat
     values = np.column_stack(calibration.in_sensor(log.accel_g, log.gyro_dps))
     integral = np.cumsum(values * np.where(is_gap, 0, step_us)[:, None], axis=0)
     times, speeds = time_us.tolist(), log.speed_mps.tolist()
-    there = np.flatnonzero(~np.isnan(log.speed_mps)).tolist()
+    logged = np.flatnonzero(~np.isnan(log.speed_mps)).tolist()
     begins = [0, *np.flatnonzero(is_gap).tolist(), len(times)]
     next_speed = 0
     for first, stop in pairwise(begins):
@@ -77,8 +77,8 @@ def drive_bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterat
             first_us = (times[end - 1] if end > start else times[start]) - times[start] if full else whole_us
             inside: list[tuple[int, float]] = []
             start_mps = end_mps = None
-            while next_speed < len(there) and there[next_speed] <= end:
-                k = there[next_speed]
+            while next_speed < len(logged) and logged[next_speed] <= end:
+                k = logged[next_speed]
                 next_speed += 1
                 if k == start:
                     start_mps = speeds[k]
@@ -115,8 +115,8 @@ def standing(logs: Sequence[Log], calibration: CalibrationFile, steps: "Steps") 
         _end_stop(standing)
         for part in drive_bins(log, calibration, BIN_US):
             length_us = part.first_us + part.last_us
-            new = [part.start_mps, *(mps for _, mps in part.speeds), part.end_mps]
-            last_mps = next((max(0.0, mps) for mps in reversed(new) if mps is not None), None)
+            speeds = [part.start_mps, *(mps for _, mps in part.speeds), part.end_mps]
+            last_mps = next((max(0.0, mps) for mps in reversed(speeds) if mps is not None), None)
             speed_mps, silent_us = (speed_mps, silent_us + length_us) if last_mps is None else (last_mps, 0)
             if speed_mps >= 0.0 and silent_us <= STALE_US and part.last_us:
                 try:

@@ -260,8 +260,8 @@ def _list(name: str, data: dict[str, Any], entry: str) -> list[Any]:
     if entry not in data:
         raise InputError(f"{name}: {entry} is missing", GIVE_CALIBRATION)
     if not isinstance(data[entry], list) or len(data[entry]) != 3:
-        what = "3 rows of 3 numbers" if entry in ("vehicle_from_sensor", *_MATRICES) else "3 numbers"
-        raise InputError(f"{name}: {entry} must be {what}: calibrate again")
+        form = "3 rows of 3 numbers" if entry in ("vehicle_from_sensor", *_MATRICES) else "3 numbers"
+        raise InputError(f"{name}: {entry} must be {form}: calibrate again")
     return data[entry]
 
 
@@ -304,8 +304,8 @@ def _check_ranges(name: str, calibration: CalibrationFile) -> None:
     for entry in ("accel_matrix", "gyro_matrix"):
         worst = float(np.max(np.abs(getattr(calibration, entry) - np.eye(3))))
         if not worst <= MAX_MATRIX_ERROR:
-            what = f"{entry} is {worst:g} from the identity, a sensor's is within {MAX_MATRIX_ERROR:g}"
-            raise InputError(f"{name}: {what}: calibrate again")
+            excess = f"{entry} is {worst:g} from the identity, a sensor's is within {MAX_MATRIX_ERROR:g}"
+            raise InputError(f"{name}: {excess}: calibrate again")
     if not (np.all(calibration.gyro_sigma >= 0.0) and np.all(calibration.gyro_sigma <= MAX_GYRO_SIGMA)):
         raise InputError(f"{name}: gyro_sigma must be 0 to {MAX_GYRO_SIGMA:g}: calibrate again")
     if not is_rotation(calibration.vehicle_from_sensor.ravel().tolist(), ROTATION_TOLERANCE):

@@ -91,11 +91,11 @@ def take_pose(name: str, readings: Array, advice: str) -> Pose:
 
 def refuse_same_file(sources: Sequence[Source]) -> None:
     """Raise InputError if a path is given twice."""
-    seen: set[Path] = set()
+    paths: set[Path] = set()
     for path in (Path(source) for source in sources if isinstance(source, (Path, str))):
-        if path.resolve() in seen:
+        if path.resolve() in paths:
             raise InputError(f"{path} is given twice: each must be a separate recording")
-        seen.add(path.resolve())
+        paths.add(path.resolve())
 
 
 @dataclass
@@ -132,8 +132,8 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)
-    >>> found = fit_six_positions([Log.from_readings(pose, ride.rate_hz) for pose in ride.poses])
-    >>> found.calibration.accel_offset_g.shape, abs(found.free_pose_error_g) < 0.01
+    >>> fit = fit_six_positions([Log.from_readings(pose, ride.rate_hz) for pose in ride.poses])
+    >>> fit.calibration.accel_offset_g.shape, abs(fit.free_pose_error_g) < 0.01
     ((3,), True)
     """
     if len(poses) not in (6, 7):
@@ -170,26 +170,26 @@ def _sides(poses: list[Pose]) -> tuple[list[Pose], Pose | None]:
 
     Of seven poses, two have the same side up. The pose that is further from the axis is the free pose.
     """
-    found: dict[int, list[Pose]] = {}
+    by_side: dict[int, list[Pose]] = {}
     for pose in poses:
-        found.setdefault(six_position.side_of(pose.accel_g.tolist()), []).append(pose)
+        by_side.setdefault(six_position.side_of(pose.accel_g.tolist()), []).append(pose)
     free = None
-    missing = [name for i, name in enumerate(SIDES) if i not in found]
-    for side, same in found.items():
-        if len(same) == 1:
+    missing = [name for i, name in enumerate(SIDES) if i not in by_side]
+    for side, poses_of_side in by_side.items():
+        if len(poses_of_side) == 1:
             continue
-        same.sort(key=_tilt_deg)
-        names = " and ".join(pose.name for pose in same)
+        poses_of_side.sort(key=_tilt_deg)
+        names = " and ".join(pose.name for pose in poses_of_side)
         if missing or len(poses) == 6:
             lacking = f"side {', '.join(missing)} is missing, and " if missing else ""
-            raise InputError(f"{lacking}side {SIDES[side]} is there {len(same)} times ({names}): one each")
-        near, free = same
+            raise InputError(f"{lacking}side {SIDES[side]} is there {len(poses_of_side)} times ({names}): one each")
+        near, free = poses_of_side
         if _tilt_deg(free) < six_position.FREE_TILT_DEG or _tilt_deg(free) - _tilt_deg(near) < _EQUAL_TILT_DEG:
             raise InputError(
                 f"side {SIDES[side]} exists twice ({names}): the seventh pose must be "
                 f"slanted, over {six_position.FREE_TILT_DEG:.0f} degrees from every side"
             )
-    return [found[side][0] for side in range(6)], free
+    return [by_side[side][0] for side in range(6)], free
 
 
 def _tilt_deg(pose: Pose) -> float:
@@ -246,19 +246,19 @@ def fit_two_positions(
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)
     >>> kickstand, upright = (Log.from_readings(pose, ride.rate_hz) for pose in (ride.kickstand, ride.upright))
-    >>> found = fit_two_positions(kickstand, upright)
-    >>> found.calibration.vehicle_from_sensor.shape, 8.0 < found.tilt_deg < 16.0
+    >>> fit = fit_two_positions(kickstand, upright)
+    >>> fit.calibration.vehicle_from_sensor.shape, 8.0 < fit.tilt_deg < 16.0
     ((3, 3), True)
     """
     refuse_same_file([kickstand, upright])
-    before = calibration or CalibrationFile()
+    earlier = calibration or CalibrationFile()
     first, second = read_pose(kickstand), read_pose(upright)
     try:
-        aligned, tilt_deg = two_position.align(before.to_firmware(), first.still, second.still, side)
+        aligned, tilt_deg = two_position.align(earlier.to_firmware(), first.still, second.still, side)
     except AlignmentError as error:
         raise RefusedInput(of_firmware(error), f"{first.name} and {second.name}") from error
     result = replace(
-        before,
+        earlier,
         gyro_bias_dps=first.gyro_dps,
         vehicle_from_sensor=np.array(aligned.vehicle_from_sensor),
         aligned=True,

@@ -47,8 +47,8 @@ def fit_procedure(source: Source) -> SixPositions:
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)
-    >>> found = fit_procedure(Log.from_readings(ride.procedure, ride.rate_hz))
-    >>> found.calibration.gyro_matrix.shape, found.turns
+    >>> fit = fit_procedure(Log.from_readings(ride.procedure, ride.rate_hz))
+    >>> fit.calibration.gyro_matrix.shape, fit.turns
     ((3, 3), 6)
     """
     log = read_log(source)
@@ -111,8 +111,8 @@ def _still_stretches(log: Log) -> list[tuple[int, int]]:
     lies[1:-2][np.diff(log.t_s) > _WINDOW_S] = 0  # the sensor may be moved in a gap, so a stretch ends at it
     edges = np.flatnonzero(np.diff(lies))
     margin = round(_MARGIN_S / step_s)
-    found = [(first + margin, last - margin) for first, last in zip(edges[::2].tolist(), edges[1::2].tolist())]
-    return [(first, last) for first, last in found if (last - first) * step_s >= _LEAST_S]
+    intervals = [(first + margin, last - margin) for first, last in zip(edges[::2].tolist(), edges[1::2].tolist())]
+    return [(first, last) for first, last in intervals if (last - first) * step_s >= _LEAST_S]
 
 
 def _pose(log: Log, first: int, last: int) -> Pose:
@@ -163,11 +163,11 @@ def _turns(log: Log, stretches: list[tuple[int, int]], poses: list[Pose]) -> lis
     low, high = _AT_RANGE
     limit = next((_QUICK * end for end in _RANGES_DPS if low * end <= most <= high * end), 2 * most + 1)
     turn = Turn(_MICRO, int(np.median(steps_us[1:])), int(limit * _MICRO))
-    found: list[tuple[list[float], float] | None] = []
-    for (_, begin), (end, _), before, after in zip(stretches, stretches[1:], poses, poses[1:]):
-        turn.start(before.gyro_dps.tolist())
+    turns: list[tuple[list[float], float] | None] = []
+    for (_, begin), (end, _), first, second in zip(stretches, stretches[1:], poses, poses[1:]):
+        turn.start(first.gyro_dps.tolist())
         for k in range(begin, end):
             turn.add((0, 0, 0, 0, *rates[k]), 1, int(steps_us[k]))
         turn.end()
-        found.append(None if turn.lost or turn.quick else (list(turn.packed(after.gyro_dps.tolist())), turn.seconds))
-    return found
+        turns.append(None if turn.lost or turn.quick else (list(turn.packed(second.gyro_dps.tolist())), turn.seconds))
+    return turns

@@ -179,10 +179,10 @@ class PublishedAlignment:
     def _find_level(self) -> bool:
         """Set the rotation that levels forces, from the current vertical. Returns False if the vertical is unknown."""
         up = vector()
-        known = self._improved.vertical.known(up)
-        if known:
+        is_known = self._improved.vertical.known(up)
+        if is_known:
             self._level = rotation_between(np.array(up, dtype=float), UP, 0)
-        return known
+        return is_known
 
     def _levelled(self, force: Array) -> complex:
         """Return the horizontal part of a force as a complex number: real part to the left, imaginary part forward."""

@@ -28,6 +28,8 @@ _POLL_S = 0.01
 _PROGRAM_S = 60  # longest run time of a program; long, because an emulated board compiles the modules slowly
 _EMULATED = "socket:"  # the name of an emulated board's port starts with this
 _SLOWER = 12  # factor on time limits for an emulated board, which is slow on a busy computer
+RETURN_S = 6  # longest wait for a port that is missing or in use, because a board restarts or has just been plugged in
+_RETURN_POLL_S = 0.25
 _RESTART_S = 2  # time to wait until the board's USB port is back, because the next command may follow at once
 
 # USB vendors of the boards themselves and of the serial chips on ESP32 boards
@@ -142,13 +144,29 @@ class _EmulatedBoard(ConnectedBoard):
     slower = _SLOWER
 
 
+# Prints what the running app noticed, which a soft reset removes: see kickstand.status_report.noticed
+_NOTICED = """
+import sys
+app, judge = [sys.modules.get("kickstand." + name) for name in ("app", "lean.consistency")]
+worst = app and app.worst
+if worst:
+    worst = worst[0], worst[1], (tuple(worst[2][0]), worst[2][1])
+print(repr((worst, judge and judge.last_odd)))
+"""
+_WORST = (int, int, ((int, int, int), float))
+
 # The name of a port, an open connection to a board, or None for the only board that is plugged in
 Port = str | ConnectedBoard | None
 
 
 @contextlib.contextmanager
-def connected(port: Port) -> Iterator[tuple[ConnectedBoard, str]]:
+def connected(
+    port: Port, before: Callable[[ConnectedBoard], None] | None = None
+) -> Iterator[tuple[ConnectedBoard, str]]:
     """A context that yields a board at its raw prompt, and the name of its port. The board's program is interrupted.
+
+    before: function that is called before the soft reset, which removes all modules. It may raise TransportError. It is
+        not called for a board that does not answer.
 
     Errors of the connection, also inside the with block, are raised as InputError.
     """
@@ -158,7 +176,7 @@ def connected(port: Port) -> Iterator[tuple[ConnectedBoard, str]]:
     else:
         transport, name = port, port.device_name
     try:
-        _enter_raw_prompt(transport, name)
+        _enter_raw_prompt(transport, name, before)
         yield transport, name
     except TransportExecError as error:
         said = last_line(error.error_output)
@@ -184,15 +202,28 @@ def connected(port: Port) -> Iterator[tuple[ConnectedBoard, str]]:
 
 def _open_board(name: str) -> ConnectedBoard:
     kind = _EmulatedBoard if name.startswith(_EMULATED) else ConnectedBoard
-    try:
-        return kind(name, timeout=ANSWER_S * (_SLOWER if kind is _EmulatedBoard else 1))
-    except (TransportError, ValueError):
-        raise why_closed(name) from None
+    until_s = time.monotonic() + (0 if kind is _EmulatedBoard else RETURN_S)
+    while True:
+        try:
+            return kind(name, timeout=ANSWER_S * (_SLOWER if kind is _EmulatedBoard else 1))
+        except TransportError:
+            refusal = why_closed(name)
+            if not isinstance(refusal, MayPass) or time.monotonic() >= until_s:
+                raise refusal from None
+            time.sleep(_RETURN_POLL_S)
+        except ValueError:
+            raise why_closed(name) from None
 
 
 def find_port() -> str:
-    """Return the port of the only board that is plugged in. Raises InputError for no board, and for several boards."""
-    found = [p for p in list_ports.comports() if p.vid in VENDORS and (p.vid, p.pid) != _DEBUG_PROBE]
+    """Return the port of the only board that is plugged in. Raises InputError for no board, and for several boards.
+
+    Waits up to RETURN_S for a board, because it may be restarting."""
+    until_s = time.monotonic() + RETURN_S
+    while not (found := [p for p in list_ports.comports() if p.vid in VENDORS and (p.vid, p.pid) != _DEBUG_PROBE]):
+        if time.monotonic() >= until_s:
+            break
+        time.sleep(_RETURN_POLL_S)
     if not found:
         plug_in = "plug it in with a USB cable that carries data, put MicroPython on it if it is new, or name its port "
         raise InputError("no board found", Remedy(plug_in + "with --port"))
@@ -200,6 +231,10 @@ def find_port() -> str:
         names = ", ".join(f"{p.device} ({VENDORS[p.vid]})" for p in sorted(found, key=lambda p: p.device))
         raise InputError(f"several boards found: {names}", Remedy("name one with --port"))
     return found[0].device
+
+
+class MayPass(InputError):
+    """A reason why a port cannot be opened that may pass within seconds."""
 
 
 def why_closed(port: str) -> InputError:
@@ -212,16 +247,19 @@ def why_closed(port: str) -> InputError:
         text = str(error)
         # On Windows, the text contains PermissionError
         if error.errno in (errno.EBUSY, errno.EAGAIN) or "PermissionError" in text:
-            return InputError(f"{port} is in use", Remedy("close the other program that has it open"))
+            remedy = (
+                "close the other program that has it open; on Linux ModemManager may hold a new port for half a minute"
+            )
+            return MayPass(f"{port} is in use", Remedy(remedy))
         if error.errno in (errno.EACCES, errno.EPERM):
             return InputError(f"no permission for {port}: on Linux join the group dialout and log in again")
         if error.errno == errno.ENOENT or "FileNotFoundError" in text:
             remedy = Remedy("plug the board in, or leave out --port to find it automatically")
-            return InputError(f"there is no port {port}", remedy)
+            return MayPass(f"there is no port {port}", remedy)
         if port.startswith("socket:") and "refused" in text:
             return InputError(f"nothing listens at {port}", Remedy("is kickstand emulate running?"))
         return InputError(f"{port} cannot be opened: {text}: check the name and the cable")
-    return InputError(f"{port} could not be opened at first, but now it can: try again")
+    return MayPass(f"{port} could not be opened at first, but now it can: try again")
 
 
 def restart(transport: ConnectedBoard) -> None:
@@ -303,10 +341,20 @@ def status(port: Port, wirings: bool = False) -> str:
 
     Raises InputError if the board returns no status.
     """
-    with connected(port) as (transport, name):
+    noticed: list[Any] = []
+
+    def ask_first(transport: ConnectedBoard) -> None:
+        worst, odd = literal(transport.exec(_NOTICED), *((a, b) for a in (_WORST, None) for b in (str, None)))
+        noticed[:] = worst, odd
+
+    with connected(port, ask_first) as (transport, name):
         describe(transport, name)
+        keep = (
+            f"from kickstand import status_report\nstatus_report.noticed = {tuple(noticed)}\n" if any(noticed) else ""
+        )
         try:
-            text = printed(transport, name, f"import kickstand\nkickstand.status({wirings or ''})", "its status")
+            code = f"{keep}import kickstand\nkickstand.status({wirings or ''})"
+            text = printed(transport, name, code, "its status")
         finally:
             restart(transport)
     return text.decode(errors="replace").replace("\r\n", "\n").rstrip()
@@ -332,11 +380,20 @@ def last_line(text: str) -> str:
     return text.strip().rpartition("\n")[2].strip() or "an unknown error"
 
 
-def _enter_raw_prompt(transport: SerialTransport, name: str) -> None:
-    """Send Ctrl-C, then a soft reset into the raw prompt. This soft reset does not start main.py."""
+def _enter_raw_prompt(
+    transport: ConnectedBoard, name: str, before: Callable[[ConnectedBoard], None] | None = None
+) -> None:
+    """Send Ctrl-C, then a soft reset into the raw prompt. This soft reset does not start main.py.
+
+    before: see connected().
+    """
     for limit_s in (_STARTING_S, ANSWER_S):  # a board may reset when its port is opened, and then needs time to start
         try:
             with contextlib.redirect_stdout(io.StringIO()):  # mpremote prints output that it cannot interpret
+                if before:
+                    transport.enter_raw_repl(soft_reset=False, timeout_overall=limit_s)
+                    with contextlib.suppress(TransportError, InputError):
+                        before(transport)
                 transport.enter_raw_repl(timeout_overall=limit_s)
             return
         except TransportError:

@@ -12,10 +12,12 @@ from ..common.errors import InputError
 from . import bytecode, config_check, others
 from .board_files import fingerprint, survey
 from .config_text import cleaned
-from .connection import ConnectedBoard, Port, Progress, ask, connected, describe, restart
+from .connection import Port, Progress, ask, connected, describe, restart
 from .firmware_files import CONFIG, contents, unfinished
 from .update import Update, plan, refuse_without_room
 
+OLDEST = (1, 23)  # oldest supported version of MicroPython
+PLATFORMS = ("rp2", "esp32")
 _TRIES = 3  # number of attempts to copy a file, because a cable may lose a byte
 _CHUNK = 2048  # bytes per transfer. With mpremote's default of 256 bytes, copying takes 1.5 times as long
 
@@ -60,11 +62,22 @@ class FlashResult:
     installed: InstallResult
 
 
+def describe_supported(transport: SerialTransport, name: str) -> str:
+    """Describe the board as describe() does. Raises InputError for a board on which Kickstand does not run."""
+    text = describe(transport, name)
+    expression = "(lambda s: (s.implementation.version[0], s.implementation.version[1], s.platform))(__import__('sys'))"
+    *version, platform = ask(transport, expression, (int, int, str))
+    if tuple(version) < OLDEST:
+        raise InputError(f"{text}: put MicroPython {OLDEST[0]}.{OLDEST[1]} or newer on the board first")
+    if platform not in PLATFORMS:
+        raise InputError(f"{text}: Kickstand runs on a Raspberry Pi Pico and on an ESP32")
+    return text
+
+
 def flash(
     port: Port,
     replace_config: bool = False,
     progress: Progress | None = None,
-    describe: Callable[[ConnectedBoard, str], str] = describe,
     compiler: bytecode.Compiler | None = None,
     judge: Callable[[Path, str, str], config_check.Judged] | None = None,
     agree: Callable[[list[str]], None] | None = None,
@@ -75,7 +88,6 @@ def flash(
         port: The board's port.
         replace_config: Also replace the user's config.py.
         progress: Function that is called with the progress.
-        describe: Function that returns the board's name, and refuses other devices.
         compiler: Function that compiles a module. None uses bytecode.cross_compiled().
         judge: Function that checks a config.py. None uses config_check.judge(), which starts a process.
         agree: Function that is called with one line per file of another project that will be renamed. It may raise
@@ -85,7 +97,7 @@ def flash(
         InputError: If the board cannot be updated. If the board has too little room, nothing is changed.
     """
     with connected(port) as (transport, name):
-        board = describe(transport, name)
+        board = describe_supported(transport, name)
         source = firmware_path.config()
         try:
             names = "(lambda s: (s.platform, getattr(s.implementation, '_machine', '')))(__import__('sys'))"

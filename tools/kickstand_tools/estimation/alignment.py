@@ -159,8 +159,8 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("city", seed=3, seconds=240.0)
-    >>> found = fit_ride(Log.from_readings(ride.readings, ride.rate_hz))
-    >>> found.yaw_deg < 2.0, found.roll_deg < 2.0, found.calibration.vehicle_from_sensor.shape
+    >>> fit = fit_ride(Log.from_readings(ride.readings, ride.rate_hz))
+    >>> fit.yaw_deg < 2.0, fit.roll_deg < 2.0, fit.calibration.vehicle_from_sensor.shape
     (True, True, (3, 3))
     """
     if phone is not None and phone not in PHONES:
@@ -178,12 +178,12 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
         if progress:
             progress(1, 2)
         expected = _mounting(phone, guess.matrix) if phone else None
-        found = _checked(windows, guess, estimate_alignment(windows, guess, expected), expected, log.notices)
+        fit = _checked(windows, guess, estimate_alignment(windows, guess, expected), expected, log.notices)
     except RefusedInput as refusal:
         raise refusal.at(log.name) from refusal
     if progress:
         progress(2, 2)
-    return found
+    return fit
 
 
 def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) -> Estimate:
@@ -203,12 +203,12 @@ def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) ->
     if expected is not None:
         mean[ROTATION], sigma[ROTATION] = rotation_vector(expected @ guess.matrix.T), np.radians(PHONE_SIGMA_DEG)
     try:
-        found = Estimate(windows.turned(guess.matrix, guess.bias), Prior(mean, sigma, posed=False), CONSTANT)
+        estimate = Estimate(windows.turned(guess.matrix, guess.bias), Prior(mean, sigma, posed=False), CONSTANT)
     except np.linalg.LinAlgError as error:
         raise RefusedInput(RideContradicts()) from error
-    if not found.change < UNSETTLED:
+    if not estimate.change < UNSETTLED:
         raise RefusedInput(RideContradicts())
-    return found
+    return estimate
 
 
 def mounted_windows(log: Log) -> Windows:
@@ -241,12 +241,14 @@ def _windows(log: Log, part: Bools | slice = slice(None)) -> Windows:
     return windows_of(t_s, log.accel_g[part], rate, log.speed_mps[part], np.zeros(len(t_s)))
 
 
-def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | None, notices: list[Message]) -> RideFit:
+def _checked(
+    windows: Windows, guess: Axes, estimate: Estimate, expected: Array | None, notices: list[Message]
+) -> RideFit:
     """Return the estimate as a RideFit. Raises RefusedInput if the quality of the estimate is too low."""
-    halves = np.degrees(found.split())
+    halves = np.degrees(estimate.split())
     if np.max(np.abs(halves)) > MOVED_DEG:
         raise RefusedInput(RideHalves(float(np.max(np.abs(halves)))))
-    prior, parameters, sigma = found.prior, np.mean(found.parameters, axis=0), found.parameter_sigma()
+    prior, parameters, sigma = estimate.prior, np.mean(estimate.parameters, axis=0), estimate.parameter_sigma()
     odd = float(np.max(np.abs(parameters[SENSOR] / prior.sigma[SENSOR])))
     if odd > ABSURD_SIGMAS:
         raise RefusedInput(RideContradicts())
@@ -258,10 +260,10 @@ def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | N
     pitch, yaw, roll = (float(angle) for angle in error)
     # With this offset, the calibrated force on a level, upright bike is 1 g up, even if the scale is wrong.
     offset = parameters[OFFSET] + parameters[ACCEL].reshape(3, 3)[:, 1]
-    matrix, states = found.matrix @ guess.matrix, found.states[: len(windows) + 1]
+    matrix, states = estimate.matrix @ guess.matrix, estimate.states[: len(windows) + 1]
     bias = guess.bias + np.median(states[:, BIAS], axis=0) @ matrix
-    still = standing(windows.turned(matrix, guess.bias))
-    lean = (0.5 * (states[1:, LEAN] + states[:-1, LEAN]))[~still]
+    standstill = standing(windows.turned(matrix, guess.bias))
+    lean = (0.5 * (states[1:, LEAN] + states[:-1, LEAN]))[~standstill]
     has_speed = not np.all(np.isnan(windows.speed))
     off = None if expected is None else _off_deg(matrix, expected)
     notes = {"ride_quality_deg": {"roll": round(roll, 2), "pitch": round(pitch, 2), "yaw": round(yaw, 2)}}
@@ -282,8 +284,8 @@ def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | N
         offset,
         sigma[OFFSET],
         (float(windows.edges[0]), float(windows.edges[-1])),
-        float(np.sum(windows.covered[~still])),
-        float(np.sum(windows.covered[still])),
+        float(np.sum(windows.covered[~standstill])),
+        float(np.sum(windows.covered[standstill])),
         float(np.degrees(np.sqrt(np.mean(lean**2)))),
         float(parameters[DELAY]) if has_speed else None,
         off,
@@ -291,19 +293,19 @@ def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | N
     )
 
 
-def _mounting(phone: str, found: Array) -> Array:
-    """Return the matrix (3, 3) of PHONES[phone] that is nearest to `found`.
+def _mounting(phone: str, estimated: Array) -> Array:
+    """Return the matrix (3, 3) of PHONES[phone] that is nearest to `estimated`.
 
     Raises RefusedInput if the two differ by over PHONE_MAX_DEG.
     """
-    off, nearest = min(((_off_deg(found, matrix), i) for i, matrix in enumerate(PHONES[phone])))
+    off, nearest = min(((_off_deg(estimated, matrix), i) for i, matrix in enumerate(PHONES[phone])))
     if off > PHONE_MAX_DEG:
-        mirrored = found * [[1.0], [-1.0], [-1.0]]  # the result if the accelerations have the opposite sign
+        mirrored = estimated * [[1.0], [-1.0], [-1.0]]  # the result if the accelerations have the opposite sign
         if min(_off_deg(mirrored, matrix) for matrix in PHONES[phone]) < PHONE_MAX_DEG:
             raise RefusedInput(PhoneUpsideDown(phone))
         raise RefusedInput(PhoneOtherwise(phone, off))
     return PHONES[phone][nearest]
 
 
-def _off_deg(found: Array, matrix: Array) -> float:
-    return float(np.degrees(rotation_angle(found @ matrix.T)))
+def _off_deg(estimated: Array, matrix: Array) -> float:
+    return float(np.degrees(rotation_angle(estimated @ matrix.T)))

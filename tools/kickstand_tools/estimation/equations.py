@@ -59,27 +59,27 @@ def process_and_measurements(windows: Windows, x: Array) -> Array:
     yaw = (wx * st + wy * ct) / cq
     upright = fx * st + fy * ct  # upward force in axes that pitch but do not lean with the bike
     ahead = (fz * cq - upright * sq) * STANDARD_GRAVITY
-    found = np.zeros((ROWS, len(t)))
-    found[LEAN] = wz - yaw * sq
-    found[PITCH] = wy * st - wx * ct
-    found[LEFT] = (fx * ct - fy * st) * STANDARD_GRAVITY - yaw * forward
-    found[UP] = (upright * cq + fz * sq - 1.0) * STANDARD_GRAVITY
-    found[FORWARD] = ahead + yaw * left
-    height, place = p[of.HEIGHT], p[of.AHEAD]
-    turn_x, turn_y, turn_z = wy * place - wz * height, -wx * place, wx * height  # rates x place
+    rows = np.zeros((ROWS, len(t)))
+    rows[LEAN] = wz - yaw * sq
+    rows[PITCH] = wy * st - wx * ct
+    rows[LEFT] = (fx * ct - fy * st) * STANDARD_GRAVITY - yaw * forward
+    rows[UP] = (upright * cq + fz * sq - 1.0) * STANDARD_GRAVITY
+    rows[FORWARD] = ahead + yaw * left
+    height, distance = p[of.HEIGHT], p[of.AHEAD]
+    turn_x, turn_y, turn_z = wy * distance - wz * height, -wx * distance, wx * height  # rates x place
     raised = turn_x * st + turn_y * ct
     wheel_up = up - (raised * cq + turn_z * sq)
     wheel = forward - (turn_z * cq - raised * sq)
-    found[SLIDING] = left - (turn_x * ct - turn_y * st)
-    found[CLIMBING] = wheel_up - wheel * (q - p[of.DIVE] * ahead / STANDARD_GRAVITY)
-    found[SLOPING] = wheel_up
-    found[BALANCED] = fx - p[of.TYRES] * st * fy - p[of.BESIDE] * ct - p[of.CAMBER] / (1.0 + (t / STRAIGHT) ** 4)
-    found[ANY_SPEED] = wheel - USUAL_MPS
-    found[MEASURED_SPEED] = wheel - p[of.DELAY] * ahead - np.nan_to_num(windows.speed)
-    found[RESTING] = left, up, forward
-    found[RESTING_RATE] = wx, wy, wz
-    found[BACKWARD] = np.minimum(wheel, 0.0)
-    return found
+    rows[SLIDING] = left - (turn_x * ct - turn_y * st)
+    rows[CLIMBING] = wheel_up - wheel * (q - p[of.DIVE] * ahead / STANDARD_GRAVITY)
+    rows[SLOPING] = wheel_up
+    rows[BALANCED] = fx - p[of.TYRES] * st * fy - p[of.BESIDE] * ct - p[of.CAMBER] / (1.0 + (t / STRAIGHT) ** 4)
+    rows[ANY_SPEED] = wheel - USUAL_MPS
+    rows[MEASURED_SPEED] = wheel - p[of.DELAY] * ahead - np.nan_to_num(windows.speed)
+    rows[RESTING] = left, up, forward
+    rows[RESTING_RATE] = wx, wy, wz
+    rows[BACKWARD] = np.minimum(wheel, 0.0)
+    return rows
 
 
 def jacobian(windows: Windows, x: Array, unknown: Ints) -> Array:
@@ -88,14 +88,14 @@ def jacobian(windows: Windows, x: Array, unknown: Ints) -> Array:
     unknown: indices of these rows of x.
     Returns an array of shape (len(unknown), ROWS, n).
     """
-    found, moved = np.empty((len(unknown), ROWS, x.shape[1])), x.copy()
-    here = process_and_measurements(windows, x)
-    for slot, row in zip(found, unknown, strict=True):
+    derivatives, moved = np.empty((len(unknown), ROWS, x.shape[1])), x.copy()
+    base = process_and_measurements(windows, x)
+    for slot, row in zip(derivatives, unknown, strict=True):
         moved[row] += STEP
-        slot[:] = process_and_measurements(windows, moved) - here
+        slot[:] = process_and_measurements(windows, moved) - base
         moved[row] = x[row]
-    found /= STEP
-    return found
+    derivatives /= STEP
+    return derivatives
 
 
 def corrected_rates(rate: Array, x: Array, warm: Array) -> Array:

@@ -75,8 +75,8 @@ class Hypotheses:
         minus_two_log = minus_two_log_likelihood(blocks, self.random_walks(prior, parameters))
         minus_two_log = minus_two_log * WEIGHT / max(1.0, unbalance) ** 2 + self.minus_two_log_prior
         weight = np.exp(-0.5 * (minus_two_log - np.min(minus_two_log)))
-        kept = np.flatnonzero(weight > LEAST_SHARE * np.sum(weight))
-        return self.select(kept, weight[kept] / np.sum(weight[kept]))
+        likely = np.flatnonzero(weight > LEAST_SHARE * np.sum(weight))
+        return self.select(likely, weight[likely] / np.sum(weight[likely]))
 
     def random_walks(self, prior: Prior, parameters: Array) -> RandomWalks:
         """Return the random walks of the estimated parameters, for the solver.
@@ -87,7 +87,7 @@ class Hypotheses:
         unknown = prior.unknown
         sigma = np.tile(prior.sigma, (len(self.weight), 1))
         sigma[:, BESIDE] = np.hypot(sigma[:, BESIDE], self.pushed)
-        information = np.stack([prior.information(one) for one in sigma])
+        information = np.stack([prior.information(deviations) for deviations in sigma])
         pull = information @ (parameters[0] - prior.mean)[unknown]
         variance = (DRIFT * sigma) ** 2
         variance[:, OFFSET] += DRIFT_G**2

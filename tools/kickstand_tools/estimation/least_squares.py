@@ -76,16 +76,16 @@ class Estimate:
         blocks = self._reduced(robust=True)
         s = STATES
         joint = covariances(blocks, posterior_covariance(*self._problem(blocks)))
-        found = np.diagonal(joint[..., : 2 * s], axis1=2, axis2=3)
-        edges = np.concatenate((found[:, :, :s].reshape(-1, s), found[-1, -1:, s:]))
+        variances = np.diagonal(joint[..., : 2 * s], axis1=2, axis2=3)
+        edges = np.concatenate((variances[:, :, :s].reshape(-1, s), variances[-1, -1:, s:]))
         return np.sqrt(np.maximum(edges, 0.0))
 
     def parameter_sigma(self) -> Array:
         """Return the standard deviations of the first block's parameters, shape (PARAMETERS)."""
         joint = posterior_covariance(*self._problem(self._reduced(robust=True)))[0]
-        found = np.zeros(PARAMETERS)
-        found[self.prior.unknown] = np.sqrt(np.maximum(np.diagonal(joint)[2 * STATES :], 0.0))
-        return found
+        sigma = np.zeros(PARAMETERS)
+        sigma[self.prior.unknown] = np.sqrt(np.maximum(np.diagonal(joint)[2 * STATES :], 0.0))
+        return sigma
 
     def split(self) -> Array:
         """Estimate a change of the misalignment in the middle of the ride.
@@ -95,8 +95,8 @@ class Estimate:
         walks = self._likely.random_walks(self.prior, self.parameters)
         middle = len(self.parameters) // 2
         walks.variance[:, middle - 1 : middle, ROTATION] = 1.0
-        found = solve(self._reduced(robust=True), walks, self._likely.weight)[1][:, ROTATION]
-        return found[-1] - found[0]
+        rotation = solve(self._reduced(robust=True), walks, self._likely.weight)[1][:, ROTATION]
+        return rotation[-1] - rotation[0]
 
     def _start(self, still: Bools) -> None:
         """Start the estimation again. still: True where the bike stands, shape (n)."""
@@ -196,9 +196,9 @@ class Estimate:
         """
         x = self._middle()
         self.noise.lean, self.noise.pitch, self.noise.speed = x[LEAN], x[PITCH], x[FORWARD]
-        found = process_and_measurements(self._windows, x).T
-        found[:, :STATES] = np.diff(self.states, axis=0) - self._windows.covered[:, None] * found[:, :STATES]
-        return found
+        residuals = process_and_measurements(self._windows, x).T
+        residuals[:, :STATES] = np.diff(self.states, axis=0) - self._windows.covered[:, None] * residuals[:, :STATES]
+        return residuals
 
     def _reduced(self, robust: bool) -> Reduced:
         windows, s, unknown = self._windows, STATES, self.prior.unknown
@@ -207,14 +207,14 @@ class Estimate:
         derivatives = jacobian(windows, self._middle(), np.concatenate((np.arange(s), s + unknown)))
         derivatives[:, :s] *= -windows.covered
         derivatives = derivatives.transpose(2, 1, 0) / sigma[..., None]
-        found = np.empty((len(windows), ROWS, 2 * s + len(unknown) + 1))
+        rows = np.empty((len(windows), ROWS, 2 * s + len(unknown) + 1))
         # The state in the middle of a window is the mean of the states at its edges.
-        found[..., :s] = found[..., s : 2 * s] = 0.5 * derivatives[..., :s]
+        rows[..., :s] = rows[..., s : 2 * s] = 0.5 * derivatives[..., :s]
         step = np.arange(s)
-        found[:, step, step] -= 1.0 / sigma[:, :s]
-        found[:, step, s + step] += 1.0 / sigma[:, :s]
-        found[..., 2 * s : -1], found[..., -1] = derivatives[..., s:], off / sigma
-        blocks = reduce_windows(found.reshape(-1, self._length, *found.shape[1:]), s)
+        rows[:, step, step] -= 1.0 / sigma[:, :s]
+        rows[:, step, s + step] += 1.0 / sigma[:, :s]
+        rows[..., 2 * s : -1], rows[..., -1] = derivatives[..., s:], off / sigma
+        blocks = reduce_windows(rows.reshape(-1, self._length, *rows.shape[1:]), s)
         blocks.left[0, step, step] += 1.0 / START**2
         blocks.left[0, DRAWN, -1] += self.states[0, DRAWN] / START[DRAWN] ** 2
         return blocks

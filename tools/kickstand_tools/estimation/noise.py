@@ -116,30 +116,30 @@ class Noise:
         """
         w, riding, balanced = self._windows, self.riding, self._is_balanced
         speed, roughness = np.maximum(self.speed, 0.0), self.roughness
-        found = np.full((len(w), eq.ROWS), np.inf)
-        found[:, :LEFT] = ANGLE_ROOT
-        found[:, LEFT : BIAS.start] = VELOCITY_ROOT
-        found[:, : BIAS.start] *= self._root * roughness[:, None]
-        found[:, LEFT : BIAS.start] *= self.misfit[:, None]
-        found[:, :LEFT] = np.hypot(found[:, :LEFT], jolted(w)[:, None])
-        found[:, BIAS] = (BIAS_ROOT if np.any(w.warm) else WARMING_ROOT) * self._root
+        sigma = np.full((len(w), eq.ROWS), np.inf)
+        sigma[:, :LEFT] = ANGLE_ROOT
+        sigma[:, LEFT : BIAS.start] = VELOCITY_ROOT
+        sigma[:, : BIAS.start] *= self._root * roughness[:, None]
+        sigma[:, LEFT : BIAS.start] *= self.misfit[:, None]
+        sigma[:, :LEFT] = np.hypot(sigma[:, :LEFT], jolted(w)[:, None])
+        sigma[:, BIAS] = (BIAS_ROOT if np.any(w.warm) else WARMING_ROOT) * self._root
         lost, free = np.minimum(LOST_ROOT * self._root, LOST_MOST), w.gap | self._in_hand
-        found[free, : BIAS.start] = lost[free]
-        found[self._not_riding, LEFT : BIAS.start] = lost[self._not_riding, LEFT:]
+        sigma[free, : BIAS.start] = lost[free]
+        sigma[self._not_riding, LEFT : BIAS.start] = lost[self._not_riding, LEFT:]
         sideways = SLIDE_SHARE * speed * np.tan(np.clip(self.lean, -1.0, 1.0))
-        found[riding, eq.SLIDING] = (roughness * np.hypot(SLIDE_MPS, sideways))[riding]
-        found[riding, eq.CLIMBING] = (roughness * np.hypot(DIVE_MPS, DIVE_RAD * speed))[riding]
-        found[riding, eq.SLOPING] = np.hypot(SLOPE_MPS, SLOPE_RAD * speed)[riding]
-        found[balanced, eq.BALANCED] = (self.unbalance * self._of_balance())[balanced]
-        found[:, eq.CLIMBING : eq.SLOPING + 1] *= self._wheelie_factor[:, None]
-        found[riding, eq.ANY_SPEED] = ANY_MPS
-        found *= self._lasting
-        found[balanced, eq.BALANCED] = np.hypot(found[:, eq.BALANCED], BALANCE_ROLLING * self._rolling)[balanced]
-        found[~np.isnan(w.speed) & ~w.gap, eq.MEASURED_SPEED] = SPEED_MPS
-        found[self._still, eq.RESTING], found[self._still, eq.RESTING_RATE] = REST_MPS, REST_RADPS
-        found[self._not_riding & ~w.gap, eq.RESTING] = HAND_MPS
-        found[riding, eq.BACKWARD] = BACKWARD_MPS
-        return found
+        sigma[riding, eq.SLIDING] = (roughness * np.hypot(SLIDE_MPS, sideways))[riding]
+        sigma[riding, eq.CLIMBING] = (roughness * np.hypot(DIVE_MPS, DIVE_RAD * speed))[riding]
+        sigma[riding, eq.SLOPING] = np.hypot(SLOPE_MPS, SLOPE_RAD * speed)[riding]
+        sigma[balanced, eq.BALANCED] = (self.unbalance * self._of_balance())[balanced]
+        sigma[:, eq.CLIMBING : eq.SLOPING + 1] *= self._wheelie_factor[:, None]
+        sigma[riding, eq.ANY_SPEED] = ANY_MPS
+        sigma *= self._lasting
+        sigma[balanced, eq.BALANCED] = np.hypot(sigma[:, eq.BALANCED], BALANCE_ROLLING * self._rolling)[balanced]
+        sigma[~np.isnan(w.speed) & ~w.gap, eq.MEASURED_SPEED] = SPEED_MPS
+        sigma[self._still, eq.RESTING], sigma[self._still, eq.RESTING_RATE] = REST_MPS, REST_RADPS
+        sigma[self._not_riding & ~w.gap, eq.RESTING] = HAND_MPS
+        sigma[riding, eq.BACKWARD] = BACKWARD_MPS
+        return sigma
 
     def robust(self, sigma: Array, off: Array) -> Array:
         """Return `sigma`, enlarged where a residual in `off` is an outlier (Cauchy). All have the shape (n, ROWS)."""
@@ -154,9 +154,9 @@ class Noise:
         """
         squares = np.mean((residual[:, ROUGH] / EXPECTED) ** 2, axis=1) * self.roughness**2
         share = averaged(self.riding.astype(float), ROUGHNESS_S)
-        found = averaged(np.where(self.riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
+        mean_square = averaged(np.where(self.riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
         least = np.where(self.misfit > 1.0, MISFIT_ROUGHNESS * self.misfit, LEAST_ROUGHNESS)
-        self.roughness = np.where(share > 0.02, np.clip(np.sqrt(found), least, MOST_ROUGHNESS), 1.0)
+        self.roughness = np.where(share > 0.02, np.clip(np.sqrt(mean_square), least, MOST_ROUGHNESS), 1.0)
 
     def estimate_misfit(self, off: Array) -> None:
         """Estimate the misfit: how much the accelerations differ from a bike's.
@@ -190,8 +190,8 @@ class Noise:
         squares = np.minimum(count * moving_mean(lasting, count) ** 2, 2.0 * MOST_MISFIT * USUAL_MISFIT**2)
         share = averaged(self.riding.astype(float), ROUGHNESS_S)
         mean = averaged(np.where(self.riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
-        found = np.where(share > 0.02, mean / USUAL_MISFIT**2, 1.0)
-        return np.clip(found, 1.0, MOST_MISFIT)
+        ratio = np.where(share > 0.02, mean / USUAL_MISFIT**2, 1.0)
+        return np.clip(ratio, 1.0, MOST_MISFIT)
 
     def estimate_unbalance(self, force: Array, over_s: float) -> None:
         """Set the unbalance, which is the factor on the standard deviation of BALANCED. An average ride has an
@@ -203,16 +203,16 @@ class Noise:
         over_s: BRIEF_S or LONG_S.
         """
         counted = self._is_balanced
-        share, whole = averaged(counted.astype(float), LASTS_S), averaged(counted.astype(float), over_s) > 0.97
+        share, complete = averaged(counted.astype(float), LASTS_S), averaged(counted.astype(float), over_s) > 0.97
         self.unbalance = 1.0
-        if np.count_nonzero(whole) < LEAST_WINDOWS:
+        if np.count_nonzero(complete) < LEAST_WINDOWS:
             return
         off = force - averaged(np.where(counted, force, 0.0), LASTS_S) / np.maximum(share, 1e-9)
-        mean = averaged(np.where(counted, off / self._of_balance(), 0.0), over_s)[whole]
+        mean = averaged(np.where(counted, off / self._of_balance(), 0.0), over_s)[complete]
         # An error that lasts for BALANCE_S keeps this share of its variance in a mean over over_s.
         ratio = over_s / BALANCE_S
-        left = 2.0 * (ratio - 1.0 + np.exp(-ratio)) / ratio**2
-        self.unbalance = float(np.clip(np.sqrt(np.mean(mean**2) / left), LEAST_UNBALANCE, MOST_UNBALANCE))
+        remaining = 2.0 * (ratio - 1.0 + np.exp(-ratio)) / ratio**2
+        self.unbalance = float(np.clip(np.sqrt(np.mean(mean**2) / remaining), LEAST_UNBALANCE, MOST_UNBALANCE))
 
     @property
     def _wheelie_factor(self) -> Array:

@@ -104,8 +104,10 @@ def back(reduced: Reduced, ends: Array, parameters: Array) -> Array:
     for gain in reversed(reduced.gains):
         count = gain.shape[1]
         common = np.concatenate((parameters, np.ones((len(parameters), 1))), axis=1)[:, None]
-        known = np.concatenate((states[:, :count], states[:, 1 : count + 1], np.repeat(common, count, axis=1)), axis=2)
-        inner = -np.matmul(gain, known[..., None])[..., 0]
+        neighbours = np.concatenate(
+            (states[:, :count], states[:, 1 : count + 1], np.repeat(common, count, axis=1)), axis=2
+        )
+        inner = -np.matmul(gain, neighbours[..., None])[..., 0]
         states = np.insert(states, np.arange(1, count + 1), inner, axis=1)
     return states
 
@@ -119,23 +121,23 @@ def covariances(reduced: Reduced, joint: Array) -> Array:
     s, width = reduced.s, joint.shape[1]
     ends = np.r_[:s, 2 * s : 3 * s]  # rows of the two outer states; two neighbouring links have three states
     all_but_inner = np.r_[ends, 3 * s : width + s]
-    found, common = joint[:, None, : 2 * s], joint[:, None, 2 * s :]
-    for gain, own in zip(reversed(reduced.gains), reversed(reduced.covariances), strict=True):
+    blocks, common = joint[:, None, : 2 * s], joint[:, None, 2 * s :]
+    for gain, conditional in zip(reversed(reduced.gains), reversed(reduced.covariances), strict=True):
         count = gain.shape[1]
-        split = found[:, :count]
+        split = blocks[:, :count]
         below = np.repeat(common, count, axis=1)
         below[..., : 2 * s] = split[..., 2 * s :].transpose(0, 1, 3, 2)
         # The covariance of the inner state with the ends and with the parameters.
         inner = -np.matmul(gain[..., :-1], np.concatenate((split, below), axis=2))
-        three = np.empty((len(found), count, 3 * s, width + s))
+        three = np.empty((len(blocks), count, 3 * s, width + s))
         three[:, :, ends[:, None], all_but_inner] = split
         three[:, :, s : 2 * s, all_but_inner] = inner
         three[:, :, ends, s : 2 * s] = inner[..., : 2 * s].transpose(0, 1, 3, 2)
-        three[:, :, s : 2 * s, s : 2 * s] = own - np.matmul(inner, gain[..., :-1].transpose(0, 1, 3, 2))
+        three[:, :, s : 2 * s, s : 2 * s] = conditional - np.matmul(inner, gain[..., :-1].transpose(0, 1, 3, 2))
         first = np.delete(three[:, :, : 2 * s], np.s_[2 * s : 3 * s], axis=3)
         finer = np.stack((first, three[:, :, s:, s:]), axis=2)
-        found = np.concatenate((finer.reshape(len(found), 2 * count, 2 * s, width), found[:, count:]), axis=1)
-    return found
+        blocks = np.concatenate((finer.reshape(len(blocks), 2 * count, 2 * s, width), blocks[:, count:]), axis=1)
+    return blocks
 
 
 @dataclass
@@ -167,15 +169,15 @@ def _chains(blocks: Reduced, walks: RandomWalks) -> tuple[Reduced, Array, Array]
     (count, width), s = blocks.left.shape[:2], blocks.s
     hypotheses, n = len(walks.prior), width - s
     links = np.zeros((hypotheses, count, 2 * n, 2 * n + 1))
-    place = np.r_[:s, n : n + s, s:n]
-    links[:, :, place[:, None], np.r_[place, 2 * n]] = blocks.left
+    columns = np.r_[:s, n : n + s, s:n]
+    links[:, :, columns[:, None], np.r_[columns, 2 * n]] = blocks.left
     weight, change = np.ones((hypotheses, count, n - s)), np.zeros((count, n - s))
     weight[:, :-1], change[:-1] = 1.0 / walks.variance, walks.between
-    before, after = np.arange(s, n), np.arange(n + s, 2 * n)
-    for one, other, sign in ((before, after, -1.0), (after, before, 1.0)):
-        links[:, :, one, one] += weight
-        links[:, :, one, other] -= weight
-        links[:, :, one, -1] += sign * weight * change
+    earlier, later = np.arange(s, n), np.arange(n + s, 2 * n)
+    for rows, cross, sign in ((earlier, later, -1.0), (later, earlier, 1.0)):
+        links[:, :, rows, rows] += weight
+        links[:, :, rows, cross] -= weight
+        links[:, :, rows, -1] += sign * weight * change
     reduced = _reduced(links, np.sum(weight * change**2, axis=(1, 2))[:, None, None])
     ends, prior = reduced.left, walks.prior[..., :-1]
     ends[:, s:n, s:n] += prior
@@ -225,9 +227,9 @@ def posterior_covariance(blocks: Reduced, walks: RandomWalks, weight: Array) -> 
     off = np.concatenate((states[:, :-1], states[:, 1:]), axis=2)
     off -= np.einsum("g,gbi->bi", weight, off)
     within = covariances(reduced, np.linalg.inv(ends[..., :-1]).astype(float))
-    whole = np.einsum("g,gbij->bij", weight, within + off[..., :, None] * off[..., None, :])
-    kept = np.r_[:s, n : n + s, s:n]
-    return whole[:, kept[:, None], kept]
+    joint = np.einsum("g,gbij->bij", weight, within + off[..., :, None] * off[..., None, :])
+    order = np.r_[:s, n : n + s, s:n]
+    return joint[:, order[:, None], order]
 
 
 def _first_states(reduced: Reduced, ends: Array) -> Array:

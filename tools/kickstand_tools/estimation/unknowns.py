@@ -95,10 +95,10 @@ class Prior:
 
         sigma: standard deviations of the prior, shape (PARAMETERS). A hypothesis may have enlarged some of them.
         """
-        found = np.diag(np.divide(1.0, sigma**2, out=np.zeros(PARAMETERS), where=sigma > 0.0))
+        matrix = np.diag(np.divide(1.0, sigma**2, out=np.zeros(PARAMETERS), where=sigma > 0.0))
         if self.posed:
             ties = (ROTATION.start, OFFSET.stop - 1, 1.0), (ROTATION.stop - 1, OFFSET.start, -1.0)
             for angle, offset, sign in ties:
-                found[offset, offset] += found[angle, angle]
-                found[angle, offset] = found[offset, angle] = sign * found[angle, angle]
-        return found[np.ix_(self.unknown, self.unknown)]
+                matrix[offset, offset] += matrix[angle, angle]
+                matrix[angle, offset] = matrix[offset, angle] = sign * matrix[angle, angle]
+        return matrix[np.ix_(self.unknown, self.unknown)]

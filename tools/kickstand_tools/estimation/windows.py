@@ -55,10 +55,10 @@ class Windows:
 
         All values are NaN if the log has fewer than two speeds.
         """
-        there, middle = ~np.isnan(self.speed), 0.5 * (self.edges[1:] + self.edges[:-1])
-        if np.count_nonzero(there) < 2:
+        logged, middle = ~np.isnan(self.speed), 0.5 * (self.edges[1:] + self.edges[:-1])
+        if np.count_nonzero(logged) < 2:
             return np.full(len(self), np.nan)
-        return np.interp(middle, middle[there], self.speed[there])
+        return np.interp(middle, middle[logged], self.speed[logged])
 
     def turned(self, matrix: Array, bias: Array | float = 0.0) -> "Windows":
         """Return a copy with corrected rates, in other axes.
@@ -71,16 +71,16 @@ class Windows:
 
     def padded(self, length: int) -> "Windows":
         """Return a copy with gaps of zero duration appended, so the number of windows is a multiple of `length`."""
-        more = -len(self) % length
+        extra = -len(self) % length
 
         def longer(values: Array, fill: float = 0.0) -> Array:
-            return np.concatenate((values, np.full((more, *values.shape[1:]), fill)))
+            return np.concatenate((values, np.full((extra, *values.shape[1:]), fill)))
 
         return replace(
             self,
             edges=longer(self.edges, self.edges[-1]),
             speed=longer(self.speed, np.nan),
-            gap=np.append(self.gap, np.ones(more, dtype=bool)),
+            gap=np.append(self.gap, np.ones(extra, dtype=bool)),
             rate=longer(self.rate),
             force=longer(self.force),
             jolt=longer(self.jolt),
@@ -106,41 +106,41 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array,
     usual = float(np.median(step)) if len(step) else WINDOW_S
     lost = step > max(GAP_S, 1.5 * usual)
     half = np.where(lost, 0.5 * usual, 0.5 * step)
-    before, after = np.append(0.5 * usual, half), np.append(half, 0.5 * usual)
+    lead, trail = np.append(0.5 * usual, half), np.append(half, 0.5 * usual)
     begins = np.append(True, lost)  # True for the first sample of each stretch without missing readings
     since = t_s - t_s[begins][np.cumsum(begins) - 1]
     starts = np.flatnonzero(np.append(True, (np.diff(cell_numbers(since, WINDOW_S)) != 0) | lost))
-    weight = before + after
+    weight = lead + trail
     length = np.add.reduceat(weight, starts)
 
     def mean(values: Array) -> Array:
         return np.add.reduceat(values * weight[:, None], starts, axis=0) / length[:, None]
 
-    there = np.flatnonzero(~np.isnan(speed))
-    place = np.searchsorted(starts, np.arange(len(t_s)), side="right") - 1
+    logged = np.flatnonzero(~np.isnan(speed))
+    window = np.searchsorted(starts, np.arange(len(t_s)), side="right") - 1
     if aligned:
         rolled = np.cumsum(rate[:, 2] * weight)
-        whole = np.add.reduceat(rate[:, 2] * weight, starts)
-        rolled -= 0.5 * rate[:, 2] * weight + (np.cumsum(whole) - 0.5 * whole)[place]
+        turns = np.add.reduceat(rate[:, 2] * weight, starts)
+        rolled -= 0.5 * rate[:, 2] * weight + (np.cumsum(turns) - 0.5 * turns)[window]
         force, rate = _rolled_back(force, rolled), _rolled_back(rate, rolled)
     in_window = np.full(len(starts), np.nan)
-    in_window[place[there]] = speed[there]
+    in_window[window[logged]] = speed[logged]
     mean_rate = mean(rate)
-    jolt = np.maximum.reduceat(np.linalg.norm(rate - mean_rate[place], axis=1), starts)
-    at = np.flatnonzero(begins[starts])[1:]  # indices of the windows after missing readings
+    jolt = np.maximum.reduceat(np.linalg.norm(rate - mean_rate[window], axis=1), starts)
+    gaps = np.flatnonzero(begins[starts])[1:]  # indices of the windows after missing readings
     ends = np.append(starts[1:], len(t_s)) - 1
-    edges = np.insert((t_s - before)[starts], at, (t_s + after)[ends[at - 1]])
+    edges = np.insert((t_s - lead)[starts], gaps, (t_s + trail)[ends[gaps - 1]])
     return Windows(
-        np.append(edges, t_s[-1] + after[-1]),
-        np.insert(mean_rate, at, 0.0, axis=0),
-        np.insert(mean(force), at, 0.0, axis=0),
-        np.insert(jolt, at, 0.0),
-        np.insert(in_window, at, np.nan),
-        np.insert(warm[starts], at, 0.0),
-        np.insert(np.zeros(len(starts), dtype=bool), at, True),
-        place + np.searchsorted(at, place, side="right"),
-        before,
-        after,
+        np.append(edges, t_s[-1] + trail[-1]),
+        np.insert(mean_rate, gaps, 0.0, axis=0),
+        np.insert(mean(force), gaps, 0.0, axis=0),
+        np.insert(jolt, gaps, 0.0),
+        np.insert(in_window, gaps, np.nan),
+        np.insert(warm[starts], gaps, 0.0),
+        np.insert(np.zeros(len(starts), dtype=bool), gaps, True),
+        window + np.searchsorted(gaps, window, side="right"),
+        lead,
+        trail,
     )
 
 

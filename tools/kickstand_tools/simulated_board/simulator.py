@@ -95,6 +95,8 @@ class Board:
         self.processor_hz = 160_000_000  # what the board starts with
         self._off = True
         self._pins = {}  # number: [mode, pull, driven level, time of first use]
+        # Pins of an RP2350 that were high. Such a pin stays high against its pull-down (erratum RP2350-E9)
+        self._high = set()
         self._fakes = Installer()
         if sensor_address is not None:
             self.fit_sensor()
@@ -266,6 +268,20 @@ class Board:
 
     def pin_level(self, number):
         """Return the result of Pin.value()."""
+        mode, pull = self._pins.get(number, (fake_machine.Pin.IN, -1))[:2]
+        level = self._level(number)
+        if number in self._high and mode == fake_machine.Pin.IN and pull == fake_machine.Pin.PULL_DOWN:
+            return 1
+        self._note_high(number, level)
+        return level
+
+    def _note_high(self, number, level):
+        if level and "RP2350" in self.machine:
+            self._high.add(number)
+        else:
+            self._high.discard(number)
+
+    def _level(self, number):
         mode, pull, level, since_us = self._pins.get(number, (fake_machine.Pin.IN, -1, 0, 0))
         for bus in self.buses:
             if number == bus.sda:
@@ -281,6 +297,8 @@ class Board:
         return level
 
     def _drive_wire(self, number, level):
+        if not level:
+            self._note_high(number, 0)
         if self.card and number == self.card.cs:
             self.card.select(level)
         for bus in self.buses:

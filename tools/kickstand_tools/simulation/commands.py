@@ -80,15 +80,15 @@ def commands(legs: list[Leg], rate_hz: float) -> RiderCommands:
         """
         values = _fill_in(legs, name)
         result = np.full_like(time, values[0])
-        for leg, start, before, after in zip(legs[1:], starts[1:], values, values[1:]):
-            if after != before:
+        for leg, start, initial, final in zip(legs[1:], starts[1:], values, values[1:]):
+            if final != initial:
                 settle = min(leg.roll_s if settle_s is None else settle_s, leg.seconds)
                 first = np.searchsorted(time, start)
-                result[first:] = before + (after - before) * smoothstep((time[first:] - start) / max(settle, 1e-3))
+                result[first:] = initial + (final - initial) * smoothstep((time[first:] - start) / max(settle, 1e-3))
         return result
 
     phases = list(dict.fromkeys(leg.phase for leg in legs))
-    which = np.searchsorted(ends, time, side="right").clip(0, len(legs) - 1)
+    leg_index = np.searchsorted(ends, time, side="right").clip(0, len(legs) - 1)
     return RiderCommands(
         rate_hz,
         time,
@@ -101,19 +101,19 @@ def commands(legs: list[Leg], rate_hz: float) -> RiderCommands:
         stepped("engine"),
         stepped("crosswind_mps2"),
         np.radians(stepped("bank_deg", 3.0)),
-        np.array([phases.index(leg.phase) for leg in legs])[which],
+        np.array([phases.index(leg.phase) for leg in legs])[leg_index],
         phases,
     )
 
 
 def _fill_in(legs: list[Leg], name: str) -> list[float]:
     """Return one value per leg. None is replaced by the previous leg's value, in the first leg by 0."""
-    kept, now = [], 0.0
+    filled, current = [], 0.0
     for leg in legs:
         value = getattr(leg, name)
-        now = now if value is None else value
-        kept.append(now)
-    return kept
+        current = current if value is None else value
+        filled.append(current)
+    return filled
 
 
 def _slope(distance: Signal, ends: Signal, percent: list[float]) -> Signal:
@@ -132,7 +132,7 @@ def _slope(distance: Signal, ends: Signal, percent: list[float]) -> Signal:
             values.append(value)
     if len(knots) == 1:
         return np.full_like(distance, np.arctan(percent[0] / 100.0))
-    at, value = np.array(knots), np.array(values)
-    place = np.searchsorted(at, distance, side="right").clip(1, len(knots) - 1)
-    u = (distance - at[place - 1]) / (at[place] - at[place - 1])
-    return np.arctan((value[place - 1] + (value[place] - value[place - 1]) * smoothstep(u)) / 100.0)
+    knot, value = np.array(knots), np.array(values)
+    segment = np.searchsorted(knot, distance, side="right").clip(1, len(knots) - 1)
+    u = (distance - knot[segment - 1]) / (knot[segment] - knot[segment - 1])
+    return np.arctan((value[segment - 1] + (value[segment] - value[segment - 1]) * smoothstep(u)) / 100.0)

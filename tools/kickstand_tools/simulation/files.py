@@ -49,33 +49,35 @@ def simulate(
     check_profile(profile)
     directory = Path(out_dir)
     check_directory(directory)
-    made = _cut(ride(profile, seed, seconds, exact=True, **conditions), seconds)
+    simulated = _cut(ride(profile, seed, seconds, exact=True, **conditions), seconds)
     try:
         make_directory(directory)
         # An old calibration belongs to another sensor, but report, plot and export would use it for this ride
         (directory / "RIDE.cal.json").unlink(missing_ok=True)
-        write_poses(directory, made)
-        _write_readings(directory / "SIX.csv", made.procedure, made.rate_hz)
-        write_ride(directory / "RIDE.csv", made, speed)
-        _write_truth(directory / "TRUTH.csv", made)
+        write_poses(directory, simulated)
+        _write_readings(directory / "SIX.csv", simulated.procedure, simulated.rate_hz)
+        write_ride(directory / "RIDE.csv", simulated, speed)
+        _write_truth(directory / "TRUTH.csv", simulated)
     except OSError as error:
         raise InputError(f"{directory} cannot be written: {error.strerror}") from error
-    return made
+    return simulated
 
 
-def _cut(made: SimulatedRide, seconds: float) -> SimulatedRide:
+def _cut(simulated: SimulatedRide, seconds: float) -> SimulatedRide:
     """Return the first `seconds` of a ride."""
-    n = min(len(made.time), round(seconds * made.rate_hz))
-    truth = {name: values[:n] for name, values in made.truth.items()}
-    return replace(made, time=made.time[:n], readings=made.readings[:n], truth=truth, phase=made.phase[:n])
+    n = min(len(simulated.time), round(seconds * simulated.rate_hz))
+    truth = {name: values[:n] for name, values in simulated.truth.items()}
+    return replace(
+        simulated, time=simulated.time[:n], readings=simulated.readings[:n], truth=truth, phase=simulated.phase[:n]
+    )
 
 
-def write_poses(directory: Path, made: SimulatedRide) -> tuple[list[Path], Path, Path]:
+def write_poses(directory: Path, simulated: SimulatedRide) -> tuple[list[Path], Path, Path]:
     """Write the seven poses, the kickstand pose and the upright pose. Returns their paths in this order."""
     seven = [directory / f"POSE_{k}.csv" for k in range(1, 8)]
     pair = directory / "KICKSTAND.csv", directory / "UPRIGHT.csv"
-    for path, readings in zip([*seven, *pair], [*made.poses, made.kickstand, made.upright]):
-        _write_readings(path, readings, made.rate_hz)
+    for path, readings in zip([*seven, *pair], [*simulated.poses, simulated.kickstand, simulated.upright]):
+        _write_readings(path, readings, simulated.rate_hz)
     return seven, *pair
 
 
@@ -83,7 +85,7 @@ def _write_readings(path: Path, readings: NDArray, rate_hz: float) -> None:
     _write(path, _LOG, _FORMATS, _log(np.arange(len(readings)) / rate_hz, readings))
 
 
-def positions(made: SimulatedRide) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def positions(simulated: SimulatedRide) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Compute the position of each reading by integrating the true speed and yaw rate.
 
     Returns:
@@ -91,11 +93,13 @@ def positions(made: SimulatedRide) -> tuple[NDArray[np.float64], NDArray[np.floa
         longitude: in degrees east, shape (n).
         time: Universal Time in s since 1970, shape (n).
     """
-    course = np.cumsum(np.radians(made.truth["yaw_rate_dps"])) / made.rate_hz  # rad from east, > 0 to the left
-    speed = made.truth["speed_mps"] / made.rate_hz
+    course = (
+        np.cumsum(np.radians(simulated.truth["yaw_rate_dps"])) / simulated.rate_hz
+    )  # rad from east, > 0 to the left
+    speed = simulated.truth["speed_mps"] / simulated.rate_hz
     lat = START[0] + np.cumsum(speed * np.sin(course)) / _DEGREE_M
     lon = START[1] + np.cumsum(speed * np.cos(course)) / (_DEGREE_M * np.cos(np.radians(START[0])))
-    return lat, lon, START_UTC_S + made.time
+    return lat, lon, START_UTC_S + simulated.time
 
 
 def _log(time: NDArray, readings: NDArray) -> NDArray:
@@ -107,21 +111,30 @@ def _write(path: Path, names: Iterable[str], formats: list[str], table: NDArray,
     form = ",".join(formats)
     with whole_file(path) as temporary, temporary.open("w", encoding="ascii") as file:
         print(*names, sep=",", file=file)
-        for row, *more in zip(table, *texts):
-            print(form % tuple(row), *more, sep=",", file=file)
+        for row, *cells in zip(table, *texts):
+            print(form % tuple(row), *cells, sep=",", file=file)
 
 
-def write_ride(path: Path, made: SimulatedRide, speed: bool) -> None:
+def write_ride(path: Path, simulated: SimulatedRide, speed: bool) -> None:
     """Write the log of a ride. speed: True to add a speed and a position once per second."""
-    log = _log(made.time, made.readings)
+    log = _log(simulated.time, simulated.readings)
     if not speed:
         _write(path, _LOG, _FORMATS, log)
         return
-    track, every = np.column_stack((made.truth["speed_mps"], *positions(made))), round(_TRACK_S * made.rate_hz)
-    cells = ["{:.2f},{:.7f},{:.7f},{:.3f}".format(*row) if k % every == 0 else ",,," for k, row in enumerate(track)]
+    track, step = (
+        np.column_stack((simulated.truth["speed_mps"], *positions(simulated))),
+        round(_TRACK_S * simulated.rate_hz),
+    )
+    cells = ["{:.2f},{:.7f},{:.7f},{:.3f}".format(*row) if k % step == 0 else ",,," for k, row in enumerate(track)]
     _write(path, (*_LOG, *TRACK), _FORMATS, log, cells)
 
 
-def _write_truth(path: Path, made: SimulatedRide) -> None:
-    table = np.column_stack((made.time, *made.truth.values()))
-    _write(path, ("t_s", *made.truth, "phase"), ["%.3f", *["%.4f"] * len(made.truth)], table, made.phase.tolist())
+def _write_truth(path: Path, simulated: SimulatedRide) -> None:
+    table = np.column_stack((simulated.time, *simulated.truth.values()))
+    _write(
+        path,
+        ("t_s", *simulated.truth, "phase"),
+        ["%.3f", *["%.4f"] * len(simulated.truth)],
+        table,
+        simulated.phase.tolist(),
+    )

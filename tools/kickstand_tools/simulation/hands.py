@@ -50,18 +50,18 @@ def procedure(
         rates.append(np.zeros((n, 3)))
 
     hold()
-    for before, after in pairwise(ups):
+    for first, second in pairwise(ups):
         heading = np.radians(chance.uniform(-hand.heading_deg, hand.heading_deg))
-        after_attitude = _rotations(np.array([[0.0, 0.0, heading]]))[0] @ attitude @ _turn_between(after, before)
-        way = _rotation_vector(after_attitude @ attitude.T)
-        turned = np.linalg.norm(way)
+        next_attitude = _rotations(np.array([[0.0, 0.0, heading]]))[0] @ attitude @ _turn_between(second, first)
+        rotation = _rotation_vector(next_attitude @ attitude.T)
+        turned = np.linalg.norm(rotation)
         n = max(2, int(chance.uniform(*hand.turn_s) * (0.25 + 0.75 * turned / (np.pi / 2)) ** 0.7 * RATE_HZ))
         u = np.arange(n + 1) / n
         # The turn starts and ends slowly, like the movement of a hand
         detour = np.radians(hand.detour_deg) * chance.standard_normal(3) / np.sqrt(3.0)
         share = u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
         stray = np.sin(np.pi * smoothstep(u)) ** 2
-        path = _rotations(share[:, None] * way) @ _rotations(stray[:, None] * detour) @ attitude
+        path = _rotations(share[:, None] * rotation) @ _rotations(stray[:, None] * detour) @ attitude
         steps = np.einsum("nji,njk->nik", path[:-1], path[1:])
         skew = steps - np.swapaxes(steps, 1, 2)
         spin = np.stack((skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]), axis=1)

@@ -16,11 +16,11 @@ def street(plan: Plan) -> Conditions:
     cruise = plan.uniform(15.0, 24.0)
     plan.to_speed(cruise, 2.5)
     while plan.going_on:
-        what = plan.uniform(0.0, 1.0)
-        if what < 0.12:
+        choice = plan.uniform(0.0, 1.0)
+        if choice < 0.12:
             plan.stop(plan.uniform(4.0, 15.0), plan.uniform(2.0, 4.5))
             plan.to_speed(plan.uniform(14.0, 22.0), plan.uniform(2.0, 4.0))
-        elif what < 0.24:  # a lane change
+        elif choice < 0.24:  # a lane change
             side, lean = plan.side(), plan.uniform(5.0, 12.0)
             plan.turn(side * lean, plan.speed, seconds=0.1, roll_s=0.9)
             plan.turn(-side * lean, plan.speed, seconds=0.1, roll_s=1.2)
@@ -80,23 +80,23 @@ def city(plan: Plan) -> Conditions:
     plan.slope_percent = 4.0
     plan.to_speed(plan.uniform(8.0, 13.0), 2.5)
     while plan.going_on:
-        what = plan.uniform(0.0, 1.0)
-        if what < 0.3:
+        choice = plan.uniform(0.0, 1.0)
+        if choice < 0.3:
             speed = plan.uniform(4.0, 7.5)
             lean = plan.side() * lean_for(speed, plan.uniform(7.0, 14.0))
             plan.into_turn(lean, speed, plan.uniform(2.0, 3.5))
             plan.turn(lean, speed, heading_deg=plan.uniform(70.0, 100.0), roll_s=plan.uniform(0.9, 1.5))
             plan.out_of_turn(plan.uniform(9.0, 14.0), 2.5)
-        elif what < 0.5:
+        elif choice < 0.5:
             plan.stop(plan.uniform(3.0, 25.0), plan.uniform(2.0, 4.0))
             plan.to_speed(plan.uniform(8.0, 15.0), plan.uniform(2.0, 3.5))
-        elif what < 0.65:
+        elif choice < 0.65:
             plan.to_speed(plan.uniform(1.2, 2.5), 2.0)
             plan.walk(plan.uniform(5.0, 20.0), plan.uniform(0.9, 2.5))
             if plan.likely(0.4):
                 plan.turn(plan.side() * plan.uniform(4.0, 9.0), 2.2, heading_deg=150.0, phase="turning round")
             plan.to_speed(plan.uniform(7.0, 12.0), 2.5)
-        elif what < 0.8:  # a roundabout: lean to one side, to the other, and back
+        elif choice < 0.8:  # a roundabout: lean to one side, to the other, and back
             speed, side = plan.uniform(6.0, 9.0), plan.side()
             lean = lean_for(speed, plan.uniform(12.0, 22.0))
             plan.into_turn(-side * lean * 0.6, speed, 2.5)
@@ -117,19 +117,19 @@ def hills(plan: Plan) -> Conditions:
     climb = plan.side()
     while plan.going_on:
         climb = -climb if plan.likely(0.1) else climb
-        before, after = climb * plan.uniform(3.0, 12.0), climb * plan.uniform(2.0, 12.0)
+        entry, exit_ = climb * plan.uniform(3.0, 12.0), climb * plan.uniform(2.0, 12.0)
         if plan.likely(0.4):  # a hairpin whose slope changes in its middle
             speed, lean = plan.uniform(5.5, 9.0), plan.side() * plan.uniform(22.0, 40.0)
             plan.into_turn(lean, speed, plan.uniform(2.5, 5.0))
             roll_s, inside = plan.uniform(1.0, 1.6), plan.uniform(-2.0, 12.0) * climb
             heading = plan.uniform(150.0, 190.0)
             plan.turn(lean, speed, heading / 2, roll_s=roll_s, phase="hairpin", slope_percent=inside)
-            plan.turn(lean, speed, heading / 2, roll_s=0.5, phase="hairpin", slope_percent=after)
+            plan.turn(lean, speed, heading / 2, roll_s=0.5, phase="hairpin", slope_percent=exit_)
             plan.out_of_turn(plan.uniform(10.0, 17.0), plan.uniform(2.0, 4.0))
         else:
             _bends(plan, plan.uniform(12.0, 40.0), (9.0, 18.0), 0.4)
         if plan.likely(0.6):
-            plan.add("straight", plan.uniform(2.0, 7.0), plan.uniform(12.0, 20.0), lean_deg=0.0, slope_percent=before)
+            plan.add("straight", plan.uniform(2.0, 7.0), plan.uniform(12.0, 20.0), lean_deg=0.0, slope_percent=entry)
     plan.finish(plan.uniform(11.0, 16.0), 3.0)
     return Conditions(CLASS_B * plan.uniform(0.6, 2.0), plan.uniform(0.05, 0.2))
 

@@ -97,8 +97,8 @@ def ride(
         values, about 3 and 1.4.
     exact: True to make the ride exactly this long, if there is enough time to set off and stop.
 
-    >>> made = ride("parked", seed=1, seconds=20.0)
-    >>> made.rate_hz, len(made.poses), made.readings.shape == (len(made.time), 7)
+    >>> simulated = ride("parked", seed=1, seconds=20.0)
+    >>> simulated.rate_hz, len(simulated.poses), simulated.readings.shape == (len(simulated.time), 7)
     (200.0, 7, True)
     """
     chance = np.random.default_rng([seed, *profile.encode()])
@@ -112,15 +112,15 @@ def ride(
         bike = replace(bike, dive_deg_per_g=dive[0], squat_deg_per_g=dive[1])
     # The options have their own source of random numbers. So a seed without options gives the same ride as in versions
     # of this program without these options
-    more = np.random.default_rng([seed, *profile.encode(), 1])
+    option_chance = np.random.default_rng([seed, *profile.encode(), 1])
     if road is not None:
-        _rough(more, plan, conditions, CLASSES[road])
-    mounted = MOUNTS[mount](more, chip) if mount is not None else Mount(chip)
+        _rough(option_chance, plan, conditions, CLASSES[road])
+    mounted = MOUNTS[mount](option_chance, chip) if mount is not None else Mount(chip)
     if mounted.rise_c is not None:
         conditions.rise_c = mounted.rise_c
     chip = mounted.chip
     command = commands(plan.legs, RATE_HZ)
-    slip = _slip(more, command, conditions)
+    slip = _slip(option_chance, command, conditions)
     motion, extra = _motion(chance, command, bike, conditions)
     # An hour at 1 kHz needs 29 MB per column, so arrays are freed early. This requires that no array is a view of
     # another.

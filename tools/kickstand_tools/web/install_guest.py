@@ -15,11 +15,8 @@ from ..deploy import bytecode, check as board_check, config_check, config_text, 
 from ..deploy.firmware_files import CONFIG
 from .serial_guest import BrowserBoard
 
-OLDEST = (1, 23)  # oldest supported version of MicroPython
-PLATFORMS = ("rp2", "esp32")
 ROOT = Path("/packages")  # where page/python.mjs unpacks archives.install_archive()
 COMMON = "armv6m"  # the first of archives.ARCHITECTURES
-_VERSION = "(lambda s: (tuple(s.implementation.version[:2]), s.platform))(__import__('sys'))"
 _POSE = "(lambda s: (s.platform, getattr(s.implementation, '_machine', '')))(__import__('sys'))"
 
 
@@ -41,7 +38,7 @@ class Installation:
         try:
             with connection.connected(BrowserBoard(line, name)) as (transport, name):
                 try:
-                    board = _describe(transport, name)
+                    board = flash.describe_supported(transport, name)
                     self._pose = transport.eval(_POSE)
                     there = others.read(transport)
                 finally:
@@ -109,7 +106,7 @@ class Installation:
         try:
             replaces = text is not None and text != self._own
             board = BrowserBoard(line, name)
-            done = flash.flash(board, replaces, progress, describe=_describe, compiler=_compiled, judge=_judged)
+            done = flash.flash(board, replaces, progress, compiler=_compiled, judge=_judged)
         except InputError as error:
             return json.dumps({"refused": error.line(page=True)})
         installed = done.installed
@@ -140,17 +137,6 @@ def check(line, name, say):
         return json.dumps({"refused": error.line(page=True)})
     lines = [board_check.line(finding) for finding in checked.findings]
     return json.dumps({"text": "\n".join([*lines, board_check.verdict(checked.findings)])})
-
-
-def _describe(transport, name):
-    """Describe the board as connection.describe() does. Refuse a board on which Kickstand does not run."""
-    text = connection.describe(transport, name)
-    version, platform = transport.eval(_VERSION)
-    if version < OLDEST:
-        raise InputError(f"{text}: put MicroPython {OLDEST[0]}.{OLDEST[1]} or newer on the board first")
-    if platform not in PLATFORMS:
-        raise InputError(f"{text}: Kickstand runs on a Raspberry Pi Pico and on an ESP32")
-    return text
 
 
 def _written(value):

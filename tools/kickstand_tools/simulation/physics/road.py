@@ -65,8 +65,8 @@ def add_bumps(slope: Signal, places_m: list[float], height_m: float, length_m: f
     """Add bumps to a profile's slope, in place. A bump has the shape 1 - cos. places_m: distance of each bump."""
     n = int(length_m / _STEP_M)
     shape = np.pi * height_m / length_m * np.sin(2.0 * np.pi * np.arange(n) / n)
-    for place in places_m:
-        first = int(place / _STEP_M)
+    for distance in places_m:
+        first = int(distance / _STEP_M)
         if first + n < len(slope):
             slope[first : first + n] += shape
 

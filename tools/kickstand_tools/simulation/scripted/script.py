@@ -181,14 +181,14 @@ class Ride:
         The state is a tuple: (phase, lean, lean rate, speed, acceleration, yaw rate, slope, slope rate, distance,
         engine). The engine is 0 (off) to 1 (running).
         """
-        start, segment, before, after, distance = self._find(t_s)
+        start, segment, initial, final, distance = self._find(t_s)
         seconds = segment.seconds
         u = min(1.0, max(0.0, (t_s - start) / seconds)) if seconds else 1.0
-        lean, lean_rate = _glide(before[0], after[0], u, seconds)
-        speed, acceleration = _glide(before[1], after[1], u, seconds)
-        slope, slope_rate = _glide(before[2], after[2], u, seconds)
-        sway, sway_rate = _glide(before[3], after[3], u, seconds)
-        engine, _ = _glide(before[4], after[4], u, seconds)
+        lean, lean_rate = _glide(initial[0], final[0], u, seconds)
+        speed, acceleration = _glide(initial[1], final[1], u, seconds)
+        slope, slope_rate = _glide(initial[2], final[2], u, seconds)
+        sway, sway_rate = _glide(initial[3], final[3], u, seconds)
+        engine, _ = _glide(initial[4], final[4], u, seconds)
         for hz, share, phase in _SWAY:
             angle = 2.0 * pi * hz * t_s + phase
             lean += sway * share * sin(angle)
@@ -197,9 +197,9 @@ class Ride:
         slope, slope_rate = radians(slope), radians(slope_rate)
         # The distance needs the integral of _glide(), which is u^6 - 3 u^5 + 2.5 u^4
         glided = u * u * u * u * (2.5 + u * (u - 3.0))
-        distance += seconds * (before[1] * u + (after[1] - before[1]) * glided)
+        distance += seconds * (initial[1] * u + (final[1] - initial[1]) * glided)
         if t_s > self.seconds:
-            distance += after[1] * (t_s - self.seconds)
+            distance += final[1] * (t_s - self.seconds)
         lift = STANDARD_GRAVITY * cos(slope) + speed * slope_rate
         yaw = yaw_rate_in_balance(lean, lift, speed) / cos(slope)  # about the vertical
         return segment.phase, lean, lean_rate, speed, acceleration, yaw, slope, slope_rate, distance, engine

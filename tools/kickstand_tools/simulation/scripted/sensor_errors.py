@@ -128,20 +128,20 @@ def resting(sensor, up):
     m = sensor.vehicle_from_sensor
     size = sqrt(up[0] * up[0] + up[1] * up[1] + up[2] * up[2])
     force = [(m[3 * i] * up[0] + m[3 * i + 1] * up[1] + m[3 * i + 2] * up[2]) / size for i in range(3)]
-    still = (force[0], force[1], force[2], 0.0, 0.0, 0.0)
-    return sensor.world(lambda t_s: still)
+    motion = (force[0], force[1], force[2], 0.0, 0.0, 0.0)
+    return sensor.world(lambda t_s: motion)
 
 
-def turning(sensor, before, after, begin_s, end_s):
+def turning(sensor, first, last, begin_s, end_s):
     """Return the function world(t_s) of a sensor that a hand turns from one pose to the next.
 
     The hand takes the shortest rotation, and turns slowly at both ends.
 
-    before, after: Vertical vectors of any length in the sensor's axes, in the two poses.
+    first, last: Vertical vectors of any length in the sensor's axes, in the two poses.
     begin_s, end_s: Times at which the turn begins and ends.
     """
     m = sensor.vehicle_from_sensor
-    a, b = _unit(before), _unit(after)
+    a, b = _unit(first), _unit(last)
     n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
     size, along = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     angle = atan2(size, along)
@@ -154,9 +154,9 @@ def turning(sensor, before, after, begin_s, end_s):
 
     def motion(t_s):
         u = min(1.0, max(0.0, (t_s - begin_s) / (end_s - begin_s)))
-        at = angle * u * u * u * (10.0 + u * (6.0 * u - 15.0))
+        turned = angle * u * u * u * (10.0 + u * (6.0 * u - 15.0))
         rate = angle * 30.0 * u * u * (1.0 - u) * (1.0 - u) / (end_s - begin_s)
-        up = [cos(at) * a[i] + sin(at) * across[i] for i in range(3)]
+        up = [cos(turned) * a[i] + sin(turned) * across[i] for i in range(3)]
         # Negative, because `up` seems to turn in the direction opposite to the sensor's rotation
         turn = [-degrees(rate) * n[i] for i in range(3)]
         return tuple(
