@@ -7,7 +7,7 @@ import pytest
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.deploy import check
 from kickstand_tools.simulated_board.i2c import OPEN
-from kickstand_tools.simulated_board.mpu6050 import FIFO_COUNTH, FIFO_COUNTL, PWR_MGMT_1, Fifo
+from kickstand_tools.simulated_board.mpu6050 import FIFO_COUNTH, FIFO_COUNTL, Fifo
 from kickstand_tools.simulated_board.other_devices import Registers
 from support import command
 from support.checked_board import CheckedBoard, part
@@ -111,15 +111,12 @@ DEFECTS = {
     "gyro z biased": ("bias, gyro z", changed(5, lambda value, t_s: value + 45), None),
     "accelerometer off": ("bias, accelerometer", changed(2, lambda value, t_s: value + 0.6), None),
     "hot": ("temperature", lambda t_s: (*REST(t_s)[:6], 95.0), None),
-    "self-test of gyro y": ("self-test, gyro y", REST, model(self_test=[1, 1, 1, 1, 0.7, 1])),
     "sample clock": ("sample clock", REST, model(clock_error=0.05)),
-    "FIFO stays empty": ("FIFO", REST, model(_queue=lambda: None)),
     "FIFO stays full": ("FIFO", REST, answered(lambda at, value, n: {FIFO_COUNTH: 4, FIFO_COUNTL: 0}.get(at, value))),
     "FIFO of half the size": ("FIFO under load", REST, model(fifo=Fifo(512))),
     "transfers fail": ("I2C errors", REST, some_nacks("sensor", 150)),
     "wrong answers": ("I2C errors", REST, answered(lambda at, value, n: value ^ 16 * (at == 0x75 and n % 300 == 0))),
     "standby": ("sensor", REST, answered(lambda at, value, n: 0x07 if at == PWR_MGMT_2 else value)),
-    "asleep": ("sensor", REST, answered(lambda at, value, n: value | 0x40 if at == PWR_MGMT_1 else value)),
     "no sensor": ("sensor", REST, lambda board: board.remove_sensor()),
     "another chip": ("sensor", REST, replaced_by(lambda board: Registers(0x68, {WHO_AM_I: 0x47}))),
     "an open wire": ("sensor", REST, lambda board: setattr(board.sensor_bus, "sda_wire", OPEN)),
@@ -128,7 +125,6 @@ DEFECTS = {
     "a display with a bad contact": ("display", REST, some_nacks("lcd", 40)),
     "button stuck": ("button", REST, lambda board: setattr(board.button, "closed", True)),
     "slow flash": ("flash", REST, faulty("slow_flash", (0, 1e6, 0.6))),
-    "full flash": ("flash", REST, faulty("disk_full", (0, 1e6))),
     "busy": ("longest turn", REST, faulty("busy", *((5 + k, 0.25) for k in range(80)))),
 }  # fmt: skip
 OFTEN = ("gyro x dead", "gyro y noisy", "gyro z biased", "FIFO of half the size", "transfers fail", "standby",
@@ -207,6 +203,3 @@ def test_board_that_cannot_be_checked_is_refused(port, error, words):
     with pytest.raises(InputError, match=words):
         check.check("P")
     assert b"machine.reset()" in port.programs[-1]
-
-
-# The order of the measurements, with a board that answers with fixed values

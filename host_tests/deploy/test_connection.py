@@ -1,11 +1,9 @@
 """How a board is found, opened, asked and left. The computer's serial port and its clock are simulated."""
 
 import errno
-import os
 from types import SimpleNamespace
 
 import pytest
-import serial
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.deploy import connection
 from mpremote.transport import TransportError
@@ -91,30 +89,6 @@ def test_port_that_cannot_be_opened_is_explained(port, error, name, message):
 def test_port_that_opens_at_the_second_attempt_is_reported(port):
     assert str(connection.why_closed("P")).startswith("P could not be opened at first, but now it can: try again")
     assert port.closed == 1
-
-
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("/dev/tty-no-such-port", "there is no port /dev/tty-no-such-port"),
-        ("socket://127.0.0.1:1", "nothing listens at socket://127.0.0.1:1"),
-        ("telepathy://board", "is not a port"),
-    ],
-)
-def test_missing_port_is_refused_by_the_command(tmp_path, monkeypatch, name, message):
-    monkeypatch.setattr(connection, "RETURN_S", 0)
-    command.refused(tmp_path, "flash", "--port", name, words=message)
-
-
-@pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals are of Unix")
-def test_port_of_another_program_is_in_use(tmp_path, monkeypatch):
-    monkeypatch.setattr(connection, "RETURN_S", 0)
-    parent, child = os.openpty()
-    name = os.ttyname(child)
-    with serial.Serial(name, exclusive=True):
-        command.refused(tmp_path, "flash", "--port", name, words=f"{name} is in use")
-    for descriptor in (parent, child):
-        os.close(descriptor)
 
 
 # The prompt

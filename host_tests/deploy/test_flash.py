@@ -168,12 +168,9 @@ def test_edited_config_is_kept_unless_requested(board, config):
     [
         ({"main": WEATHER}, ["main"]),
         ({"main": b"from kickstand.start import main\nimport mine\nmain()\n"}, ["main"]),
-        ({"main": b"\xff\xfe\0binary"}, ["main"]),
         ({"boot": b"import webrepl\nwebrepl.start()\n"}, ["boot"]),
         ({"boot": b"# This file is executed on every boot\n#import esp\n"}, []),
-        ({"boot": b"'text'\n"}, []),
         ({"config": WIFI}, ["config"]),
-        ({"config": b"ssid = 'home'\n"}, ["config"]),
         ({"config": b"DISPLAY = 'ST7789'\nPASSWORD = 'x'\n"}, ["config"]),
         ({"config": b"DISPLAY = 'auto'\nSIDE = 'left'\n"}, []),
         ({"config": "WLAN = 'Caf\xe9'".encode("latin-1")}, ["config"]),

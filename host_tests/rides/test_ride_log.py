@@ -50,18 +50,6 @@ def test_row_has_the_speed_and_the_place_of_its_pass():
 
 
 @pytest.mark.parametrize(
-    ("speed", "every", "columns"),
-    [(False, 0, []), (False, 10, ["lat_deg", "lon_deg", "utc_s"]), (True, 10, list(TRACK))],
-)
-def test_log_has_no_empty_columns(speed, every, columns, tmp_path):
-    blocks, _ = block_reader.read(b"".join(ride_writer.blocks(1, speed=speed, places_every=every)[0]))
-    ride_log.write(tmp_path / "ride.csv", blocks)
-    header, first = (tmp_path / "ride.csv").read_text().splitlines()[:2]
-    assert header.split(",")[7:] == [*columns, "temp_c"]
-    assert not columns or first.split(",")[-4:] == ["-33.8687242", "-179.9999998", "1798761582.100", "31.25"]
-
-
-@pytest.mark.parametrize(
     ("turns", "sample_hz", "missing_s"),
     [
         # The samples are 5 ms apart. Two samples may be late by two sample periods.
@@ -73,11 +61,6 @@ def test_log_has_no_empty_columns(speed, every, columns, tmp_path):
 )
 def test_pass_that_is_late_by_over_two_samples_is_a_gap(turns, sample_hz, missing_s):
     assert block(turns, sample_hz=sample_hz).missing_s() == missing_s
-
-
-def test_gaps_are_counted_in_words():
-    assert block_reader.missing_note([1.25]).startswith("readings are missing once, 1.2 s in all")
-    assert block_reader.missing_note([1.0, 2.0]).startswith("readings are missing 2 times, 3.0 s in all")
 
 
 def test_replay_subtracts_the_delay_of_the_ride(tmp_path):
@@ -116,13 +99,6 @@ def streamed(*blocks, live=None, writes=99):
     return log, file.getvalue().splitlines(), notes, stopped.is_set()
 
 
-def test_stream_is_a_log_from_its_first_block():
-    log, (header, *rows), notes, stopped = streamed(block(), block(sequence=1, time_us=1_020_000))
-    assert header.startswith("t_s,ax_g") and header.endswith("utc_s,temp_c")
-    assert [row.partition(",")[0] for row in rows] == ["0.010000", "0.020000", "0.030000", "0.040000"]
-    assert (log.count, log.seconds, log.written, notes, stopped) == (4, 0.04, True, [], False)
-
-
 def test_lost_blocks_and_gaps_of_a_stream_are_noted():
     notes = streamed(block(sequence=2), block(sequence=5, time_us=2_000_000))[2]
     assert notes == ["4 blocks of half a second did not arrive: the log has gaps"]  # the lost blocks are 0, 1, 3 and 4
@@ -137,13 +113,3 @@ def test_stream_ends_with_a_full_disk_or_a_new_calibration():
     assert notes[0].startswith("writing the log failed (")
     log, _, notes, stopped = streamed(block(), block(sequence=1, bias=1.0), block(sequence=2))
     assert (log.count, notes, stopped) == (2, [CHANGED], True)
-
-
-@pytest.mark.parametrize("vehicle", ["car", "motorcycle"])
-def test_live_readings_without_an_alignment(vehicle):
-    readings: list = []
-    streamed(block(vehicle=vehicle), block(sequence=1, time_us=1_020_000), live=readings.append)
-    first, second = readings
-    assert (first.aligned, first.car, first.rate_hz, first.seconds) == (False, vehicle == "car", 100.0, 0.02)
-    assert first.moments == [(0.01, None, None, None), (0.02, None, None, None)] and second.seconds == 0.04
-    assert (first.max_left_deg, first.max_right_deg, first.max_accel_g, first.max_brake_g) == (0.0,) * 4

@@ -171,14 +171,15 @@ CLASSIC = (1, 3, 6, 7, 8, 9, 10, 11)
     [
         ("ESP32", CLASSIC),
         ("ESP32-UNICORE", CLASSIC),
-        ("ESP32-PICO-D4", CLASSIC),
-        ("ESP32-D2WD", CLASSIC),
+        ("ESP32-PICO-D4", (*CLASSIC, 16, 17)),  # the flash in the package
+        ("ESP32-D2WD", (*CLASSIC, 16, 17)),
         ("ESP32-S2", (19, 20)),
         ("ESP32S3", (19, 20)),
         ("ESP32C3", (18, 19)),
+        ("ESP32C5", (13, 14)),
         ("ESP32C6", (12, 13)),
         ("ESP32H2", (26, 27)),
-        ("ESP32P4", ()),
+        ("ESP32P4", (24, 25)),
     ],
 )
 def test_pins_that_the_chip_needs_are_taken(chip, taken, port_of):
@@ -186,7 +187,7 @@ def test_pins_that_the_chip_needs_are_taken(chip, taken, port_of):
     outputs. An unknown board has no usual pins."""
     port = port_of(f"Some board with {chip}")
     assert port.IS_ESP32 and port.TAKEN_PINS == taken
-    assert port.INPUT_PINS == ((34, 35, 36, 37, 38, 39) if taken == CLASSIC else ())
+    assert port.INPUT_PINS == ((34, 35, 36, 37, 38, 39) if taken[:8] == CLASSIC else ())
     assert (
         port.SENSOR_PINS == port.LCD_PINS == port.GPS_PINS == (None, None) and port.BUTTON_PIN is port.WHEEL_PIN is None
     )

@@ -176,11 +176,7 @@ def connected(
     else:
         transport, name = port, port.device_name
     try:
-        if before:
-            with contextlib.suppress(TransportError, InputError), contextlib.redirect_stdout(io.StringIO()):
-                transport.enter_raw_repl(soft_reset=False, timeout_overall=_STARTING_S)
-                before(transport)
-        _enter_raw_prompt(transport, name)
+        _enter_raw_prompt(transport, name, before)
         yield transport, name
     except TransportExecError as error:
         said = last_line(error.error_output)
@@ -384,11 +380,20 @@ def last_line(text: str) -> str:
     return text.strip().rpartition("\n")[2].strip() or "an unknown error"
 
 
-def _enter_raw_prompt(transport: SerialTransport, name: str) -> None:
-    """Send Ctrl-C, then a soft reset into the raw prompt. This soft reset does not start main.py."""
+def _enter_raw_prompt(
+    transport: ConnectedBoard, name: str, before: Callable[[ConnectedBoard], None] | None = None
+) -> None:
+    """Send Ctrl-C, then a soft reset into the raw prompt. This soft reset does not start main.py.
+
+    before: see connected().
+    """
     for limit_s in (_STARTING_S, ANSWER_S):  # a board may reset when its port is opened, and then needs time to start
         try:
             with contextlib.redirect_stdout(io.StringIO()):  # mpremote prints output that it cannot interpret
+                if before:
+                    transport.enter_raw_repl(soft_reset=False, timeout_overall=limit_s)
+                    with contextlib.suppress(TransportError, InputError):
+                        before(transport)
                 transport.enter_raw_repl(timeout_overall=limit_s)
             return
         except TransportError:

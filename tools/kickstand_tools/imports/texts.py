@@ -3,6 +3,7 @@
 Spreadsheets and apps write numbers as their user's country does: -1,029.5 may be -1.029,5 or U+2212 and digits.
 """
 
+import contextlib
 import csv
 import io
 import json
@@ -27,9 +28,11 @@ def plain_text(text: str) -> str:
     if not text.isascii() or "'" in text:
         text = _BLANK.sub("", _MINUS.sub("-", text))
     votes = [_decimal_comma(line) for line in text.split("\n", LOOKED_AT)[:LOOKED_AT]]
+    if votes.count(False) > len(votes) / 2:
+        return text
     if any("." in cell[0] for cell in _COMMAS.finditer(text)):  # 1,029.5
         return _COMMAS.sub(lambda cell: cell[0].replace(",", ""), text)
-    if sum(vote is True for vote in votes) <= sum(vote is False for vote in votes):
+    if votes.count(True) <= votes.count(False):
         return text
     if any("," in cell[0] for cell in _POINTS.finditer(text)):  # 1.029,5
         text = _POINTS.sub(lambda cell: cell[0].replace(".", ""), text)
@@ -39,7 +42,9 @@ def plain_text(text: str) -> str:
 def _decimal_comma(line: str) -> bool | None:
     """True if the line has numbers with a decimal comma. False if commas separate its cells. None without commas."""
     cells = [cell for cell in _BETWEEN.split(line) if cell.strip(",")]
-    if any(cell.count(",") > 1 or cell.endswith(",") or cell.startswith(",") for cell in cells):
+    if any(cell.endswith(",") or cell.startswith(",") for cell in cells):
+        return False
+    if any(cell.count(",") > 1 and (len(cells) == 1 or not _COMMAS.fullmatch(cell)) for cell in cells):
         return False
     return True if len(cells) > 1 and any(map(_COMMA_NUMBER.fullmatch, cells)) else None
 
@@ -53,8 +58,10 @@ def _rows_of_json(text: str) -> str:
         found = list(_objects(text))
     if isinstance(found, dict):
         lists = {name: values for name, values in found.items() if isinstance(values, list)}
-        of_objects = [values for values in lists.values() if values and isinstance(values[0], dict)]
-        found = max(of_objects, key=len) if of_objects else [dict(zip(lists, row)) for row in zip(*lists.values())]
+        found = [row | {"sensor": name} for name, rows in lists.items() for row in rows if isinstance(row, dict)]
+        found = found or [dict(zip(lists, row)) for row in zip(*lists.values())]
+        with contextlib.suppress(TypeError):
+            found.sort(key=lambda row: next(iter(row.values())))  # by time
     rows = [dict(_flat(row)) for row in found if isinstance(row, dict)]
     if len(rows) < FEWEST_ROWS:
         return text
