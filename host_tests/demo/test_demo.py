@@ -154,15 +154,22 @@ def test_a_changed_page_is_printed_at_once_and_its_values_every_250_ms(device):
 
 
 def test_the_device_obeys_its_commands():
-    """It sends a state every 50 ms of its time. A pause stops its time."""
+    """It sends a state every 50 ms of its time, which a second pause continues."""
     with DeviceProcess("cpython", "hand", 20.0) as process:
         states: list = []
 
+        def each():
+            """Yield all states as they come."""
+            while not process.ended:
+                for state in process.ticks(10.0):
+                    assert state["t_s"] < 100.0
+                    states.append(state)
+                    yield state
+
+        coming = each()
+
         def until(condition):
-            while not states or not condition(states[-1]):
-                states.extend(process.ticks(10.0))
-                assert not process.ended and (not states or states[-1]["t_s"] < 100.0)
-            return states[-1]
+            return next(state for state in coming if condition(state))
 
         until(lambda state: "On stand: press" in " ".join(state["lcd"]))
         process.send("upright")
@@ -171,14 +178,12 @@ def test_the_device_obeys_its_commands():
         until(lambda state: state["pressed"])
         until(lambda state: not state["pressed"])
         process.send("pause")
-        while new := process.ticks(0.3):
-            states.extend(new)
         process.send("pause")
-        count = len(states)
-        until(lambda state: len(states) > count)
+        resumed_s = states[-1]["t_s"] + 1.0
+        until(lambda state: state["t_s"] > resumed_s)
         process.send("quit")
-        while not process.ended:
-            process.ticks(10.0)
+        for _ in coming:
+            pass
     assert not process.failed
     assert [round(20 * state["t_s"]) for state in states] == list(range(1, len(states) + 1))
     assert {state["of_s"] for state in states} == {None}
