@@ -32,8 +32,8 @@ def ride(lat_deg=52.5, lon_deg=13.4, gap=False):
     return overview(api.open_ride(log, ALIGNED))
 
 
-def points_of(seen):
-    points = track_map.map_points(seen)
+def points_of(ride_overview):
+    points = track_map.map_points(ride_overview)
     assert points is not None
     return points
 
@@ -87,8 +87,8 @@ def test_the_map_has_left_blue_right_orange_and_north_up():
 
 def track(n=301, step_s=1.0, vehicle="motorcycle", **columns):
     """Return a ride whose positions go north by 1.1 m per sample."""
-    places = {"lat_deg": 10.0 + np.arange(n) * 1e-5, "lon_deg": 8.0} | columns
-    return overview_of(samples(n, step_s=step_s, **places), vehicle=vehicle)
+    positions = {"lat_deg": 10.0 + np.arange(n) * 1e-5, "lon_deg": 8.0} | columns
+    return overview_of(samples(n, step_s=step_s, **positions), vehicle=vehicle)
 
 
 def test_a_track_is_in_metres_from_its_middle():
@@ -105,9 +105,9 @@ def test_a_track_is_in_metres_from_its_middle():
 
 @pytest.mark.parametrize(("vehicle", "lean"), [("motorcycle", True), ("car", False)])
 def test_the_points_of_a_map_have_time_lean_and_speed(vehicle, lean):
-    seen = track(lean_deg=np.arange(301) / 10.0, speed_mps=10.0, vehicle=vehicle)
-    points = points_of(seen)
-    line, dots = track_map.figure(points, seen)["data"]
+    ride_overview = track(lean_deg=np.arange(301) / 10.0, speed_mps=10.0, vehicle=vehicle)
+    points = points_of(ride_overview)
+    line, dots = track_map.figure(points, ride_overview)["data"]
     assert line["customdata"][0] == [0.0, 0.0, 36.0] and line["customdata"][-1][0] == pytest.approx(300.0, abs=1.0)
     assert dots["customdata"] == [row[0] for row in line["customdata"]] and len(dots["x"]) == len(line["x"])
     assert dots["customdata"] == pytest.approx(points.t_s, abs=0.051)
@@ -119,8 +119,8 @@ def test_the_points_of_a_map_have_time_lean_and_speed(vehicle, lean):
 
 
 def test_a_lean_that_is_not_trusted_has_no_dot_on_the_map():
-    seen = track(sure=np.where(np.arange(301) < 150, 0.0, 1.0))
-    line, dots = track_map.figure(points_of(seen), seen)["data"]
+    ride_overview = track(sure=np.where(np.arange(301) < 150, 0.0, 1.0))
+    line, dots = track_map.figure(points_of(ride_overview), ride_overview)["data"]
     assert line["customdata"][0][1] is None and line["customdata"][-1][1] == 0.0
     assert min(dots["customdata"]) == pytest.approx(150.0, abs=1.0) and len(dots["x"]) < len(line["x"])
 

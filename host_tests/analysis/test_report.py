@@ -22,8 +22,8 @@ from support.recordings import analysis_rides
 EXCHANGED = ForwardExchanged(False, "left", 0.0)
 
 
-def rows_of(seen):
-    return {name: (value, time) for name, value, time in report.words(seen).ride}
+def rows_of(ride_overview):
+    return {name: (value, time) for name, value, time in report.words(ride_overview).ride}
 
 
 def test_the_rows_of_a_report():
@@ -52,11 +52,11 @@ def test_the_rows_of_a_report():
     ],
 )
 def test_uncertain_and_missing_time_is_reported(times_s, rows):
-    seen = overview_of(samples(1000))
-    seen.summary.not_sure_s, seen.summary.missing_s, seen.summary.frozen_s = times_s
-    words = {name: value for name, (value, _) in rows_of(seen).items()}
+    ride_overview = overview_of(samples(1000))
+    ride_overview.summary.not_sure_s, ride_overview.summary.missing_s, ride_overview.summary.frozen_s = times_s
+    words = {name: value for name, (value, _) in rows_of(ride_overview).items()}
     assert {name: words[name] for name in ("Lean not sure", "No readings", "Readings frozen") if name in words} == rows
-    assert report.as_data(seen)["lean_unsure_s"] == times_s[0]
+    assert report.as_data(ride_overview)["lean_unsure_s"] == times_s[0]
 
 
 @pytest.mark.parametrize(
@@ -97,9 +97,9 @@ def test_contradictions_hide_figures():
     assert set(data["alignment"].values()) == set(data["lean_cost"].values()) == {None}
 
 
-def terminal(seen):
+def terminal(ride_overview):
     console = Console(width=80, record=True, file=io.StringIO())
-    console.print(report.page(seen))
+    console.print(report.page(ride_overview))
     return console.export_text().splitlines()
 
 
@@ -164,9 +164,9 @@ def test_the_shortest_log_is_reported_and_drawn(tmp_path):
     pytest.importorskip("matplotlib")
     pytest.importorskip("plotly")
     log = command.still(tmp_path / "log.csv", (0, 1, 0), seconds=0.02)
-    seen = overview(open_ride(log, analysis_rides.calibration(tmp_path / "log.cal.json")))
-    assert "all of it standing" in report.words(seen).too_little
-    picture.draw(tmp_path / "x.png", seen)
+    ride_overview = overview(open_ride(log, analysis_rides.calibration(tmp_path / "log.cal.json")))
+    assert "all of it standing" in report.words(ride_overview).too_little
+    picture.draw(tmp_path / "x.png", ride_overview)
 
 
 def test_plot_refuses_files_as_directories(short_ride, tmp_path):

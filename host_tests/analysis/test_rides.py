@@ -141,8 +141,8 @@ def test_a_standing_bike_is_not_riding(log, rides):
 @pytest.mark.parametrize("speed_hz", [0, 5])
 def test_riding_time_excludes_standing(tmp_path, speed_hz):
     """The bike stands for 4 s before the ride and for 4 s after it."""
-    seen = overview(api.open_ride(analysis_rides.short(tmp_path, speed_hz=speed_hz, rate_hz=50)))
-    assert seen.summary.duration_s - seen.riding_s == pytest.approx(8.0, abs=2.0)
+    ride_overview = overview(api.open_ride(analysis_rides.short(tmp_path, speed_hz=speed_hz, rate_hz=50)))
+    assert ride_overview.summary.duration_s - ride_overview.riding_s == pytest.approx(8.0, abs=2.0)
 
 
 def test_a_speed_that_is_always_0_is_no_speed(tmp_path):
@@ -150,9 +150,13 @@ def test_a_speed_that_is_always_0_is_no_speed(tmp_path):
     log = api.read_log(analysis_rides.short(tmp_path, rate_hz=50))
     riding_s = overview(api.open_ride(log, ALIGNED)).riding_s
     log.speed_mps[::20] = 0.0
-    seen = overview(api.open_ride(log, ALIGNED))
-    assert not seen.has_speed and np.all(np.isnan(seen.course.speed_mps)) and seen.riding_s == riding_s > 20.0
+    ride_overview = overview(api.open_ride(log, ALIGNED))
+    assert (
+        not ride_overview.has_speed
+        and np.all(np.isnan(ride_overview.course.speed_mps))
+        and ride_overview.riding_s == riding_s > 20.0
+    )
     log.speed_mps[::40] = 5.0
-    seen = overview(api.open_ride(log, ALIGNED))
-    assert seen.has_speed and np.nanmax(seen.course.speed_mps) == 5.0
-    assert np.all(np.isnan(seen.course.temp_c)) and np.all(np.isnan(seen.course.utc_s))
+    ride_overview = overview(api.open_ride(log, ALIGNED))
+    assert ride_overview.has_speed and np.nanmax(ride_overview.course.speed_mps) == 5.0
+    assert np.all(np.isnan(ride_overview.course.temp_c)) and np.all(np.isnan(ride_overview.course.utc_s))

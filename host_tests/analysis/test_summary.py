@@ -37,6 +37,7 @@ def test_samples_are_averaged_over_each_stretch():
     assert thin.lean_deg == pytest.approx([2.0, 5.0, NAN], nan_ok=True)
     assert thin.lat_deg == pytest.approx([2.0, 3.0, NAN], nan_ok=True)
     assert thinned(course, 0.01) is course and len(thinned(course, 0.02).t_s) == 3
+    assert len(thinned(samples(2, t_s=np.array([0.004, 0.016])), 0.02).t_s) == 1
     assert rounded_to(np.array([0.014, 0.016]), 0.01) == pytest.approx([0.01, 0.02])
     assert spacing_s(course) == pytest.approx(0.01) and spacing_s(samples(1)) == 1.0
 
@@ -70,10 +71,10 @@ def test_a_maximum_of_the_lean_must_be_held(size):
 def test_a_summary_by_hand():
     """The bike leans by 30 degrees from 2 to 4 s, and by 40 degrees from 4 to 5 s. From 6 to 7 s the lean is uncertain.
     From 8 s on the bike is at rest."""
-    t_s, lean, sure, rest = np.arange(1000) / 100.0, np.zeros(1000), np.ones(1000), np.zeros(1000)
-    lean[200:400], lean[400:500], lean[600:700], sure[600:700], rest[800:] = 30.0, 40.0, 60.0, 0.0, 1.0
-    shown = np.where(t_s < 1.0, 0.3, np.where(t_s < 2.0, -0.6, np.where(sure > 0.0, 0.0, 2.0)))
-    total = summary(samples(1000, lean_deg=lean, sure=sure, resting=rest, shown_g=shown, speed_mps=t_s))
+    t_s, lean, sure, resting = np.arange(1000) / 100.0, np.zeros(1000), np.ones(1000), np.zeros(1000)
+    lean[200:400], lean[400:500], lean[600:700], sure[600:700], resting[800:] = 30.0, 40.0, 60.0, 0.0, 1.0
+    displayed_g = np.where(t_s < 1.0, 0.3, np.where(t_s < 2.0, -0.6, np.where(sure > 0.0, 0.0, 2.0)))
+    total = summary(samples(1000, lean_deg=lean, sure=sure, resting=resting, shown_g=displayed_g, speed_mps=t_s))
     assert (total.accel_g.value, total.brake_g.value, total.brake_g.time_s) == (0.3, 0.6, 1.0)
     assert total.beyond_s == pytest.approx({30.0: 3.0, 40.0: 1.0}) and total.not_sure_s == pytest.approx(1.0)
     assert total.riding_s == pytest.approx(8.0, abs=0.011)
@@ -89,6 +90,7 @@ def test_time_without_readings_is_missing():
     total = summary(samples(500, t_s=t_s + 7.0))
     assert (total.missing_s, total.duration_s, total.riding_s) == pytest.approx((3.01, 7.99, 4.98))
     assert summary(samples(100, step_s=0.5)).missing_s == 0.0  # two samples per second are no gaps
+    assert (summary(samples(1)).samples, summary(samples(1)).duration_s) == (1, 0.0)
 
 
 def test_the_alignment_of_a_straight_ride_by_hand():
@@ -115,8 +117,8 @@ def test_an_error_of_the_alignment_costs_lean():
 
 def test_positions_are_interpolated_except_in_gaps():
     """From -179 to 179 degrees the short way crosses the meridian of 180 degrees."""
-    places = LogTrack(np.array([0.0, 4.0, 10.0]), np.array([1.0, 3.0, 4.0]), np.array([179.0, -179.0, -178.0]))
-    lat, lon = places.at(np.array([-1.0, 0.0, 1.0, 4.0, 7.0, 10.0, 11.0]))
+    positions = LogTrack(np.array([0.0, 4.0, 10.0]), np.array([1.0, 3.0, 4.0]), np.array([179.0, -179.0, -178.0]))
+    lat, lon = positions.at(np.array([-1.0, 0.0, 1.0, 4.0, 7.0, 10.0, 11.0]))
     assert lat == pytest.approx([NAN, 1.0, 1.5, 3.0, NAN, 4.0, NAN], nan_ok=True)
     assert lon == pytest.approx([NAN, 179.0, 179.5, -179.0, NAN, -178.0, NAN], nan_ok=True)
     assert not np.isnan(LogTrack(np.array([0.0, 5.0]), np.zeros(2), np.zeros(2)).at(np.array([2.0]))[0][0])
@@ -131,17 +133,17 @@ def test_channels_and_maxima_are_those_of_the_display(tmp_path):
     """The channels equal the firmware's meter at each step."""
     ride = open_ride(analysis_rides.short(tmp_path, rate_hz=50))
     log, engine = reader.read_log(ride.log), replay_engine.Replay(ride.calibration.to_firmware())
-    rows, shown, rolling, trusted = [], [], [], []
+    rows, displayed_g, rolling, trusted = [], [], [], []
     for row in log.rows():
         rows.append(engine.step(*row))
-        shown.append(engine.meter.smooth_force[2])
+        displayed_g.append(engine.meter.smooth_force[2])
         rolling.append(engine.meter.filter.rolling)
         trusted.append(engine.meter.trusted)
     course, meter = joined(list(ride.blocks())), engine.meter
     for name, column in zip(replay_engine.COLUMNS, np.transpose(rows)):
         if name not in ("static_lean_deg", "lean_formula_deg", "lean_sigma_deg"):
             assert np.max(np.abs(getattr(course, name) - column)) < 1e-5, name
-    assert np.array_equal(course.shown_g, shown) and np.array_equal(course.trusted, trusted)
+    assert np.array_equal(course.shown_g, displayed_g) and np.array_equal(course.trusted, trusted)
     assert np.array_equal(course.rolling, rolling) and 0.2 < np.mean(rolling) < 0.9  # bends and straights
     total = summary(course)
     # the display finds maxima in windows of 150 ms that begin every 75 ms, the summary in windows from every sample

@@ -1,14 +1,11 @@
 """Commands of other packages are found by their entry points. Any error of a command is one line with its status."""
 
-import os
 import signal
 import subprocess
 import sys
 
 import pytest
 from kickstand_tools.cli import main
-from kickstand_tools.common import plugins
-from kickstand_tools.common.errors import InputError
 from support import command
 
 LAPS = '''
@@ -110,22 +107,6 @@ def test_own_command_cannot_be_replaced(install):
     install("[kickstand.commands]\nreport = lap_timer:laps_command\n")
     for arguments in (["report", "--help"], ["--help"]):
         assert "Split a ride into laps" not in command.works(*arguments).out
-
-
-def test_unreadable_metadata_adds_no_command(install):
-    install("[kickstand.commands]\nlaps\n")
-    assert "laps " not in command.works("--help").out and "No such command 'laps'" in command.run("laps").err
-
-
-def test_projects_own_part_is_preferred(install):
-    install("[kickstand.simulations]\nfleet = os:sep\nroad = os:linesep\n[other]\nx = os:name\n")
-    assert callable(plugins.part("kickstand.simulations", "fleet"))
-    assert plugins.part("kickstand.simulations", "road") == os.linesep
-    assert {"fleet", "road"} <= set(plugins.entry_points("kickstand.simulations")) and "x" not in plugins.entry_points(
-        "kickstand.simulations"
-    )
-    with pytest.raises(InputError, match="the part c of kickstand-lean is not installed"):
-        plugins.part("kickstand.simulations", "c")
 
 
 def test_users_own_script_is_not_run(tmp_path):

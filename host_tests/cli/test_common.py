@@ -1,7 +1,6 @@
 """What all commands share: files written completely or not at all, times, drawings, templates, messages, progress."""
 
 import contextlib
-import gzip
 import io
 import os
 import pickle
@@ -11,9 +10,8 @@ import sys
 import time
 from pathlib import Path
 
-import jinja2
 import pytest
-from kickstand_tools.common import errors, firmware_path, messages, output, progress, svg, templates, times, unix_port
+from kickstand_tools.common import errors, firmware_path, messages, output, progress, unix_port
 from kickstand_tools.common.errors import InputError, RefusedInput
 from kickstand_tools.common.messages import Message, Plain, Remedy, WrongAxes
 from support.watched_stderr import Watched
@@ -115,72 +113,7 @@ def test_file_that_the_shell_has_opened_is_not_replaced(name, tmp_path):
     assert "this command's own input or output" in done.stderr and (tmp_path / "log").read_text() == "before\n"
 
 
-def test_only_names_that_end_in_gz_are_packed(tmp_path):
-    for name in ("a.csv", "a.csv.gz"):
-        output.write_packed(tmp_path / name, [b"one\n", b"two\n"])
-    assert (tmp_path / "a.csv").read_bytes() == gzip.decompress((tmp_path / "a.csv.gz").read_bytes()) == b"one\ntwo\n"
-    with pytest.raises(InputError, match="cannot be written"):
-        output.write_packed(tmp_path / "none" / "a.csv", [b""])
-
-
-@pytest.mark.parametrize("error", [None, KeyboardInterrupt])
-def test_only_new_and_empty_directories_are_removed(error, tmp_path):
-    (tmp_path / "old").mkdir()
-    for name in ("old", "new/empty", "new/filled"):
-        with contextlib.suppress(KeyboardInterrupt), output.new_directory(tmp_path / name):
-            if name == "new/filled":
-                (tmp_path / name / "file").write_text("")
-            if error:
-                raise error
-    assert sorted(path.name for path in tmp_path.rglob("*")) == ["file", "filled", "new", "old"]
-    output.make_directory(tmp_path / "e" / "f")
-    output.make_directory(tmp_path / "e" / "f")
-    for make in (output.make_directory, lambda path: output.new_directory(path).__enter__()):
-        with pytest.raises(InputError, match="cannot be made"):
-            make(tmp_path / "new" / "filled" / "file" / "x")
-
-
 # Texts
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [(0, "0:00"), (9.6, "0:10"), (59.4, "0:59"), (59.6, "1:00"), (3599, "59:59"), (3600, "1:00:00"),
-     (3723, "1:02:03"), (36061, "10:01:01")],
-)  # fmt: skip
-def test_time_is_written_as_on_a_clock(seconds, text):
-    assert times.clock(seconds) == text
-
-
-def test_time_axis_has_six_to_twelve_round_ticks():
-    limits = {12.0: 2, 24.0: 5, 60.0: 10, 120.0: 20, 240.0: 30, 360.0: 60, 720.0: 120, 1440.0: 300, 3600.0: 600,
-              7200.0: 1800, 21_600.0: 3600}  # fmt: skip
-    ticks = [1, *limits.values()]
-    for (seconds, tick), shorter in zip(limits.items(), ticks):
-        assert (times.tick_s(seconds - 0.1), times.tick_s(seconds)) == (shorter, tick) and seconds / tick < 12.1
-
-
-def test_drawing_is_a_file_of_its_elements():
-    text = svg.element("text", "1 < 2 & 3", x=1 / 3, font_weight=None, text_anchor="end", class_="a<b")
-    assert text == '<text x="0.33" text-anchor="end" class="a&lt;b">1 &lt; 2 &amp; 3</text>'
-    assert svg.element("g", text) == f"<g>{text}</g>"  # an element inside another element is not escaped again
-    assert svg.element("rect", width=200000, y=-0.006) == '<rect width="200000" y="-0.01"/>'
-    drawing = svg.drawing((10.125, 20), svg.element("g"), role="img")
-    assert drawing == '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 10.12 20" role="img">\n<g/>\n</svg>\n'
-    assert svg.path([(0, 0.004), (1.5, 2), (-3, 1e6)]) == "M0 0L1.5 2L-3 1000000"
-
-
-def test_template_escapes_its_values_and_lacks_none(tmp_path):
-    page = tmp_path / "page.html"
-    page.write_text("{% if shown %}\n  <p>{{ name }}</p>\n{% endif %}\n{{ values | tojson }}\n")
-    filled = templates.filled(page, shown=True, name="<b>°", values=["°", "</script>"])
-    assert filled == '  <p>&lt;b&gt;°</p>\n["°", "\\u003c/script\\u003e"]\n'
-    with pytest.raises(jinja2.UndefinedError):
-        templates.filled(page, shown=True, values=1)
-    with pytest.raises(ValueError):
-        templates.filled(page, shown=False, values=float("nan"))
-    # the well-known hash of an empty text
-    assert templates.source_hash("") == "'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='"
 
 
 class Late(Message):

@@ -8,7 +8,7 @@ import sys
 import pytest
 from kickstand_tools.common import unix_port
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.demo.demo import DeviceStopped, demo
+from kickstand_tools.demo.demo import demo
 from kickstand_tools.demo.device_process import DeviceProcess
 from kickstand_tools.simulated_board.lcd import shown_lean
 from support import command
@@ -114,7 +114,6 @@ def test_in_a_terminal_by_hand():
 
 
 STATE = {"of_s": 60.0, "lean_deg": -30.04, "speed_mps": 15.0, "phase": "held turn", "pressed": False}
-LEAN = {**STATE, "t_s": 1.0, "lcd": ["Lean  27° left", ""]}
 OFF = {"ended": "off"}
 
 
@@ -154,22 +153,6 @@ def test_a_changed_page_is_printed_at_once_and_its_values_every_250_ms(device):
     assert lines[:4] == frame
 
 
-@no_micropython
-def test_pixels_are_printed_and_no_console(device):
-    pixels = {**LEAN, "lcd": ["Raw", ""], "pixels": "ff" * 1024}
-    assert device(pixels, OFF)[1:] == [*["\u28ff" * 64] * 16, "The lean was not shown yet."]
-    assert "from my code" not in device("from my code", LEAN, OFF)
-
-
-@no_micropython
-@pytest.mark.parametrize("messages", [["oh", {"ended": "returned"}], ["oh"]])
-def test_a_device_that_stops_early_is_an_error(device, messages):
-    with pytest.raises(DeviceStopped, match="oh"):
-        device(*messages)
-    failed = command.run("demo")
-    assert failed.status == 1 and "oh" in failed.err
-
-
 def test_the_device_obeys_its_commands():
     """It sends a state every 50 ms of its time. A pause stops its time."""
     with DeviceProcess("cpython", "hand", 20.0) as process:
@@ -199,11 +182,3 @@ def test_the_device_obeys_its_commands():
     assert not process.failed
     assert [round(20 * state["t_s"]) for state in states] == list(range(1, len(states) + 1))
     assert {state["of_s"] for state in states} == {None}
-
-
-def test_a_device_that_is_left_alone_ends():
-    with DeviceProcess("micropython" if unix_port.available() else "cpython", "hand", 1.0) as process:
-        process.hang_up()
-        while not process.ended:
-            process.ticks(10.0)
-    assert not process.failed

@@ -14,7 +14,7 @@ FIRST, DEVICE, TOOLS, CONTRIBUTING = (
 BEHIND = sorted(path for folder in ("firmware", "tools") for path in (ROOT / folder / "docs").glob("*.md"))
 DISPLAYS, HOW = (ROOT / "firmware" / "docs" / name for name in ("displays.md", "how-it-works.md"))
 PAGES = [FIRST, DEVICE, TOOLS, CONTRIBUTING, ROOT / "firmware/FAQ.md", ROOT / "CHANGELOG.md", *BEHIND]
-MOST_LINES = {FIRST: 130, DEVICE: 250, TOOLS: 200}
+MOST_LINES = {FIRST: 130, DEVICE: 250, TOOLS: 200, ROOT / "firmware/docs/settings.md": 220}
 WIDEST = 120  # characters in a line, except in tables, pictures and commands
 # relative links to issues, releases and the site, which are valid wherever the project is hosted
 OF_THE_REPOSITORY = re.compile(r"(\.\./){2,}(issues|releases|deployments)\b")
@@ -63,7 +63,7 @@ def test_every_page_is_linked_from_the_first_or_its_own():
         assert leads_to(page) >= {behind for behind in BEHIND if behind.is_relative_to(page.parent)}
 
 
-@pytest.mark.parametrize("page", [*MOST_LINES, *BEHIND], ids=lambda path: path.relative_to(ROOT).as_posix())
+@pytest.mark.parametrize("page", sorted({*MOST_LINES, *BEHIND}), ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_a_page_has_a_readable_length(page):
     assert len(text_of(page).splitlines()) <= MOST_LINES.get(page, 200)
 
@@ -83,7 +83,7 @@ def test_the_first_page_is_short_and_begins_with_an_animation():
     text = text_of(FIRST)
     assert re.findall(r'src="([^"]+)"', text)[0].endswith(".webp")
     assert "    python3 tools/dev.py demo\n" in text
-    assert "    python3 tools/dev.py test\n" in text_of(CONTRIBUTING)
+    assert "    python3 tools/dev.py test " in text_of(CONTRIBUTING)
 
 
 def test_how_right_it_is_stands_in_both_places_alike():

@@ -102,14 +102,6 @@ def test_several_logs_of_one_mount_are_combined(tmp_path):
         assert len(times) >= 3 and times == pytest.approx(list(ends[: len(times)]), abs=2.0)
 
 
-def test_a_drive_that_begins_in_motion_counts_from_its_beginning(tmp_path):
-    """The gyro's bias is known only from the stop at the end, and is subtracted from the whole drive."""
-    legs = [*around(6, stands=False)[1:], [20.0, -1.0, 0.0], list(STAND)]
-    log = record(tmp_path / "drive.csv", legs, start_mps=12.0)
-    command.works("calibrate", "drive", log, "--out", tmp_path / "CAL.json")
-    assert max(errors(matrix_in(tmp_path / "CAL.json"), MOUNT)) < 0.5
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_a_motorcycle_whose_pitch_changed_on_the_kickstand(tmp_path, side):
@@ -136,7 +128,7 @@ def refused(tmp_path, words, *arguments):
 
 
 @pytest.mark.parametrize(
-    ("method", "words", "legs", "given"),
+    ("method", "words", "legs", "options"),
     [
         ("improved", "no speed: record a column speed_mps", around(1), {"speed": False}),
         ("published", "no speed: record a column speed_mps", around(1), {"source": {"silent": (-1.0, 1e9)}}),
@@ -146,9 +138,9 @@ def refused(tmp_path, words, *arguments):
         ("published", "2.5 s late", around(6), {"source": {"late_s": 2.5}}),
     ],
 )
-def test_unusable_drives_are_refused(tmp_path, method, words, legs, given):
+def test_unusable_drives_are_refused(tmp_path, method, words, legs, options):
     """test_drive_alignment.py tests the other refusals of the improved method."""
-    refused(tmp_path, words, record(tmp_path / "drive.csv", legs, **given), "--method", method)
+    refused(tmp_path, words, record(tmp_path / "drive.csv", legs, **options), "--method", method)
 
 
 def test_unusable_logs_are_refused(tmp_path):

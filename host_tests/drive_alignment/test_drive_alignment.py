@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from kickstand.drive_alignment import alignment, speed_check, verdict
+from kickstand.drive_alignment import alignment, verdict
 from kickstand.drive_alignment.quality import PITCH_DEG, ROLL_DEG
 from kickstand_tools.signals import rotation_vector
 from support import driving_runs, engines
@@ -129,22 +129,11 @@ def test_camber_at_the_stops_does_not_reach_forward(method, yaw_deg):
     assert total < max(2.3, 1.1 * abs(yaw))
 
 
-@pytest.mark.parametrize(
-    ("source", "fine"),
-    [
-        ({"every_s": 1.0, "step": 1 / 3.6}, True),
-        ({"late_s": 0.9 * speed_check.MAX_LAG_S}, True),
-        ({"late_s": 1.1 * speed_check.MAX_LAG_S}, False),
-        ({"scale": 1.1 / speed_check.MIN_FORCE_RATIO}, False),
-        ({"scale": 0.9 / speed_check.MAX_FORCE_RATIO}, False),
-    ],
-)
-def test_only_usable_speeds_align(source, fine):
+@pytest.mark.parametrize("source", [{"every_s": 1.0, "step": 1 / 3.6}, {"late_s": 1.7}, {"scale": 1.25}])
+def test_a_coarse_or_late_speed_aligns(source):
     result = drive(around(), source=source)
-    assert result["ready"] is fine, result.get("refused")
-    if fine:
-        assert abs(errors(result, MOUNT)[0]) < 0.5
-        assert result["lag"] == pytest.approx(source.get("late_s", 0.0), abs=0.15)
+    assert result["ready"] and abs(errors(result, MOUNT)[0]) < 0.5
+    assert result["lag"] == pytest.approx(source.get("late_s", 0.0), abs=0.15)
 
 
 @pytest.mark.parametrize(

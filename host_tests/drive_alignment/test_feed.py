@@ -26,12 +26,12 @@ def samples(vehicle, events):
     return *(np.array([row[k] for row in rows]) @ MOUNT for k in (0, 1)), np.array([row[2] for row in rows])
 
 
-def driven(vehicle="car", events=7, every=50, jitter_s=0.0, name="ride"):
-    """Return the log of a drive at 100 Hz. every: number of samples between two speeds."""
+def driven(vehicle="car", events=7, step=50, jitter_s=0.0, name="ride"):
+    """Return the log of a drive at 100 Hz. step: number of samples between two speeds."""
     force, rate, mps = samples(vehicle, events)
     n = len(mps)
     t_s = np.arange(n) / 100.0 + np.random.default_rng(5).uniform(0.0, jitter_s + 1e-9, n)
-    speed = np.where(np.arange(n) % every == 3, mps, NAN)
+    speed = np.where(np.arange(n) % step == 3, mps, NAN)
     return Log(t_s, force, rate + BIAS, speed, name=name)
 
 
@@ -42,17 +42,17 @@ def angle_deg(a, b):
 @pytest.mark.parametrize(("every", "gap"), [(51, True), pytest.param(21, False, marks=pytest.mark.long)])
 def test_bins_give_the_board_s_matrix(every, gap):
     """The board takes each sample. Its alignment has the same matrix, counts and quality."""
-    log = driven(events=9, every=every, jitter_s=0.003)
+    log = driven(events=9, step=every, jitter_s=0.003)
     if gap:
         log = log.part((log.t_s < 70.0) | (log.t_s > 71.3))
     fit = fit_logs([log], CALIBRATION, "car")
     bias = (fit.calibration.gyro_bias_dps - CALIBRATION.gyro_bias_dps).tolist()
     board, firmware = DriveAlignment("car", None, bias), CALIBRATION.to_firmware()
-    force, rate, previous = [0.0] * 3, [0.0] * 3, 0
-    for now, reading, speed in log.rows():
+    force, rate, previous_us = [0.0] * 3, [0.0] * 3, 0
+    for now_us, reading, speed in log.rows():
         firmware.apply(reading, force, rate)
-        board.update(force, rate, now - previous)
-        previous = now
+        board.update(force, rate, now_us - previous_us)
+        previous_us = now_us
         if speed == speed:
             board.measure_speed(speed)
     board.finish()

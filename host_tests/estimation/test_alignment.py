@@ -66,14 +66,14 @@ def test_ride_aligns_a_randomly_mounted_sensor(profile, seed, seconds, speed):
     assert fit.riding_s + fit.standing_s == pytest.approx(log.t_s[-1], abs=0.3)
     riding = ride.truth["speed_mps"] > 1.0
     assert fit.lean_deg == pytest.approx(np.sqrt(np.mean(ride.truth["lean_deg"][riding] ** 2)), rel=0.1)
-    made = fit.calibration
-    assert (made.aligned, made.six_done, made.vehicle) == (True, False, "motorcycle")
+    calibration = fit.calibration
+    assert (calibration.aligned, calibration.six_done, calibration.vehicle) == (True, False, "motorcycle")
     at_rest = np.mean(ride.readings[:400], axis=0)
-    assert made.gyro_bias_dps == pytest.approx(at_rest[4:], abs=0.3)
+    assert calibration.gyro_bias_dps == pytest.approx(at_rest[4:], abs=0.3)
     # On an upright bike at rest, the calibrated force is up
-    still = made.vehicle_from_sensor @ (np.mean(ride.upright, axis=0)[:3] + made.accel_offset_g)
-    assert still == pytest.approx([0.0, 1.0, 0.0], abs=0.045)
-    assert fit.offset_g @ made.vehicle_from_sensor == pytest.approx(made.accel_offset_g)
+    force = calibration.vehicle_from_sensor @ (np.mean(ride.upright, axis=0)[:3] + calibration.accel_offset_g)
+    assert force == pytest.approx([0.0, 1.0, 0.0], abs=0.045)
+    assert fit.offset_g @ calibration.vehicle_from_sensor == pytest.approx(calibration.accel_offset_g)
     assert np.all((0.005 < fit.offset_sigma_g) & (fit.offset_sigma_g < 0.03))
 
 
@@ -81,36 +81,14 @@ def test_a_ride_is_as_good_as_two_poses_and_serves_the_display():
     """A kickstand pose hardly determines yaw, and an offset of the accelerometer falsifies the roll of the poses."""
     ride = ride_of("hills", 22)
     log = log_of(ride, speed=False)
-    made = api.fit_ride(log).calibration
+    calibration = api.fit_ride(log).calibration
     kickstand, upright = (api.Log.from_readings(pose, ride.rate_hz) for pose in (ride.kickstand, ride.upright))
     poses = errors_deg(api.fit_two_positions(kickstand, upright).calibration, ride.vehicle_from_sensor)
-    assert np.all(errors_deg(made, ride.vehicle_from_sensor)[1:] < poses[1:])
-    live = api.replay(log, made)
+    assert np.all(errors_deg(calibration, ride.vehicle_from_sensor)[1:] < poses[1:])
+    live = api.replay(log, calibration)
     shown = ~np.isnan(live.lean_sigma_deg)
     assert np.mean(shown) > 0.9
     assert np.sqrt(np.mean((live.lean_deg - ride.truth["lean_deg"][::4])[shown] ** 2)) < 1.5
-
-
-@pytest.mark.parametrize("extra", [0.05, pytest.param(-0.05, marks=pytest.mark.long)])
-def test_an_offset_across_the_bike_is_estimated(extra):
-    """50 mg across the bike would be 2.9 degrees of roll."""
-    ride = ride_of("street")
-    log, across = log_of(ride), ride.vehicle_from_sensor[0]
-    plain, shifted = api.fit_ride(log), api.fit_ride(replace(log, accel_g=log.accel_g + extra * across))
-    assert shifted.offset_g[0] - plain.offset_g[0] == pytest.approx(-extra, abs=0.02)
-    assert np.all(errors_deg(shifted.calibration, ride.vehicle_from_sensor) < [1.0, 1.5, 1.5])
-
-
-@pytest.mark.parametrize(
-    ("axis", "half"), [(0, 1), pytest.param(1, 2, marks=pytest.mark.long), pytest.param(2, 0, marks=pytest.mark.long)]
-)
-def test_a_moving_mount_enlarges_the_standard_error(axis, half):
-    """The sensor turns by 5 degrees in the middle of the ride. The halves are roll, pitch and yaw."""
-    ride, log = ride_of("hills", 22), log_of(ride_of("hills", 22))
-    turn = rotation_matrix(np.radians(-5.0) * np.eye(3)[axis])
-    fit = api.fit_ride(moved(log, ride.vehicle_from_sensor.T @ turn @ ride.vehicle_from_sensor))
-    assert fit.halves_deg[half] == pytest.approx(5.0, abs=2.5)
-    assert stated_deg(fit)[axis] > 0.5 * abs(fit.halves_deg[half])
 
 
 def phone_log(mounting, tilt_deg=(0.0, 0.0, 0.0)):
@@ -138,8 +116,8 @@ def test_a_phone_may_be_tilted_in_its_holder(phone, k):
 
 @pytest.mark.parametrize("phone", PHONES)
 def test_a_phone_mounted_otherwise_is_refused(phone):
-    for other in PHONES.keys() - {phone}:
-        for mounting in PHONES[other]:
+    for different in PHONES.keys() - {phone}:
+        for mounting in PHONES[different]:
             assert refusal(phone_log(mounting, (20.0, 10.0, 0.0))[0], phone).code in (
                 "phone-otherwise",
                 "phone-upside-down",

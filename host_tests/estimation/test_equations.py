@@ -6,7 +6,6 @@ from kickstand_tools.estimation import equations as eq, unknowns as of
 from kickstand_tools.estimation.equations import jacobian, process_and_measurements
 from kickstand_tools.estimation.unknowns import FORWARD, LEAN, LEFT, PARAMETERS, PITCH, STATES, UP
 from kickstand_tools.estimation.windows import windows_of
-from kickstand_tools.signals import rotation_matrix
 from window_input import windows
 
 G = 9.80665
@@ -88,14 +87,6 @@ def test_dive_and_delay_of_the_speed_follow_the_braking():
     assert residuals([0.0] * 3, force, {FORWARD: -2.0})[eq.BACKWARD] == pytest.approx(-2.0)
 
 
-def test_a_warmer_sensor_has_other_offsets():
-    left, forward = of.OFFSET_PER_C.start, of.OFFSET_PER_C.stop - 1
-    errors = {left: 0.001, forward: 0.002, of.BIAS_PER_C.stop - 1: 0.01}
-    readings = [0.0, 0.0, 0.1], [-0.01, 1.0, -0.02]
-    assert np.allclose(residuals(*readings, parameters=errors, warm=10.0)[MOTION], 0.0, atol=1e-12)
-    assert residuals(*readings, parameters=errors)[LEAN] == pytest.approx(0.1)
-
-
 def test_the_jacobian_equals_central_differences():
     """All states and parameters are tested, at forward and backward speeds."""
     rng, n = np.random.default_rng(3), 30
@@ -108,25 +99,3 @@ def test_the_jacobian_equals_central_differences():
         step = 1e-5 * (unknown == row)[:, None]
         above, below = (process_and_measurements(noise, x + sign * step) for sign in (1.0, -1.0))
         assert np.allclose(derivative, (above - below) / 2e-5, rtol=1e-4, atol=1e-4), row
-
-
-def test_a_yaw_of_eight_degrees_is_no_error_of_scale():
-    """The sensor is rotated by 8 degrees about the bike's up, while the bike leans, rolls and turns. If the parameters
-    contain the sensor's rotation, the residuals do not change."""
-    lean, speed, yaw_rate, roll = 0.7, 25.0, -0.3, 1.5
-    s, c = np.sin(lean), np.cos(lean)
-    across = speed * yaw_rate / G
-    rate, force = [yaw_rate * s, yaw_rate * c, roll], [across * c + s, c - across * s, 0.0]
-    turn = rotation_matrix(np.radians([0.0, 8.0, 0.0]))
-    states, rotation = {LEAN: lean, FORWARD: speed}, {of.ROTATION.start + 1: np.radians(8.0)}
-    straight, turned = residuals(rate, force, states), residuals(turn.T @ rate, turn.T @ force, states, rotation)
-    # With equations of first order the residuals would differ by 15e-3
-    assert np.allclose(turned[:LEFT], straight[:LEFT], atol=1e-3)
-
-
-def test_a_tilt_and_the_opposite_offset_cancel_at_rest():
-    """If the sum of offset and tilt is right, the force at rest is right too. The prior of a pose relies on this."""
-    errors = {of.ROTATION.stop - 1: 0.03, of.OFFSET.start: 0.03}  # to the side
-    errors |= {of.ROTATION.start: 0.02, of.OFFSET.stop - 1: -0.02}  # along forward
-    motion = residuals([0.0] * 3, [0.0, 1.0, 0.0], parameters=errors)
-    assert np.allclose(motion[[LEFT, FORWARD]], 0.0, atol=1e-9)

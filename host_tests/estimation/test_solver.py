@@ -72,19 +72,19 @@ class Problem:
 @pytest.mark.parametrize(("blocks", "length"), [(1, 1), (1, 5), (2, 1), (4, 3), (3, 7)])
 def test_blocks_give_the_solution_of_dense_algebra(blocks, length):
     problem = Problem(blocks, length)
-    want, covariance, _ = problem.at_once()
+    exact, covariance, _ = problem.at_once()
     states, parameters = solve(problem.blocks, problem.walks, np.ones(1))
     joint = posterior_covariance(problem.blocks, problem.walks, np.ones(1))
     spread = covariances(problem.blocks, joint)
     for b in range(blocks):
-        own = slice(len(want) - (blocks - b) * M, len(want) - (blocks - b - 1) * M)
-        assert np.allclose(parameters[b], want[own])
-        assert np.allclose(joint[b, 2 * S :, 2 * S :], covariance[own, own])
+        block = slice(len(exact) - (blocks - b) * M, len(exact) - (blocks - b - 1) * M)
+        assert np.allclose(parameters[b], exact[block])
+        assert np.allclose(joint[b, 2 * S :, 2 * S :], covariance[block, block])
         for k in range(length):
             ends = slice((b * length + k) * S, (b * length + k + 2) * S)
-            assert np.allclose(states[b, k : k + 2].ravel(), want[ends])
+            assert np.allclose(states[b, k : k + 2].ravel(), exact[ends])
             assert np.allclose(spread[b, k, :, : 2 * S], covariance[ends, ends])
-            assert np.allclose(spread[b, k, :, 2 * S :], covariance[ends, own])
+            assert np.allclose(spread[b, k, :, 2 * S :], covariance[ends, block])
 
 
 def test_likelihood_is_that_of_dense_algebra():
@@ -96,13 +96,13 @@ def test_likelihood_is_that_of_dense_algebra():
 def test_mean_of_hypotheses_includes_their_difference():
     variances = [0.01, 0.1], [1.0, 10.0]
     firm, loose = (Problem(3, 4, (variance,)) for variance in variances)
-    both, weight = Problem(3, 4, variances), np.array([0.75, 0.25])
+    mixed, weight = Problem(3, 4, variances), np.array([0.75, 0.25])
     (first, _), (second, _) = (solve(each.blocks, each.walks, np.ones(1)) for each in (firm, loose))
-    mean, parameters = solve(both.blocks, both.walks, weight)
+    mean, parameters = solve(mixed.blocks, mixed.walks, weight)
     assert np.allclose(mean, 0.75 * first + 0.25 * second)
-    assert np.allclose(back(both.blocks, mean[:, [0, -1]], parameters), mean)
+    assert np.allclose(back(mixed.blocks, mean[:, [0, -1]], parameters), mean)
     within = [posterior_covariance(each.blocks, each.walks, np.ones(1)) for each in (firm, loose)]
     apart = np.concatenate((second - first)[:, [0, -1]].transpose(1, 0, 2), axis=1)
-    joint = posterior_covariance(both.blocks, both.walks, weight)[:, : 2 * S, : 2 * S]
+    joint = posterior_covariance(mixed.blocks, mixed.walks, weight)[:, : 2 * S, : 2 * S]
     between = 0.75 * 0.25 * apart[:, :, None] * apart[:, None, :]
     assert np.allclose(joint, 0.75 * within[0][:, : 2 * S, : 2 * S] + 0.25 * within[1][:, : 2 * S, : 2 * S] + between)

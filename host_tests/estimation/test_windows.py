@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from kickstand_tools.estimation.windows import windows_of
-from window_input import windows
 
 
 def cut(t_s, force=(0.0, 1.0, 0.0), rate=(0.0, 0.0, 0.0), speed=None, warm=None, **more):
@@ -42,7 +41,9 @@ def test_gravity_keeps_its_length_while_the_bike_rolls():
     t = np.arange(400) / 200.0
     lean = np.radians(150.0) * (t - 1.0)
     force = np.column_stack((np.sin(lean), np.cos(lean), np.zeros(400)))
-    rolling, aligned = (cut(t, force, (0.0, 0.0, np.radians(150.0)), aligned=known) for known in (False, True))
+    rolling, aligned = (
+        cut(t, force, (0.0, 0.0, np.radians(150.0)), aligned=is_aligned) for is_aligned in (False, True)
+    )
     middle = np.radians(150.0) * (0.5 * (aligned.edges[1:] + aligned.edges[:-1]) - 1.0)
     assert np.all(np.linalg.norm(rolling.force, axis=1) < 0.99)
     assert np.allclose(aligned.force, np.column_stack((np.sin(middle), np.cos(middle), 0 * middle)), atol=1e-4)
@@ -58,26 +59,3 @@ def test_a_long_step_between_samples_is_a_gap(hz, step_s, gaps):
     # A gap begins and ends half a step from a reading
     assert np.sum(result.seconds[result.gap]) == pytest.approx(gaps * (step_s - 1.0 / hz))
     assert (result.edges[0], result.before[0]) == pytest.approx((-0.5 / hz, 0.5 / hz))
-
-
-def test_a_jolt_is_the_largest_difference_from_the_mean():
-    """Each window has 20 samples. One of them has 2 rad/s about two axes, so the mean is 0.1 rad/s."""
-    rate = np.zeros((100, 3))
-    rate[30, :2] = 2.0
-    result = cut(np.arange(100) / 100.0, rate=rate, warm=np.arange(100) / 10.0)
-    assert result.jolt == pytest.approx([0.0, np.sqrt(2.0) * 1.9, 0.0, 0.0, 0.0])
-    assert result.warm == pytest.approx([0.0, 2.0, 4.0, 6.0, 8.0])
-
-
-def test_padding_has_no_duration_and_no_readings():
-    padded = windows(5, speed=3.0).padded(4)
-    assert len(padded) == 8 and padded.gap.tolist() == [False] * 5 + [True] * 3
-    assert padded.covered == pytest.approx([0.2] * 5 + [0.0] * 3)
-    assert np.sum(padded.seconds[5:]) == 0.0 and np.isnan(padded.speed[5:]).all() and np.all(padded.force[5:] == 0.0)
-    assert len(windows(5).padded(5)) == 5
-
-
-def test_axes_are_turned_after_the_bias_is_removed():
-    quarter = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    result = windows(2, rate=(0.3, 0.1, 0.0)).turned(quarter, np.array([0.1, 0.0, 0.0]))
-    assert result.rate[0] == pytest.approx([0.1, -0.2, 0.0]) and result.force[0] == pytest.approx([1.0, 0.0, 0.0])

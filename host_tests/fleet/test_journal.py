@@ -22,8 +22,8 @@ def result(name="v", message="x"):
 @pytest.fixture(params=["file", "store"])
 def journal_of(request, tmp_path):
     """Return a function that opens the same journal each time, in a file or in a store."""
-    place = f"memory:///{tmp_path.name}-{os.getpid()}/journal"
-    return lambda: Journal(tmp_path / "journal.jsonl") if request.param == "file" else StoreJournal(place)
+    address = f"memory:///{tmp_path.name}-{os.getpid()}/journal"
+    return lambda: Journal(tmp_path / "journal.jsonl") if request.param == "file" else StoreJournal(address)
 
 
 def vehicles(journal, keys):
@@ -48,13 +48,13 @@ def test_results_are_read_again_in_the_order_of_their_keys(journal_of):
 
 
 def test_a_damaged_result_in_a_store_is_counted_and_computed_again(tmp_path):
-    place = f"memory:///{tmp_path.name}-damaged"
-    with StoreJournal(place) as journal:
+    address = f"memory:///{tmp_path.name}-damaged"
+    with StoreJournal(address) as journal:
         for key in ("a", "b", "c"):
             journal.add(key, result(key), again=key == "c")
     for name in ("b.json", "c.again.json"):
-        files.write_bytes(f"{place}/{name}", b'{"key": "b"')
-    with StoreJournal(place) as journal:
+        files.write_bytes(f"{address}/{name}", b'{"key": "b"')
+    with StoreJournal(address) as journal:
         assert journal.damaged == 2 and ["a" in journal, "b" in journal, "c" in journal] == [True, False, False]
         assert vehicles(journal, ["a", "b", "c"]) == ["a"]
 

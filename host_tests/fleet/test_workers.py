@@ -35,8 +35,8 @@ def test_bad_tasks_cost_no_other_task(tmp_path):
     items = [(k, behaviours.get(k, ""), str(note)) for k in range(10)]
     results = {index: (result, reason) for index, result, reason, _ in run_tasks(task, items, None, 2)}
     assert results == {k: (k, "") for k in range(10)} | {2: (None, CRASHED), 4: (None, CRASHED)}
-    begun = Counter(int(line.split()[0]) for line in note.read_text().splitlines())
-    assert begun[2] == 2 and sum(begun.values()) <= 10 + 6  # finished tasks are not computed again
+    starts = Counter(int(line.split()[0]) for line in note.read_text().splitlines())
+    assert starts[2] == 2 and sum(starts.values()) <= 10 + 6  # finished tasks are not computed again
 
 
 PROGRAM = """

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.imports import importing
 from support import command
 from support.recordings import app_exports, drawn_tables
 from support.recordings.app_exports import riding
@@ -45,10 +44,6 @@ def calibrate(source):
     axes = api.CalibrationFile(vehicle_from_sensor=app_exports.PHONE.T, aligned=True)
     api.write_calibration(source.with_name("EXPORT.cal.json"), axes)
     return source
-
-
-def aligned_export(target, files):
-    return calibrate(app_exports.into(target, files))
 
 
 @pytest.mark.parametrize("name", ["EXPORT.zip", "EXPORT"])
@@ -96,27 +91,6 @@ def test_an_export_in_vehicle_axes_needs_no_alignment(tmp_path):
     assert "x is left, y up, z forward, as far as the logger was mounted so" in result.out
     units = {taken.quantity: taken.unit for taken in api.import_recording(tmp_path / "v.vbo").taken}
     assert units["position"] == "minutes, west positive"
-
-
-def test_remarks_and_files_of_an_export_in_reports(tmp_path, monkeypatch):
-    """Each remark appears once, although the log is checked twice. The export is unpacked once, and no output may
-    overwrite its files."""
-    sources, read_files = [], importing.read_files
-    monkeypatch.setattr(importing, "read_files", lambda path: sources.append(path) or read_files(path))
-    source = aligned_export(tmp_path / "EXPORT", app_exports.sensor_kinetics(riding().every(4)))
-    result = command.works("report", source, "--json", "--live")
-    assert [remark["code"] for remark in json.loads(result.out)["remarks"]].count("import-sign") == 1
-    assert result.err.count("is not certain") == 1 and sources == [source]
-    out = source / "Ride_accm.csv"
-    command.refused(tmp_path, "export", source, "--to", "csv", "--out", out, words="Ride_accm.csv is also an input")
-
-
-@pytest.mark.long
-def test_a_page_has_the_remarks_of_an_import(tmp_path):
-    pytest.importorskip("plotly")
-    source = aligned_export(tmp_path / "EXPORT", app_exports.sensor_kinetics(riding().every(4)))
-    command.works("plot", source, "--live", "--out", tmp_path / "plots")
-    assert "is not certain" in (tmp_path / "plots" / "EXPORT.html").read_text()
 
 
 def test_a_damaged_export_gives_a_log_or_one_line(tmp_path):

@@ -169,6 +169,11 @@ def test_a_contradiction_with_gravity_is_refused(tmp_path, head, row, units, wor
     ("head", "row", "words"),
     [
         ("time,ax,ay,az,speed", "{:.2f},0,1,0,3", "and no gyro found in it: without one there is no lean"),
+        (
+            "INDEX,LAP,TIME,SPEED_KPH,LATERALG,LINEALG,LEAN_DEG",
+            "{1},1,{0},80,0.{1},0.{2},{1}.5",
+            "and no gyro found in it",
+        ),
         ("ax,ay,az,gx,gy,gz", "0,1,0,0,0,0.1", "no time found in it: write the time of each row, such as millis()"),
         (
             "time,lin_ax,lin_ay,lin_az,gx,gy,gz",
@@ -197,6 +202,69 @@ def test_an_uncertain_table_gives_a_command_line_that_works(tmp_path, monkeypatc
     assert words[:4] == ["import", name, "--out", "RIDE.csv"]
     assert "written: RIDE.csv, 119 samples in 2.4 s, 50 per second" in command.works(*words).out
     assert api.read_log("RIDE.csv").accel_g[0] == pytest.approx(riding().phone_g[0], abs=1e-4)
+
+
+TYPED = {  # names of the columns, factors of the time, the forces and the rates, and words of the refusal
+    "exchanged names": ("t,rx,ry,rz,ax,ay,az", 1.0, 1.0, 1.0, "so these columns are the accelerometer's"),
+    "3000 rows per second": ("t,ax,ay,az,gx,gy,gz", 1.0 / 60.0, 1.0, 1.0, "samples per second, which is doubtful"),
+    "a speed without a unit": ("t,ax,ay,az,gx,gy,gz,speed", 1.0, 1.0, 1.0, "its noise at rest"),
+    "names twice": ("t,x,y,z,x,y,z", 1.0, 1.0, 1.0, "its noise at rest"),
+}
+
+
+@pytest.mark.parametrize("name", TYPED)
+def test_a_doubtful_table_is_refused_with_a_line_that_works(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    head, time, force, rates, words = TYPED[name]
+    t_s, force_g, rates_dps = drawn_tables.motion(
+        "rest" if "noise" in words else "hand", 50.0, np.random.default_rng(5)
+    )
+    columns = np.column_stack((t_s * time, force_g * force, rates_dps * rates))
+    if name == "exchanged names":
+        columns = np.column_stack((columns[:, 0], force_g, rates_dps))
+    if "speed" in head:
+        columns = np.column_stack((columns, 20.0 + t_s))
+    rows = [",".join(f"{value:.6f}" for value in row) for row in columns.tolist()]
+    (tmp_path / "log.csv").write_text("\n".join([head, *rows]) + "\n")
+    line = command.refused(tmp_path, "import", "log.csv", "--out", "R.csv", words=words)
+    typed = shlex.split(line.partition("type: kickstand ")[2])
+    command.works(*typed)
+    log = api.read_log("RIDE.csv", axes=False)
+    assert log.accel_g == pytest.approx(force_g, abs=1e-4) and log.gyro_dps == pytest.approx(rates_dps, abs=1e-3)
+    assert log.t_s[-1] == pytest.approx(t_s[-1], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("lat", "lon", "words"),
+    [
+        (lambda north, east: east, lambda north, east: north, "latitude and longitude are exchanged"),
+        (lambda north, east: 100.0 * north, lambda north, east: 100.0 * east, "they are no degrees"),
+        (lambda north, east: north, lambda north, east: east, ""),
+    ],
+)
+def test_wrong_positions_are_left_out(tmp_path, lat, lon, words):
+    """They do not turn the sign of the accelerations. The speed shows an exchange, because a degree of longitude is
+    shorter."""
+    ride = riding().every(4)
+    north, east = ride.lat_deg, ride.lon_deg
+    columns = (ride.t_s, ride.phone_g, np.degrees(ride.phone_rad), ride.speed_mps, lat(north, east), lon(north, east))
+    names = "t,ax (g),ay (g),az (g),gx (deg/s),gy (deg/s),gz (deg/s),speed (m/s),lat,lon".split(",")
+    (tmp_path / "log.csv").write_text(app_exports.lines(names, np.column_stack(columns).tolist()))
+    imported = api.import_recording(tmp_path / "log.csv")
+    assert imported.log.accel_g == pytest.approx(ride.phone_g, abs=1e-4)
+    assert bool(np.isfinite(imported.log.lat_deg).any()) is not bool(words)
+    notices = [notice.line() for notice in imported.notices if notice.code == "import-positions"]
+    assert len(notices) == bool(words) and words in "".join(notices)
+
+
+@pytest.mark.parametrize("unit", ["g", "m/s^2"])
+def test_a_table_with_names_like_phyphoxs_is_not_phyphoxs(tmp_path, unit):
+    """So the sign of the accelerations is not certain."""
+    axes = [f"Accelerometer {axis} ({unit})" for axis in "XYZ"] + [f"Gyroscope {axis} (rad/s)" for axis in "XYZ"]
+    size = -1.0 if unit == "g" else -9.80665
+    (tmp_path / "log.csv").write_text(hand_table(["Time (s)", *axes], size, np.pi / 180.0))
+    imported = api.import_recording(tmp_path / "log.csv")
+    assert imported.app == "a table" and "import-sign" in [notice.code for notice in imported.notices]
 
 
 def random_table(seed, path):

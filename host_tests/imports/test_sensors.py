@@ -8,9 +8,9 @@ import pytest
 from kickstand_tools import api
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.imports import units
-from kickstand_tools.imports.importing import ImportDamaged, Imported
+from kickstand_tools.imports.importing import ImportDamaged
 from kickstand_tools.imports.join import in_order, join, on_clock
-from kickstand_tools.imports.recording import AppRecording, ReceiverTrack, RecordedSensor, rate_hz
+from kickstand_tools.imports.recording import AppRecording, ReceiverTrack, RecordedSensor
 from support import command
 from support.recordings import app_exports
 from support.recordings.app_exports import riding
@@ -56,16 +56,6 @@ def test_a_faster_gyro_is_averaged_over_each_sample():
     gyro, clock = sensor(1e3 * t_s, 10.0 * t_s + 50.0 * np.sin(2 * np.pi * 99.0 * t_s)), np.arange(100, 390) * 10 * MS
     error = on_clock(gyro, clock, 10.0 * MS)[:, 0] - clock * 1e-8
     assert np.std(error) < 0.3 * np.std(np.interp(clock * 1e-9, t_s, gyro.values[:, 0]) - clock * 1e-8)
-
-
-@pytest.mark.parametrize(("gap_ms", "steps"), [(100.0, []), (520.0, [0.53])])
-def test_two_missing_samples_are_no_gap_and_more_stay_one(gap_ms, steps):
-    t_ms = np.arange(0.0, 4000.0, 10.0)
-    for accel_gap, gyro_gap in ((gap_ms, 0.0), (0.0, gap_ms)):
-        accel, gyro = (sensor(t_ms[(t_ms <= 1000.0) | (t_ms > 1000.0 + gap)]) for gap in (accel_gap, gyro_gap))
-        log, _ = join(AppRecording("none", accel, gyro), "log")
-        gaps = Imported("none", log, []).gaps_s
-        assert gaps == pytest.approx(steps, abs=0.02)
 
 
 def test_lost_rows_are_counted():
@@ -118,15 +108,6 @@ def test_impossible_times_are_refused(times_ms, words):
         assert len(in_order(sensor(times_ms), "n").time_ns) == len(times_ms)
 
 
-def test_many_readings_past_the_range_are_another_unit():
-    accel, gyro = sensor(np.arange(100.0) * 10.0), sensor(np.arange(100.0) * 10.0, None, "gyro")
-    accel.values[:2, 1] = 1e4
-    assert join(AppRecording("app", accel, gyro), "n")[1] == 2
-    accel.values[2, 1] = 1e4
-    with pytest.raises(InputError, match=r"past any sensor's, up to 1e\+04 g and 1 deg/s: check their units"):
-        join(AppRecording("app", accel, gyro), "n")
-
-
 def test_a_fix_is_only_in_the_nearest_row():
     """A fix belongs to a row within 170 ms. The first row has a time without a fix."""
     t_ms = np.arange(0.0, 5000.0, 10.0)
@@ -153,21 +134,6 @@ def test_markers_and_repetitions_of_a_receiver_are_dropped():
     still = track_of(np.arange(80) * 0.05, np.repeat([0.0, 5.0], 40), 52.0, 13.0)
     assert (still.time_ns // MS).tolist() == [0, 1000, 2000, 3000]
     assert still.speed_mps.tolist() == [0.0, 0.0, 5.0, 5.0] and len(track_of([0.0]).time_ns) == 0
-
-
-def test_a_rate_leaves_gaps_and_marks_out():
-    time_ns = np.array([0, 10, 20, 30, 40, 90, 100, 110]) * MS
-    assert rate_hz(time_ns) == pytest.approx(100.0)  # the gap of 5 steps does not count
-    assert rate_hz(np.array([0, 10, 20, 30, 40, 89, 99]) * MS) == pytest.approx(6 / 0.099)
-    assert rate_hz(np.append(time_ns, units.REPEATED)) == pytest.approx(100.0)
-    assert rate_hz(time_ns[:1]) == rate_hz(time_ns[:1].repeat(3)) == 0.0
-
-
-def test_shortfalls_of_an_import():
-    for hz, duration_s, codes in ((19.6, 61.0, []), (19.4, 61.0, ["import-slow"]), (20.0, 9.0, ["import-short"])):
-        t_s = np.arange(0.0, duration_s, 1.0 / hz)
-        imported = Imported("a", api.Log(t_s, np.zeros((len(t_s), 3)), np.zeros((len(t_s), 3))), [])
-        assert [notice.code for notice in imported.shortfalls] == codes and imported.rate_hz == pytest.approx(hz)
 
 
 def test_repeated_and_shuffled_rows_of_an_export(tmp_path):

@@ -4,7 +4,6 @@ show the axes of apps that record along the bike."""
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.checks.course import log_agrees
 from support import command
 from support.recordings import app_exports
 from support.recordings.app_exports import PHONE, riding
@@ -102,16 +101,6 @@ def test_no_turns_show_no_sign(tmp_path):
     assert [notice.code for notice in api.import_recording(tmp_path / "r.csv").notices] == ["import-sign"]
 
 
-def test_mirrored_export_of_a_known_app_gives_a_remark(tmp_path):
-    """The sign of this app is known, so something else reversed the accelerations. The import changes no sign."""
-    ride = riding().every(2)
-    ride.force_g = -ride.force_g
-    imported = api.import_recording(app_exports.into(tmp_path / "p.zip", app_exports.phyphox(ride)))
-    assert [notice.code for notice in imported.notices] == ["mirrored"]
-    assert "left and right are exchanged" in api.sentence(imported.notices[0])
-    assert up_at_rest(imported) == pytest.approx(-UP, abs=0.02)
-
-
 def test_uncertain_sign_is_reported_and_can_be_turned(tmp_path):
     ride = riding().every(2)
     ride.force_g = -ride.force_g  # an iPhone might give this sign
@@ -120,17 +109,3 @@ def test_uncertain_sign_is_reported_and_can_be_turned(tmp_path):
     assert warning.startswith("warning: ") and "--units a=-g or a=-m/s2 puts it right" in warning
     imported = api.import_recording(folder, units={"a": "-m/s2"})
     assert up_at_rest(imported) == pytest.approx(UP, abs=0.02) and not imported.notices
-
-
-@pytest.mark.parametrize("late_s", [0.0, 1.0, 2.0])
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_late_swerves_are_not_mistaken_for_opposite_ones(sign, late_s):
-    """The bike swerves to the left and to the right with a period of four seconds. In a track that is 2 s late, the
-    turns therefore seem to be in the opposite direction."""
-    t_s = np.arange(0.0, 60.0, 0.02)
-    yaw_dps = 20.0 * np.sin(2 * np.pi * t_s / 4.0 + np.sin(t_s / 7.0))
-    course = np.cumsum(np.radians(yaw_dps)) * 0.02
-    north, east = (1e-5 * np.cumsum(10.0 * component(course)) * 0.02 for component in (np.sin, np.cos))
-    lat, lon = (np.where(np.arange(3000) % 50 == 0, np.interp(t_s - late_s, t_s, way), np.nan) for way in (north, east))
-    rates = np.column_stack((0 * t_s, yaw_dps, 0 * t_s))
-    assert log_agrees(t_s, np.tile([0.0, sign, 0.0], (3000, 1)), rates, lat, lon) is (sign > 0)

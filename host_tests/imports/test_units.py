@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.imports import findings, units
-from kickstand_tools.imports.rate_fit import RateFit, fit_rates, turns_too_far
+from kickstand_tools.imports.rate_fit import RateFit, fit_rates
 from kickstand_tools.imports.recording import Sheet
 from kickstand_tools.imports.speeds import unit_by_positions
 from kickstand_tools.logs.csv_reader import columns_of
@@ -117,24 +117,6 @@ def test_gravity_shows_the_unit_of_accelerations(length, stated, unit, certain):
     assert finding.why.startswith("gravity at rest is ")
 
 
-@pytest.mark.parametrize(
-    ("most", "moving", "unit"),
-    [(2.9, True, "rad/s"), (3.1, True, "deg/s"), (999.0, True, "deg/s"), (1001.0, True, "mdeg/s"),
-     (0.1, False, "deg/s"), (0.1 / 57.3, False, "rad/s"), (100.0, False, "mdeg/s"), (1.75, False, "mrad/s")],
-)  # fmt: skip
-def test_the_size_of_rates_suggests_their_unit(most, moving, unit):
-    """At rest the noise shows the unit, because it is about 0.1 deg/s. In motion the 90th percentile shows it. The
-    finding is uncertain."""
-    force, rates = still(1.0), np.random.default_rng(1).normal(0.0, most, (200, 3))
-    if moving:
-        force[::2, 0] += 0.2
-        rates = np.zeros((200, 3))
-        rates[::2, 0], rates[1::2, 0] = most, -most
-    accel = findings.ColumnFinding([], "g")
-    finding = findings.gyro(force, rates, accel, None)
-    assert (finding.unit, finding.certain) == (unit, False)
-
-
 @pytest.mark.parametrize(("accel", "gyro"), [(16384, 131), (8192, 65.5), (4096, 32.8), (2048, 16.4), (99, 131)])
 def test_counts_of_a_gyro_follow_the_accelerometers_range(accel, gyro):
     finding = findings.gyro(still(1.0), np.full((200, 3), 30.0), findings.ColumnFinding([], f"counts/{accel}"), None)
@@ -165,46 +147,6 @@ def test_rates_that_turn_gravity_show_their_unit():
     rates[::3] = np.nan
     assert np.degrees(fit_rates(t_s, u, rates).factor) == pytest.approx(1.0 / 9.81, rel=0.01)
     assert fit_rates(t_s[:79], u[:79], w[:79]) == RateFit()
-
-
-@pytest.mark.parametrize(("dps", "too_far"), [(59.0, False), (61.0, True)])
-def test_rates_may_turn_constant_gravity_by_120_degrees(dps, too_far):
-    """120 degrees in 2 s are a rate of 60 deg/s. Only the rate across gravity counts."""
-    t_s = np.arange(0.0, 10.0, 0.01)
-    force = np.tile([0.0, 1.0, 0.0], (len(t_s), 1))
-    assert turns_too_far(t_s, force, np.tile([dps, 500.0, 0.0], (len(t_s), 1))) is too_far
-    t_s, u, w = turning(dps=150.0)
-    assert not turns_too_far(t_s, u, 3.0 * np.degrees(w))
-
-
-RAD_S = 180.0 / np.pi
-BOTH = {"rad/s": RAD_S, "deg/s": 1.0}
-
-
-@pytest.mark.parametrize(
-    ("size", "candidates", "explained", "turn", "unit"),
-    [
-        (1.0, BOTH, 0.6, 0.1, "rad/s"), (1.0 / RAD_S, BOTH, 0.6, 0.1, "deg/s"),
-        # the fitted size may differ from a unit by a factor of up to e^1.2 = 3.32
-        (3.3, BOTH, 0.6, 0.1, "rad/s"), (1 / 3.3, BOTH, 0.6, 0.1, "rad/s"), (3.35, BOTH, 0.6, 0.1, ""),
-        (1 / 3.35, BOTH, 0.6, 0.1, ""),
-        # if two units differ by a factor below e^3 = 20.1, the fit must explain 0.9 of the variance
-        (1.0, {"one": RAD_S, "other": RAD_S / 20.0}, 0.89, 0.1, ""),
-        (1.0, {"one": RAD_S, "other": RAD_S / 20.0}, 0.91, 0.1, "one"),
-        (1.0, {"one": RAD_S, "other": RAD_S / 20.2}, 0.51, 0.1, "one"),
-        # the limit between two units that differ by a factor of 2 is 1.414
-        (1.4, {"one": RAD_S, "other": 2.0 * RAD_S}, 0.95, 0.1, "one"),
-        (1.43, {"one": RAD_S, "other": 2.0 * RAD_S}, 0.95, 0.1, "other"),
-        # with only one possible unit, the fitted size may differ by a factor of up to e^1 = 2.72
-        (2.7, {"one": RAD_S}, 0.95, 0.1, "one"), (2.75, {"one": RAD_S}, 0.95, 0.1, ""),
-        (1.0, {"one": RAD_S}, 0.89, 0.1, ""),
-        # too little turn, too little explained, a wrong sign
-        (1.0, BOTH, 0.95, 0.029, ""), (1.0, BOTH, 0.49, 0.1, ""), (-1.0, BOTH, 0.95, 0.1, ""),
-        (1.0, BOTH, 0.5, 0.03, "rad/s"),
-    ],
-)  # fmt: skip
-def test_the_unit_of_rates_is_the_one_near_the_fit(size, candidates, explained, turn, unit):
-    assert RateFit(size, explained, turn).unit_among(candidates) == unit
 
 
 @pytest.mark.parametrize(

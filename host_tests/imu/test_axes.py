@@ -9,7 +9,6 @@ from kickstand.imu.fifo_frames import DUE, LOOK_MS, AxisWatch, add_up
 
 RATE_HZ = 200
 LOOK = RATE_HZ * LOOK_MS // 1000  # samples
-COLUMNS = (0, 1, 2, 4, 5, 6)
 REST = (0, 0, 4096, -3920, 10, -500, 300)  # counts of a chip at rest, in the ranges of 8 g and 500 deg/s
 NOISE = (13, 13, 13, 3, 2.66, 2.66, 2.66)  # rms of the noise in counts, by the data sheet at DLPF 3
 
@@ -153,55 +152,6 @@ def one_look(column=None, values=(), clipped=0, gyro_clipped=0, end=(1,), shaken
 
 
 @pytest.mark.parametrize(
-    ("gyro_range", "dlpf", "column", "looks", "fault"),
-    [
-        (1, 3, 0, 1, "Accel x stuck"),
-        (1, 4, 0, 4, "Accel x stuck"),
-        (1, 5, 1, 15, "Accel y stuck"),
-        (1, 6, 2, 80, "Accel z stuck"),
-        (1, 3, 6, 1, "Gyro z dead"),
-        (0, 4, 6, 3, "Gyro z dead"),
-        (0, 6, 4, 11, "Gyro x dead"),
-        (2, 4, 5, 10, "Gyro y dead"),
-        (3, 3, 4, 14, "Gyro x dead"),
-        (2, 5, 4, 62, "Gyro x dead"),
-        (2, 6, 6, None, None),  # the noise is too small to judge
-        (3, 4, 5, None, None),
-    ],
-)
-def test_an_axis_without_noise_is_ill_after_its_looks(gyro_range, dlpf, column, looks, fault):
-    """The limits are for the noise of the quietest chip. The counts have two values."""
-    judged = Judged(gyro_range, dlpf)
-    for _ in range(looks or 90):
-        judged.feed(one_look(column, (3, 4)))
-    assert [words for words, _, _ in judged.looks] == [None] * ((looks or 91) - 1) + ([fault] if fault else [])
-
-
-@pytest.mark.parametrize(
-    ("values", "ill"),
-    [([8], True), ([8, 9], True), ([8, 9, 10], False), ([8, 10, 12], True), ([9, 11, 13], True), ([8, 9, 11], False)],
-)
-def test_a_working_axis_has_three_values_even_and_odd(values, ill):
-    """The axis also changes its high byte, in a look with a neighbour at the end of the range."""
-    look = one_look(0, [value + 16 * (k % 40) for k in range(LOOK) for value in values], clipped=1)
-    assert (Judged().feed(look).looks[0][0] == "Accel x stuck") is ill
-
-
-def test_a_stuck_high_byte_wraps_in_two_looks():
-    """A look with a change of the high byte starts the count again."""
-    wrapped = one_look(2, (2, 3, 4, 250, 251, 249))
-    assert [fault for fault, _, _ in Judged().feed(np.vstack([wrapped] * 2)).looks] == [None, "Accel z stuck"]
-    mixed = Judged().feed(np.vstack([wrapped, one_look(clipped=1), wrapped, wrapped, wrapped]))
-    assert [fault for fault, _, _ in mixed.looks] == [None] * 4 + ["Accel z stuck"]
-
-
-def test_equal_axes_are_not_judged_with_a_slow_low_pass():
-    equal = one_look(6, one_look()[:, 5])
-    for dlpf, fault in ((3, "Gyro yz equal"), (6, None)):
-        assert Judged(1, dlpf).feed(equal).looks[0][0] == fault
-
-
-@pytest.mark.parametrize(
     ("share", "notice", "fault"),
     [
         ({"clipped": 7}, None, None),
@@ -220,39 +170,3 @@ def test_samples_at_the_end_of_the_range_clip(share, notice, fault):
     judged = Judged(accel_range=3 if "shaken" in share else 1).feed(np.vstack([one_look(**share)] * 2))
     assert judged.looks == [(None, notice, False), (fault, None, False)]
     assert judged.watch.clipped == 2 * share.get("clipped", 0)
-
-
-@pytest.mark.parametrize(
-    ("clips", "faults"),
-    [
-        ((40, 19, 40), (None, None, None)),  # less than a quarter ends the count
-        ((40, 20, 40), (None, None, "Accel")),
-        ((80,) * 5, (None, "Accel", "Accel", "Accel", "Accel y stuck")),  # all samples of five looks
-        ((79,) * 5, (None,) + ("Accel",) * 4),
-        ((40, 40, 0, 40, 0), (None, "Accel", "Accel", "Accel", None)),  # two good looks end a fault
-    ],
-)
-def test_looks_in_a_row_decide(clips, faults):
-    judged = Judged(accel_range=1)
-    for clipped in clips:
-        judged.feed(one_look(clipped=clipped))
-    assert tuple(fault for fault, _, _ in judged.looks) == faults
-
-
-def test_set_ups_every_10_s_and_notices_every_minute():
-    judged = Judged().feed(np.vstack([one_look(0, (8,))] * 152))
-    assert [k for k, look in enumerate(judged.looks) if look[2]] == [*range(0, 152, 25)]
-    assert [k for k, look in enumerate(judged.looks) if look[1]] == [0, 150]
-
-
-def test_a_set_up_begins_a_new_look_and_a_row_of_0_1_s_clips():
-    judged = Judged().feed(one_look(clipped=19)[:19])
-    assert judged.watch.clips() is None
-    judged.feed(one_look(clipped=1)[:1])
-    assert words(judged.watch.clips()) == "Accel"
-    judged.feed(one_look(gyro_clipped=1)[:1])
-    assert words(judged.watch.clips()) == "Gyro"
-    judged.watch.restart()
-    assert judged.watch.clips() is None
-    judged.feed(one_look()[:-1])
-    assert judged.looks == []

@@ -75,15 +75,3 @@ def test_ticks_that_begin_again_at_0_are_no_gap(clock):
         now_us = (end + k * PERIOD_US + PERIOD_US // 2) % end
         assert clock.step(1, now_us) == PERIOD_US
         clock.emptied(now_us)
-
-
-def test_a_sample_is_half_a_period_old_on_average(clock):
-    """The first read is at the moment of a sample. The later reads are at random moments within a period, so the age of
-    a sample is half a period on average."""
-    rng, errors, samples_us = np.random.default_rng(2), [], np.arange(1200) * PERIOD_US
-    for _ in range(10):
-        clock.restart()
-        looks_us = [0, *(samples_us[1:-1] + rng.integers(0, PERIOD_US, 1198)).tolist()]
-        total, true = elapsed(clock, samples_us, looks_us)
-        errors.append(total - true)
-    assert np.mean(errors) == pytest.approx(0, abs=300)

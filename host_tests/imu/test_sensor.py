@@ -6,7 +6,6 @@ import textwrap
 from typing import Any
 
 import pytest
-from kickstand.errors import Notice
 from kickstand_tools.simulated_board.simulator import Board
 from support.board_access import level, on_board, write
 
@@ -110,13 +109,6 @@ def test_a_chip_that_has_reset_itself_is_set_up_again(leaves):
     assert run.since("sensor-reset") == pytest.approx(1.0, abs=0.002) and run.changes[-1][0] < 1.25
 
 
-@pytest.mark.parametrize(("count", "codes"), [(4, []), (6, ["sensor-lost", None])])
-def test_a_check_that_is_lost_counts_as_a_lost_transfer(count, codes):
-    """A pass has two transfers of samples, then the check, which is tried twice. Each later pass restarts the FIFO."""
-    run = Run(lambda board: board.at(0.995, lambda: board.faults.nack(SENSOR, 3, count)), check_ms=10)
-    assert run.codes() == [*STARTED, *codes]
-
-
 def test_a_start_takes_0_2_s_and_a_prepared_chip_has_no_old_samples():
     run = Run(lambda board: None, until_s=1.0)
     assert [change[1:] for change in run.changes] == [("starting", 0), ("starting", 1), (None, 1)]
@@ -142,50 +134,6 @@ def test_a_missing_or_unknown_chip_is_looked_for_every_50_ms(board, code):
     run = Run(fit, **board)
     assert [code for code in run.codes() if code != "starting"] == [code, None] and run.changes[0][0] < 0.01
     assert 1.2 < run.changes[-1][0] < 1.29 and run.changes[-1][2] == 1
-
-
-def test_failed_set_ups_are_explained_about_once_a_second():
-    times_s = []
-
-    def explain(chip, error):
-        assert isinstance(error, OSError)
-        times_s.append(run_board[0].clock.now_us / 1e6)
-        return Notice("exchanged", 4, 5), [0x3C]
-
-    run_board = []
-    run = Run(run_board.append, explain=explain, sensor_address=None)
-    assert times_s == pytest.approx([0.1, 1.1, 2.1], abs=0.02)
-    assert run.codes() == ["starting", "exchanged"] and run.sensor.found == [0x3C]
-
-
-def test_the_fifo_is_tested_if_set_ups_do_not_help():
-    """The test runs at the third fault in a row, if each fault comes soon after a set-up. It runs only once, because it
-    takes 0.3 s. A sample ends the fault."""
-    calls = []
-
-    def explain(chip, error):
-        calls.append(error)
-        return Notice("sensor-fifo", "stays empty"), []
-
-    def dead_fifo(board):
-        push = board.sensor.fifo.push
-        board.at(1.0, lambda: vars(board.sensor.fifo).update(push=lambda *data, **kind: True))
-        board.at(2.5, lambda: vars(board.sensor.fifo).update(push=push))
-
-    run = Run(dead_fifo, explain=explain)
-    assert run.codes() == [*STARTED, "sensor-silent", "sensor-fifo", None] and calls == [None]
-    assert [restarts for time_s, _, restarts in run.changes if time_s < run.since("sensor-fifo")][-1] == 3
-
-    def slow(board):
-        for k in range(5):
-            board.at(1.0 + 1.5 * k, lambda: write(board.sensor, 0x6B, 0x41))
-
-    assert Run(slow, 9.0, lambda chip, error: 1 / 0).codes() == STARTED + ["sensor-silent", None] * 5
-
-
-def test_a_broken_fifo_explains_lost_readings():
-    run = Run(lambda board: board.faults.busy(1.0, 0.6), explain=lambda *_: (Notice("sensor-fifo", "stays full"), []))
-    assert run.codes() == [*STARTED, "sensor-fifo", None]
 
 
 def test_clipped_samples_are_skipped_and_a_faulty_axis_gives_none():

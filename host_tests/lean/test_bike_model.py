@@ -116,11 +116,6 @@ def test_near_balance_the_turn_rates_give_no_force_to_the_side(lean):
     assert x[PITCH] == pytest.approx(0.0, abs=1e-12)  # the rates are about the vertical, so the pitch does not change
 
 
-def test_slow_or_far_from_balance_turn_rates_are_measured():
-    assert rates_at(0.5, 20.0, 0.1, 0.4) == (0.1, 0.4)  # the bike leans to one side and turns to the other
-    assert rates_at(0.5, 3.0, 0.1, -1.6) == (0.1, -1.6)
-
-
 @pytest.mark.parametrize("lean", [-0.6, 0.0, 0.6])
 @pytest.mark.parametrize("pitch", [-0.2, 0.2])
 def test_pitch_seen_by_the_yaw_error_is_not_lean(lean, pitch):

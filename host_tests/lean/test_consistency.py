@@ -4,7 +4,6 @@ MicroPython."""
 from math import radians
 
 from bike_motion import DT_US, force_and_rate, meter, near, ride, roll, speed_up
-from kickstand.calibration.parameters import Calibration
 from kickstand.lean import consistency
 from kickstand.lean.consistency import HOLDS_S, Consistency
 
@@ -34,7 +33,7 @@ def test_each_kind_of_misfit_is_found_in_its_time():
     """The rows are the kind, its value, a time that is too short, and a time that is long enough. Vibration, a real
     slope, and larger means on a rough road are no misfits."""
     steep, never = radians(10.0), 0.0
-    for least_s, most_s, given in (
+    for least_s, most_s, kind in (
         (0.4, 1.0, {"left": -4.0}),
         (0.4, 1.0, {"up": -4.0}),
         (1.0, 3.2, {"left": 1.5}),
@@ -53,19 +52,12 @@ def test_each_kind_of_misfit_is_found_in_its_time():
         (30.0, never, {"up": 0.55, "shaken": 1.5}),
     ):
         judge = Consistency()
-        assert not windows(judge, least_s, **given) and not judge.doubt, given
-        assert bool(windows(judge, most_s - least_s, **given)) == (most_s > 0.0), given
+        assert not windows(judge, least_s, **kind) and not judge.doubt, kind
+        assert bool(windows(judge, most_s - least_s, **kind)) == (most_s > 0.0), kind
     judge = Consistency()
     for _ in range(10):  # a rider who accelerates down a slope soon brakes on it
         assert not windows(judge, 2.0, pitch=radians(-8.0), push=0.4)
         assert not windows(judge, 2.0, pitch=radians(-8.0), push=-0.8)
-
-
-def test_an_accelerometer_of_six_positions_has_the_narrow_limits():
-    for six_done in (True, False):
-        calibration = Calibration()
-        calibration.six_done = six_done
-        assert bool(windows(meter(calibration).filter.consistency, 30.0, up=0.55)) == six_done
 
 
 def test_a_lean_is_believed_again_when_it_has_fitted_for_a_while():
@@ -116,20 +108,6 @@ def test_repeated_misfits_are_reported():
     assert judge.doubt  # in the end only turns show that it fits again
     windows(judge, HOLDS_S[3] + 1.0, yaw_rate=0.1)
     assert not judge.doubt and judge.odd is None
-
-
-def test_after_a_gap_it_must_fit_or_rest_first():
-    for seconds, doubt in ((4.2, True), (4.8, False)):
-        judge = Consistency()
-        judge.gap()
-        windows(judge, seconds)
-        assert judge.doubt == doubt
-    judge.gap()
-    judge.rest(WINDOW_S)
-    assert not judge.doubt
-    judge.gap(False)
-    judge.rest(60.0)
-    assert judge.doubt
 
 
 def weave(shown, seconds, bias_dps=0.0, gain=1.0, then=lambda lean_deg: None):

@@ -3,14 +3,13 @@
 test_known_ride.py notices any change of their parameters.
 """
 
-from math import cos, degrees, radians, sin, sqrt
+from math import cos, degrees, radians, sin
 
 import pytest
 from bike_motion import GRAVITY_MPS2
 from kickstand.lean.dive import PRIOR_SHARE, Dive
 from kickstand.lean.measurements import gyro_variances
 from kickstand.lean.rest import RestDetector
-from kickstand.lean.upright_trim import UprightTrim
 
 WINDOW_S = 0.25
 NONE = (0.0, 0.0, 0.0)
@@ -54,54 +53,6 @@ def rest_after(detector, seconds, rates=NONE, force=(0.0, 1.0, 0.0), bias=NONE, 
 )
 def test_rest_is_stillness_without_a_turn(first, motion, rest_s):
     assert rest_after(RestDetector(first), 12.0, **motion) == rest_s
-
-
-def test_rest_counts_from_the_end_of_other_signs():
-    detector = RestDetector()
-    rest_after(detector, 5.0, rolling=True)
-    assert rest_after(detector, 3.0) == 1.5
-    assert rest_after(detector, 3.0, rolling=True) == 2.0  # ten seconds of stillness in all
-    assert rest_after(detector, 12.0, rates=(0.05, 0.0, 0.0)) is None  # after a rest, a rate is a turn
-    for k, moved in ((1, 1.25), (2, 9.75)):
-        detector = RestDetector()
-        rest_after(detector, moved, rolling=k == 2)
-        # The moving average needs half a second after a movement
-        assert rest_after(detector, 14.0, force=(0.0, 1.0, 0.03), rolling=k == 2) == (2.0, 10.5)[k - 1]
-
-
-def after_turns(sides, lean_share):
-    """Return the trim after turns of a minute each at 35 degrees. The upright pose has an error of 2 degrees.
-
-    sides: 1 for a turn to the right, -1 for a turn to the left.
-    lean_share: in turns, a force of lean_share * sin(lean) acts to the side.
-    """
-    trim = UprightTrim(0.0)
-    for side in sides:
-        lean = radians(35.0 * side)
-        for _ in range(300):
-            trim.update(radians(2.0) + lean_share * sin(lean), lean + radians(2.0), -0.35 * side, 0.2)
-    return trim
-
-
-@pytest.mark.parametrize("lean_share", [0.0, 0.1, -0.1])
-def test_turns_to_both_sides_show_a_pose_error(lean_share):
-    """Tyres and rider have the same effect on both sides. Turns to one side do not separate them from the pose."""
-    assert degrees(after_turns((1, -1, 1, -1), lean_share).angle) == pytest.approx(2.0, abs=0.4)
-    left, both = after_turns((1, 1), lean_share), after_turns((1, -1), lean_share)
-    assert degrees(sqrt(left.variance)) > max(1.5, 2.0 * degrees(sqrt(both.variance)))
-
-
-def test_straights_show_a_pose_error_by_hand():
-    """Disturbances of 1.5 degrees last 2 s each, so 30 s contain 7.5 independent measurements. The pose has a standard
-    deviation of 2.5 degrees."""
-    trim = UprightTrim(0.0)
-    trim.update(0.15, 0.0, 0.0, 0.2)  # a bike that is pushed to the side is not in balance
-    assert trim.angle == 0.0 and degrees(sqrt(trim.variance)) == pytest.approx(2.5)
-    for _ in range(150):
-        trim.update(sin(radians(2.0)), radians(2.0), 0.0, 0.2)
-    share = 1.0 / (1.0 + 1.5**2 / 7.5 / 2.5**2)
-    assert degrees(trim.angle) == pytest.approx(2.0 * share, abs=0.02)
-    assert degrees(sqrt(trim.variance)) == pytest.approx(2.5 * sqrt(1.0 - share), abs=0.02)
 
 
 def ridden(share, seconds, road=0.0, speed=20.0):

@@ -63,12 +63,12 @@ def states():
         rates: rates of change of the three values.
         True if the speed is measured.
     """
-    t_s, before = 0.0, (3, 0, 2)
-    for seconds, *after, measured in LEGS:
-        rates = [(b - a) / seconds for a, b in zip(before, after)]
+    t_s, begin = 0.0, (3, 0, 2)
+    for seconds, *end, measured in LEGS:
+        rates = [(b - a) / seconds for a, b in zip(begin, end)]
         for k in range(100 * seconds):
-            yield t_s + k / 100.0, [a + r * k / 100.0 for a, r in zip(before, rates)], rates, measured
-        t_s, before = t_s + seconds, after
+            yield t_s + k / 100.0, [a + r * k / 100.0 for a, r in zip(begin, rates)], rates, measured
+        t_s, begin = t_s + seconds, end
 
 
 def sensed(t_s, values, rates):
@@ -91,7 +91,7 @@ def figures():
     A row has the lean and its standard deviation in degrees, the speed in m/s, pitch and trim in degrees, and 1 at rest
     or 0 otherwise.
     """
-    estimator, before_s, rows = LeanFilter(), 0.0, []
+    estimator, last_s, rows = LeanFilter(), 0.0, []
     for k, (t_s, values, rates, measured) in enumerate(states()):
         if SLOW_S[0] <= t_s < SLOW_S[1] and k % 2:
             continue
@@ -102,8 +102,8 @@ def figures():
         for lost_s, seconds in LOST:
             if abs(t_s - lost_s) < 1e-6:
                 estimator.inflate_covariance(seconds)
-        lean = estimator.update(*sensed(t_s, values, rates), int((t_s - before_s) * 1e6 + 0.5))
-        before_s = t_s
+        lean = estimator.update(*sensed(t_s, values, rates), int((t_s - last_s) * 1e6 + 0.5))
+        last_s = t_s
         if k % 100 == 0 and k:
             sigma = degrees(sqrt(estimator.variance))
             trim = degrees(estimator.trim.angle)
@@ -113,13 +113,13 @@ def figures():
 
 def test_the_figures_of_the_known_ride_are_what_they_were():
     with open(__file__.rpartition("/")[0] + "/known_ride.csv") as file:
-        known = [[float(value) for value in line.split(",")] for line in file]
-    found = figures()
-    assert len(found) == len(known)
-    for t_s, (now, then) in enumerate(zip(found, known), 1):
-        assert now[5] == then[5], t_s
-        for a, b in zip(now, then):
-            assert abs(a - b) < TOLERANCE, (t_s, now, then)
+        references = [[float(value) for value in line.split(",")] for line in file]
+    rows = figures()
+    assert len(rows) == len(references)
+    for t_s, (row, reference) in enumerate(zip(rows, references), 1):
+        assert row[5] == reference[5], t_s
+        for a, b in zip(row, reference):
+            assert abs(a - b) < TOLERANCE, (t_s, row, reference)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Tests when the meter shows a lean, its maxima, and the effect of gaps. Also runs on MicroPython."""
 
 from array import array
-from math import degrees, pi, radians
+from math import degrees
 
 from bike_motion import DT_US, force_and_rate, meter, near, nose_up, reading, ride, roll, speed_up
 from kickstand.calibration.parameters import Calibration
@@ -28,14 +28,6 @@ def test_a_meter_takes_sums_of_counts():
     assert [round(3 * value, 6) for value in shown.reading] == [8, 12288, 4, 100, -2, 6, 131]
     near(shown.force[1], 1.0, 0.001)
     near(degrees(shown.rate[2]), 131 / 3 / 65.5, 0.01)
-
-
-def test_the_first_g_is_shown_at_once_also_after_a_gap():
-    shown = meter(leans=False)
-    for left, forward, dt_us in ((0.1, 0.3, 10_000), (-0.1, -0.3, 600_000)):
-        shown.update((left, 0.9, forward, 25.0, 0.0, 0.0, 0.0), dt_us)
-        near(shown.smooth_force[2], forward, 1e-12)
-        near(shown.smooth_force[0], left, 1e-12)
 
 
 def test_the_shown_g_is_smooth():
@@ -94,12 +86,6 @@ def test_after_the_poses_the_first_bend_shows_its_lean():
     assert not ride(shown, 1.0, 15.0, lean_deg=30.0).trusted  # the bike moves right after the poses
 
 
-def test_a_car_shows_its_g_however_it_stands():
-    shown = nose_up(ride(meter(leans=False), 1.0), 0.0, 25.0)
-    shown.distrust("mount-moved")
-    assert shown.trusted and shown.lean_deg == 0.0
-
-
 def test_a_bike_that_lies_on_its_side_for_a_second_has_fallen():
     for sign in (1.0, -1.0):
         lying = sign * 80.0
@@ -112,13 +98,6 @@ def test_a_bike_that_lies_on_its_side_for_a_second_has_fallen():
         assert ride(shown, 0.7, lean_deg=lying).fallen
         shown.restart()
         assert not shown.fallen and shown.lean_deg == 0.0
-
-
-def test_the_lean_of_a_fall_is_no_maximum():
-    shown = ride(roll(ride(meter(), 3.0), 0.0, 63.0), 0.2, lean_deg=63.0)
-    near(shown.max_right_deg, 63.0, 0.5)  # the lean is extrapolated by the delay of the low-pass
-    roll(shown, 63.0, 85.0)
-    assert shown.lean_deg > 80.0 and shown.max_right_deg < 65.0
 
 
 def test_maxima_are_the_largest_values_until_a_reset():
@@ -168,20 +147,6 @@ def test_a_distrusted_lean_is_hidden_and_no_maximum():
     assert shown.suppressed_reason is None
 
 
-def test_only_a_long_gap_restarts_the_filter():
-    """The filter computes the movement during a short gap from the rate at its end."""
-    shown = ride(meter(), 3.0)
-    shown.update(reading(*force_and_rate(4.0, roll_dps=10.0)), 400_000)
-    near(shown.lean_deg, 4.0, 0.3)
-    shown.update(reading(*force_and_rate(-20.0, roll_dps=50.0)), 600_000)
-    near(shown.lean_deg, -20.0, 0.01)  # the force alone gives this lean, without the rate
-    assert shown.filter.variance == pi * pi and not shown.trusted and not shown.at_rest
-    for lost_us, trusted in ((150_000, True), (300_000, False)):
-        shown = ride(meter(), 3.0)
-        shown.update(STILL, lost_us)
-        assert shown.trusted is trusted
-
-
 def test_a_restart_resets_the_ride_and_keeps_the_maxima():
     shown = ride(roll(ride(meter(), 3.0), 0.0, 20.0), 0.2, lean_deg=20.0)
     for again in (shown.restart, lambda: shown.use(shown.calibration)):
@@ -192,24 +157,6 @@ def test_a_restart_resets_the_ride_and_keeps_the_maxima():
         ride(shown, 3.0)
 
 
-def test_a_certain_trim_is_kept_at_rest():
-    for angle_deg, sigma_deg, calibrated_deg, mps, keeps in (
-        (1.0, 0.3, 0.0, 0.0, True),
-        (-1.0, 0.3, 0.0, 0.0, True),
-        (1.0, 0.8, 0.0, 0.0, False),
-        (1.0, 0.3, 0.9, 0.0, False),  # saving wears the flash
-        (1.0, 0.3, 0.0, 15.0, False),
-    ):
-        calibration = Calibration()
-        calibration.trim_deg = calibrated_deg
-        shown = ride(meter(calibration), 3.0)
-        shown.filter.trim.angle, shown.filter.trim.variance = radians(angle_deg), radians(sigma_deg) ** 2
-        speed_up(shown, 0.0, mps, 5.0 if mps else 0.01)
-        assert shown.keep_trim() is keeps, (angle_deg, sigma_deg, calibrated_deg)
-        near(calibration.trim_deg, angle_deg if keeps else calibrated_deg, 1e-5)
-        assert not shown.keep_trim()  # the same trim is not kept again
-
-
 def test_the_delay_of_the_low_pass_is_compensated():
     """The bike rolls to the right at 60 deg/s. The readings are 20 ms old, so the lean is now larger by 1.2 degrees."""
     prompt, late = ride(meter(delay_s=0.0), 3.0), ride(meter(delay_s=0.02), 3.0)
@@ -218,15 +165,3 @@ def test_the_delay_of_the_low_pass_is_compensated():
             shown.update(reading(*force_and_rate(0.6 * (k + 1), roll_dps=60.0)), DT_US)
     near(late.lean_deg - prompt.lean_deg, 60.0 * 0.02, 0.01)
     near(prompt.lean_deg, 6.0, 0.2)
-
-
-def test_a_negative_speed_is_ignored():
-    measured, alone = meter(), meter()
-    for shown in (measured, alone):
-        ride(speed_up(ride(shown, 3.0), 0.0, 20.0, 6.0), 1.0, speed_mps=20.0)
-    measured.measure_speed(-1.0)
-    for shown in (measured, alone):
-        ride(shown, 1.0, speed_mps=20.0)
-    assert measured.speed_mps == alone.speed_mps
-    measured.measure_speed(0.0)  # a speed of 0 is valid
-    assert ride(measured, 1.0, speed_mps=20.0).speed_mps < alone.speed_mps - 0.5

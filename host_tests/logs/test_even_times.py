@@ -34,70 +34,6 @@ def test_samples_with_a_common_time_are_spread():
     assert even_times([0.0, 0.0, 0.1, 0.1, 0.2]) == pytest.approx([0.0, 0.05, 0.1, 0.15, 0.2], abs=0.06)
 
 
-def changing(low: int, high: int, n: int = 400):
-    """Return times with steps of `low` and `high` ticks of 0.5 ms in random order, as many of each."""
-    steps = np.random.default_rng(1).permutation(np.repeat([low, high], n // 2))
-    return np.concatenate(([0], np.cumsum(steps))) * 0.0005
-
-
-RANDOM = np.random.default_rng(1)
-UNCHANGED = {
-    "even": np.arange(1000) / 100.0,
-    "some samples are lost": np.delete(np.arange(1000) / 100.0, [5, 500, 501]),
-    "2 % of the steps are lost": np.cumsum([0.0, *[0.01] * 98, 0.02, 0.02]),
-    "fine ticks": np.round(np.cumsum(0.01 + 0.002 * RANDOM.random(1000)), 4),
-    "a tick of a twentieth": changing(20, 21),
-    "since 1970": 1.7e9 + np.arange(1000) / 200.0,
-    "one": np.array([3.0]),
-    "none": np.array([]),
-}
-
-
-@pytest.mark.parametrize("name", UNCHANGED)
-def test_fine_or_even_times_are_unchanged(name):
-    assert np.array_equal(even_times(UNCHANGED[name]), UNCHANGED[name])
-    assert not np.array_equal(even_times(changing(19, 20)), changing(19, 20))
-
-
-@pytest.mark.parametrize(("repeats", "least", "most"), [(20, 1, 20), (45, 1, 45), (55, 900, 1000)])
-def test_one_repeated_time_in_twenty_changes_all_times(repeats, least, most):
-    """With fewer repeats only the repeated times are changed."""
-    times = np.cumsum(0.01 + 0.002 * np.random.default_rng(1).random(1000)).round(6)
-    rows = np.linspace(5, 990, repeats).astype(int)
-    times[rows] = times[rows - 1]
-    moved = np.abs(even_times(times) - times) > 1e-9
-    assert least <= np.count_nonzero(moved) <= most
-
-
-@pytest.mark.parametrize("gap", [4, 8, 40])
-def test_gaps_do_not_lengthen_the_period(gap):
-    """Samples are 10.4 ms apart, rounded to 10 ms. After every 20 samples some samples are missing."""
-    numbers = np.concatenate([np.arange(20) + (19 + gap) * k for k in range(60)])
-    steps = np.diff(even_times(np.rint(numbers * 1.04) / 100.0))
-    inside = np.arange(len(steps)) % 20 != 19
-    assert np.mean(steps[inside]) == pytest.approx(0.0104, rel=0.01)
-    assert steps[inside] / 0.0104 == pytest.approx(1.0, abs=0.4)
-
-
-@pytest.mark.parametrize("gap_s", [0.035, 0.5, 45.0])
-def test_gaps_stay_gaps(gap_s):
-    true = np.arange(3000) / 104 + np.where(np.arange(3000) >= 1500, gap_s, 0.0)
-    steps = np.diff(even_times(np.round(true, 2)))
-    assert steps[1499] == pytest.approx(gap_s + 1.0 / 104, abs=0.01)
-    assert np.delete(steps, 1499) * 104 == pytest.approx(1.0, abs=0.1)
-
-
-def test_a_repeated_line_moves_other_times_within_rounding():
-    times = np.arange(1000) / 100.0
-    twice = np.insert(times, 500, times[500])
-    spread = even_times(twice)
-    assert np.all(np.diff(spread) > 0.004) and np.abs(spread - twice).max() <= 0.006
-    assert np.abs(spread - twice)[:400].max() < 1e-3
-    fine = times + 1e-6 * np.random.default_rng(2).integers(0, 900, 1000)
-    spread = even_times(np.insert(fine, 500, fine[500]))
-    assert np.delete(spread, 501) == pytest.approx(fine, abs=1e-5) and fine[500] < spread[501] < fine[501]
-
-
 @given(st.lists(st.integers(0, 20), min_size=2, max_size=200), st.sampled_from([1e-6, 0.001, 0.01, 1.0]))
 def test_times_increase_and_stay_near(steps, tick_s):
     """For any times that do not decrease: each result is after the previous one, or the clock has stopped."""
@@ -123,13 +59,6 @@ def test_times_increase_and_stay_near(steps, tick_s):
 def test_an_invalid_time_is_refused(times, words):
     with pytest.raises(InputError, match=words):
         even_times(times, "log")
-
-
-@pytest.mark.parametrize(("usual", "crowd"), [(1, 50), (10, 97)])
-def test_a_crowd_of_samples_at_one_time_is_spread(usual, crowd):
-    """A clock has stopped at over 50 samples with one time, and at over ten times the usual number."""
-    times = np.repeat(np.arange(1000) * 0.1, np.where(np.arange(1000) == 500, crowd, usual))
-    assert np.all(np.diff(even_times(times)) > 0.0)
 
 
 def rows_at(times):
@@ -159,22 +88,3 @@ def test_times_are_spread_equally_for_any_block_size(text_log, small_blocks, nam
     (notice,) = (notice for notice in notices if notice.code == "times-spread")
     repeated = np.count_nonzero(np.diff(recorded) == 0.0)
     assert f"({repeated} of {len(true)} repeat the previous one): they are spread evenly" in notice.line()
-
-
-def test_times_that_become_rounded_continue_after_even_ones(text_log, small_blocks):
-    """The times of the first blocks are unchanged. Blocks have about 700 rows."""
-    small_blocks(30_000)
-    even = np.arange(6000) * 0.01
-    rounded = 60.0 + np.floor(np.arange(6000) * 0.7) / 100.0
-    blocks = list(read_blocks(text_log(*rows_at([*even, *rounded]))))
-    time_us = np.concatenate([block.time_us for block in blocks])
-    assert np.all(np.diff(time_us) >= 1) and len(time_us) == 12_000
-    assert blocks[0].own_times and not blocks[-1].own_times
-    assert time_us[:3000].tolist() == np.rint(even[:3000] * 1e6).astype(int).tolist()
-    assert np.abs(time_us[6000:] * 1e-6 - rounded).max() <= 0.0061
-
-
-def test_a_shift_of_under_two_milliseconds_is_no_remark(text_log):
-    notices = []
-    (block,) = read_blocks(text_log(*rows_at(np.round(np.arange(2000) / 300.0, 3))), notices=notices)
-    assert not block.own_times and "times-spread" not in [notice.code for notice in notices]

@@ -1,17 +1,13 @@
 """A log in memory: shapes and times that are refused, the order of columns, blocks, stretches, names."""
 
-import io
 from typing import Any
 
 import numpy as np
 import pytest
 from kickstand_tools.api import Log, Stretch
-from kickstand_tools.calibration.file import calibration_path
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import reader
-from kickstand_tools.logs.csv_lines import write_log
-from kickstand_tools.logs.reader import read_blocks, read_log, read_twice, split_stretch
-from kickstand_tools.logs.source import log_stem, name_of, total_bytes
+from kickstand_tools.logs.reader import read_blocks, read_log, split_stretch
 from support import command
 
 FORCE, RATE = [0.1, 0.2, 0.9], [1.0, 2.0, 3.0]
@@ -39,16 +35,6 @@ def test_the_chips_order_and_the_names_of_the_columns():
     copy = Log.from_readings(log.readings, 50.0, "mine")
     assert (copy.t_s.tolist(), copy.name) == ([0.0, 0.02], "mine")
     assert copy.readings.tolist() == log.readings.tolist() and np.isnan(copy.speed_mps).all()
-
-
-def test_a_row_without_a_temperature_gets_25_degrees():
-    """The firmware's modules need a temperature."""
-    log = log_of(3, temperature_c=[np.nan, 31.5, np.nan], speed_mps=[np.nan, 4.0, np.nan])
-    rows = list(log.rows())
-    assert [row[1][3] for row in rows] == [25.0, 31.5, 25.0]
-    assert rows[1] == (10_000, [0.1, 0.2, 0.9, 31.5, 1.0, 2.0, 3.0], 4.0)
-    (block,) = read_blocks(log)
-    assert repr(list(block.rows())) == repr(rows)
 
 
 @pytest.mark.parametrize(
@@ -108,40 +94,8 @@ def test_a_stretch_without_samples_is_refused(from_s, to_s, words):
         read_log(Stretch(log_of(101), from_s, to_s))
 
 
-def test_an_open_file_is_read_once_and_kept(text_log):
-    rows = [f"{k / 4},0,1,0,0,0,{k}" for k in range(9)]
-    for source in (text_log(*rows), Stretch(text_log(*rows), 0.5, 1.5)):
-        twice = read_twice(source)
-        assert [len(read_log(twice).t_s) for _ in range(2)] == [5 if isinstance(twice, Stretch) else 9] * 2
-    log = log_of(5)
-    assert read_twice(log) is log and read_twice("log.csv") == "log.csv" and split_stretch(log) == (log, None)
-
-
-def test_the_least_number_of_samples_is_checked():
-    assert len(read_log(log_of(300), 300).t_s) == 300 and len(read_log(log_of(1), minimum=1).t_s) == 1
-    with pytest.raises(InputError, match="the log is too short: 299 samples, at least 300 are needed"):
-        read_log(log_of(299), 300)
-    with pytest.raises(InputError, match="too short: 1 samples, at least 2 are needed"):
-        list(read_blocks(log_of(1)))
-
-
 def test_a_log_has_a_largest_number_of_samples(monkeypatch):
     monkeypatch.setattr(reader, "MOST_SAMPLES", 100)
     assert len(read_log(log_of(100)).t_s) == 100
     with pytest.raises(InputError, match="million samples: kickstand cut writes a part of it"):
         read_log(log_of(101))
-
-
-def test_sources_have_their_names(tmp_path, monkeypatch):
-    for name in ("monday.csv", "monday", "monday.zip", "monday.VBO", "monday.txt.gz", "rides/monday.parquet"):
-        assert log_stem(name) == "monday", name
-    assert log_stem("b.c.zip") == "b.c" and log_stem("b.json") == "b.json"
-    assert name_of(io.StringIO()) == "the log" and name_of(log_of(2, name="mine")) == "mine"
-    write_log(tmp_path / "a.csv", log_of(2))
-    assert total_bytes(tmp_path / "a.csv") == (tmp_path / "a.csv").stat().st_size
-    assert total_bytes(io.StringIO("abc")) == total_bytes("there is none") == 0
-    (tmp_path / "EXPORT" / "in").mkdir(parents=True)
-    monkeypatch.chdir(tmp_path / "EXPORT" / "in")
-    assert log_stem(".") == "in" and log_stem("..") == "EXPORT"
-    for folder, file in ((".", tmp_path / "EXPORT" / "in.cal.json"), ("..", tmp_path / "EXPORT.cal.json")):
-        assert calibration_path(type(tmp_path)(folder)) == file

@@ -90,13 +90,6 @@ def test_a_command_refuses_a_bad_log_in_one_line(tmp_path, name):
     assert name.replace("\n", " ") in line
 
 
-def test_the_ride_beside_a_lean_is_named(tmp_path):
-    for name in ("A.cal.json", "A.csv.gz", "LEAN.csv"):
-        (tmp_path / name).write_bytes(b"t_s,lean_deg\n0,1\n")
-    with pytest.raises(InputError, match=r"made from, .*A\.csv\.gz"):
-        read_log(tmp_path / "LEAN.csv")
-
-
 def test_directories_and_missing_files_are_refused(tmp_path):
     for path, words in ((tmp_path, "is a directory: give the name of a log in it"), (tmp_path / "x", "no such file")):
         with pytest.raises(InputError, match=words):
@@ -211,24 +204,6 @@ def test_blocks_add_up_to_the_log(tmp_path, small_blocks, name, size):
     bare = list(read_blocks(path, lines=False))
     assert not any(block.lines for block in bare) and len(bare) == len(blocks)
     assert len(blocks[0].part(slice(0, 1)).lines) == len(blocks[0].part(blocks[0].time_us < 5000).lines) == 1
-
-
-@pytest.mark.parametrize(
-    ("row", "words"),
-    [
-        ("0.0,0,0,1,0,0,0,20,", "line 1002: time goes back from 4.995000 at 0.0 s"),
-        ("9.0,0,0,1,0,0,20,", "line 1002: 8 values under 9 column names"),
-        ("9.0,0,0,77,0,0,0,20,", "line 1002: az_g is '77', past any reading"),
-        ("9.0,0,0,,0,0,0,20,", "line 1002: az_g is empty"),
-        ("9.0,0,0,1,0,0,0,20,\xff", "line 1002: not text"),
-    ],
-)
-@pytest.mark.parametrize("size", [1, 700, 1 << 22])  # with 1 byte, each block is one row
-def test_a_mistake_far_down_is_reported_with_its_line(small_blocks, row, words, size):
-    small_blocks(size)
-    lines = "\n".join([HEADER, *row_texts(1000), row, *row_texts(300, 2000)]).encode("latin-1") + b"\n"
-    with pytest.raises(InputError, match=words):
-        list(read_blocks(io.BytesIO(lines)))
 
 
 def test_memory_does_not_grow_with_the_log(tmp_path, small_blocks, monkeypatch):

@@ -1,15 +1,12 @@
 """`kickstand cut` and the options --from and --to: the samples, the lines and the times of a stretch."""
 
 import gzip
-import io
 import json
-import os
 
-import numpy as np
 import pytest
 from kickstand_tools import api
 from kickstand_tools.logs.log import Stretch
-from kickstand_tools.logs.reader import read_blocks, read_log
+from kickstand_tools.logs.reader import read_blocks
 from support import command
 from support.recordings import analysis_rides
 
@@ -81,50 +78,3 @@ def test_the_lean_of_a_stretch_is_that_of_the_whole_ride(tmp_path, name):
     times = [float(line.partition(",")[0]) for line in lines]
     inside = [line for line, t_s in zip(lines, times) if 16.0 <= t_s <= times[-1] - 4.0 + 1e-9]
     assert part.read_text().splitlines()[1:] == inside
-
-
-def test_a_stretch_warns_of_another_mounts_calibration(tmp_path):
-    """The readings outside the stretch show the mount."""
-    ride = analysis_rides.short(tmp_path, rate_hz=50, speed_hz=1)
-    turned = [[-1, 0, 0], [0, 1, 0], [0, 0, -1]]
-    backward = analysis_rides.calibration(tmp_path / "backward.json", vehicle_from_sensor=turned)
-    assert "forward" in command.works("report", ride, "--calibration", backward, "--from", "30").err
-
-
-def test_an_exported_stretch_keeps_its_time_of_day(tmp_path):
-    """A log without a time of day is assumed to end when its file was written. A stretch ends earlier."""
-    ride, out = analysis_rides.short(tmp_path, rate_hz=50), tmp_path / "out.csv"  # a ride of 34 s
-    os.utime(ride, (1_700_000_100, 1_700_000_100))
-    api.export(api.open_ride(Stretch(ride, 10.0, 20.0)), "racechrono", out)
-    first = out.read_text().splitlines()[12]
-    assert float(first.split(",")[0]) == pytest.approx(1_700_000_100 - 34 + 10, abs=1.5)
-
-
-PLACED = range(3, 400, 20)  # rows that have a position
-
-
-def position(k):
-    return -33.8688197 + 1e-7 * k, 151.2092955 - 1e-7 * k, 1_700_000_000.25 + k / 100
-
-
-def positions_text(t="{:.2f}"):
-    rows = [command.HEADER + ",lat_deg,lon_deg,utc_s"]
-    for k in range(400):
-        cells = "{:.7f},{:.7f},{:.3f}".format(*position(k)) if k in PLACED else ",,"
-        rows.append(f"{t.format(k / 100)},0.0{k % 7},1.0,0.0{k % 3},0.{k % 9},0.5,0.1,{cells}")
-    return io.StringIO("\n".join(rows) + "\n")
-
-
-@pytest.mark.parametrize("size", [700, 1 << 22])
-@pytest.mark.parametrize(("from_s", "to_s", "rows"), [(None, None, PLACED), (1.0, 2.0, range(103, 200, 20))])
-def test_positions_stay_in_their_rows(small_blocks, size, from_s, to_s, rows):
-    """Also if ten rows have the same time, which is then spread."""
-    small_blocks(size)
-    for source in (positions_text(), read_log(positions_text())):
-        log = read_log(Stretch(source, from_s, to_s))
-        row = np.flatnonzero(np.isfinite(log.lat_deg))
-        assert np.rint(100.0 * (log.start_s + log.t_s[row])).tolist() == list(rows)
-        table = np.column_stack((log.lat_deg, log.lon_deg, log.utc_s))[row]
-        assert table == pytest.approx(np.array([position(k) for k in rows]), rel=0, abs=1e-8)
-    spread = read_log(positions_text("{:.1f}"))
-    assert np.flatnonzero(np.isfinite(spread.utc_s)).tolist() == list(PLACED)

@@ -10,23 +10,19 @@ from kickstand_tools.api import Log, read_log, write_log
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import csv_reader
 from kickstand_tools.logs.csv_lines import (
-    csv_lines,
     cut_log,
     joined_cells,
     number_cells,
-    text_cells,
     write_lean,
     write_table,
 )
 from kickstand_tools.logs.csv_reader import (
     as_text,
-    cells_of,
     columns_of,
     columns_of_text,
     filled,
     numbers_in,
     numbers_of,
-    separator_of,
 )
 from kickstand_tools.logs.log import float_schema
 from kickstand_tools.logs.reader import read_blocks
@@ -56,29 +52,6 @@ def test_any_number_is_written_as_python_writes_it(values, digits):
     assert lines == [f"{value:.{digits}f}" for value in values]
 
 
-@pytest.mark.parametrize("values", [[np.nan, 1.25, -np.nan], [np.nan], [np.nan, np.inf]])
-@pytest.mark.parametrize("nan", ["nan", "", "unknown"])
-def test_nan_and_infinity_have_their_texts(values, nan):
-    lines = joined_cells([number_cells(np.array(values), 1, nan)]).decode().split("\n")[:-1]
-    assert lines == [nan if np.isnan(value) else f"{value:.1f}" for value in values]
-
-
-def test_lines_contain_texts_and_numbers():
-    texts, values = ["0.00", "1700000000.125", "2"], np.array([-1.0, 22.125, 3.375])
-    assert joined_cells([text_cells(texts), number_cells(values, 2)]) == b"0.00,-1.00\n1700000000.125,22.12\n2,3.38\n"
-    assert joined_cells([text_cells([]), number_cells(values[:0], 2)]) == b""
-    with pytest.raises(UnicodeEncodeError):
-        text_cells(["\u0661"])
-
-
-def test_a_table_is_written_in_pieces():
-    table = np.random.default_rng(1).normal(size=(31_000, 2))
-    table[30_500, 1] = np.nan
-    pieces = list(csv_lines(table, [3, 0]))
-    assert len(pieces) == 3
-    assert b"".join(pieces).decode() == "".join(f"{a:.3f},{b:.0f}\n".replace("nan", "") for a, b in table.tolist())
-
-
 @pytest.mark.parametrize("digits", range(8))
 def test_numbers_are_read_as_python_reads_them(digits):
     texts = [f"{value:.{digits}f}" for value in numbers(digits).tolist()]
@@ -106,26 +79,6 @@ def test_other_tables_are_left_to_another_reader(text):
     assert numbers_in(text.encode(), 2) is None
 
 
-def test_the_separator_is_the_most_frequent_outside_quotes():
-    for line, separator in (('a;b,c;"d,,,,"', ";"), ("a\tb", "\t"), ("a,b", ",")):
-        assert separator_of(line) == separator
-    assert cells_of('a, "b,c",d') == ["a", "b,c", "d"] and cells_of("a;b", ";") == ["a", "b"]
-
-
-@pytest.mark.parametrize(
-    ("cells", "kind", "values"),
-    [
-        (["1", "2"], "i", [1, 2]), (["1", "2.5"], "f", [1.0, 2.5]), (["1_0", "2"], "O", ["1_0", "2"]),
-        (["x", "nan"], "O", ["x", ""]), (["1", "-2e3"], "f", [1.0, -2000.0]), (["9" * 30, "1"], "f", [1e30, 1.0]),
-        (["0" * 40 + "7"], "f", [7.0]), ([" 1.5 ", "1"], "f", [1.5, 1.0]),
-        *[([word, "1.5", "x"], "O", ["", "1.5", "x"]) for word in ("-", "NA", "n/a", "nil", "None", "NULL", "#N/A")],
-    ],
-)  # fmt: skip
-def test_columns_have_the_narrowest_type(cells, kind, values):
-    (column,) = columns_of([[cell] for cell in cells], 1)
-    assert column.dtype.kind == kind and column.tolist() == values
-
-
 def test_damaged_rows_of_a_table_are_counted():
     """A row with too few cells is filled up. The first row may be wider. A lone quotation mark is ignored."""
     columns, left_out = columns_of_text('1,2.5,x\n2,,\n\n3\n4,"1,y\n1,2,3,4\n' + "9," * 60_000, ",", 3)
@@ -137,15 +90,6 @@ def test_damaged_rows_of_a_table_are_counted():
     assert numbers_of(columns[2]) == pytest.approx([np.nan] * 4, nan_ok=True) and numbers_of(columns[0]) is columns[0]
     columns, left_out = columns_of_text("1,2,3\n4,5\n6,7,8,9\n", ",", 2)
     assert left_out == 1 and [column.tolist() for column in columns] == [[1, 4], [2, 5]]
-
-
-def test_columns_are_those_of_all_blocks_of_rows():
-    """Integers that are followed by decimals or texts become floats or texts."""
-    rows = [[str(k), str(k) if k < 60_000 else f"{k}.5", str(k) if k < 60_000 else "x"] for k in range(70_000)]
-    whole, halves, texts = columns_of(rows, 3)
-    assert whole.dtype.kind == "i" and whole.tolist() == list(range(70_000))
-    assert halves[[0, 69_999]].tolist() == [0.0, 69_999.5] and texts[[7, 69_999]].tolist() == ["7", "x"]
-    assert [column.tolist() for column in columns_of([], 2)] == [[], []]
 
 
 @pytest.mark.parametrize(("name", "most"), [("MOST_CELLS", 9), ("MOST_TEXTS", 1)])

@@ -136,12 +136,6 @@ def test_speed_has_its_unit_and_may_be_missing():
     assert not says(without, "72") and not says(without, "km/h")
 
 
-def test_unknown_values_draw_nothing(gauge):
-    unknown = dict.fromkeys(("lean_deg", "forward_g", "left_g", "speed_mps"), NAN)
-    assert not amber(gauge, **unknown).any()
-    assert np.array_equal(drawn(gauge, **unknown), drawn(gauge, **(unknown | {"left_g": 0.5})))
-
-
 def test_maxima_have_a_mark_on_their_side(gauge):
     middle = 0.6 * gauge.height
     for side, name in ((-1, "left_deg"), (1, "right_deg")):
@@ -160,15 +154,3 @@ def test_gauge_scales_with_the_video_and_has_clear_corners(video_height, height)
     assert (gauge.height, *picture.shape) == (height, height, gauge.width, 4) and gauge.width % 2 == height % 2 == 0
     assert picture[0, 0, 3] == picture[-1, -1, 3] == 0 and picture[..., 3].max() == 255
     assert 50 < picture[gauge.height // 2, 2, 3] < 200  # the panel is partly transparent
-
-
-def test_parts_are_drawn_completely_and_symmetrically():
-    for words in ("31", "km/h", "max 45°", "BRAKE 0.90 g"):
-        alpha = np.asarray(parts.text(words, 20.0, WHITE))[..., 3]
-        edges = alpha[0].max(), alpha[-1].max(), alpha[:, 0].max(), alpha[:, -1].max()
-        assert max(edges) < 255 and alpha.max() == 255, words  # no letter is cut off
-    spot, bike = np.asarray(parts.spot(20, ACCENT)), np.asarray(parts.bike(100.0))
-    assert np.array_equal(spot, spot[::-1]) and np.array_equal(spot, spot[:, ::-1])
-    assert np.abs(bike.astype(int) - bike[:, ::-1]).mean() < 3.0
-    rows = np.flatnonzero(bike[..., 3].max(axis=1) == 255)
-    assert rows[-1] == pytest.approx(len(bike) / 2, abs=3)  # the tyre touches the ground in the middle

@@ -155,47 +155,9 @@ def test_names_and_options_that_do_not_fit_are_refused(ffmpeg, tmp_path, ride, m
     command.refused(tmp_path / "film.mp4", "overlay", ride, "--out", out, *options, words=words)
 
 
-def test_gauge_follows_the_video_or_the_chosen_height(ffmpeg, tmp_path, parked):
-    """Over a video, it follows the smaller side. The video starts at the drawn part, and keeps its own rate."""
-    log, calibration = parked
-    upright: dict[str, Any] = {
-        "video": ffmpeg.film(20, "700x1000", "5 fps"),
-        "offset_s": 3.0,
-        "from_s": 4.5,
-        "live": True,
-    }
-    clips: list[tuple[str, dict[str, Any], int, int]] = [
-        ("a.mp4", upright, 700, 5),
-        ("a.mov", {"from_s": 99.9}, 1080, 30),
-        ("a.WEBM", {"from_s": 99.0, "fps": 4.0, "height": 720}, 720, 4),
-    ]
-    for out, options, height, rate in clips:
-        result = api.overlay(log, tmp_path / out, calibration, **options)
-        gauge = Gauge(height, has_speed=False)
-        arguments = ffmpeg.read("calls").decode().splitlines()[-1]
-        assert f"-pix_fmt rgba -s {gauge.width}x{gauge.height} -r {rate} -i -" in arguments
-        assert len(ffmpeg.read("pictures")) == 4 * gauge.width * gauge.height * result.pictures
-        assert (arguments.partition("-ss ")[2].split()[:3] == ["1.5000", "-t", "2.5000"]) is (out == "a.mp4")
-        assert result.fps == rate
-
-
 def test_file_that_is_not_a_video_is_refused(tmp_path, ride, film):
     (tmp_path / "text.mp4").write_text("no film\n" * 100)
     (tmp_path / "half.mp4").write_bytes(film.read_bytes()[: film.stat().st_size // 2])
     for name in ("text.mp4", "half.mp4"):
         arguments = "--video", tmp_path / name, "--offset", 1, "--out", tmp_path / "out.mp4"
         command.refused(tmp_path, "overlay", ride, *arguments, words="is not a video that ffmpeg can read")
-
-
-def test_stopped_overlay_leaves_the_older_clip(ffmpeg, tmp_path, parked):
-    log, calibration = parked
-    (tmp_path / "clip.mov").write_text("an older clip")
-
-    def stop(done: int, total: int) -> None:
-        if (done, total) == (20, 50):
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        api.overlay(log, tmp_path / "clip.mov", calibration, to_s=50.0, fps=1.0, live=True, progress=stop)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["bin", "clip.mov"] and not ffmpeg.running
-    assert (tmp_path / "clip.mov").read_text() == "an older clip"

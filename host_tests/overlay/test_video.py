@@ -4,11 +4,9 @@ import struct
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.overlay import gpmf, video
-from support.recordings import broken_logs
 
 
 def described(ffmpeg, rate="30 fps", size="1920x1080", more="", **counted):
@@ -77,13 +75,6 @@ def test_missing_packages_and_a_missing_ffmpeg_are_explained(monkeypatch):
             video.ffmpeg()
 
 
-def test_pictures_are_written_to_ffmpeg(ffmpeg):
-    counted = []
-    video.write_video(Path("o.mp4"), ["-f", "rawvideo"], [b"one", b"two"], lambda: counted.append(1))
-    assert ffmpeg.read("pictures") == b"onetwo" and len(counted) == 2
-    assert ffmpeg.read("calls").split()[-4:] == [b"-y", b"-f", b"rawvideo", b"file:o.mp4"]
-
-
 @pytest.mark.parametrize("deaf", [False, True])
 @pytest.mark.parametrize(("words", "message"), [("one\nthe last \n\n", "the last$"), ("", "it does not say why")])
 def test_ffmpeg_that_fails_says_why(ffmpeg, words, message, deaf):
@@ -91,18 +82,6 @@ def test_ffmpeg_that_fails_says_why(ffmpeg, words, message, deaf):
     ffmpeg.answers(words=words, status="1", **({"deaf": ""} if deaf else {}))
     with pytest.raises(InputError, match="ffmpeg has stopped: " + message):
         video.write_video(Path("o.mp4"), ["-f", "rawvideo"], [bytes(1_000_000)] * 3)
-
-
-def test_ffmpeg_is_killed_after_an_interruption(ffmpeg):
-    def pictures():
-        yield b"1"
-        while not (ffmpeg.folder / "pictures").exists():  # until ffmpeg runs
-            pass
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        video.write_video(Path("o.mp4"), ["-f", "rawvideo"], pictures())
-    assert not ffmpeg.running
 
 
 # The gyro of a GoPro
@@ -140,40 +119,3 @@ GYRO = item(b"GYRO", b"s", 6, ROWS)
 def test_a_gyro_is_divided_by_its_scale(items, rates):
     found = [values.tolist() for values in gpmf.streams(packet(*items), b"GYRO")]
     assert found == ([] if rates is None else [rates])
-
-
-@pytest.mark.parametrize(("kind", "form"), list(zip("bBsSlLjJfd", "bBhHiIqQfd")))
-def test_each_kind_of_number_is_read(kind, form):
-    body = struct.pack(f">3{form}", 1, 2, 100)
-    (found,) = gpmf.streams(packet(item(b"GYRO", kind.encode(), len(body), body)), b"GYRO")
-    assert found.tolist() == [[1.0, 2.0, 100.0]]
-
-
-def test_damaged_readings_are_numbers_or_nothing():
-    content = packet(scale(5), item(b"GYRO", b"s", 6, np.arange(30).astype(">i2").tobytes()))
-    changes = broken_logs.flip_bytes, broken_logs.cut_end, broken_logs.cut_a_piece, broken_logs.put_nul_bytes
-    for number in range(300):
-        chance = broken_logs.random.Random(number)
-        for values in gpmf.streams(chance.choice(changes)(content, chance), b"GYRO"):
-            assert values.ndim == 2 and values.shape[1] == 3
-
-
-def test_readings_of_a_packet_are_spread_over_its_time(ffmpeg):
-    """The second packet lasts no time, and the rates of the third are impossible. Times are in ticks of 1 ms."""
-    gyro = item(b"GYRO", b"f", 12, struct.pack(">12f", *[0.5] * 12))
-    good, absurd = packet(gyro), packet(item(b"GYRO", b"f", 12, struct.pack(">3f", 1e3, 0.0, 0.0)))
-    sizes = len(good), len(absurd)
-    listed = "#tb 0: 1/1000\n" + "".join(
-        f"0, 0, {begin}, {lasts}, {size}, 0xab\n"
-        for begin, lasts, size in ((1000, 2000, sizes[0]), (3000, 0, sizes[0]), (3000, 1000, sizes[1]))
-    )
-    film = described(ffmpeg, more="  Stream #0:3(eng): Data: (gpmd / 0x1)\n")
-    ffmpeg.answers(listed=listed)
-    (ffmpeg.folder / "packets").write_bytes(good + good + absurd)
-    found = gpmf.telemetry(film)
-    assert found is not None
-    assert found.t_s == pytest.approx([1.25, 1.75, 2.25, 2.75]) and found.rate_dps == pytest.approx(np.degrees(0.5))
-    for listed in ("x", "#tb 0: 1/1000\n0, no, list\n"):
-        ffmpeg.answers(listed=listed)
-        assert gpmf.telemetry(film) is None
-    assert gpmf.telemetry(described(ffmpeg)) is None  # without a stream of readings

@@ -6,7 +6,7 @@ import pytest
 from kickstand.rides import ride_paths
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.fakes import fake_os, fake_time
-from rings import FLASH, KB_4, opened
+from rings import KB_4, opened
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def clock(monkeypatch):
 
 @pytest.fixture
 def root(tmp_path, monkeypatch):
-    """Yield the flash and the card of a board: space.free bytes of space.all are free."""
+    """Yield the flash of a board: space.free bytes of space.all are free."""
     space = types.SimpleNamespace(free=400 * KB_4, all=500 * KB_4, path=tmp_path)
 
     def statvfs(_path):
@@ -31,7 +31,7 @@ def root(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("os.statvfs", statvfs, raising=False)
     monkeypatch.setattr("os.ilistdir", fake_os.ilistdir, raising=False)
-    monkeypatch.setattr(ride_paths, "directory", lambda settings: "rides" if settings is FLASH else "card")
+    monkeypatch.setattr(ride_paths, "directory", lambda settings: "rides")
     yield space
     while opened:
         opened.pop().abandon()

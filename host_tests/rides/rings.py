@@ -1,4 +1,4 @@
-"""Common helpers for the tests of rides in flash and on a card."""
+"""Common helpers for the tests of rides in flash."""
 
 import types
 
@@ -6,7 +6,6 @@ from kickstand.rides import ride_paths
 from kickstand.rides.flash_ring import RideRing
 
 FLASH = types.SimpleNamespace(SD_SPI=None)
-CARD = types.SimpleNamespace(SD_SPI=1)
 KB_4 = 4096
 opened: list[RideRing] = []  # the rings of this test, whose files are closed at its end
 

@@ -1,14 +1,11 @@
 """The format of a recorded ride: what the firmware writes comes back exactly, and everything fits in the worst case."""
 
-import types
-
 import pytest
 from hypothesis import given, settings, strategies
 from kickstand import __version__
 from kickstand.rides import block as block_format
 from kickstand.rides.block import RideBlock, block_length
 from kickstand_tools.rides import block_reader
-from support.mpy import run_mpy
 from support.recordings import ride_writer
 from support.recordings.ride_writer import CHIP
 
@@ -79,50 +76,6 @@ def test_full_blocks_keep_speeds_places_and_calibration(length, every):
         assert len(used) - len(used.rstrip(b"\0")) < 16 + 60
 
 
-@pytest.mark.parametrize("length", range(700, 720, 3))
-def test_worst_pass_and_a_position_fit_into_any_block(length):
-    """A pass of the loop with quiet readings needs few bits. In a pass with violent readings after quiet passes, every
-    number needs the longest code."""
-    quiet = [800] * 7, 8, 40_000
-    count = 0
-    # the first round counts the quiet passes; in the second round the last pass has violent readings
-    for violent in (False, True):
-        block = RideBlock(5000)
-        for sequence in range(2):  # only the second block reserves room for a position from its beginning on
-            ride_writer.begun(length, sequence, block)
-            block.add_place(ride_writer.place(0))
-            while not block.full() and (not violent or not sequence or block.count < count - 1):
-                block.add(*quiet)
-        if violent:
-            block.add_speed(1 << 24)
-            block.add_place(ride_writer.place(1))
-            block.add([-32768] * 7, 1, 1 << 29)
-        count = block.count
-        stored = ride_writer.ended(block)
-        assert len(places([stored])) == 1 + violent
-    assert stored.turns[-1].sums == (-32768,) * 6 and {turn.sums for turn in stored.turns[:-1]} == {(800,) * 6}
-    assert len(stored.turns) == count - 1 > 90
-
-
-def test_first_position_is_dropped_if_it_has_no_room():
-    """After the ride's first position, every block reserves room for a position, even if it is almost full."""
-    block = RideBlock(5000)
-    for sequence in range(3):
-        ride_writer.begun(512, sequence, block)
-        sign = 1
-        while not block.full():
-            sign = -sign
-            block.add_speed((1 << 24) * (sign > 0))
-            if sequence:
-                block.add_place(ride_writer.place(sequence))
-            block.add([sign * 8 * 32767] * 7, 8, (1 << 29) if sign > 0 else 0)
-            if block.full() and not sequence:
-                block.add_place(ride_writer.place(0))
-        stored = ride_writer.ended(block)
-        assert len(places([stored])) == (len(stored.turns) if sequence else 0)
-        assert stored.turns[-1].sums == (sign * 8 * 32767,) * 6
-
-
 @pytest.mark.parametrize(
     ("date", "lat", "lon", "place"),
     [
@@ -140,75 +93,3 @@ def test_position_in_hundred_thousandths_of_a_minute(date, lat, lon, place):
     block.add_place((date, 1500, lat, lon))
     block.add([0, 0, 8192, 0, 0, 0, 0], 2, 10_000)
     assert places([ride_writer.ended(block)]) == ([(0, place)] if place else [])
-
-
-def test_block_contains_nothing_of_the_previous_one():
-    """Each block can be read without the others."""
-    first, again = ride_writer.begun(4096), RideBlock(5000)
-    for entry in ride_writer.turns(150):
-        first.add_speed(900)
-        first.add(*entry)
-    first.close()
-    for block in (first, again):
-        ride_writer.begun(1024, 1, block)
-        for entry in ride_writer.turns(5):
-            block.add(*entry)
-        block.close()
-    assert first.buffer[:1024] == again.buffer[:1024] and first.count == again.count == 5
-
-
-def test_temperature_is_that_of_the_last_passs_mean():
-    chip = types.SimpleNamespace(accel_lsb_per_g=4096, gyro_lsb_per_dps=16.4, gyro_delay_s=0.0186)
-    chip.temperature_c = lambda counts: counts / 4
-    block = RideBlock(5000)
-    block.begin(1024, 1, 0, 0, chip, 200, bytes(80))
-    block.add([0, 0, 0, 900, 0, 0, 0], 3, 15_000)
-    block.add([0, 0, 0, -303, 0, 0, 0], 3, 15_000)
-    stored = ride_writer.ended(block)
-    assert (stored.centidegrees, stored.gyro_lsb_tenths, stored.delay_tenths_ms) == (-2525, 164, 186)
-
-
-@pytest.mark.parametrize("index", [0, 1, 2, 3, 4, 6, 8, 96, 1 << 12])
-def test_littlefs_block_begins_with_a_pointer_per_halving(index):
-    pointers = 1 + max(k for k in range(20) if index % (1 << k) == 0) if index else 0
-    assert block_length(index) == 4096 - 4 * pointers
-
-
-# Encodes random entries with machine code and with Python. Most entries are typical.
-_BOTH = """
-import random
-from array import array
-from kickstand.rides import block as block_format
-from kickstand.rides.block import encode, encode_python
-assert encode is not encode_python
-random.seed(1)
-for block in range(BLOCKS):
-    states, outs = [], []
-    for _ in range(2):
-        state = array("i", [0] * (block_format._PERIOD + 1))
-        state[0] = 1
-        for i in range(block_format.FIELDS):
-            state[block_format._MEANS + i] = block_format.START_MEAN
-        state[block_format._PERIOD] = 5000
-        states.append(state)
-        outs.append(bytearray(4096))
-    while states[0][block_format._AT] < 4096 - 60:
-        wide = random.choice((10, 300, 32767))
-        n = random.choice((0, 1, 2, 2, 2, 8))
-        entry = array("i", [n, n * 5000 + random.randint(-200, 200)])
-        if random.random() < 0.01:
-            entry[1] = random.randint(0, block_format.MAX_DT_US)
-        for _ in range(6):
-            entry.append(random.randint(-max(1, n) * (wide + 1), max(1, n) * wide))
-        entry.append(random.choice((0, random.randint(0, 30000), random.randint(0, 1 << 24))))
-        for function, state, out in zip((encode, encode_python), states, outs):
-            function(entry, state, out)
-        assert states[0] == states[1], (list(entry), states)
-    assert outs[0] == outs[1]
-print("equal")
-"""
-
-
-@pytest.mark.parametrize("blocks", [20, pytest.param(200, marks=pytest.mark.long)])
-def test_machine_code_codes_as_python_does(blocks):
-    assert run_mpy(_BOTH.replace("BLOCKS", str(blocks))) == "equal\n"

@@ -40,11 +40,6 @@ RIDES = {
         "000803f0000c03f[14]803f[14]803f0000803f[10]a03f020000a3fff8000400008071007ffe00002690002fc8[6]09c4[16]040027"
         "f6b7ca"
     ),
-    "0.3.0": (
-        "4b5249440100b00007[7]40420f[5]350c00108f02c800302e332e30[7]680801020ad7233c0ad7a3bc8fc2f53cae47813fa4707d3f0"
-        "000803f0000c03f[14]803f[14]803f0000803f[10]a03f020000a3fff8000400008071007ffe00002690002fc8[6]09c4[16]0400e8"
-        "fd0cd1"
-    ),
     "0.4.0": (
         "4b5249440100b00007[7]40420f[5]350c00108f02c800302e342e30[6]86680801020ad7233c0ad7a3bc8fc2f53cae47813fa4707d3"
         "f0000803f0000c03f[14]803f[14]803f0000803f[10]a03f020000a3fff8000400008071007ffe00002690002fc8[6]09c4[16]0400"
@@ -88,14 +83,14 @@ def test_calibration_in_flash_stays_valid(record, tmp_path):
 def test_recorded_ride_stays_readable(release, tmp_path):
     (block,), problems = block_reader.read(unpacked(RIDES[release]))
     assert problems == [] and (block.ride, block.sequence, block.time_us) == (7, 0, 1_000_000)
-    assert block.firmware == (release if release in ("0.1.0", "0.3.0") else "0.4.0")
+    assert block.firmware == (release if release == "0.1.0" else "0.4.0")
     assert [(turn.time_us, turn.n, turn.speed_mps) for turn in block.turns] == [
         (1_010_000, 2, None), (1_020_001, 2, 12.34), (1_030_003, 2, None),
     ]  # fmt: skip
     assert [turn.sums for turn in block.turns] == [(200 * i, -100, 8192, 4, -4, 8) for i in range(3)]
     check_calibration(block.calibration(), matrices="matrices" in release)
     cal = read_calibration(ride_log.write(tmp_path / "ride.csv", [block]))
-    assert cal.gyro_delay_s == (None if release in ("0.1.0", "0.3.0") else 0.0134)
+    assert cal.gyro_delay_s == (None if release == "0.1.0" else 0.0134)
     place = block.turns[2].place
     assert (place is not None) is release.startswith("with")
     if place:
@@ -138,14 +133,14 @@ def test_calibration_file_stays_readable(added, tmp_path):
 
 
 # The settings of 0.1.0 to 0.4.0, each in use and with another value than the default where a Pico allows one
-CONFIG = """
-SIDE = "right"; SAMPLE_HZ = 100; ACCEL_RANGE_G = 4; GYRO_RANGE_DPS = 1000; DLPF = 4
-ACCEPT_WHO_AM_I = 0x47; SENSOR_ADDRESS = 0x69; SENSOR_I2C = 0; SENSOR_SDA = 4; SENSOR_SCL = 5
-SENSOR_BUS_HZ = 100_000; LCD_I2C = 1; LCD_SDA = 6; LCD_SCL = 7; LCD_BUS_HZ = 100_000
-LCD_ADDRESSES = (0x26,); BUTTON_PIN = 15; VEHICLE = "car"; SPEED = "wheel"; GPS_UART = 1; GPS_RX = 9
-GPS_TX = 8; GPS_BAUD = 38400; WHEEL_PIN = 14; PULSES_PER_METRE = 2.0; WATCHDOG = False; RECORD = True
-SD_SPI = 0; SD_SCK = 18; SD_MOSI = 19; SD_MISO = 16; SD_CS = 17
-"""
+CONFIG = (
+    "SIDE = 'right'; SAMPLE_HZ = 100; ACCEL_RANGE_G = 4; GYRO_RANGE_DPS = 1000; DLPF = 4; "
+    "ACCEPT_WHO_AM_I = 0x47; SENSOR_ADDRESS = 0x69; SENSOR_I2C = 0; SENSOR_SDA = 4; SENSOR_SCL = 5; "
+    "SENSOR_BUS_HZ = 100_000; LCD_I2C = 1; LCD_SDA = 6; LCD_SCL = 7; LCD_BUS_HZ = 100_000; "
+    "LCD_ADDRESSES = (0x26,); BUTTON_PIN = 15; VEHICLE = 'car'; SPEED = 'wheel'; GPS_UART = 1; GPS_RX = 9; "
+    "GPS_TX = 8; GPS_BAUD = 38400; WHEEL_PIN = 14; PULSES_PER_METRE = 2.0; WATCHDOG = False; RECORD = True; "
+    "SD_SPI = 0; SD_SCK = 18; SD_MOSI = 19; SD_MISO = 16; SD_CS = 17"
+)
 
 
 def test_settings_file_stays_valid(tmp_path):

@@ -1,10 +1,9 @@
-"""No command loses existing data if the power is cut, the disk is full or the cable is pulled at a random moment.
+"""No command loses existing data if the power is cut or the disk is full at a random moment.
 
 Each case runs a command in a fork of this process. A timer's signal ends the fork without a handler, like kill -9, or
-the disk or the cable of the fork fails. The test then examines the remaining files.
+the disk of the fork fails. The test then examines the remaining files.
 """
 
-import contextlib
 import gzip
 import os
 import random
@@ -15,7 +14,6 @@ import time
 from pathlib import Path
 
 import pytest
-from kickstand_tools.common import output
 from kickstand_tools.logs.reader import read_log
 from ride_boards import RideBoard, Stream, StreamingBoard, half_seconds, streamed
 from support import command, fake_board
@@ -134,9 +132,8 @@ class Smooth(Scene):
         for name in ("RIDE.csv", "RIDE.cal.json"):
             shutil.copy(source / name, place / name)
             self.keep(name)
-        ride, cal = place / "RIDE.csv", ["--calibration", place / "RIDE.cal.json"]
         result = self.keep("out/old.csv", b"t_s,of,before\n")
-        self.arguments = ["smooth", ride, *cal, "--out", result]
+        self.arguments = ["smooth", place / "RIDE.csv", "--calibration", place / "RIDE.cal.json", "--out", result]
 
 
 @pytest.fixture(scope="module")
@@ -145,14 +142,14 @@ def source(tmp_path_factory):
     place = tmp_path_factory.mktemp("source")
     command.works("simulate", "--profile", "street", "--seconds", 20, "--out", place)
     command.works("calibrate", "two", place / "KICKSTAND.csv", place / "UPRIGHT.csv", "--out", place / "RIDE.cal.json")
-    command.works(*Smooth(place / "smooth", place).arguments)  # so each fork finds the modules already imported
+    command.works(*Smooth(place / "smooth", place).arguments)  # each fork finds the modules already imported
     return place
 
 
 def in_a_fork(scene, fault, share=0.0, usual_s=1.0):
     """Run the scene's command in a fork. Return its duration in s.
 
-    share: the share of usual_s, of the file or of the transfer after which the fault happens.
+    share: the share of usual_s or of the file after which the fault happens.
     usual_s: duration of the command without a fault.
     """
     begin_s = time.monotonic()
@@ -166,8 +163,6 @@ def in_a_fork(scene, fault, share=0.0, usual_s=1.0):
             if fault == "full":
                 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
                 resource.setrlimit(resource.RLIMIT_FSIZE, (round(60_000 * share**2), resource.RLIM_INFINITY))
-            elif fault == "cable":
-                cut(scene.board, share)
             elif fault in ("kill", "term"):
                 handler = (lambda *_: os.kill(os.getpid(), signal.SIGTERM)) if fault == "term" else signal.SIG_DFL
                 signal.signal(signal.SIGALRM, handler)
@@ -179,27 +174,8 @@ def in_a_fork(scene, fault, share=0.0, usual_s=1.0):
     return time.monotonic() - begin_s
 
 
-def cut(board, share):
-    """Let the cable be pulled after a share of the changes to the board's flash, or of the board's output."""
-    left = [round(share * (30 if isinstance(board.serial, Stream) else 300))]
-    waiting = board.serial.inWaiting
-
-    def pulled(*_):
-        left[0] -= 1
-        if left[0] <= 0:
-            raise ConnectionError("device disconnected")
-
-    def in_waiting():
-        pulled()
-        return waiting()
-
-    board.before_change = pulled
-    board.serial.inWaiting = in_waiting
-
-
-OFTEN = {(Record, "full"), (Pull, "kill"), (Pull, "cable"), (Flash, "cable"), (Smooth, "kill")}
-KINDS = [(scene, fault) for scene in (Record, Pull, Flash) for fault in ("kill", "full", "cable", "term")]
-KINDS += [(Smooth, fault) for fault in ("kill", "full", "term")]
+OFTEN = {(Record, "full"), (Pull, "kill"), (Flash, "kill"), (Smooth, "kill")}
+KINDS = [(scene, fault) for scene in (Record, Pull, Flash, Smooth) for fault in ("kill", "full", "term")]
 
 
 @pytest.mark.parametrize(
@@ -219,19 +195,3 @@ def test_no_existing_file_is_lost(scene, fault, count, source, tmp_path):
         if fault != "kill":
             losses += [f"{path.name} was left" for path in trial.out.glob(".*")]
     assert losses == []
-
-
-def test_killed_command_that_writes_in_place_loses_data(source, tmp_path, monkeypatch):
-    """A command without a temporary file loses an earlier result, so the test above can fail."""
-
-    @contextlib.contextmanager
-    def in_place(path):
-        yield path
-
-    monkeypatch.setattr(output, "whole_file", in_place)
-    losses = []
-    for k in range(3):
-        trial = Smooth(tmp_path / str(k), source)
-        in_a_fork(trial, "full", 0.3 + 0.1 * k)
-        losses += trial.lost()
-    assert losses

@@ -50,32 +50,11 @@ def test_card_records_without_loss_in_little_time(tmp_path):
     assert record.first("Raw") < 1.5 and leans_on(record, 9)
 
 
-def test_without_a_card_nothing_waits_for_one(tmp_path):
-    plan = {**RIDE, "config": {"RECORD": True}, "until": 2}
-    first_s = device_plans.run("micropython", tmp_path, plan).first("Raw")
-    assert first_s == device_plans.run("micropython", tmp_path, plan | {"config": {}}).first("Raw") < 0.7
-
-
-@long
-def test_losses_of_a_very_slow_card_are_reported(tmp_path):
-    record = run(tmp_path, {"faults": [[3.0, "busy_s", 0.25]]}, until=35)
-    assert len(blocks(record)) >= 2 and len(missing_s(record)) >= 2 and leans_on(record, 12)
-
-
 @pytest.mark.parametrize("fault", [["rejects", 1], pytest.param(["stuck", True], marks=long)])
 def test_failing_card_ends_the_ride_without_a_restart(fault, tmp_path):
     record = run(tmp_path, {"faults": [[10.0, *fault]]}, until=32)
     assert 10 < record.first("card fault") < 19
     assert blocks(record) and leans_on(record, 20)
-
-
-@long
-def test_cards_room_is_counted_before_the_watchdog_runs(tmp_path):
-    """The card has no valid count of its free room (FSINFO). Reading the whole FAT of the card takes longer than the
-    watchdog's time-out."""
-    record = run(tmp_path, {"sectors": 1 << 24, "read_s": 0.006, "fsinfo": False}, until=40)
-    assert record.first("SD card") < 1.0 and record.first("Raw   20°") < 30
-    assert record.ends == ["off"] and len(blocks(record)) >= 2
 
 
 @pytest.mark.parametrize(
@@ -93,15 +72,3 @@ def test_unusable_card_is_reported_without_a_restart(card, tmp_path):
     assert record.first("No SD card|SD card:") < 12 and leans_on(record, 12)
     assert record.console.count("SD card: ") in (1, 2) and not blocks(record)
     assert ("its driver is not on the board: mpremote mip install sdcard" in record.console) is ("driver" in card)
-
-
-@long
-def test_card_that_failed_at_the_start_is_not_waited_for_again(tmp_path):
-    """The driver would wait for seconds, and the displayed lean would freeze. When the rider chooses to record, the
-    display only reports the failure again."""
-    menu = [[14, 1.2], *([16 + i, 0.15] for i in range(4)), [21, 1.2]]
-    plan = {"config": {**PINS, "RECORD": False}, "presses": menu, "lean": [[0, 0], [23, 20]], "until": 35}
-    record = run(tmp_path, {"init_s": None}, **plan)
-    assert record.first("No SD card") < 8
-    assert 21 < record.first("No SD card", 20.0) < 23 < record.first("Raw   20°") < 25
-    assert record.ends == ["off"]

@@ -1,7 +1,7 @@
 """A wheel's pulses, and the limits of any speed: periods, bounces, stops, storms. Also runs on MicroPython."""
 
 from kickstand_tools.simulated_board.simulator import Board
-from speed_runs import DAYS, Contact, drive, later
+from speed_runs import Contact, drive
 from support.board_access import level
 
 
@@ -133,27 +133,6 @@ def test_a_storm_turns_the_interrupt_off_for_5_s():
         assert abs(speeds[-1] - 10.0) < 0.01 and wheel.fault(wait()) is None
 
     on_wheel(test)
-
-
-def test_days_without_a_pulse():
-    """After 6.2 days ticks_diff() is negative. Also tries a wheel that has never turned before."""
-    for turned in (True, False):
-        for days in DAYS:
-
-            def test(wheel, contact, wait, turned=turned, days=days):
-                wheel.poll(1000)
-                wait(50)
-                if turned:
-                    pulse(contact, wait)
-                    wheel.poll(1200)
-                for k in range(1, int(24 * days)):
-                    assert wheel.poll(later(k / 24)) == (0.0 if turned else None)
-                wait(50)
-                pulse(contact, wait)
-                wheel.poll(later(days))
-                assert wheel.poll(later(days) + 1799) is None and wheel.poll(later(days) + 1800) == 0.0
-
-            on_wheel(test)
 
 
 def test_an_esp32_counts_pulses_that_fall_into_a_transfer():

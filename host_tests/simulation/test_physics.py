@@ -9,9 +9,7 @@ from kickstand_tools.simulation.commands import Leg, commands
 from kickstand_tools.simulation.physics import bike as physics, road
 from kickstand_tools.simulation.physics.bike import Bike
 from kickstand_tools.simulation.physics.chip import Chip
-from kickstand_tools.simulation.physics.engine import crank_rpm, vibration
 from kickstand_tools.simulation.physics.kinematics import Motion, body_rates, specific_force
-from kickstand_tools.simulation.physics.mount import Holder
 from kickstand_tools.simulation.physics.signals import integral, second_order, smoothed, smoothstep
 
 RATE = 1000.0
@@ -150,17 +148,6 @@ def test_the_road_has_the_standards_density():
         assert np.mean(displacement * (waves[near] / 0.1) ** 2) == pytest.approx(64e-6, rel=0.25)
 
 
-@pytest.mark.parametrize("hz", [0.0, 0.1, 1.8, 15.0])
-def test_the_chassis_moves_as_two_masses_on_two_springs(hz):
-    """A mass of 120 kg is on a spring of 17 kN/m with a damper of 1100 Ns/m. Below the spring a mass of 15 kg is on a
-    tyre of 150 kN/m."""
-    w = 2.0 * np.pi * hz
-    strut = 17e3 + 1j * w * 1100.0
-    masses = np.array([[strut - 120.0 * w * w, -strut], [-strut, strut + 150e3 - 15.0 * w * w]])
-    chassis, _ = np.linalg.solve(masses, np.array([0.0, 150e3]))
-    assert road.transmitted(np.array([hz]))[0] == pytest.approx(chassis)
-
-
 def heave_g(speed: float, roughness: float, seconds: float = 40.0):
     chance, n = np.random.default_rng(0), int(seconds * RATE)
     distance = np.linspace(0.0, speed * seconds, n)
@@ -173,44 +160,6 @@ def test_shaking_grows_with_roughness_and_speed():
     assert 0.3 < np.percentile(np.abs(heave_g(25.0, road.CLASS_B)), 99.9) < 0.6
     assert np.std(heave_g(15.0, road.CLASS_C)) / np.std(heave_g(15.0, road.CLASS_A)) == pytest.approx(4.0, rel=0.01)
     assert np.std(heave_g(25.0, road.CLASS_B)) > 1.5 * np.std(heave_g(6.0, road.CLASS_B))
-
-
-def test_the_front_wheel_meets_a_bump_first():
-    """A bump of 50 mm begins at 20 m. The wheelbase of 1.43 m takes 0.14 s at 10 m/s."""
-    slope = np.zeros(3000)
-    road.add_bumps(slope, [20.0], 0.05, 0.6)
-    height = np.cumsum(slope) * 0.02
-    assert height.max() == pytest.approx(0.05, rel=0.02) and np.all(np.abs(height[[999, 1031]]) < 1e-4)
-    distance = np.linspace(0.0, 40.0, 4000)
-    shaken = road.shaking(np.random.default_rng(0), distance, np.full(4000, 10.0), slope, Bike(), RATE)
-    nose_up, lifted = np.argmax(shaken.pitch > 0.003), np.argmax(shaken.heave > 1.0)
-    assert 0.05 < (lifted - nose_up) / RATE < 0.25
-
-
-@pytest.mark.parametrize(
-    ("mps", "rpm"),
-    [(0.0, 1250), (3.0, 1250), (10.0, 3700), (15.0, 3900), (22.0, 4510), (27.0, 4590), (31.0, 4650), (40.0, 5400)],
-)
-def test_lowest_gear_under_the_shift_speed_is_used(mps, rpm):
-    """The six gears give 370, 260, 205, 170, 150 and 135 /min per m/s. The clutch slips at low speed."""
-    assert crank_rpm(np.full(4000, mps), 5000.0, RATE)[2000] == pytest.approx(rpm)
-
-
-@pytest.mark.parametrize(
-    ("mps", "rms_g", "running", "expected_g"),
-    [
-        (6000.0 / 370.0, 0.2, 1.0, 0.2),
-        (0.0, 0.2, 1.0, 0.2 * (0.25 + 0.75 * (1250.0 / 6000.0) ** 2)),
-        (6000.0 / 370.0, 0.9, 1.0, 0.5),  # the limit
-        (6000.0 / 370.0, 0.2, 0.0, 0.0),
-    ],
-)
-def test_vibration_grows_with_the_square_of_engine_speed(mps, rms_g, running, expected_g):
-    """The rates vibrate by 15 deg/s per g."""
-    n = 20_000
-    force, rates = vibration(np.random.default_rng(1), np.full(n, mps), np.full(n, running), rms_g, 7000.0, RATE)
-    assert np.sqrt((force**2).mean(axis=0)) / G == pytest.approx([expected_g] * 3, rel=0.02)
-    assert np.degrees(np.sqrt((rates**2).mean(axis=0))) == pytest.approx([15.0 * expected_g] * 3, rel=0.02)
 
 
 N = 10000
@@ -284,23 +233,3 @@ def test_a_random_chip_is_within_the_data_sheet():
     half = Chip.random(np.random.default_rng(1), share=0.5, drift=3.0)
     assert half.accel_offset == pytest.approx(0.5 * chips[1].accel_offset)
     assert half.gyro_per_c == pytest.approx(1.5 * chips[1].gyro_per_c)
-
-
-@pytest.mark.parametrize(("hz", "least", "most"), [(1.0, 0.99, 1.03), (10.0, 9.5, 10.5), (50.0, 0.0, 0.12)])
-def test_a_holder_resonates_at_its_frequency(hz, least, most):
-    """The gain is 1 / (2 damping) at the natural frequency, and 1 far below it."""
-    holder = Holder(np.full(3, 10.0), np.full(3, 0.05), np.zeros(3))
-    wave = np.tile(np.sin(2.0 * np.pi * hz * np.arange(20_000) / RATE)[:, None], (1, 3))
-    for shaken in holder.shaken(wave, wave, RATE):
-        size = np.abs(shaken[5000:15000]).max(axis=0)
-        assert np.all((least < size) & (size < most))
-
-
-def test_the_gyro_measures_the_sagging_of_a_holder():
-    """A force of 0.5 g forward lasts for two seconds. The holder sags by 1 degree per g."""
-    holder = Holder(np.full(3, 20.0), np.full(3, 0.5), np.radians([1.0, 0.0, 1.0]))
-    pushed = np.zeros((8000, 3))
-    pushed[:, 1], pushed[3000:5000, 2] = 1.0, 0.5
-    force, rates = holder.shaken(pushed, np.zeros((8000, 3)), RATE)
-    assert np.sum(rates[2000:4000, 0]) / RATE == pytest.approx(0.5, abs=0.02)
-    assert abs(np.degrees(np.arctan2(force[4000, 2] - 0.5, force[4000, 1]))) == pytest.approx(0.5, abs=0.02)

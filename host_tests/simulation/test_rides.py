@@ -1,23 +1,20 @@
 """Simulated rides: plans, possible values, the special condition of each profile, poses, files and memory."""
 
 import functools
-import tracemalloc
 
 import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY as G
-from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.signals import rotation_matrix
 from kickstand_tools.simulation import poses
 from kickstand_tools.simulation.commands import Leg, commands
 from kickstand_tools.simulation.files import simulate
-from kickstand_tools.simulation.physics.chip import RATE_HZ
 from kickstand_tools.simulation.plan import Plan, lean_for
 from kickstand_tools.simulation.profiles import PROFILES
 from kickstand_tools.simulation.ride import ride
 from kickstand_workshop.evaluation.bands import QUANTITIES, bands_of
-from support.command import refused, works
+from support.command import works
 
 
 def test_legs_become_signals():
@@ -167,16 +164,6 @@ def test_a_rough_road_and_a_bad_mount_change_the_readings():
         assert not np.allclose(rough.readings, bad.readings, atol=0.01)
 
 
-def test_a_given_dive_is_used():
-    """The springs turn the sensor, but the road is unchanged."""
-    soft, stiff = (ride("track", 3, 40.0, dive=dive) for dive in ((6.0, 3.0), (0.0, 0.0)))
-    assert np.array_equal(soft.truth["slope_deg"], stiff.truth["slope_deg"])
-    push = np.gradient(soft.truth["speed_mps"]) * soft.rate_hz / G
-    nose = soft.truth["pitch_deg"] - stiff.truth["pitch_deg"]
-    for part, per_g in ((push < -0.25, 6.0), (push > 0.25, 3.0)):
-        assert nose[part] @ push[part] / (push[part] @ push[part]) == pytest.approx(per_g, rel=0.15)
-
-
 def test_poses_have_six_sides_up_and_one_slanted():
     """A hand tilts the sensor by up to 4 degrees."""
     tilts = []
@@ -229,32 +216,3 @@ def test_simulate_writes_logs_that_calibrate_and_replay(tmp_path):
     north_m, east_m = 111_195.0 * np.diff(ride_log.lat_deg[::200]), 75_000.0 * np.diff(ride_log.lon_deg[::200])
     assert np.hypot(north_m, east_m).sum() == pytest.approx(speed.sum() / 200.0, rel=0.02)
     assert ride_log.utc_s[200] - ride_log.utc_s[0] == pytest.approx(1.0)
-
-
-def test_simulate_replaces_an_earlier_ride(tmp_path):
-    """The calibration of the earlier ride belongs to a sensor with another mounting."""
-    (tmp_path / "RIDE.cal.json").write_text("{}")
-    works("simulate", "--profile", "street", "--seed", 1, "--seconds", 30, "--out", tmp_path)
-    assert np.all(np.isnan(read_log(tmp_path / "RIDE.csv").speed_mps))
-    refused(tmp_path, "report", tmp_path / "RIDE.csv", words="no calibration RIDE.cal.json beside it")
-    with pytest.raises(InputError, match="no profile cafe: there are street, track"):
-        simulate("cafe", 1, tmp_path)
-
-
-@pytest.mark.parametrize(("profile", "seed"), [("hills", 3), ("fall", 1)])
-def test_a_ride_has_the_requested_length(profile, seed):
-    """The first ride is cut off in a bend. The second ride ends with a fall."""
-    assert len(ride(profile, seed, 120.0, exact=True).readings) == 120 * 200
-
-
-@pytest.mark.long
-def test_memory_of_a_ride_is_limited():
-    """An hour has 3.6 million rows at the chip's 1 kHz. The result keeps none of the rows in memory."""
-    column = 400.0 * RATE_HZ * 8  # bytes of a column with one number per row
-    tracemalloc.start()
-    try:
-        simulated = ride("creep", seed=0, seconds=400.0)
-        remaining, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    assert simulated.rate_hz == 200.0 and peak < 44 * column and remaining < 6 * column

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY as G
 from kickstand_tools.common import unix_port
-from kickstand_tools.demo.hand_bike import CRUISE_MPS, HandBike
 from kickstand_tools.signals import rotation_matrix
 from kickstand_tools.simulation.physics.bike import Bike
 from kickstand_tools.simulation.physics.kinematics import Motion, body_rates, specific_force
@@ -38,11 +37,11 @@ def test_scripted_motion_matches_the_simulated_kinematics():
     t = np.arange(0.0, ride.seconds, 0.001)
     lean, speed, yaw_rate, slope = np.array([[ride.state(x)[i] for i in (1, 3, 5, 6)] for x in t]).T
     on_the_roll_axis = Bike(sensor_height=0.06, sensor_forward=0.0)
-    same = Motion(1000.0, speed, slope, yaw_rate, lean, slope, np.zeros_like(t))
+    simulated = Motion(1000.0, speed, slope, yaw_rate, lean, slope, np.zeros_like(t))
     motion = np.array([ride.motion(x) for x in t])
     assert np.all(np.ptp(motion, axis=0) > (0.001, 0.3, 0.5, 10.0, 40.0, 40.0))
-    assert np.abs(specific_force(same, on_the_roll_axis) / G - motion[:, :3])[1:-1].max() < 1e-3
-    assert np.abs(np.degrees(body_rates(same)) - motion[:, 3:])[1:-1].max() < 0.01
+    assert np.abs(specific_force(simulated, on_the_roll_axis) / G - motion[:, :3])[1:-1].max() < 1e-3
+    assert np.abs(np.degrees(body_rates(simulated)) - motion[:, 3:])[1:-1].max() < 0.01
     distance = np.array([ride.state(x)[8] for x in t])
     assert np.abs(distance - np.cumsum(speed) * 0.001).max() < 0.1
     riding = [ride.truth(x) for x in t[10_000:-8_000:50]]
@@ -79,26 +78,6 @@ def test_vibration_has_its_size_and_stops_with_the_engine(vibration_g):
     assert np.std(shake[:, 1]) == pytest.approx(vibration_g, rel=0.05) and 0.2 < np.std(shake[:, 3]) < 4.0
 
 
-def test_a_bike_steered_by_hand_stays_in_balance():
-    bike = HandBike(vibration_g=0.0)
-    assert bike.truth(1.0)[3] == "kickstand"
-    bike.command("left")
-    assert bike.truth(2.0)[:2] == (pytest.approx(KICKSTAND_DEG), 0.0)  # the bike does not ride off from the kickstand
-    bike.command("upright")
-    assert bike.truth(5.0)[0] == pytest.approx(0.0, abs=0.2)
-    for _ in range(5):
-        bike.command("left")  # the first command only sets the bike off
-    lean, speed, yaw_rate, phase = bike.truth(16.0)
-    assert (lean, speed) == (pytest.approx(-20.0, abs=0.6), pytest.approx(CRUISE_MPS, rel=0.01))
-    assert phase == "held turn" and yaw_rate > 0
-    left, up, _, w_left, w_up, _ = bike.motion(16.0)
-    assert (left, up) == (pytest.approx(0.0, abs=1e-9), pytest.approx(1 / np.cos(np.radians(lean))))
-    assert np.hypot(w_left, w_up) == pytest.approx(yaw_rate)
-    bike.command("kickstand")
-    assert min(bike.motion(t)[2] for t in np.arange(16.0, 18.0, 0.1)) < -0.4
-    assert bike.truth(30.0) == (pytest.approx(KICKSTAND_DEG), 0.0, 0.0, "kickstand")
-
-
 def test_readings_contain_the_stated_errors():
     ride, sensor = Ride(HILLY[:5], vibration_g=0.0), Sensor(seed=5)
     t = np.arange(0.0, ride.seconds, 0.01)
@@ -127,8 +106,8 @@ def test_seed_determines_the_simulated_sensor():
     assert np.abs(mountings @ np.swapaxes(mountings, 1, 2) - np.eye(3)).max() < 1e-12
     assert np.linalg.det(mountings) == pytest.approx(np.ones(50)) and len(np.unique(mountings, axis=0)) == 50
     ride = Ride(HILLY)
-    first, again, other = (Sensor(seed=seed).world(ride.motion)(7.5) for seed in (1, 1, 2))
-    assert first == again != other
+    first, repeated, different = (Sensor(seed=seed).world(ride.motion)(7.5) for seed in (1, 1, 2))
+    assert first == repeated != different
     numbers = [sensor_errors.normal(sensor_errors.scrambled(k)) for k in range(4000)]
     assert np.mean(numbers) == pytest.approx(0.0, abs=0.05) and np.std(numbers) == pytest.approx(1.0, abs=0.03)
 
@@ -186,7 +165,7 @@ for n in range(60):
 
 @pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
 def test_the_same_readings_under_micropython():
-    here: dict = {}
-    exec(BOTH, here)
+    host: dict = {}
+    exec(BOTH, host)
     board = json.loads(mpy.run_mpy(BOTH + "print(json.dumps(readings))"))
-    assert np.abs(np.array(here["readings"]) - np.array(board)).max() < 1e-9
+    assert np.abs(np.array(host["readings"]) - np.array(board)).max() < 1e-9

@@ -195,6 +195,8 @@ class _Writer:
     def close(self) -> None:
         self._file.close()
 
+    __del__ = close  # as on a board, whose soft reset closes its files
+
 
 def _implementation(name: str, mpy: int, version: tuple) -> types.SimpleNamespace:
     return types.SimpleNamespace(name=name, version=version, _machine="Imagined Pico with RP2040", _mpy=mpy)

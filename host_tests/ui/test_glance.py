@@ -25,6 +25,7 @@ def picture():
                     self.digits[x, y] = digit
                     return
             self.calls.append(("scale", x, y))
+            self.scale = glyph
 
         def __getattr__(self, name):
             return lambda *arguments: self.calls.append((name, *arguments))
@@ -51,28 +52,6 @@ def test_the_maxima_are_drawn_to_both_sides(picture, left, right, digits):
 
 
 @pytest.mark.parametrize(
-    ("forward_g", "digits", "word", "bar"),
-    [
-        # The bar begins at column 64 and has 60 columns per g.
-        (0.55, (0, 5, 5), "accel", (64, 49, 33, 6, 1)),
-        (-0.97, (0, 9, 7), "brake", (6, 49, 58, 6, 1)),
-        (1.5, (1, 5, 0), "accel", (64, 49, 63, 6, 1)),
-        (-1.5, (1, 5, 0), "brake", (1, 49, 63, 6, 1)),
-        (0.0, (0, 0, 0), "accel", (64, 49, 0, 6, 1)),
-    ],
-)
-def test_an_acceleration_is_drawn_as_number_and_bar(picture, forward_g, digits, word, bar):
-    """Three marks show 0 g and the two peaks. The peak of 0.4 g is 24 columns to the right, and the peak of 1.2 g is at
-    the left edge."""
-    canvas = picture("acceleration", smooth_force=[0.0, 1.0, forward_g], max_accel_g=0.4, max_brake_g=1.2)
-    assert canvas.digits == dict(zip([(0, 8), (34, 8), (62, 8)], digits))
-    assert canvas.calls == [
-        ("fill_rect", 25, 42, 6, 6, 1), ("text", word, 88, 8, 1), ("text", "g", 94, 40, 1), ("hline", 0, 51, 128, 1),
-        ("fill_rect", *bar), *[("vline", x, 49, 6, 1) for x in (64, 88, 1)], ("text", "pk +0.40 / -1.20", 0, 56, 1),
-    ]  # fmt: skip
-
-
-@pytest.mark.parametrize(
     ("lean_deg", "digits", "columns", "side"),
     [
         (31.6, {(38, 16): 3, (66, 16): 2}, range(64, 97), ("text", "right", 88, 56, 1)),
@@ -89,6 +68,11 @@ def test_a_lean_is_drawn_as_number_arc_and_side(picture, lean_deg, digits, colum
     back is 29 pixels high."""
     canvas = picture("lean", recording=True, lean_deg=lean_deg)
     assert canvas.calls[0] == ("scale", 0, 0) and canvas.digits == digits
+    edges = {0: 2, 15: 3, 30: 7, 60: 22}  # the scale is one row, and seven rows at every 30 degrees
+    for x, row in edges.items():
+        for column in (64 + x, 64 - x):
+            lit = [y for y in range(32) if canvas.scale.pixel(column, y)]
+            assert lit == list(range(row, row + (7 if x % 30 == 0 else 1)))
     lines = [call for call in canvas.calls if call[0] == "vline"]
     assert [line[1] for line in lines[: len(columns)]] == list(columns) and lines[0][2:] == (2, 7, 1)
     assert len(columns) < 61 or lines[60][2] == 22

@@ -4,20 +4,26 @@ import ast
 import functools
 import re
 
-import pytest
 from kickstand import console, errors
-from kickstand.errors import AlignmentError, Notice, Refusal, SettingsError
+from kickstand.errors import Notice, Refusal, SettingsError
 from kickstand.ui import messages
-from kickstand_tools.calibration import drive_refusals, pose_refusals
 from kickstand_tools.common import firmware_path
 
-POSES = {"CaptureError", "SickSensor", "CalibrationError", "GyroError"}  # exceptions whose codes the tools raise, too
 CLASSES = {name for name in vars(errors) if name[0].isupper()}
 # Codes that the firmware passes as a variable, so codes() does not find them.
 INDIRECT = {"other-side", "mount-moved", "incomplete", "no-memory", "out-of-memory", "out-of-room"}
 INDIRECT |= {"sensor-lost", "sensor-frozen", "sensor-silent", "sensor-reset", "flash-fault", "card-fault", "usb-fault"}
 # Codes for which the display shows the setting's name
-OTHER_SETTINGS = {"not-allowed", "card-pins", "one-i2c", "no-such-pin", "i2c-pins", "uart-pins", "aliasing"}
+OTHER_SETTINGS = {
+    "i2c-number",
+    "not-allowed",
+    "card-pins",
+    "one-i2c",
+    "no-such-pin",
+    "i2c-pins",
+    "uart-pins",
+    "aliasing",
+}
 CONSOLE_ONLY = {"wrong-code"}  # codes that are reported during imports, before a display exists
 # Values for the words of each code. Some are long numbers and long names.
 VALUES = {"dead-axis": ("x", 0.1), "odd-axis": ("x", 0.1, 1.0), "side-tilted": ("+x", 25.0, 20.0)}
@@ -74,19 +80,6 @@ def test_a_refusal_of_the_board_has_a_console_sentence():
             values = VALUES.get(code, ("NAME", 2.0, 3.0, 4.0, 5.0, 6.0) if kind == "SettingsError" else (1.0, 2.0, 3.0))
             assert "{" not in console.sentence(Refusal(code, *values))
         assert code in sentences or kind not in ("SettingsError", "LiveError", "StoreError")
-
-
-def test_each_refusal_of_a_calibration_has_one_class():
-    here = {code for code, kind in codes().items() if kind in POSES | {"AlignmentError"}} | {"mount-moved"}
-    assert set(pose_refusals.CODES) | set(drive_refusals.CODES) == here
-    assert not set(pose_refusals.CODES) & set(drive_refusals.CODES)
-
-
-@pytest.mark.parametrize("reason", ["between-stops", "since-alignment"])
-def test_a_mount_that_moved(reason):
-    refusal = AlignmentError("mount-moved", reason, 12.0)
-    assert drive_refusals.of_firmware(refusal).line().startswith("the mount has moved: ")
-    assert messages.lines(refusal) == ("Mount has moved", "Align again")
 
 
 def test_the_limits_of_user_code_are_said_as_they_are():

@@ -47,15 +47,6 @@ def test_the_entries_of_the_menu_and_their_order(config, names):
     assert entries(panel)[-4:] == ["Stop recording", "Own pages", "Stop Bluetooth", "Leave menu"]
 
 
-def test_a_menu_counts_its_entries_and_ends_20_s_after_the_last_press():
-    panel = Panel()
-    assert panel.press(LONG, 0) == ("\x7eAlign the bike", "next 1/6 hold=ok")
-    assert panel.press(SHORT, 15_000) == ("\x7eSix positions", "next 2/6 hold=ok")
-    assert panel.lines(34_900)[0] == "\x7eSix positions" and panel.lines(35_000)[0].startswith("Lean")
-    assert panel.screen.menu is None
-    assert panel.choose("Leave menu")[0].startswith("Lean")
-
-
 def test_the_menu_resets_maxima_and_records():
     panel = Panel()
     panel.meter.max_left_deg = 30.0
@@ -73,14 +64,6 @@ def test_a_recording_that_is_refused_says_why(monkeypatch):
     panel = Panel()
     monkeypatch.setitem(sys.modules, "kickstand.rides.recorder", None)
     assert panel.choose("Record ride") == ("Incomplete:", "flash it again") and not panel.app.rides.recorder.active
-
-
-def test_a_short_press_closes_the_sensor_info():
-    panel = Panel()
-    assert panel.choose("Sensor info")[0].startswith("MPU6050")
-    assert panel.press(LONG)[0].startswith("\x7e")  # the menu in front of the sensor's page
-    assert panel.lines(60_000)[0].startswith("MPU6050") and panel.screen.front.name == "info"
-    assert panel.press(SHORT)[0].startswith("Lean")
 
 
 def test_a_press_is_for_what_a_notice_covers():
@@ -145,15 +128,6 @@ def test_the_page_of_the_drive_follows_the_others_or_is_first():
     panel = Panel(**WHEEL)
     assert panel.choose("Align by drive")[0] == "Brakings   0/6" or panel.screen.pages.name == "drive"
     assert panel.walk(2 * 6) == ["drive", *PAGES] * 2
-
-
-def test_before_an_alignment_the_page_of_the_drive_is_first():
-    panel = Panel(aligned=False, **WHEEL)
-    assert panel.lines()[1] == "Not aligned" and panel.lines(2000)[1] == "On stand: press"
-    panel.choose("Align by drive")
-    assert panel.screen.pages.name == "drive"
-    assert panel.press(SHORT, 6000) == ("Raw    0° +1.00g", "drive and brake")
-    assert panel.walk(2) == ["not_aligned", "drive"]
 
 
 def test_without_an_alignment_a_press_begins_it_and_own_pages_are_in_the_menu():

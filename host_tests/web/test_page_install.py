@@ -4,8 +4,8 @@ The board is a simulated one at a serial port in the test's process. Python star
 page.
 """
 
-import json
 import re
+import types
 
 import pytest
 from kickstand_tools.deploy import firmware_files
@@ -104,6 +104,32 @@ def test_config_with_more_than_settings_stays_with_the_rider(line, page, board):
     assert board.path("config.py").read_bytes() == own
 
 
+def test_a_board_of_a_shop_is_offered_by_its_name(line, page, board):
+    """Only boards with the same chip are offered. The firmware accepts their pins."""
+    look(line, board)
+    names = page.locator("#shop-board option").all_text_contents()
+    assert names == ["another board", "Seeed XIAO RP2040, RP2350", "Waveshare RP2040-Zero"]
+    page.select_option("#shop-board", "Seeed XIAO RP2040, RP2350")
+    assert page.input_value("[name=BUTTON_PIN]") == "2" and page.input_value("[name=SENSOR_I2C]") == "1"
+    text = line.rider.text("#config")
+    assert "used twice" not in text and page.is_enabled("#install")
+    assert "SENSOR_SDA = 6" in page.text_content("#text")
+    page.select_option("#shop-board", "another board")
+    assert page.input_value("[name=BUTTON_PIN]") == "" and "\nSENSOR_SDA" not in page.text_content("#text")
+
+
+def test_status_keeps_what_the_firmware_noticed_before_it_is_stopped(line, board):
+    """A soft reset removes the firmware's modules, before the status is asked."""
+    app, report, firmware = (types.ModuleType(name) for name in ("app", "status_report", "kickstand"))
+    vars(app)["worst"] = (1200, 3, ((1, 2, 3), 0.5))
+    vars(report)["noticed"] = None
+    vars(firmware).update(status_report=report, status=lambda *_: print("noticed", vars(report)["noticed"]))
+    board.modules["kickstand"] = firmware
+    vars(board.modules["sys"])["modules"] = {"kickstand.app": app}
+    line.plug_in(RawPrompt(board))
+    assert line.status() == "noticed ((1200, 3, ((1, 2, 3), 0.5)), None)"
+
+
 @pytest.mark.parametrize(
     ("name", "version", "platform", "words"),
     [
@@ -112,10 +138,8 @@ def test_config_with_more_than_settings_stays_with_the_rider(line, page, board):
         ("micropython", (1, 26, 1), "stm32", "runs on a Raspberry Pi Pico"),
     ],
 )
-def test_unsuitable_board_is_not_changed(line, page, board, name, version, platform, words):
-    implementation = board.modules["sys"].implementation
-    implementation.name, implementation.version = name, version
-    board.modules["sys"].platform = platform
+def test_unsuitable_board_is_not_changed(line, page, tmp_path, name, version, platform, words):
+    board = FakeBoard(tmp_path, name, version=version, platform=platform)
     assert words in look(line, board)
     assert page.is_hidden("#config") and board.written == [] and board.resets == 1
 
@@ -144,23 +168,6 @@ def test_status_equals_the_output_of_the_command(line, page, board, monkeypatch)
     page.click("#status-copy")
     page.wait_for_selector("#status-said:has-text('Copied')")
     assert page.evaluate("navigator.clipboard.readText()") == report
-
-
-def test_file_that_is_no_esp32_image_is_not_written(line, page, board, tmp_path):
-    """No chip answers in this test."""
-    page.click("a[href='#micropython']")
-    page.click("text=ESP32: a file that ends in .bin")
-    for name, content, words in (
-        ("notes.bin", b"hello", "no image for an ESP32"),
-        ("pico.uf2", b"UF2\n" * 200, "no image for an ESP32"),
-        ("esp32.bin", b"\xe9" + bytes(2000), "no ESP32 answers: hold its button BOOT"),
-    ):
-        (tmp_path / name).write_bytes(content)
-        line.plug_in(RawPrompt(board, deaf=True))
-        page.set_input_files("#image-file", tmp_path / name)
-        page.click("#image")
-        page.wait_for_selector(f"#image-said:has-text({json.dumps(words)})")
-    page.wait_for_selector("#image:enabled")
 
 
 def test_after_its_first_use_the_page_works_without_a_network(line, page, board):

@@ -132,8 +132,8 @@ class Cluster:
             self.__exit__()
             if not isinstance(error, (OSError, TimeoutError, ValueError)):
                 raise
-            where = self._address or "this computer"
-            raise InputError(f"no workers at {where}: {cause(error)}") from error
+            address = self._address or "this computer"
+            raise InputError(f"no workers at {address}: {cause(error)}") from error
         # The time when each task began and the address of its worker, by the key of the task
         self._started: dict[str, tuple[float, str]] = {}
         self._client.subscribe_topic(_TOPIC, self._note_begin)
@@ -183,11 +183,11 @@ class Cluster:
             self._check_workers()
         else:
             self._working_s = time.monotonic()
-            place = self._under_way.pop(future.key, None)
+            task = self._under_way.pop(future.key, None)
             self._started.pop(future.key, None)
-            if place is None:
+            if task is None:
                 return
-            index, status = place[0], future.status
+            index, status = task[0], future.status
             if status == "finished":
                 try:
                     result = future.result()
@@ -249,11 +249,11 @@ def _without_interrupts() -> Iterator[None]:
     # Start Python's resource tracker now. If Python started the tracker with the first process, the tracker would
     # unblock Ctrl-C
     resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
 def _silence() -> None:

@@ -27,7 +27,7 @@ from . import KEPT
 @click.option(
     "--vehicle", type=VEHICLES, default="car", help="The kind of vehicle, for a GLOB. A manifest has its own column."
 )
-def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **how: Any) -> None:
+def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **options: Any) -> None:
     """Align many vehicles, find mounts that moved, and measure brake tests.
 
     The manifest is CSV with the columns vehicle,path,kind and optionally mount: one line per log, in chronological
@@ -43,24 +43,25 @@ def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **how: Any
     periods = by_pattern(manifest, vehicle) if is_pattern(manifest) else read_manifest(manifest)
     try:
         with Bar("vehicles", lines_s=10.0, patience_s=0.0) as bar:
-            found = run_fleet(periods, out, progress=bar.reach, **how)
+            run = run_fleet(periods, out, progress=bar.reach, **options)
     except KeyboardInterrupt:
         echo(KEPT, err=True)
         raise
-    before = found.vehicles - found.new
-    done = f", {before} of them finished earlier" if before else ""
-    echo(f"mounted sensors: {found.vehicles}{done}")
-    if found.damaged:
-        echo(f"{found.damaged} earlier results were damaged and are recomputed", err=True)
-    seen = found.seen
-    counts = seen.statuses
+    earlier = run.vehicles - run.new
+    reused = f", {earlier} of them finished earlier" if earlier else ""
+    echo(f"mounted sensors: {run.vehicles}{reused}")
+    if run.damaged:
+        echo(f"{run.damaged} earlier results were damaged and are recomputed", err=True)
+    summary = run.seen
+    counts = summary.statuses
     echo(f"aligned: {counts['aligned']}, refused: {counts['refused']}, errors: {counts['error']}")
-    for (status, reason), count in seen.reasons.most_common():
+    for (status, reason), count in summary.reasons.most_common():
         echo(f"{count:7}  {status}: {reason}")
-    tests = len(seen.decelerations[1])
-    echo(f"mounts that seem to have moved: {seen.moved_vehicles}; brake tests: {tests}; rows of errors: {seen.errors}")
-    for path, message in seen.first_errors:
+    tests = len(summary.decelerations[1])
+    moved, errors = summary.moved_vehicles, summary.errors
+    echo(f"mounts that seem to have moved: {moved}; brake tests: {tests}; rows of errors: {errors}")
+    for path, message in summary.first_errors:
         echo(f"error: {message if path in message else f'{path}: {message}'}")
-    if seen.errors > len(seen.first_errors):
+    if summary.errors > len(summary.first_errors):
         echo("more errors are in errors.parquet")
     echo(f"written: {out}/index.html, alignments.parquet, moved.parquet, brake_tests.parquet, errors.parquet")

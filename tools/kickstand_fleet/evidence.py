@@ -106,20 +106,20 @@ def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
     step = np.diff(log.t_s, prepend=log.t_s[0])
     step = np.where(step * 1e6 > GAP_US, 0.0, step)
     rate = np.radians(log.gyro_dps - bias_dps)
-    there = np.flatnonzero(~np.isnan(log.speed_mps))
-    time, speed = log.t_s[there] - lag_s, log.speed_mps[there]
-    kept = time >= 0.0
-    time, speed = _thinned(time[kept], speed[kept])
+    valid = np.flatnonzero(~np.isnan(log.speed_mps))
+    time, speed = log.t_s[valid] - lag_s, log.speed_mps[valid]
+    inside = time >= 0.0
+    time, speed = _thinned(time[inside], speed[inside])
     curve = rate * (np.interp(log.t_s, time, speed) / STANDARD_GRAVITY)[:, None]
     sway = _sway(log)
-    squares = (one * other for one in sway.T for other in sway.T)
+    squares = (first * second for first in sway.T for second in sway.T)
     ends = _integrals(chain(log.accel_g.T, curve.T, squares), log.t_s, step, time)
-    seconds, whole = np.diff(time), np.diff(np.interp(time, log.t_s, np.cumsum(step)))
-    good = (seconds <= MAX_INTERVAL_US * 1e-6) & (whole > 0.9 * seconds)
-    means = (np.diff(ends, axis=0) / np.maximum(whole, 1e-9)[:, None])[good]
-    middle, length = (time[1:] - seconds / 2.0)[good], seconds[good]
-    mean_mps = (0.5 * (speed[1:] + speed[:-1]))[good]
-    a = (np.diff(speed) / seconds / STANDARD_GRAVITY)[good]
+    seconds, sampled_s = np.diff(time), np.diff(np.interp(time, log.t_s, np.cumsum(step)))
+    usable = (seconds <= MAX_INTERVAL_US * 1e-6) & (sampled_s > 0.9 * seconds)
+    means = (np.diff(ends, axis=0) / np.maximum(sampled_s, 1e-9)[:, None])[usable]
+    middle, length = (time[1:] - seconds / 2.0)[usable], seconds[usable]
+    mean_mps = (0.5 * (speed[1:] + speed[:-1]))[usable]
+    a = (np.diff(speed) / seconds / STANDARD_GRAVITY)[usable]
     up = _local_up(middle, means[:, :3], length)
     c = np.sum(means[:, 3:6] * up, axis=1)
     standing = (mean_mps < STANDING_MPS) & (np.abs(a) < 0.01)
@@ -127,24 +127,24 @@ def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
         terms = np.column_stack((np.sqrt(1.0 + c * c), a, np.zeros_like(a), np.zeros_like(a)))
         # A motorcycle at a lower speed has no weight, because the rider may have a foot on the ground
         weight = length * (mean_mps > MOVING_MPS)
-        shown = np.zeros_like(a)  # no sway, because a motorcycle sways about its tyre contacts and with its rider
+        sway_weight = np.zeros_like(a)  # no sway, because a motorcycle sways about its tyre contacts and with its rider
     else:
-        around = [np.clip(time + ahead, log.t_s[0], log.t_s[-1]) for ahead in (-SWING_S / 2.0, SWING_S / 2.0)]
-        sooner, later = (_integrals(rate.T, log.t_s, step, at) for at in around)
-        swing = (later - sooner) / np.maximum(around[1] - around[0], 1e-9)[:, None]
-        w = np.sum(np.diff(swing, axis=0)[good] * up, axis=1) / length
+        edges = [np.clip(time + offset_s, log.t_s[0], log.t_s[-1]) for offset_s in (-SWING_S / 2.0, SWING_S / 2.0)]
+        sooner, later = (_integrals(rate.T, log.t_s, step, edge) for edge in edges)
+        swing = (later - sooner) / np.maximum(edges[1] - edges[0], 1e-9)[:, None]
+        w = np.sum(np.diff(swing, axis=0)[usable] * up, axis=1) / length
         terms = np.column_stack((np.ones_like(a), a, c, w))
         weight = length * np.where(standing, STANDING_WEIGHT, mean_mps > STANDING_MPS)
         turning_dps = np.degrees(c * STANDARD_GRAVITY / np.maximum(mean_mps, MOVING_MPS))
         weight /= 1.0 + (turning_dps / TIGHT_DPS) ** 2
-        shown = (mean_mps > MOVING_MPS).astype(float)
-    sway = (means[:, 6:] * shown[:, None]).reshape(-1, 3, 3)
+        sway_weight = (mean_mps > MOVING_MPS).astype(float)
+    sway = (means[:, 6:] * sway_weight[:, None]).reshape(-1, 3, 3)
     return Intervals(middle, means[:, :3], terms, weight, mean_mps, sway)
 
 
 def blocks(logs: list[Intervals]) -> Blocks:
     """All intervals of the logs in blocks of about BLOCK_S."""
-    square, product, sway, which, begin, end = [], [], [], [], [], []
+    square, product, sway, log_index, begin_s, end_s = [], [], [], [], [], []
     for index, log in enumerate(logs):
         if not len(log.t_s):
             continue
@@ -154,13 +154,13 @@ def blocks(logs: list[Intervals]) -> Blocks:
         product.append(np.add.reduceat(terms[:, :, None] * force[:, None, :], starts))
         swayed = np.add.reduceat(log.sway, starts)
         sway.append(swayed / np.maximum(np.trace(swayed, axis1=1, axis2=2), 1e-12)[:, None, None])
-        which.append(np.full(len(starts), index))
-        begin.append(log.t_s[starts])
-        end.append(log.t_s[np.append(starts[1:], len(log.t_s)) - 1])
+        log_index.append(np.full(len(starts), index))
+        begin_s.append(log.t_s[starts])
+        end_s.append(log.t_s[np.append(starts[1:], len(log.t_s)) - 1])
     if not square:
         none = np.zeros(0)
         return Blocks(np.zeros((0, 4, 4)), np.zeros((0, 4, 3)), np.zeros((0, 3, 3)), np.zeros(0, int), none, none)
-    return Blocks(*(np.concatenate(parts) for parts in (square, product, sway, which, begin, end)))
+    return Blocks(*(np.concatenate(parts) for parts in (square, product, sway, log_index, begin_s, end_s)))
 
 
 def fits(square: Array, product: Array) -> tuple[Array, Array]:
@@ -175,19 +175,19 @@ def fits(square: Array, product: Array) -> tuple[Array, Array]:
         variation: of the regressors a and c of the module's docstring, shape (k, 2), in g^2 s.
     """
     ridge = np.diag([1e-9] + [1e-6] * (square.shape[-1] - 1)) * np.maximum(square[..., :1, :1], 1e-3)
-    found = np.asarray(np.linalg.solve(square + ridge, product), dtype=float)
+    coefficients = np.asarray(np.linalg.solve(square + ridge, product), dtype=float)
     seconds = np.maximum(square[..., 0, 0], 1e-9)[..., None]
     means = square[..., 0, 1:3] / seconds
     varied = np.diagonal(square, axis1=-2, axis2=-1)[..., 1:3] - seconds * means * means
-    return found, varied
+    return coefficients, varied
 
 
-def frames(found: Array, varied: Array) -> Array:
+def frames(coefficients: Array, varied: Array) -> Array:
     """Compute k rotations from sensor to vehicle axes, shape (k, 3, 3), from the two results of fits().
 
     The rows of a rotation are left, up, forward.
     """
-    level, forward, left = found[..., 0, :], found[..., 1, :], found[..., 2, :]
+    level, forward, left = coefficients[..., 0, :], coefficients[..., 1, :], coefficients[..., 2, :]
     up = level / np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), 1e-9)
     ahead = varied[..., :1] * forward + varied[..., 1:] * np.cross(left, up)
     return frame_of(up, np.asarray(ahead, dtype=float))
@@ -204,7 +204,7 @@ def frame_of(up: Array, ahead: Array) -> Array:
     return np.asarray(np.stack((side, up, np.cross(side, up)), axis=-2), dtype=float)
 
 
-def handedness(found: Array, varied: Array) -> float:
+def handedness(coefficients: Array, varied: Array) -> float:
     """Divide the lateral force measured in bends by the lateral force computed from speed and yaw rate.
 
     The ratio is about 1. The ratio is about -1 if the gyro's signs or the axes are mirrored. The ratio is 0 without
@@ -213,7 +213,7 @@ def handedness(found: Array, varied: Array) -> float:
     """
     if varied[1] < 0.05:
         return 0.0
-    level, forward, left = found[:3]
+    level, forward, left = coefficients[:3]
     side = np.cross(level, forward)
     return float(side @ left / max(float(np.linalg.norm(side)), 1e-9))
 
@@ -229,12 +229,12 @@ def _without_road(log: Intervals) -> tuple[Array, Array]:
     standard deviations. The differences are uncorrelated, so ordinary least squares can be used on them.
     """
     rows = np.hstack((log.terms, log.force))
-    driven = log.speed * np.diff(log.t_s, prepend=log.t_s[0])
-    kept = np.exp(-driven / ROAD_M)
+    driven_m = log.speed * np.diff(log.t_s, prepend=log.t_s[0])
+    memory = np.exp(-driven_m / ROAD_M)
     predicted, variance = np.zeros(rows.shape[1]), ROAD_SHARE
     for k, weight in enumerate(log.weight.tolist()):
-        predicted = predicted * kept[k]
-        variance = ROAD_SHARE + (variance - ROAD_SHARE) * kept[k] ** 2
+        predicted = predicted * memory[k]
+        variance = ROAD_SHARE + (variance - ROAD_SHARE) * memory[k] ** 2
         gain = variance * weight / (variance * weight + 1.0)
         rows[k] -= predicted
         predicted = predicted + gain * rows[k]
@@ -281,12 +281,12 @@ def _integrals(columns: Iterable[Array], t_s: Array, step: Array, time: Array) -
 
 def _thinned(time: Array, speed: Array) -> tuple[Array, Array]:
     """Keep at most one speed per INTERVAL_S. Returns the times and the speeds that are kept."""
-    kept, last = [], -np.inf
+    selected, last = [], -np.inf
     for k, now in enumerate(time.tolist()):
         if now - last >= INTERVAL_S:
-            kept.append(k)
+            selected.append(k)
             last = now
-    return time[kept], speed[kept]
+    return time[selected], speed[selected]
 
 
 def _local_up(middle: Array, force: Array, length: Array) -> Array:

@@ -76,8 +76,8 @@ def join(base: str, path: str) -> str:
 def read_bytes(path: str, most: int = MOST_BYTES) -> bytes:
     """Read a whole file of at most `most` bytes. Raises InputError."""
     if is_remote(path):
-        with _in_store(path, "read") as (fs, place):
-            content = fs.cat_file(place, end=most + 1)
+        with _in_store(path, "read") as (fs, name):
+            content = fs.cat_file(name, end=most + 1)
     else:
         try:
             with open_input(path) as file:
@@ -92,16 +92,16 @@ def read_bytes(path: str, most: int = MOST_BYTES) -> bytes:
 def read_all(paths: list[str]) -> list[bytes]:
     """Read whole files of one store, fetched together. Raises InputError."""
     with _in_store(paths[0], "read") as (fs, _):
-        places = [_system(path)[1] for path in paths]
-        found = fs.cat(places)
-        return [found[place] for place in places]
+        names = [_system(path)[1] for path in paths]
+        contents = fs.cat(names)
+        return [contents[name] for name in names]
 
 
 def matches(pattern: str) -> list[str]:
     """The files that match a pattern with * ? [ ], sorted. ** matches any number of directories."""
-    with _in_store(pattern, "read") as (fs, place):
-        found = sorted(str(path) for path in fs.glob(place))
-        return [fs.unstrip_protocol(path) for path in found] if is_remote(pattern) else found
+    with _in_store(pattern, "read") as (fs, name):
+        names = sorted(str(path) for path in fs.glob(name))
+        return [fs.unstrip_protocol(path) for path in names] if is_remote(pattern) else names
 
 
 def identities(paths: Iterable[str]) -> dict[str, str]:
@@ -110,21 +110,21 @@ def identities(paths: Iterable[str]) -> dict[str, str]:
     The mark consists of the file's size and time. In a store it is the file's ETag, if it has one. The mark is "" if
     the file does not exist. Each remote directory is listed only once.
     """
-    known: dict[str, str] = {}
+    marks: dict[str, str] = {}
     directories: dict[str, dict[str, str]] = {}
     for path in paths:
         if not is_remote(path):
             try:
                 stat = Path(path).stat()
-                known[path] = f"{stat.st_size}-{stat.st_mtime_ns}"
+                marks[path] = f"{stat.st_size}-{stat.st_mtime_ns}"
             except (OSError, ValueError):  # OSError or ValueError: the name contains a NUL
-                known[path] = ""
+                marks[path] = ""
             continue
         parent = path.rpartition("/")[0]
         if parent not in directories:
             directories[parent] = listed(parent)
-        known[path] = directories[parent].get(path, "")
-    return known
+        marks[path] = directories[parent].get(path, "")
+    return marks
 
 
 def open_log(path: str) -> Log:
@@ -150,32 +150,32 @@ def listed(parent: str) -> dict[str, str]:
     Returns the mark of each file (see identities()), by its path. If the directory does not exist, the result is empty.
     """
     marks: dict[str, str] = {}
-    with _in_store(parent, "read") as (fs, place), contextlib.suppress(FileNotFoundError):
-        fs.invalidate_cache(place)
-        for info in fs.ls(place, detail=True):
+    with _in_store(parent, "read") as (fs, name), contextlib.suppress(FileNotFoundError):
+        fs.invalidate_cache(name)
+        for info in fs.ls(name, detail=True):
             time = info.get("ETag") or info.get("mtime") or info.get("LastModified") or ""
             marks[fs.unstrip_protocol(info["name"])] = f"{info.get('size')}-{time}"
     return marks
 
 
 @contextlib.contextmanager
-def _in_store(path: str, what: str) -> Iterator[tuple[Any, str]]:
+def _in_store(path: str, action: str) -> Iterator[tuple[Any, str]]:
     """A context that yields the file system of a remote path, and the path within that file system.
 
     The context turns any error of the libraries into an InputError.
 
-    path: the remote path. what: the past participle of the attempted action, for the message.
+    path: the remote path. action: the past participle of the attempted action, for the message.
     """
     try:
         yield _system(path)
     except InputError:
         raise
     except FileNotFoundError as error:
-        instead = "there is no such file" if what == "read" else f"cannot be {what}: there is no such place"
-        raise InputError(f"{path}: {instead}") from error
+        words = "there is no such file" if action == "read" else f"cannot be {action}: there is no such place"
+        raise InputError(f"{path}: {words}") from error
     except Exception as error:
-        said = " ".join((cause(error)).split())
-        raise InputError(f"{path} cannot be {what}: {said}") from error
+        reason = " ".join((cause(error)).split())
+        raise InputError(f"{path} cannot be {action}: {reason}") from error
 
 
 def _system(path: str):
@@ -193,8 +193,8 @@ def _system(path: str):
 def write_bytes(path: str, content: bytes) -> None:
     """Write a file completely or not at all. Create its directory if needed. Raises InputError."""
     if is_remote(path):
-        with _in_store(path, "written") as (fs, place):
-            fs.pipe_file(place, content)
+        with _in_store(path, "written") as (fs, name):
+            fs.pipe_file(name, content)
         return
     directory = Path(path).parent
     try:  # a new directory stays if the write fails, because other workers use it too
@@ -216,9 +216,9 @@ def to_write(path: str) -> Iterator[Path]:
         with whole_file(Path(path)) as temporary:
             yield temporary
         return
-    with tempfile.TemporaryDirectory() as here:
-        temporary = Path(here) / path.rpartition("/")[2]
-        with whole_file(temporary) as begun:
-            yield begun
-        with _in_store(path, "written") as (fs, place):
-            fs.put_file(str(temporary), place)
+    with tempfile.TemporaryDirectory() as folder:
+        temporary = Path(folder) / path.rpartition("/")[2]
+        with whole_file(temporary) as partial:
+            yield partial
+        with _in_store(path, "written") as (fs, name):
+            fs.put_file(str(temporary), name)

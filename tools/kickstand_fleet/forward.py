@@ -59,27 +59,27 @@ def find_forward(logs: list[Intervals], device: DriveFit | None = None) -> Forwa
     logs: The intervals of each log.
     device: The firmware's alignment from the same logs, or None if the firmware refuses them.
     """
-    whole = evidence.blocks(logs)
-    count = len(whole.log)
+    driving = evidence.blocks(logs)
+    count = len(driving.log)
     if count < _LEAST_BLOCKS:
         return _alone(device) if device else None
-    square, product = whole.square[:, :_TERMS, :_TERMS], whole.product[:, :_TERMS]
+    square, product = driving.square[:, :_TERMS, :_TERMS], driving.product[:, :_TERMS]
 
     def frame_of(part: slice) -> Array:
         return evidence.frames(*evidence.fits(np.sum(square[part], axis=0), np.sum(product[part], axis=0)))
 
     frame = frame_of(slice(None))
-    others = evidence.frames(*evidence.fits(np.sum(square, axis=0) - square, np.sum(product, axis=0) - product))
-    off = np.degrees(rotation_vector(others @ frame.T))
+    partial_frames = evidence.frames(*evidence.fits(np.sum(square, axis=0) - square, np.sum(product, axis=0) - product))
+    deviation_deg = np.degrees(rotation_vector(partial_frames @ frame.T))
     # Jackknife: compute the alignment without each block in turn. The variance comes from the differences of these
     # alignments
-    pitch, yaw, roll = (count - 1) / count * np.sum(off * off, axis=0)
+    pitch, yaw, roll = (count - 1) / count * np.sum(deviation_deg * deviation_deg, axis=0)
     variance = float(yaw) + SENSOR_DEG**2
-    apart = float(_yaw_deg(frame_of(slice(count // 2, None)), frame_of(slice(count // 2))))
+    halves_deg = float(_yaw_deg(frame_of(slice(count // 2, None)), frame_of(slice(count // 2))))
     if device is not None:
         frame, variance = _mean(frame, variance, device.calibration.vehicle_from_sensor, device.quality_deg)
     attitude = variance + float(pitch + roll) + UP_DEG**2
-    return Forward(frame, float(np.sqrt(variance)), float(np.sqrt(attitude)), abs(apart))
+    return Forward(frame, float(np.sqrt(variance)), float(np.sqrt(attitude)), abs(halves_deg))
 
 
 def _alone(device: DriveFit) -> Forward:
@@ -102,15 +102,15 @@ def _mean(frame: Array, variance: float, device: Array, quality_deg: float) -> t
         merged: the alignment with the firmware's up and the weighted mean of both forwards, shape (3, 3).
         variance: variance of the mean, in deg^2.
     """
-    other = quality_deg**2 + SENSOR_DEG**2
-    share = variance / (variance + other)
-    common = CORRELATION * float(np.sqrt(variance * other))
-    apart = float(_yaw_deg(device, frame))
-    excess = apart**2 / (variance + other - 2.0 * common) / APART_SIGMAS**2
-    mean = (1.0 - share) ** 2 * variance + share**2 * other + 2.0 * share * (1.0 - share) * common
+    device_variance = quality_deg**2 + SENSOR_DEG**2
+    share = variance / (variance + device_variance)
+    common = CORRELATION * float(np.sqrt(variance * device_variance))
+    difference_deg = float(_yaw_deg(device, frame))
+    excess = difference_deg**2 / (variance + device_variance - 2.0 * common) / APART_SIGMAS**2
+    mean = (1.0 - share) ** 2 * variance + share**2 * device_variance + 2.0 * share * (1.0 - share) * common
     return evidence.frame_of(device[1], (1.0 - share) * frame[2] + share * device[2]), mean * max(1.0, excess)
 
 
-def _yaw_deg(frames: Array, before: Array) -> Array:
+def _yaw_deg(frames: Array, reference: Array) -> Array:
     """Compute the angle about up, in degrees, from the alignment `before` to each alignment in frames."""
-    return np.degrees(rotation_vector(frames @ before.T)[..., 1])
+    return np.degrees(rotation_vector(frames @ reference.T)[..., 1])

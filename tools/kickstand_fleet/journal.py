@@ -34,8 +34,8 @@ class Journal:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._places: dict[str, int] = {}
-        self._again: set[str] = set()  # keys of results that the next run should recompute
+        self._offsets: dict[str, int] = {}
+        self._provisional: set[str] = set()  # keys of results that the next run should recompute
         self.damaged = 0
 
     def __enter__(self) -> "Journal":
@@ -86,7 +86,7 @@ class Journal:
 
     def __contains__(self, key: str) -> bool:
         """True if there is a final result for this key."""
-        return key in self._places and key not in self._again
+        return key in self._offsets and key not in self._provisional
 
     def add(self, key: str, result: PeriodResult, again: bool = False) -> None:
         """Save a result. again: True if the next run should recompute the result.
@@ -106,9 +106,9 @@ class Journal:
     def _write(self, line: bytes) -> None:
         """Append a line without a buffer, because a buffer would later write the rest of a line that did not fit."""
         self._file.raw.seek(self._end)
-        rest = memoryview(line)
-        while rest:
-            rest = rest[self._file.raw.write(rest) :]
+        remaining = memoryview(line)
+        while remaining:
+            remaining = remaining[self._file.raw.write(remaining) :]
 
     def sync(self) -> None:
         """Flush the results to the disk, so that they survive a power loss. Raises InputError."""
@@ -121,8 +121,8 @@ class Journal:
         """Yield the latest result of each of these keys. Keys without a result are skipped."""
         with open(self._path, "rb") as file:
             for key in keys:
-                if key in self._places:
-                    file.seek(self._places[key])
+                if key in self._offsets:
+                    file.seek(self._offsets[key])
                     if entry := _entry(file.readline()):
                         yield entry[2]
 
@@ -134,8 +134,8 @@ class Journal:
         if not (line.endswith(b"\n") and (entry := _entry(line))):
             return False
         key, again, _ = entry
-        self._places[key] = self._end
-        (self._again.add if again else self._again.discard)(key)
+        self._offsets[key] = self._end
+        (self._provisional.add if again else self._provisional.discard)(key)
         return True
 
 
@@ -148,15 +148,15 @@ class StoreJournal:
 
     def __init__(self, directory: str) -> None:
         self._directory = directory
-        self._kept: set[str] = set()
-        self._again: set[str] = set()
+        self._final: set[str] = set()
+        self._provisional: set[str] = set()
         self.damaged = 0
 
     def __enter__(self) -> "StoreJournal":
         for path in files.listed(self._directory):
             name = path.rpartition("/")[2]
-            (self._again if name.endswith(".again.json") else self._kept).add(name.partition(".")[0])
-        for _ in self.results(self._kept | self._again):
+            (self._provisional if name.endswith(".again.json") else self._final).add(name.partition(".")[0])
+        for _ in self.results(self._final | self._provisional):
             pass
         return self
 
@@ -164,25 +164,27 @@ class StoreJournal:
         pass
 
     def __contains__(self, key: str) -> bool:
-        return key in self._kept
+        return key in self._final
 
     def add(self, key: str, result: PeriodResult, again: bool = False) -> None:
         files.write_bytes(self._path(key, again), _line(key, result, again))
-        (self._again if again else self._kept).add(key)
+        (self._provisional if again else self._final).add(key)
 
     def sync(self) -> None:
         pass
 
     def results(self, keys: Iterable[str]) -> Iterator[PeriodResult]:
-        there = [self._path(key, key not in self._kept) for key in keys if key in self._kept or key in self._again]
-        for first in range(0, len(there), _AT_ONCE):
-            paths = there[first : first + _AT_ONCE]
+        saved = [
+            self._path(key, key not in self._final) for key in keys if key in self._final or key in self._provisional
+        ]
+        for first in range(0, len(saved), _AT_ONCE):
+            paths = saved[first : first + _AT_ONCE]
             for path, content in zip(paths, files.read_all(paths)):
                 if entry := _entry(content):
                     yield entry[2]
                 else:
                     self.damaged += 1
-                    (self._again if path.endswith(".again.json") else self._kept).discard(
+                    (self._provisional if path.endswith(".again.json") else self._final).discard(
                         path.rpartition("/")[2].partition(".")[0]
                     )
 

@@ -71,12 +71,12 @@ def read_manifest(path: str) -> list[Period]:
             raise InputError(f"{path}, line {line}: kind is {cells['kind']!r}, it is motorcycle or car")
         if kinds.setdefault(period, cells["kind"]) != cells["kind"]:
             raise InputError(f"{path}, line {line}: {cells['vehicle']} is a {kinds[period]} in an earlier line")
-        found = _found(files.join(base, cells["path"]))
-        known = logs.setdefault(period, {})
-        for log in found:
-            if log in known:
+        matched = _matching_logs(files.join(base, cells["path"]))
+        period_logs = logs.setdefault(period, {})
+        for log in matched:
+            if log in period_logs:
                 raise InputError(f"{path}, line {line}: {log} is given twice for {cells['vehicle']}")
-            known[log] = None
+            period_logs[log] = None
     if not logs:
         raise InputError(f"{path} has no vehicles: each line after the first is vehicle,path,kind")
     return [Period(*period, kinds[period], tuple(paths)) for period, paths in logs.items()]
@@ -92,10 +92,10 @@ def by_pattern(pattern: str, kind: str = CAR) -> list[Period]:
     ...     [period.vehicle == file.name for period in by_pattern(file.name[:-6] + "*.csv")]
     [True]
     """
-    found = files.matches(pattern)
-    if not found:
+    paths = files.matches(pattern)
+    if not paths:
         raise InputError(f"{pattern} matches no file")
-    return [Period(files.printable(path), "", kind, (path,)) for path in found]
+    return [Period(files.printable(path), "", kind, (path,)) for path in paths]
 
 
 def is_pattern(path: str) -> bool:
@@ -103,6 +103,6 @@ def is_pattern(path: str) -> bool:
     return any(mark in path for mark in "*?[")
 
 
-def _found(path: str) -> list[str]:
+def _matching_logs(path: str) -> list[str]:
     """Return the files that match a pattern. If none matches, return the path itself: the run reports it as missing."""
     return (files.matches(path) or [path]) if is_pattern(path) else [path]

@@ -97,16 +97,16 @@ def find_moves(logs: list[Intervals], suspected: bool = False) -> list[Move]:
     return _search(logs, blocks(logs), SUSPECTED_SHARE if suspected else 1.0)
 
 
-def _search(logs: list[Intervals], whole: Blocks, share: float) -> list[Move]:
-    count = len(whole.log)
+def _search(logs: list[Intervals], driving: Blocks, share: float) -> list[Move]:
+    count = len(driving.log)
     best: tuple[float, int, Move] | None = None
-    for at in range(LEAST_BLOCKS, count - LEAST_BLOCKS + 1):
-        between = whole.log[at] != whole.log[at - 1]
-        turned = compare(*_sides(whole, at, between))
+    for index in range(LEAST_BLOCKS, count - LEAST_BLOCKS + 1):
+        between = driving.log[index] != driving.log[index - 1]
+        turned = compare(*_sides(driving, index, between))
         if turned is None:
             continue
         turn, sigma = turned
-        move = Move(int(whole.log[at]), None if between else float(whole.t_s[at]), turn, sigma)
+        move = Move(int(driving.log[index]), None if between else float(driving.t_s[index]), turn, sigma)
         tilted = move.tilt_deg >= TILT_DEG
         score = move.sigmas / share / (BETWEEN_SIGMAS if between else SUDDEN_SIGMAS if tilted else WITHIN_SIGMAS)
         if move.angle_deg < LEAST_DEG or score < 1.0 or (best and score <= best[0]):
@@ -118,23 +118,28 @@ def _search(logs: list[Intervals], whole: Blocks, share: float) -> list[Move]:
             if moment is None:
                 continue
             move.at_s = moment
-        best = score, at, move
+        best = score, index, move
     if best is None:
         return []
-    _, at, move = best
-    return [*_search(logs, whole.part(slice(0, at)), share), move, *_search(logs, whole.part(slice(at, count)), share)]
+    _, index, move = best
+    return [
+        *_search(logs, driving.part(slice(0, index)), share),
+        move,
+        *_search(logs, driving.part(slice(index, count)), share),
+    ]
 
 
-def _sides(whole: Blocks, at: int, between: bool) -> tuple[Blocks, Blocks]:
+def _sides(driving: Blocks, index: int, between: bool) -> tuple[Blocks, Blocks]:
     """Return the blocks before and after block number `at`.
 
     between: True if the block is the first of a log. True uses blocks of all logs, False only blocks of the same log.
     """
     if between:
-        return whole.part(slice(max(0, at - REACH), at)), whole.part(slice(at, at + REACH))
-    first, last = np.searchsorted(whole.log, [whole.log[at], whole.log[at] + 1])
+        return driving.part(slice(max(0, index - REACH), index)), driving.part(slice(index, index + REACH))
+    first, last = np.searchsorted(driving.log, [driving.log[index], driving.log[index] + 1])
     # The block in which the rotation happens is left out on both sides
-    return whole.part(slice(max(first, at - REACH), at)), whole.part(slice(at + 1, min(last, at + 1 + REACH)))
+    earlier = slice(max(first, index - REACH), index)
+    return driving.part(earlier), driving.part(slice(index + 1, min(last, index + 1 + REACH)))
 
 
 def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
@@ -148,16 +153,16 @@ def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
     """
     if min(len(before.log), len(after.log)) < LEAST_BLOCKS:
         return None
-    one, other = _align_part(before), _align_part(after)
-    if one is None or other is None:
+    earlier, later = _align_part(before), _align_part(after)
+    if earlier is None or later is None:
         return None
-    turn = np.degrees(rotation_vector(other.frame @ one.frame.T))
+    turn = np.degrees(rotation_vector(later.frame @ earlier.frame.T))
     road = ROAD_DEG if before.log[-1] == after.log[0] else OTHER_ROAD_DEG
-    variance = one.variance + other.variance + 2.0 * road**2
+    variance = earlier.variance + later.variance + 2.0 * road**2
     # The direction of the sway measures the yaw in another way than the frame. An error between the yaws of the two
     # frames makes the sway seem to turn by the same angle
-    swayed = one.sway_variance + other.sway_variance + 2.0 * SWAY_DEG**2
-    error = (other.sway_deg - one.sway_deg + 90.0) % 180.0 - 90.0
+    swayed = earlier.sway_variance + later.sway_variance + 2.0 * SWAY_DEG**2
+    error = (later.sway_deg - earlier.sway_deg + 90.0) % 180.0 - 90.0
     if swayed < SWAY_WORST_DEG**2 and error**2 < SWAY_SIGMAS**2 * (swayed + variance[1]):
         turn[1] -= error * variance[1] / (variance[1] + swayed)
         variance[1] *= swayed / (variance[1] + swayed)
@@ -186,12 +191,12 @@ def _align_part(part: Blocks) -> _PartAlignment | None:
     Returns None if the blocks do not determine an alignment.
     """
     square, product = np.sum(part.square, axis=0), np.sum(part.product, axis=0)
-    found, varied = fits(square, product)
+    coefficients, varied = fits(square, product)
     if np.sum(varied) < LEAST_VARIED:
         return None
-    frame = frames(found, varied)
-    others = frames(*fits(square - part.square, product - part.product))
-    off = np.degrees(rotation_vector(others @ frame.T))
+    frame = frames(coefficients, varied)
+    partial_frames = frames(*fits(square - part.square, product - part.product))
+    off = np.degrees(rotation_vector(partial_frames @ frame.T))
     n = len(off)
     variance = (n - 1) / n * np.sum(off * off, axis=0)
     variance[1] += YAW_PRIOR_DEG**2 / float(np.sum(varied))
@@ -209,15 +214,15 @@ def _moment_of_jump(log: Intervals, move: Move) -> float | None:
     tilt = move.tilt_deg
     if move.at_s is None:
         return None
-    used = log.weight > 0.0
-    time, terms, force = log.t_s[used], log.terms[used], log.force[used]
+    weighted = log.weight > 0.0
+    time, terms, force = log.t_s[weighted], log.terms[weighted], log.force[weighted]
     near = np.abs(time - move.at_s) < 60.0
     if np.count_nonzero(near) < 10:
         return None
-    found, varied = fits(terms[near].T @ terms[near], terms[near].T @ force[near])
+    coefficients, varied = fits(terms[near].T @ terms[near], terms[near].T @ force[near])
     # The vertical: the measured force minus the effects of driving
-    level = (force - terms[:, 1:] @ found[1:]) / terms[:, :1]
-    left, _, forward = frames(found, varied)
+    level = (force - terms[:, 1:] @ coefficients[1:]) / terms[:, :1]
+    left, _, forward = frames(coefficients, varied)
     # Unit vector of the direction in which the vertical moves
     tips = (left * move.turn_deg[2] - forward * move.turn_deg[0]) / tilt
     best, moment = 0.0, move.at_s

@@ -78,8 +78,8 @@ def work_on_period(period: Period, signals_to: str | None = None) -> PeriodResul
     except OSError as error:
         return failed(period, UNREADABLE, cause(error))
     except Exception as error:  # any exception, because a bug in Kickstand must not affect other vehicles
-        where = traceback.extract_tb(error.__traceback__)[-1]
-        message = f"{type(error).__name__}: {error} ({Path(where.filename).name}, line {where.lineno})"
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        message = f"{type(error).__name__}: {error} ({Path(frame.filename).name}, line {frame.lineno})"
         return failed(period, FAULT, message)
 
 
@@ -101,9 +101,9 @@ def _result(period: Period, signals_to: str | None) -> PeriodResult:
     logs, errors = _logs(period)
     if not logs:
         refused = [row for row in errors if row["reason"] != UNREADABLE]
-        because = (refused or errors)[0]
+        cause_row = (refused or errors)[0]
         status = "refused" if refused else "error"
-        row = _alignment(period, status, because["reason"], because["message"], [], len(errors))
+        row = _alignment(period, status, cause_row["reason"], cause_row["message"], [], len(errors))
         return PeriodResult(row, errors=errors)
     drive = _drive(period, logs)
     reason, message = _refusal(drive, logs)
@@ -117,12 +117,12 @@ def _result(period: Period, signals_to: str | None) -> PeriodResult:
     ]
     moved = [_vehicle_columns(period) | _moved_row(move, logs) for move in drive.moves]
     result = PeriodResult(row, moved, [], errors, _picture(drive))
-    if aligned and drive.found:
-        known = CalibrationFile(
-            gyro_bias_dps=drive.fit.bias_dps, vehicle_from_sensor=drive.found.frame, aligned=True, vehicle=period.kind
+    if aligned and drive.forward:
+        calibration = CalibrationFile(
+            gyro_bias_dps=drive.fit.bias_dps, vehicle_from_sensor=drive.forward.frame, aligned=True, vehicle=period.kind
         )
         for log in logs:
-            _add_drive(result, period, log, known, signals_to)
+            _add_drive(result, period, log, calibration, signals_to)
     return result
 
 
@@ -133,13 +133,13 @@ class _Drive:
     fit: Alignment by the firmware's method.
     intervals: Intervals of each log. Empty if the firmware refused the logs and no other method can help.
     moves: Moves of the mount.
-    found: Alignment from all logs, or None if they do not determine it.
+    forward: Alignment from all logs, or None if they do not determine it.
     """
 
     fit: DriveFit
     intervals: list[evidence.Intervals] = field(default_factory=list)
     moves: list[Move] = field(default_factory=list)
-    found: Forward | None = None
+    forward: Forward | None = None
 
 
 def _drive(period: Period, logs: list[Log]) -> _Drive:
@@ -154,7 +154,7 @@ def _drive(period: Period, logs: list[Log]) -> _Drive:
 def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
     """Return the reason why the vehicle is not aligned, as a code and a sentence. Both are empty if the vehicle is
     aligned."""
-    fit, found = drive.fit, drive.found
+    fit, forward = drive.fit, drive.forward
     if drive.moves:
         return MOVED, _moved_words(drive.moves, logs)
     reason = None
@@ -164,21 +164,23 @@ def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
         # The problem of a late speed, which makes braking look like a moved mount
         late = fit_problem(fit.lag_s or 0.0, 1.0)
         reason = of_firmware(late) if late else None
-    elif found and found.sure:
+    elif forward and forward.sure:
         return "", ""
-    elif found and not fit.reason:
-        reason = Uncertain(found.sigma_deg, fit.used)
+    elif forward and not fit.reason:
+        reason = Uncertain(forward.sigma_deg, fit.used)
     refusal = RefusedInput(reason) if reason else fit.refusal
     return (refusal.code, str(refusal)) if refusal else ("", "")
 
 
-def _add_drive(result: PeriodResult, period: Period, log: Log, known: CalibrationFile, signals_to: str | None) -> None:
+def _add_drive(
+    result: PeriodResult, period: Period, log: Log, calibration: CalibrationFile, signals_to: str | None
+) -> None:
     """Add the brake tests of a log to the result, and write its signals."""
     try:
-        tests = brake_tests(log, known)
+        tests = brake_tests(log, calibration)
         result.brake_tests += [_vehicle_columns(period) | {"log": log.name} | _stop_row(stop, log) for stop in tests]
         if signals_to is not None:
-            signals.write(signals_to, period, log, known)
+            signals.write(signals_to, period, log, calibration)
     except (InputError, OSError) as error:
         full = getattr(error.__cause__ or error, "errno", None) in (errno.ENOSPC, errno.EDQUOT)
         result.errors.append(_error(period, log.name, DISK_FULL if full else AFTERWARDS, cause(error)))
@@ -212,18 +214,18 @@ def _logs(period: Period) -> tuple[list[Log], list[Row]]:
 def _alignment(
     period: Period, status: str, reason: str, message: str, logs: list[Log], left_out: int, drive: _Drive | None = None
 ) -> Row:
-    fit, found = (drive.fit, drive.found) if drive else (None, None)
-    known = found if status == "aligned" else None
+    fit, forward = (drive.fit, drive.forward) if drive else (None, None)
+    solution = forward if status == "aligned" else None
     return _vehicle_columns(period) | {
         "kind": period.kind,
         "status": status,
         "reason": reason,
         "message": message,
-        "quality_deg": found.sigma_deg if found else None,
-        "attitude_deg": found.attitude_deg if found else None,
-        "halves_deg": found.halves_deg if found else None,
-        "vehicle_from_sensor": known.frame.ravel().tolist() if known else None,
-        "gyro_bias_dps": fit.bias_dps.tolist() if fit and known else None,
+        "quality_deg": forward.sigma_deg if forward else None,
+        "attitude_deg": forward.attitude_deg if forward else None,
+        "halves_deg": forward.halves_deg if forward else None,
+        "vehicle_from_sensor": solution.frame.ravel().tolist() if solution else None,
+        "gyro_bias_dps": fit.bias_dps.tolist() if fit and solution else None,
         "speed_lag_s": fit.lag_s if fit else None,
         "stops": fit.stops if fit else 0,
         "events_used": fit.used if fit else 0,
@@ -238,11 +240,11 @@ def _alignment(
 
 def _mirrored(driven: list[evidence.Intervals]) -> bool:
     """Detect mirrored axes. With mirrored axes, the yaw rate in bends predicts the force on the wrong side."""
-    whole = evidence.blocks(driven)
-    if not len(whole.log):
+    regression = evidence.blocks(driven)
+    if not len(regression.log):
         return False
-    found, varied = evidence.fits(np.sum(whole.square, axis=0), np.sum(whole.product, axis=0))
-    return evidence.handedness(found, varied) <= _AGAINST
+    coefficients, varied = evidence.fits(np.sum(regression.square, axis=0), np.sum(regression.product, axis=0))
+    return evidence.handedness(coefficients, varied) <= _AGAINST
 
 
 def _moved_words(moves: list[Move], logs: list[Log]) -> str:
@@ -289,11 +291,11 @@ def _picture(drive: _Drive) -> list[list[float]]:
     If the mount moved, the alignment is a mean over several mountings. If the mount moved, the scatter of the points
     shows the move.
     """
-    if not drive.found:
+    if not drive.forward:
         return []
-    used = [log.weight > 0.0 for log in drive.intervals]
-    terms = np.concatenate([log.terms[which] for log, which in zip(drive.intervals, used)])
-    force = np.concatenate([log.force[which] for log, which in zip(drive.intervals, used)]) @ drive.found.frame.T
+    weighted = [log.weight > 0.0 for log in drive.intervals]
+    terms = np.concatenate([log.terms[rows] for log, rows in zip(drive.intervals, weighted)])
+    force = np.concatenate([log.force[rows] for log, rows in zip(drive.intervals, weighted)]) @ drive.forward.frame.T
     table = np.column_stack((terms[:, 1], force[:, 2], terms[:, 2], force[:, 0]))
     step = max(1, math.ceil(len(table) / _PLOTTED))
     return table[::step].round(3).tolist()

@@ -92,20 +92,20 @@ def run_fleet(
         keys = _keys(periods, marks, with_signals)
         signals_to = files.join(directory, SIGNALS) if with_signals else None
         todo = [k for k, key in enumerate(keys) if key not in journal]
-        done = len(keys) - len(todo)
+        finished = len(keys) - len(todo)
         if progress:
-            progress(done, len(keys))
+            progress(finished, len(keys))
         last_s, pause_s = time.monotonic(), _WRITE_S
         try:
             items = [(periods[k], signals_to) for k in todo]
             for index, result, reason, message in run_tasks(work_on_period, items, scheduler, workers, timeout_s):
                 k = todo[index]
-                kept = result or failed(periods[k], reason, message)
-                changed = _note_changed(periods[k], marks, kept)
-                _keep(directory, journal, keys[k], kept, again=result is None or changed)
-                done += 1
+                outcome = result or failed(periods[k], reason, message)
+                changed = _note_changed(periods[k], marks, outcome)
+                _keep(directory, journal, keys[k], outcome, again=result is None or changed)
+                finished += 1
                 if progress:
-                    progress(done, len(keys))
+                    progress(finished, len(keys))
                 if time.monotonic() - last_s > pause_s:
                     journal.sync()
                     before_s = time.monotonic()
@@ -118,8 +118,8 @@ def run_fleet(
                 if next(journal.results(keys), None):
                     write_results(directory, journal.results(keys), len(keys))
             raise
-        seen = write_results(directory, journal.results(keys), len(keys))
-        return FleetRun(len(keys), len(todo), journal.damaged, seen)
+        summary = write_results(directory, journal.results(keys), len(keys))
+        return FleetRun(len(keys), len(todo), journal.damaged, summary)
 
 
 def write_results(directory: str, results: Iterable[PeriodResult], expected: int) -> Glance:
@@ -129,12 +129,12 @@ def write_results(directory: str, results: Iterable[PeriodResult], expected: int
     """
     glance = Glance()
 
-    def seen() -> Iterator[PeriodResult]:
+    def counted() -> Iterator[PeriodResult]:
         for result in results:
             glance.add(result)
             yield result
 
-    tables.write_tables(directory, seen())
+    tables.write_tables(directory, counted())
     files.write_bytes(files.join(directory, "index.html"), glance.page(expected).encode())
     return glance
 
@@ -153,21 +153,21 @@ def _note_changed(period: Period, marks: dict[str, str], result: PeriodResult) -
     return bool(changed)
 
 
-def _keep(directory: str, journal: Journal | StoreJournal, key: str, kept: PeriodResult, again: bool) -> None:
+def _keep(directory: str, journal: Journal | StoreJournal, key: str, result: PeriodResult, again: bool) -> None:
     """Save a result in the journal, and write its picture. again: True if the next run should recompute the result.
 
     Raises InputError if a file cannot be written, or if the disk was full when the signals were written.
     """
-    missing = [row for row in kept.errors if row["reason"] in (AFTERWARDS, DISK_FULL)]
+    missing = [row for row in result.errors if row["reason"] in (AFTERWARDS, DISK_FULL)]
     unshown = None
-    if kept.picture:
-        path = f"{PLOTS}/{plot.file_name(kept.alignment['vehicle'], kept.alignment['mount'])}"
+    if result.picture:
+        path = f"{PLOTS}/{plot.file_name(result.alignment['vehicle'], result.alignment['mount'])}"
         try:
-            plot.write_plot(files.join(directory, path), kept)
-            kept.alignment["plot"] = path
+            plot.write_plot(files.join(directory, path), result)
+            result.alignment["plot"] = path
         except InputError as error:
             unshown = error
-    journal.add(key, kept, again or bool(missing) or unshown is not None)
+    journal.add(key, result, again or bool(missing) or unshown is not None)
     if unshown:
         raise unshown
     full = next((row for row in missing if row["reason"] == DISK_FULL), None)

@@ -44,9 +44,9 @@ def write(directory: str, period: Period, log: Log, calibration: CalibrationFile
     force, rate = calibration.in_vehicle(log.readings)
     utc_s = log.t_s + (np.nan if log.start_utc_s is None else log.start_utc_s)
     values = dict(zip(COLUMNS, (log.t_s, utc_s, *force.T, *rate.T, log.speed_mps), strict=True))
-    whole = {"made_by": "kickstand fleet", "vehicle": period.vehicle, "mount": period.mount}
+    metadata = {"made_by": "kickstand fleet", "vehicle": period.vehicle, "mount": period.mount}
     schema = float_schema(
-        COLUMNS, _FINE, whole | {"log": printable(log.name), "axes": "left, up, forward of the vehicle"}
+        COLUMNS, _FINE, metadata | {"log": printable(log.name), "axes": "left, up, forward of the vehicle"}
     )
     readable = f"{period.mount} {log_stem(log.name)}".strip()
     name = file_stem(readable, period.vehicle, period.mount, log.name) + ".parquet"

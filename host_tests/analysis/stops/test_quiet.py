@@ -34,9 +34,9 @@ def maybe(**changed: float) -> Channels:
     ride.forward_g += changed.get("drifting", 0.0) * np.where(middle, t - BEGIN_S, 0.0)
     ride.rolling[middle] = np.arange(np.count_nonzero(middle)) % 10 < changed.get("rolling", 0.0)
     if "rested" in changed:  # "rested": the filter found a rest during the ride, with this upward force
-        rest = (t >= 5.0) & (t < 7.0)
-        ride.resting[rest] = 1.0
-        ride.up_g[rest] = changed["rested"]
+        resting = (t >= 5.0) & (t < 7.0)
+        ride.resting[resting] = 1.0
+        ride.up_g[resting] = changed["rested"]
         ride.forward_g[t < 5.0] = 0.1
     return ride
 
@@ -54,9 +54,9 @@ def test_standstill_is_found_within_half_a_second(ridden_s):
 @pytest.mark.parametrize(("seconds", "stands"), [(0.7, False), (2.0, True)])
 def test_standstill_needs_a_second_of_quiet(seconds, stands):
     quiet, ridden = maybe(), maybe(pitch_rate_dps=1.0, yaw_rate_dps=1.0, up_g=1.0)
-    there = (quiet.t_s >= BEGIN_S) & (quiet.t_s < BEGIN_S + seconds)
+    still = (quiet.t_s >= BEGIN_S) & (quiet.t_s < BEGIN_S + seconds)
     for name in SHAKEN:
-        setattr(ridden, name, np.where(there, getattr(quiet, name), getattr(ridden, name)))
+        setattr(ridden, name, np.where(still, getattr(quiet, name), getattr(ridden, name)))
     assert standing(ridden).any() == stands
 
 

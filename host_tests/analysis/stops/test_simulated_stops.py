@@ -49,9 +49,9 @@ def with_speed(ride, hz, late_s, noise_mps):
     course, time, speed = ride
     result = course.part(slice(None))
     result.speed_mps = np.full(len(result.t_s), np.nan)
-    places = np.arange(0, len(result.t_s), 50 // hz)
-    noise = noise_mps * np.random.default_rng(0).normal(size=len(places))
-    result.speed_mps[places] = np.abs(np.interp(result.t_s[places] - late_s, time, speed) + noise).round(2)
+    samples = np.arange(0, len(result.t_s), 50 // hz)
+    noise = noise_mps * np.random.default_rng(0).normal(size=len(samples))
+    result.speed_mps[samples] = np.abs(np.interp(result.t_s[samples] - late_s, time, speed) + noise).round(2)
     return result
 
 

@@ -55,6 +55,7 @@ class RawPrompt:
 
     def _do(self, code):
         if not code:
+            vars(self.board.modules["sys"]).pop("modules", None)  # what the firmware had imported
             self.heard(b"OK\r\nMPY: soft reboot\r\n" + _PROMPT)
         elif "machine.reset()" in code:
             self.board.resets += 1

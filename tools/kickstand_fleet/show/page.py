@@ -17,7 +17,7 @@ from markupsafe import Markup
 from ..period import MOVED, PeriodResult, Row
 from .panel import Panel, date_text
 
-_WORST, _MOST_MOVED, _MOST_ROWS, _MOST_DOTS, _SAID = 25, 200, 2000, 3000, 3
+_WORST, _MOST_MOVED, _MOST_ROWS, _MOST_DOTS, _NAMED_ERRORS = 25, 200, 2000, 3000, 3
 _WORDS = {
     "mount-moved": "the mount seems to have moved",
     "speed-unit": "the speed is not in m/s",
@@ -89,16 +89,16 @@ class Glance:
         self.moved_count += len(result.moved)
         self.moved_vehicles += bool(result.moved) or row["reason"] == MOVED
         self.errors += len(result.errors)
-        said = [(row["log"] or row["vehicle"], row["message"]) for row in result.errors]
-        self.first_errors = (self.first_errors + said)[:_SAID]
+        messages = [(row["log"] or row["vehicle"], row["message"]) for row in result.errors]
+        self.first_errors = (self.first_errors + messages)[:_NAMED_ERRORS]
         for test in result.brake_tests:
             self.decelerations[0].append(math.nan if test["utc_s"] is None else test["utc_s"])
             self.decelerations[1].append(test["mfdd_mps2"])
         if aligned:
             self._qualities.append(row["quality_deg"])
             self.worst = heapq.nlargest(_WORST, [*self.worst, row], key=lambda row: row["quality_deg"])
-        found = [*self.moved, *((move, row["plot"]) for move in result.moved)]
-        self.moved = heapq.nlargest(_MOST_MOVED, found, key=lambda move: move[0]["turned_deg"])
+        moves = [*self.moved, *((move, row["plot"]) for move in result.moved)]
+        self.moved = heapq.nlargest(_MOST_MOVED, moves, key=lambda move: move[0]["turned_deg"])
         if len(self._rows[aligned]) < _MOST_ROWS:
             self._rows[aligned].append((row, [test["mfdd_mps2"] for test in result.brake_tests]))
 
@@ -130,8 +130,8 @@ class Glance:
         )
 
 
-def _share(part: int, whole: int) -> str:
-    return f"{100.0 * part / whole:.0f} %" if whole else "--"
+def _share(part: int, total: int) -> str:
+    return f"{100.0 * part / total:.0f} %" if total else "--"
 
 
 def _quality(values: Sequence[float]) -> Markup:

@@ -44,7 +44,7 @@ class Panel:
 
     def dots(self, points: Sequence[Point], colour: str, radius: float = 2.0) -> None:
         """Draw a dot at each point."""
-        d = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in self._places(points))
+        d = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in self._positions(points))
         if d:
             style = {"stroke_opacity": 0.55, "stroke_width": 2.0 * radius, "stroke_linecap": "round"}
             self._parts.append(element("path", d=d, stroke=colour, **style))
@@ -52,13 +52,13 @@ class Panel:
     def line(self, points: Sequence[Point], colour: str, width: float = 1.5) -> None:
         """Draw a line from point to point."""
         if len(points) > 1:
-            d = path(self._places(points))
+            d = path(self._positions(points))
             self._parts.append(element("path", d=d, fill="none", stroke=colour, stroke_width=width))
 
     def bars(self, edges: Sequence[float], heights: Sequence[float], colour: str) -> None:
         """Draw a bar from edge to edge for each height."""
-        tops = self._places(list(zip(edges, heights)))
-        ends = self._places([(edge, 0.0) for edge in edges[1:]])
+        tops = self._positions(list(zip(edges, heights)))
+        ends = self._positions([(edge, 0.0) for edge in edges[1:]])
         for (left, top), (right, bottom) in zip(tops, ends):
             if bottom > top:
                 size = {"width": max(0.5, right - left - 1.0), "height": bottom - top}
@@ -75,18 +75,18 @@ class Panel:
             element("text", self.unit_along, x=at_left, y=middle_y, **turned, fill=_QUIET),
         ]
         for value in ticks(*self.across, 4):
-            ((x, _),) = self._places([(value, 0.0)])
+            ((x, _),) = self._positions([(value, 0.0)])
             axes.append(element("path", d=path([(x, self._top), (x, self._bottom)]), stroke=_RULE))
             words = self.words(value)
             middle = min(x, self.x + self.width - 0.5 * _LETTER * len(words))  # the text must not leave the picture
             axes.append(element("text", words, x=middle, y=self._bottom + 14.0, text_anchor="middle", fill=_QUIET))
         for value in ticks(*self.along, 5):
-            ((_, y),) = self._places([(0.0, value)])
+            ((_, y),) = self._positions([(0.0, value)])
             axes.append(element("path", d=path([(self._left, y), (self._right, y)]), stroke=_RULE))
             axes.append(element("text", f"{value:g}", x=self._left - 5.0, y=y + 4.0, text_anchor="end", fill=_QUIET))
         return element("g", *axes, *self._parts)
 
-    def _places(self, points: Sequence[Point]) -> list[Point]:
+    def _positions(self, points: Sequence[Point]) -> list[Point]:
         """The points in the picture's coordinates."""
         (x0, x1), (y0, y1) = self.across, self.along
         x_scale = (self._right - self._left) / ((x1 - x0) or 1.0)

@@ -26,7 +26,7 @@ def draw(result: PeriodResult) -> str:
     """The picture as SVG."""
     row = result.alignment
     name = row["vehicle"] + (f", mount {row['mount']}" if row["mount"] else "")
-    said = row["message"] or (
+    subtitle = row["message"] or (
         f"forward known to {row['quality_deg']:.1f}°, the whole alignment to {row['attitude_deg']:.1f}°, "
         f"{row['events_used']} events, {row['stops']} stops, speed {row['speed_lag_s']:.1f} s late"
     )
@@ -34,7 +34,7 @@ def draw(result: PeriodResult) -> str:
     parts = [
         element("rect", width=_WIDTH, height=_HEIGHT, fill="#fff"),
         element("text", name, x=20, y=26, font_size=16, font_weight=600),
-        element("text", said, x=20, y=45, fill="#555"),
+        element("text", subtitle, x=20, y=45, fill="#555"),
         _agreement("forward: measured against dv/dt", "dv/dt, g", [(p[0], p[1]) for p in points], 20),
     ]
     if row["kind"] == "motorcycle":  # a motorcycle leans into bends, so its force to the left is about zero

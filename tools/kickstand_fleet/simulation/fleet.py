@@ -106,21 +106,21 @@ def make_fleet(
     check_directory(directory)
     if troubles is None:
         troubles = _shares(np.random.default_rng([seed, 1]), vehicles)
-    made = []
+    fleet = []
     try:
         make_directory(directory / "drives")
         for k, trouble in enumerate(troubles):
             vehicle = _vehicle(np.random.default_rng([seed, 2, k]), directory / "drives", k, trouble, seconds, rate_hz)
-            made.append(vehicle)
+            fleet.append(vehicle)
             if progress:
                 progress(k + 1, len(troubles))
         kinds = {"motorcycle": "motorcycle", "car": "car", "bus": "car"}  # a manifest has no kind "bus"
-        rows = [(v.name, path.relative_to(directory), kinds[v.kind]) for v in made for path in v.paths]
+        rows = [(v.name, path.relative_to(directory), kinds[v.kind]) for v in fleet for path in v.paths]
         write_table(directory / "MANIFEST.csv", ("vehicle", "path", "kind"), rows)
-        write_table(directory / "TRUTH.csv", (*_COLUMNS, *MATRIX), (list(_truth(v)) for v in made))
+        write_table(directory / "TRUTH.csv", (*_COLUMNS, *MATRIX), (list(_truth(v)) for v in fleet))
     except OSError as error:
         raise InputError(f"{directory} cannot be written: {cause(error)}") from error
-    return made
+    return fleet
 
 
 def _shares(chance: np.random.Generator, vehicles: int) -> list[str]:
@@ -145,27 +145,27 @@ def _vehicle(
     elif trouble == "km/h":
         receiver.factor = 3.6
     suffix = ".csv" if k % 5 == 0 else ".csv.gz"
-    made = MadeVehicle(name, kind, trouble, [], [sensor.mount])
+    vehicle = MadeVehicle(name, kind, trouble, [], [sensor.mount])
     if trouble.startswith("moved"):
-        made.moved_deg = float(np.exp(chance.uniform(np.log(_LEAST_TURN_DEG), np.log(_LARGEST_TURN_DEG))))
-        made.mounts.append(_turn(chance, made.moved_deg) @ sensor.mount)
-        made.moved_log = int(chance.integers(1, drives)) if trouble == "moved-between" else 0
+        vehicle.moved_deg = float(np.exp(chance.uniform(np.log(_LEAST_TURN_DEG), np.log(_LARGEST_TURN_DEG))))
+        vehicle.mounts.append(_turn(chance, vehicle.moved_deg) @ sensor.mount)
+        vehicle.moved_log = int(chance.integers(1, drives)) if trouble == "moved-between" else 0
     first_utc_s = _START_UTC_S + _DAY_S * float(chance.integers(0, 60))
     for drive in range(drives):
         route = random_route(chance, HANDLING[kind], seconds * chance.uniform(0.85, 1.2), rate_hz, trouble != "circles")
         moved = None
         if trouble == "moved-between":
-            sensor.mount = made.mounts[drive >= (made.moved_log or 0)]
+            sensor.mount = vehicle.mounts[drive >= (vehicle.moved_log or 0)]
         elif trouble == "moved-within":
-            made.moved_s = round(float(route.time[-1] * chance.uniform(0.4, 0.6)), 1)
-            moved = made.moved_s, made.mounts[1]
+            vehicle.moved_s = round(float(route.time[-1] * chance.uniform(0.4, 0.6)), 1)
+            moved = vehicle.moved_s, vehicle.mounts[1]
         if trouble == "dies":
             receiver.until_s = float("inf") if drive == 0 else 60.0
         broken = trouble if drive == 0 and trouble in ("garbage", "empty", "cut", "missing") else ""
         start_s = first_utc_s + drive * _DAY_S * chance.uniform(0.1, 1.5)
-        made.paths.append(directory / f"{name}-{drive + 1}{suffix}")
-        _write(made.paths[-1], drive_log(chance, kind, route, sensor, receiver, start_s, moved), broken)
-    return made
+        vehicle.paths.append(directory / f"{name}-{drive + 1}{suffix}")
+        _write(vehicle.paths[-1], drive_log(chance, kind, route, sensor, receiver, start_s, moved), broken)
+    return vehicle
 
 
 def _turn(chance: np.random.Generator, degrees: float) -> Array:
@@ -210,9 +210,15 @@ def log_bytes(log: Log) -> bytes:
     return sink.getvalue().to_pybytes()
 
 
-def _truth(made: MadeVehicle) -> Iterator[object]:
-    yield from (made.name, made.kind, made.trouble, "refused" if made.reasons else "aligned", made.reasons)
-    yield round(made.moved_deg, 3)
-    yield "" if made.moved_log is None else made.moved_log
-    yield "" if np.isnan(made.moved_s) else made.moved_s
-    yield from (round(float(value), 6) for value in made.mounts[-1].ravel())
+def _truth(vehicle: MadeVehicle) -> Iterator[object]:
+    yield from (
+        vehicle.name,
+        vehicle.kind,
+        vehicle.trouble,
+        "refused" if vehicle.reasons else "aligned",
+        vehicle.reasons,
+    )
+    yield round(vehicle.moved_deg, 3)
+    yield "" if vehicle.moved_log is None else vehicle.moved_log
+    yield "" if np.isnan(vehicle.moved_s) else vehicle.moved_s
+    yield from (round(float(value), 6) for value in vehicle.mounts[-1].ravel())

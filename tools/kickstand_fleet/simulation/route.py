@@ -67,8 +67,8 @@ def random_route(
     time = np.arange(round(knots[-1, 0] * rate_hz)) / rate_hz
     width = max(2, round(_SMOOTH_S * rate_hz))
     speed = moving_mean(np.interp(time, knots[:, 0], knots[:, 1]), width)
-    place = np.searchsorted(knots[:, 0], time, side="right").clip(1, len(knots) - 1)
-    lateral = moving_mean(knots[place, 2], 2 * width)  # the last knot of a leg has the leg's lateral acceleration
+    leg = np.searchsorted(knots[:, 0], time, side="right").clip(1, len(knots) - 1)
+    lateral = moving_mean(knots[leg, 2], 2 * width)  # the last knot of a leg has the leg's lateral acceleration
     yaw_rate = np.where(speed > 0.3, lateral / np.maximum(speed, 1.5), 0.0)
     distance = np.cumsum(speed) / rate_hz
     return Route(
@@ -119,13 +119,13 @@ class _Legs:
         self.leg(seconds, None, lateral if self.chance.random() < 0.5 else -lateral)
 
     def in_traffic(self) -> None:
-        what = self.chance.random()
+        draw = self.chance.random()
         if self.speed < 1.0:
             self.cruise()
-        elif what < 0.5:
+        elif draw < 0.5:
             self.leg(self.chance.uniform(1.5, 6.0))
             self.stop()
-        elif what < 0.75:  # a junction
+        elif draw < 0.75:  # a junction
             self.to(self.chance.uniform(4.0, 7.0))
             self.leg(1.0)
             self.turn(self.chance.uniform(60.0, 100.0))
@@ -136,10 +136,10 @@ class _Legs:
             self.leg(self.chance.uniform(1.0, 5.0))
 
     def in_circles(self) -> None:
-        before = self.speed
-        after = self.chance.uniform(2.0, 6.0) if before > 4.0 else self.chance.uniform(5.0, 8.0)
+        entry_mps = self.speed
+        exit_mps = self.chance.uniform(2.0, 6.0) if entry_mps > 4.0 else self.chance.uniform(5.0, 8.0)
         side = 1.0 if self.chance.random() < 0.5 else -1.0
-        for speed in (after, after):
+        for speed in (exit_mps, exit_mps):
             self.leg(self.chance.uniform(2.5, 6.0), speed, side * min(_FASTEST_LATERAL_MPS2, 0.35 * max(speed, 3.0)))
 
 

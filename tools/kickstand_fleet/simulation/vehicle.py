@@ -76,21 +76,21 @@ def drive_log(
     force, rate = _readings(chance, kind, route)
     mount = np.broadcast_to(sensor.mount, (len(force), 3, 3))
     if moved is not None:
-        at_s, other = moved
-        mount = np.where((route.time >= at_s)[:, None, None], other, mount)
-        rate = rate + _mount_rates(route.time, at_s, other @ sensor.mount.T)
+        at_s, moved_mount = moved
+        mount = np.where((route.time >= at_s)[:, None, None], moved_mount, mount)
+        rate = rate + _mount_rates(route.time, at_s, moved_mount @ sensor.mount.T)
     force = np.einsum("nij,ni->nj", mount, force)
     rate = np.einsum("nij,ni->nj", mount, rate)
     force = np.round((force / STANDARD_GRAVITY - sensor.offset_g) / sensor.slope / _COUNT_G) * _COUNT_G
     rate = np.round((np.degrees(rate) + sensor.bias_dps) / _COUNT_DPS) * _COUNT_DPS
     speed, utc_s = (np.full(len(force), np.nan) for _ in range(2))
     step_s = route.time[1]
-    shown = np.arange(0, len(force), max(1, round(receiver.every_s / step_s)))
-    shown = shown[route.time[shown] <= receiver.until_s]
-    seen = np.interp(route.time[shown] - receiver.late_s, route.time, route.speed)
-    seen = np.where(seen > 0.2, np.maximum(0.0, seen + chance.normal(0.0, 0.05, len(seen))), 0.0)
-    speed[shown] = np.round(seen * receiver.factor, 2)
-    utc_s[shown] = np.round(start_utc_s + route.time[shown], 1)
+    fixes = np.arange(0, len(force), max(1, round(receiver.every_s / step_s)))
+    fixes = fixes[route.time[fixes] <= receiver.until_s]
+    measured = np.interp(route.time[fixes] - receiver.late_s, route.time, route.speed)
+    measured = np.where(measured > 0.2, np.maximum(0.0, measured + chance.normal(0.0, 0.05, len(measured))), 0.0)
+    speed[fixes] = np.round(measured * receiver.factor, 2)
+    utc_s[fixes] = np.round(start_utc_s + route.time[fixes], 1)
     return Log(route.time, force, rate, speed, utc_s=utc_s, name=name)
 
 

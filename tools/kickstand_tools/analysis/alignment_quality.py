@@ -59,7 +59,7 @@ class LeanCost:
     yaw_deg: float | None
 
 
-def lean_cost(found: Quality) -> LeanCost:
+def lean_cost(quality: Quality) -> LeanCost:
     """Return the errors of a motorcycle's shown lean that these errors of the axes cause.
 
     >>> cost = lean_cost(Quality(0.2, None, 5.1, 1.0, 60.0, np.zeros(1), np.zeros(1)))
@@ -67,7 +67,7 @@ def lean_cost(found: Quality) -> LeanCost:
     (0.0, None, 0.27)
     """
 
-    roll, pitch, yaw = found.roll_deg, found.pitch_deg, found.yaw_deg
+    roll, pitch, yaw = quality.roll_deg, quality.pitch_deg, quality.yaw_deg
     return LeanCost(
         None if roll is None else max(0.0, abs(roll) - float(np.degrees(MAX_TRIM))),
         None if pitch is None else PITCH_COSTS_DEG * abs(float(np.sin(np.radians(pitch)))),
@@ -98,9 +98,9 @@ def quality(ride: Channels, standing: Bools) -> Quality:
     moving = means(standing.astype(float)) == 0.0
     still = means(standing.astype(float)) == 1.0
     static = np.degrees(np.arctan2(left, up))
-    ahead = moving & (np.abs(yaw_rate) < STRAIGHT_DPS)
-    usual = float(np.median(static[ahead])) if np.any(ahead) else 0.0  # measured lean of an upright bike
-    straight = ahead & (np.abs(static - usual) < STRAIGHT_DEG)
+    not_turning = moving & (np.abs(yaw_rate) < STRAIGHT_DPS)
+    usual = float(np.median(static[not_turning])) if np.any(not_turning) else 0.0  # measured lean of an upright bike
+    straight = not_turning & (np.abs(static - usual) < STRAIGHT_DEG)
     straight_s = float(np.count_nonzero(straight)) * n * step_s
     roll = pitch = yaw = None
     if straight_s >= ENOUGH_S:

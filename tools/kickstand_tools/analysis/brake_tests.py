@@ -34,10 +34,10 @@ def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
 
 def car_channels(log: Source, calibration: CalibrationFile) -> list[Channels]:
     """Return the channels of a car's log, in the vehicle's axes and without a lean. The list has one item per block."""
-    found = []
-    for whole in read_blocks(log, lines=False):
-        block = whole.measured
-        if len(block.time_us):
-            lean: dict[str, Array] = {name: np.zeros(len(block.time_us)) for name in ("shown_g", "resting", "sure")}
-            found.append(channels(block, calibration, lean, car=True))
-    return found
+    parts = []
+    for block in read_blocks(log, lines=False):
+        measured = block.measured
+        if len(measured.time_us):
+            lean: dict[str, Array] = {name: np.zeros(len(measured.time_us)) for name in ("shown_g", "resting", "sure")}
+            parts.append(channels(measured, calibration, lean, car=True))
+    return parts

@@ -167,16 +167,16 @@ def downsampled(blocks: Iterable[Channels], step_s: float, rounded: bool = False
 
     rounded: a stretch contains the times that round to the same multiple of step_s.
     """
-    rest: Channels | None = None
+    remainder: Channels | None = None
     for block in blocks:
-        block = block if rest is None else joined([rest, block])
+        block = block if remainder is None else joined([remainder, block])
         step = _stretches(block.t_s, step_s, rounded)
         last = int(np.searchsorted(step, step[-1]))  # the last stretch may continue in the next block
-        rest = block.part(slice(last, None))
+        remainder = block.part(slice(last, None))
         if last:
             yield _means(block.part(slice(0, last)), step[:last])
-    if rest is not None:
-        yield _means(rest, np.zeros(len(rest.t_s)))
+    if remainder is not None:
+        yield _means(remainder, np.zeros(len(remainder.t_s)))
 
 
 def rounded_to(t_s: Array, step_s: float) -> Array:
@@ -196,12 +196,12 @@ def _means(block: Channels, step: Array) -> Channels:
     columns = []
     for field in fields(block):
         values = getattr(block, field.name)
-        there = ~np.isnan(values)
+        valid = ~np.isnan(values)
         if field.name in _LAST:
-            last = np.maximum.reduceat(np.where(there, np.arange(len(step)), -1), starts)
+            last = np.maximum.reduceat(np.where(valid, np.arange(len(step)), -1), starts)
             columns.append(np.where(last >= 0, values[last], np.nan))
             continue
-        count = np.add.reduceat(there, starts, dtype=float)
-        total = np.add.reduceat(np.where(there, values, 0.0), starts)
+        count = np.add.reduceat(valid, starts, dtype=float)
+        total = np.add.reduceat(np.where(valid, values, 0.0), starts)
         columns.append(np.divide(total, count, out=np.full(len(starts), np.nan), where=count > 0))
     return Channels(*columns)

@@ -89,24 +89,24 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     # The notice is about the whole log, even if the ride is a stretch of the log.
     total.frozen_s = min(frozen_s, total.missing_s) if isinstance(ride.log, Stretch) else frozen_s
     still = standing(course)
-    found = quality(course, still)
-    moved_s = min(total.riding_s, _riding_s(course, still, whole=not isinstance(ride.log, Stretch)))
-    notices = [replace(n, roll_deg=found.roll_deg) if isinstance(n, ForwardExchanged) else n for n in notices]
-    seen = Overview(ride, total, course, [], found, moved_s, notices)
-    if not seen.exchanged:
-        seen.stops = stops_of(course, still)
-    return seen
+    alignment = quality(course, still)
+    moved_s = min(total.riding_s, _riding_s(course, still, whole_ride=not isinstance(ride.log, Stretch)))
+    notices = [replace(n, roll_deg=alignment.roll_deg) if isinstance(n, ForwardExchanged) else n for n in notices]
+    result = Overview(ride, total, course, [], alignment, moved_s, notices)
+    if not result.exchanged:
+        result.stops = stops_of(course, still)
+    return result
 
 
-def _riding_s(ride: Channels, standing: Bools, whole: bool = True) -> float:
+def _riding_s(ride: Channels, standing: Bools, whole_ride: bool = True) -> float:
     """Return the time for which a vehicle was moving, in s.
 
     ride: evenly spaced samples (see downsampled()).
     standing: True where the vehicle stands still, shape (n).
-    whole: True for a whole ride. In a stretch of a ride, a vehicle may go straight ahead, or keep the same turn, from
-        start to end.
+    whole_ride: True for a whole ride. In a stretch of a ride, a vehicle may go straight ahead, or keep the same turn,
+        from start to end.
     """
-    if whole and not _has_moved(ride):
+    if whole_ride and not _has_moved(ride):
         return 0.0
     return float(np.count_nonzero(~standing)) * spacing_s(ride)
 

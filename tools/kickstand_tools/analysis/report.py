@@ -61,117 +61,117 @@ class Words:
     remark: str
 
 
-def as_data(seen: Overview) -> dict[str, Any]:
+def as_data(overview: Overview) -> dict[str, Any]:
     """Return the values of the report for JSON; None for a missing value."""
-    total, quality = seen.summary, seen.quality
+    total, quality = overview.summary, overview.quality
     data: dict[str, Any] = {
-        "ride": seen.ride.name,
-        "vehicle": "car" if seen.ride.car else "motorcycle",
+        "ride": overview.ride.name,
+        "vehicle": "car" if overview.ride.car else "motorcycle",
         "duration_s": round(total.duration_s, 3),
         "samples": total.samples,
-        "riding_s": round(seen.riding_s, 1),
+        "riding_s": round(overview.riding_s, 1),
         "lean_unsure_s": round(total.not_sure_s, 1),
         "missing_s": round(max(0.0, total.missing_s - total.frozen_s), 1),
         "frozen_s": round(total.frozen_s, 1),
     }
     peaks = {"max_brake_g": total.brake_g, "max_accel_g": total.accel_g, "max_speed_mps": total.speed_mps}
-    if not seen.ride.car:
-        data["lean"] = "smoothed" if seen.ride.smoothed else "live"
+    if not overview.ride.car:
+        data["lean"] = "smoothed" if overview.ride.smoothed else "live"
         peaks = {"max_left_deg": total.left_deg, "max_right_deg": total.right_deg} | peaks
         data |= {f"beyond_{limit:.0f}_deg_s": round(s, 2) for limit, s in total.beyond_s.items()}
     for name, peak in peaks.items():
-        there = peak.time_s is not None
-        data[name] = {"value": round(peak.value, 4), "time_s": round(peak.time_s or 0.0, 3)} if there else None
-    fits = judged(seen)
+        present = peak.time_s is not None
+        data[name] = {"value": round(peak.value, 4), "time_s": round(peak.time_s or 0.0, 3)} if present else None
+    fits = judged(overview)
     data["alignment"] = {
         name: round(value, 4) if fits and value is not None else None
         for name, value in vars(quality).items()
         if not name.endswith(("lateral_g", "forward_g"))
     }
-    if not seen.ride.car:
+    if not overview.ride.car:
         costs = vars(lean_cost(quality))
-        known = fits and not seen.exchanged
+        costs_known = fits and not overview.exchanged
         data["lean_cost"] = {
-            name: round(value, 2) if known and value is not None else None for name, value in costs.items()
+            name: round(value, 2) if costs_known and value is not None else None for name, value in costs.items()
         }
-    data["remarks"] = remarks_as_data(seen.notices)
-    data["remark"] = seen.exchanged.line() if seen.exchanged else ""
+    data["remarks"] = remarks_as_data(overview.notices)
+    data["remark"] = overview.exchanged.line() if overview.exchanged else ""
     data["stops"] = [
         {name: value if isinstance(value, str) else round(value, 3) for name, value in vars(stop).items()}
         | {"duration_s": round(stop.duration_s, 3)}
-        for stop in seen.stops
+        for stop in overview.stops
     ]
     return data
 
 
-def page(seen: Overview) -> "Group":
+def page(overview: Overview) -> "Group":
     """Format the report for a terminal."""
     from rich.console import Group
     from rich.table import Table
     from rich.text import Text
 
-    said = words(seen)
+    texts = words(overview)
     ride = Table.grid(padding=(0, 3))
-    for row in said.ride:
+    for row in texts.ride:
         ride.add_row(*row)
-    parts: list[Any] = [Text(said.name, style="bold")]
-    parts += [Text(said.too_little, style="bold")] if said.too_little else []
-    parts += [ride, Text(), Text(said.alignment), Text()]
-    if said.stops:
+    parts: list[Any] = [Text(texts.name, style="bold")]
+    parts += [Text(texts.too_little, style="bold")] if texts.too_little else []
+    parts += [ride, Text(), Text(texts.alignment), Text()]
+    if texts.stops:
         stops = Table(title=STOPS_TITLE, title_justify="left", box=None, pad_edge=False, header_style="dim")
         for name, unit in STOPS_UNITS.items():
             stops.add_column(f"{name}\n{unit}", justify="right", no_wrap=True)
-        for row in said.stops:
+        for row in texts.stops:
             stops.add_row(*row)
         parts += [stops, Text(STOPS_TERMS, style="dim")]
-    if said.remark:
-        parts += [Text(said.remark, style="dim" if said.stops else "")]
+    if texts.remark:
+        parts += [Text(texts.remark, style="dim" if texts.stops else "")]
     return Group(*parts)
 
 
-def words(seen: Overview, on_page: bool = False) -> Words:
+def words(overview: Overview, on_page: bool = False) -> Words:
     """Describe the ride in words. on_page: remedies name the buttons of the page, not commands."""
-    name, alignment = Path(seen.ride.name).name, _alignment(seen, on_page)
-    return Words(name, _too_little(seen), _ride(seen), alignment, _stops(seen.stops), _remark(seen))
+    name, alignment = Path(overview.ride.name).name, _alignment(overview, on_page)
+    return Words(name, _too_little(overview), _ride(overview), alignment, _stops(overview.stops), _remark(overview))
 
 
-def _too_little(seen: Overview) -> str:
-    if seen.riding_s >= RIDDEN_S:
+def _too_little(overview: Overview) -> str:
+    if overview.riding_s >= RIDDEN_S:
         return ""
-    riding = f"{seen.riding_s:.0f} s of it riding" if seen.riding_s >= 1.0 else "all of it standing"
-    return f"{clock(seen.summary.duration_s)} of log, {riding}: too little for a report."
+    riding = f"{overview.riding_s:.0f} s of it riding" if overview.riding_s >= 1.0 else "all of it standing"
+    return f"{clock(overview.summary.duration_s)} of log, {riding}: too little for a report."
 
 
-def _remark(seen: Overview) -> str:
-    if any(stop.speed_from == "integrated" for stop in seen.stops):
+def _remark(overview: Overview) -> str:
+    if any(stop.speed_from == "integrated" for stop in overview.stops):
         return "* no speed in the log: integrated from the acceleration"
-    return "" if seen.stops else _no_stops(seen)
+    return "" if overview.stops else _no_stops(overview)
 
 
-def _no_stops(seen: Overview) -> str:
-    if seen.exchanged:
+def _no_stops(overview: Overview) -> str:
+    if overview.exchanged:
         return "Stops: not known, see the warning."
-    if not seen.has_speed and seen.riding_s > RIDDEN_S:
+    if not overview.has_speed and overview.riding_s > RIDDEN_S:
         return "Stops: not known, the log has no speed."  # without a speed, no stop is certain
-    if stops_by_speed(seen.course):
+    if stops_by_speed(overview.course):
         return "The speed falls to a stop, the force says otherwise: is the calibration this ride's?"
     return "No stop from over 10 km/h found."
 
 
-def _ride(seen: Overview) -> list[tuple[str, str, str]]:
-    total = seen.summary
-    rows = [("Duration", clock(total.duration_s), f"riding {clock(seen.riding_s)}")]
-    if not seen.ride.car:
+def _ride(overview: Overview) -> list[tuple[str, str, str]]:
+    total = overview.summary
+    rows = [("Duration", clock(total.duration_s), f"riding {clock(overview.riding_s)}")]
+    if not overview.ride.car:
         smoothed = ("Lean", "best estimate", "from the whole ride")
-        rows.append(smoothed if seen.ride.smoothed else ("Lean", "as the display showed it", ""))
+        rows.append(smoothed if overview.ride.smoothed else ("Lean", "as the display showed it", ""))
         rows.append(("Max left", *peak_words(total.left_deg, "{:.0f}°")))
         rows.append(("Max right", *peak_words(total.right_deg, "{:.0f}°")))
-        known = (total.left_deg.time_s, total.right_deg.time_s) != (None, None)
+        has_lean = (total.left_deg.time_s, total.right_deg.time_s) != (None, None)
         for limit, seconds in total.beyond_s.items():
-            rows.append((f"Over {limit:.0f}°", f"{seconds:.1f} s" if known else "--", ""))
+            rows.append((f"Over {limit:.0f}°", f"{seconds:.1f} s" if has_lean else "--", ""))
     rows.append(("Max braking", *peak_words(total.brake_g, "{:.2f} g")))
     rows.append(("Max acceleration", *peak_words(total.accel_g, "{:.2f} g")))
-    if seen.has_speed:
+    if overview.has_speed:
         peak = Peak(total.speed_mps.value * 3.6, total.speed_mps.time_s)
         rows.append(("Max speed", *peak_words(peak, "{:.0f} km/h")))
     if total.not_sure_s >= 1.0:
@@ -183,34 +183,37 @@ def _ride(seen: Overview) -> list[tuple[str, str, str]]:
     return rows
 
 
-def _alignment(seen: Overview, on_page: bool) -> str:
-    quality = seen.quality
-    if not judged(seen):
+def _alignment(overview: Overview, on_page: bool) -> str:
+    quality = overview.quality
+    if not judged(overview):
         return "Alignment: not judged, see the warning."
-    said = "Alignment: not enough straight riding to know how far it is off."
-    known = angles(quality)
-    if known:
-        far = abs(quality.roll_deg or 0.0) > SWAPPED_DEG and not seen.ride.car
+    text = "Alignment: not enough straight riding to know how far it is off."
+    angle_words = angles(quality)
+    if angle_words:
+        far = abs(quality.roll_deg or 0.0) > SWAPPED_DEG and not overview.ride.car
         # Swapped poses also exchange forward and backward.
-        swapped = far and (seen.exchanged or not seen.has_speed)
-        costs = "" if seen.ride.car or seen.exchanged else _cost_sentences(lean_cost(quality), seen.has_speed, on_page)
-        said = f"Alignment: it seems off by {', '.join(known)}"
-        if _is_well_aligned(seen):
-            said = f"Alignment: good. It seems off by {', '.join(known)}, which costs less than {COSTS_DEG}° of lean."
+        swapped = far and (overview.exchanged or not overview.has_speed)
+        costs = ""
+        if not (overview.ride.car or overview.exchanged):
+            costs = _cost_sentences(lean_cost(quality), overview.has_speed, on_page)
+        errors = ", ".join(angle_words)
+        text = f"Alignment: it seems off by {errors}"
+        if _is_well_aligned(overview):
+            text = f"Alignment: good. It seems off by {errors}, which costs less than {COSTS_DEG}° of lean."
         else:
-            said += ": were the poses swapped?" if swapped else ": was it held upright?" if far else "."
-        said += costs
-    return said + _gravity(quality.gravity_g, on_page)
+            text += ": were the poses swapped?" if swapped else ": was it held upright?" if far else "."
+        text += costs
+    return text + _gravity(quality.gravity_g, on_page)
 
 
-def _is_well_aligned(seen: Overview) -> bool:
+def _is_well_aligned(overview: Overview) -> bool:
     """True if the ride shows that the alignment errors of a motorcycle together cause a lean error under COSTS_DEG."""
-    cost = lean_cost(seen.quality)
-    if seen.ride.car or seen.exchanged or cost.roll_deg is None or cost.yaw_deg is None:
+    cost = lean_cost(overview.quality)
+    if overview.ride.car or overview.exchanged or cost.roll_deg is None or cost.yaw_deg is None:
         return False
     together = cost.roll_deg + cost.yaw_deg + (cost.pitch_deg or 0.0)
-    upright = abs(seen.quality.roll_deg or 0.0) <= SWAPPED_DEG
-    return together < COSTS_DEG and upright and not any(isinstance(notice, PoseOff) for notice in seen.notices)
+    upright = abs(overview.quality.roll_deg or 0.0) <= SWAPPED_DEG
+    return together < COSTS_DEG and upright and not any(isinstance(notice, PoseOff) for notice in overview.notices)
 
 
 def _gravity(found_g: float | None, on_page: bool) -> str:
@@ -221,11 +224,11 @@ def _gravity(found_g: float | None, on_page: bool) -> str:
     return f" At rest the force is {found_g:.3f} g and not 1: {_SIX_POSITIONS.words(on_page)}."
 
 
-def judged(seen: Overview) -> bool:
+def judged(overview: Overview) -> bool:
     """Return True if the ride shows how well the sensor is aligned, False if it contradicts the whole calibration."""
     return not any(
         isinstance(notice, WrongAxes) or (isinstance(notice, WrongMount) and not notice.judged)
-        for notice in seen.notices
+        for notice in overview.notices
     )
 
 

@@ -82,33 +82,33 @@ class Ride:
         progress, notices: see read_blocks(). They are about the whole log, even if the ride is a stretch of the log.
         Raises InputError.
         """
-        along, absurd, slow, some = MeterAlong(self.calibration), False, False, False
+        along, absurd, slow, any_block = MeterAlong(self.calibration), False, False, False
         log, stretch = split_stretch(self.log)
         misfit = Misfit()
-        for whole, found in self._read(log, progress, notices):
-            block = whole.measured
+        for raw_block, smoothed_values in self._read(log, progress, notices):
+            block = raw_block.measured
             if not len(block.time_us):
                 continue
-            lean, variance, odd = _lean_along(along, block, shown=found is None)
+            lean, variance, odd = _lean_along(along, block, displayed=smoothed_values is None)
             misfit.add(block.t_s, odd)
             if notices is not None and not absurd and np.any(variance < 0.0):
                 absurd = True
                 notices.append(_divergence_notice(block, int(np.argmax(variance < 0.0))))
-            slow |= self.smoothed and found is None
-            if found is not None:
-                lean_deg, sigma_deg, _, _, doubtful = found[~whole.frozen].T
+            slow |= self.smoothed and smoothed_values is None
+            if smoothed_values is not None:
+                lean_deg, sigma_deg, _, _, doubtful = smoothed_values[~raw_block.frozen].T
                 sure = sigma_deg <= _MAX_SIGMA_DEG  # False for NaN
                 lean |= {"lean_deg": lean_deg, "lean_sigma_deg": sigma_deg, "doubtful": doubtful}
                 lean["sure"] = sure.astype(float)
-            seen = channels(block, self.calibration, lean, self.car)
+            part = channels(block, self.calibration, lean, self.car)
             if stretch is not None:
-                which = stretch.holds(block)
-                if not which.any():
+                in_stretch = stretch.holds(block)
+                if not in_stretch.any():
                     continue
-                seen = seen.part(which)
-            some = True
-            yield seen
-        if not some:
+                part = part.part(in_stretch)
+            any_block = True
+            yield part
+        if not any_block:
             raise InputError(f"{self.name}: all readings are frozen, so that nothing is known: check the sensor")
         if notices is not None and not self.car:
             notices += misfit.remarks(notices)
@@ -134,16 +134,16 @@ def calibration_beside(log: Path) -> Path:
     Raises InputError if the calibration or the log does not exist, or if the file is not a log.
     """
     if not log.is_file():
-        what = "is a directory: give the name of a ride in it" if log.is_dir() else "there is no such file"
-        raise InputError(f"{log}: {what}")
-    beside = calibration_path(log)
-    if not beside.exists():
+        problem = "is a directory: give the name of a ride in it" if log.is_dir() else "there is no such file"
+        raise InputError(f"{log}: {problem}")
+    path = calibration_path(log)
+    if not path.exists():
         check_first_line(log)
         raise InputError(
-            f"{log}: no calibration {beside.name} beside it: give one with --calibration, or make it from a "
-            f"motorcycle's ride: kickstand calibrate ride {log} --out {beside}"
+            f"{log}: no calibration {path.name} beside it: give one with --calibration, or make it from a "
+            f"motorcycle's ride: kickstand calibrate ride {log} --out {path}"
         )
-    return beside
+    return path
 
 
 def open_ride(log: Source, calibration: CalibrationFile | File | None = None, smoothed: bool = False) -> Ride:
@@ -193,17 +193,17 @@ def vehicle_channels(
     return joined(open_ride(log, calibration).blocks(progress))
 
 
-def _divergence_notice(block: Block, at: int) -> Message:
+def _divergence_notice(block: Block, row: int) -> Message:
     """Return the notice that the lean filter diverged at row `at`, with the largest readings of the previous second."""
-    before = slice(int(np.searchsorted(block.time_us, block.time_us[at] - 1_000_000)), at + 1)
-    most = np.max(np.abs(block.readings[before]), axis=0)
-    return AbsurdReadings(block.time_us[at] / 1e6, float(np.max(most[4:])), float(np.max(most[:3])))
+    last_second = slice(int(np.searchsorted(block.time_us, block.time_us[row] - 1_000_000)), row + 1)
+    largest = np.max(np.abs(block.readings[last_second]), axis=0)
+    return AbsurdReadings(block.time_us[row] / 1e6, float(np.max(largest[4:])), float(np.max(largest[:3])))
 
 
-def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str, Array], Array, Bools]:
+def _lean_along(along: MeterAlong, block: Block, displayed: bool) -> tuple[dict[str, Array], Array, Bools]:
     """Run the firmware's meter over a block of n samples.
 
-    shown: True to compute the displayed lean. False leaves lean_deg and sure at 0, which saves a tenth of the time.
+    displayed: True to compute the displayed lean. False leaves lean_deg and sure at 0, which saves a tenth of the time.
     Returns:
         lean: the argument `lean` of channels().
         variance: variance of the lean, shape (n), in rad2; negative if the filter diverged.
@@ -219,12 +219,12 @@ def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str,
         resting(lean.at_rest)
         rolling(lean.rolling)
         odd(meter.odd is not None)
-        if shown:
+        if displayed:
             lean_deg(meter.lean_deg)
             sure(meter.trusted)
     n = len(block.time_us)
-    found = {name: np.array(column or np.zeros(n), dtype=float) for name, column in zip(names, columns)}
-    variances = found.pop("variance")
-    found["doubtful"] = np.zeros(n)  # only smooth() finds doubtful samples
-    found["lean_sigma_deg"] = np.degrees(np.sqrt(np.where(variances >= 0.0, variances, np.nan)))
-    return found, variances, found.pop("odd") > 0.0
+    columns_by_name = {name: np.array(column or np.zeros(n), dtype=float) for name, column in zip(names, columns)}
+    variances = columns_by_name.pop("variance")
+    columns_by_name["doubtful"] = np.zeros(n)  # only smooth() finds doubtful samples
+    columns_by_name["lean_sigma_deg"] = np.degrees(np.sqrt(np.where(variances >= 0.0, variances, np.nan)))
+    return columns_by_name, variances, columns_by_name.pop("odd") > 0.0

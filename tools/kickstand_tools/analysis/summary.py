@@ -29,8 +29,8 @@ class Peak:
     def add(self, t_s: Array, values: Array) -> None:
         """Add values and their times, both of shape (n). A value that does not count is NaN."""
         if len(values) and np.nanmax(values, initial=-np.inf) > self.value:
-            at = int(np.nanargmax(values))
-            self.value, self.time_s = float(values[at]), float(t_s[at])
+            index = int(np.nanargmax(values))
+            self.value, self.time_s = float(values[index]), float(t_s[index])
 
 
 @dataclass
@@ -108,8 +108,8 @@ class Summary:
                 windows = np.lib.stride_tricks.sliding_window_view(values, n + 1)  # each window has n steps
                 least = np.min(windows, axis=1)
                 best = int(np.argmax(np.where(np.isnan(least), -np.inf, least)))
-                at = best + int(np.argmin(windows[best]))
-                peak.add(t_s[at : at + 1], least[best : best + 1])
+                index = best + int(np.argmin(windows[best]))
+                peak.add(t_s[index : index + 1], least[best : best + 1])
 
 
 def summary(channels: Channels) -> Summary:

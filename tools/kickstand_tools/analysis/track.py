@@ -35,22 +35,22 @@ class LogTrack:
         none = np.full(len(t_s), np.nan)
         if not len(self.t_s):
             return none, none
-        after = np.clip(np.searchsorted(self.t_s, t_s), 1, max(1, len(self.t_s) - 1))
-        before_s, after_s = self.t_s[after - 1], self.t_s[np.minimum(after, len(self.t_s) - 1)]
-        known = (t_s >= self.t_s[0]) & (t_s <= self.t_s[-1])
-        known &= (after_s - before_s <= GAP_S) | (t_s == before_s) | (t_s == after_s)
+        next_index = np.clip(np.searchsorted(self.t_s, t_s), 1, max(1, len(self.t_s) - 1))
+        before_s, after_s = self.t_s[next_index - 1], self.t_s[np.minimum(next_index, len(self.t_s) - 1)]
+        valid = (t_s >= self.t_s[0]) & (t_s <= self.t_s[-1])
+        valid &= (after_s - before_s <= GAP_S) | (t_s == before_s) | (t_s == after_s)
         lat = np.interp(t_s, self.t_s, self.lat_deg)
         lon = np.interp(t_s, self.t_s, np.unwrap(self.lon_deg, period=360.0))  # also across 180 degrees
-        return np.where(known, lat, np.nan), np.where(known, (lon + 180.0) % 360.0 - 180.0, np.nan)
+        return np.where(valid, lat, np.nan), np.where(valid, (lon + 180.0) % 360.0 - 180.0, np.nan)
 
 
 def track(part: Channels | Block) -> LogTrack:
     """Return the positions in a block of a ride or of a log, or in a whole ride."""
-    there = np.isfinite(part.lat_deg) & np.isfinite(part.lon_deg)
-    return LogTrack(part.t_s[there], part.lat_deg[there], part.lon_deg[there])
+    valid = np.isfinite(part.lat_deg) & np.isfinite(part.lon_deg)
+    return LogTrack(part.t_s[valid], part.lat_deg[valid], part.lon_deg[valid])
 
 
 def joined(tracks: list[LogTrack]) -> LogTrack:
     """Join the tracks of successive blocks."""
-    columns = ([getattr(one, field.name) for one in tracks] for field in fields(LogTrack))
+    columns = ([getattr(part, field.name) for part in tracks] for field in fields(LogTrack))
     return LogTrack(*(np.concatenate(column) for column in columns))

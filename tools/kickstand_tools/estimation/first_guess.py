@@ -28,10 +28,11 @@ MIN_LEAN = np.radians(3.0)  # a ride whose lean has a smaller rms does not show 
 MIN_LIKENESS = 0.5  # least correlation between leaning and turning; bikes have over 0.75
 # Largest force to the side in bends, divided by the lean. Bikes have 0.1 to 0.2, due to the width of the tyres.
 MAX_PUSHED = 0.5
-# A car has a larger rms of the force to the side, also divided by the lean, and a smaller rms of lean. Its rates are
+# A car has a larger rms of the force to the side, also divided by the lean, and a smaller rms of lean. The rates are
 # about the force: in recorded drives the angle was at most 16 degrees. A leaning bike's rates are not, even in a bend
-# that is so long that the lean hardly changes.
+# that is so long that the lean hardly changes. In less than CAR_S, the force to the side must also fit the yaw rate.
 CAR_G, CAR_PUSHED, CAR_LEAN, CAR_TILT = 0.045, 2.0, np.radians(5.0), np.radians(20.0)
+CAR_S, CAR_LIKENESS = 60.0, 0.35
 CONTRADICTS_S = 120.0  # less riding that no mounting explains is only not enough
 # A log's speed is stuck if it changes by less than STUCK_MPS, although the force along the vehicle changes the speed by
 # an rms of PUSHED_MPS.
@@ -217,13 +218,15 @@ def _refuse_no_motorcycle(found: Leaning, sideways: Array, tilt: float, riding: 
     rolled, turned, sideways = found.rolled[riding], found.turned[riding], sideways[riding]
     lean, side = float(np.sqrt(np.mean(rolled**2))), float(np.sqrt(np.mean(sideways**2)))
     pushed = abs(float(sideways @ turned)) / max(abs(float(rolled @ turned)), 1e-30)
-    if pushed > CAR_PUSHED and side > CAR_G and lean < CAR_LEAN and tilt < CAR_TILT:
+    likeness = abs(float(sideways @ turned)) / max(float(np.linalg.norm(sideways) * np.linalg.norm(turned)), 1e-30)
+    car = pushed > CAR_PUSHED and side > CAR_G and lean < CAR_LEAN and tilt < CAR_TILT
+    riding_s = np.count_nonzero(riding) * WINDOW_S
+    if car and (likeness > CAR_LIKENESS or riding_s > CAR_S):
         raise RefusedInput(NotLeaning())
     if lean < MIN_LEAN:
         raise RefusedInput(NoBends(float(np.degrees(lean))))
     if pushed > MAX_PUSHED or found.likeness < MIN_LIKENESS:
-        enough = np.count_nonzero(riding) * WINDOW_S > CONTRADICTS_S
-        raise RefusedInput(RideContradicts() if enough else SideUnsure())
+        raise RefusedInput(RideContradicts() if riding_s > CONTRADICTS_S else SideUnsure())
     # A leaning bike that turns also rotates about its own left. The opposite sign of this rotation contradicts the side
     # of the lean. The handedness itself is judged when the log is read.
     if found.share < 0.0:

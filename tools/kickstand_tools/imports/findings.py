@@ -22,7 +22,6 @@ from ..common.errors import InputError
 from ..signals import Array, moving_mean, moving_spread
 from .rate_fit import RateFit, fit_rates
 from .recording import Sheet, plain, unit_in
-from .speeds import unit_by_positions
 from .units import (
     ACCELERATIONS,
     COUNTS_PER_DPS,
@@ -32,6 +31,7 @@ from .units import (
     NO_TIME,
     RATES,
     SPEEDS,
+    TIME_NAME,
     TIMES,
     counts_per,
     since_first_s,
@@ -51,15 +51,15 @@ _KINDS = {  # kinds of sensors, by the words in their columns' names
     "accel": r"acc|force|^ac$|^gf$|^f$|^a$",
     "either": r"^g$",
 }
-_TIME = re.compile(r"time|milli|micro|^(t|ts|ms|us|ns|s|sec|secs|seconds|elapsed\w*)$|epoch|utc|clock|stamp|^monitors$")
 # Words for an axis, longest first: of vehicles, and of web pages, whose alpha turns about z
 _AXES = {"longitudinal": "x", "inline": "x", "long": "x", "roll": "x", "beta": "x", "lateral": "y", "lat": "y"}
 _AXES |= {"pitch": "y", "gamma": "y", "vertical": "z", "vert": "z", "yaw": "z", "alpha": "z"}
 # Scales above the rows: seconds per count, g per count, rad/s per count, counts per g
 _SCALE = re.compile(
-    r'^\W*(tscale|ascale|gscale|gyro_?scale|acc_?1g)"?[,;:=\s]+"?([\d.eE+-]+)', re.IGNORECASE | re.MULTILINE
+    r'^\W*(tscale|ascale|gscale|gyro_?scale|acc_?1g)"?[,;:=\s]+"?(\d*\.?\d+(?:[eE][+-]?\d+)?)',
+    re.IGNORECASE | re.MULTILINE,
 )
-_SAMPLE_RATE = re.compile(r"(?:rate|frequency|sampl\w*)[^\d\n]*([\d.]+)\W*hz", re.IGNORECASE)
+_SAMPLE_RATE = re.compile(r"(?:rate|frequency|sampl\w*)[^\d\n]*(\d+(?:\.\d+)?)\W*hz", re.IGNORECASE)
 _COUNTER = re.compile(r"^(no|nr|n|i|index|count|counter|record|sample|frame|id|row)$")
 CALM_S = 0.5  # length of the moving window in which the motion is measured to find calm samples
 CALMEST = 0.2  # share of the samples that count as calm
@@ -147,9 +147,6 @@ def find(sheet: Sheet) -> Findings:
     lat, lon = (_find_by_name(sheet, words, used) for words in ("^lat|latitude", "^lon|^lng|longitude"))
     if lat is not None and lon is not None:
         findings.found |= {"lat": lat, "lon": lon}
-    if speed is not None and time is not None and not speed.unit and lat is not None and lon is not None:
-        at, *places = (sheet.columns.index(one.columns[0]) for one in (time, speed, lat, lon))
-        speed.unit = unit_by_positions(sheet, sheet.times(at, time.unit), places[0], places[1], places[2])
     if speed is not None:
         findings.found["speed"] = speed
     return findings
@@ -163,7 +160,7 @@ def _time(sheet: Sheet) -> ColumnFinding | None:
     then the column with the finest steps."""
     usable = []
     for place, name in enumerate(sheet.columns):
-        named = bool(_TIME.search(plain(name.rpartition(":")[2])))
+        named = bool(TIME_NAME.search(plain(name.rpartition(":")[2])))
         stated = stated_unit(name) if stated_unit(name) in TIMES else ""
         values = sheet.cells[place]
         if not (named or stated) and values.dtype.kind == "O" and not MOMENT.fullmatch(str(values[0])):
@@ -186,20 +183,19 @@ def _time(sheet: Sheet) -> ColumnFinding | None:
     name, numbers = sheet.columns[place], sheet.numbers(place)
     if time_unit(sheet.cells[place]) == DATES:
         return ColumnFinding([name], "", "dates or times of day")
-    stated, rate = stated_unit(name), _SAMPLE_RATE.search(sheet.head)
-    step, scale = _mean_step(numbers), _scales(sheet).get("t", "")
+    step, stated, rate = _mean_step(numbers), stated_unit(name), _SAMPLE_RATE.search(sheet.head)
     fitting = [key for key, size in TIMES.items() if rate and 0.9 < step * size * float(rate[1]) / 1e9 < 1.1]
-    unit_name = scale or (stated if stated in TIMES else "") or next(iter(fitting), "") or time_unit(sheet.cells[place])
-    why = f"{name} says {unit_name}" if unit_name == stated else "the lines above the rows say so"
+    above = _scales(sheet).get("t", "") or next(iter(fitting), "")
+    unit_name = above or (stated if stated in TIMES else "") or time_unit(sheet.cells[place])
     step_s = step * TIMES[unit_name] / 1e9
-    if not (scale or fitting or unit_name == stated):
-        why = f"in {unit_name} there are {1.0 / max(step_s, 1e-9):.3g} samples per second"
+    why = f"in {unit_name} there are {1.0 / max(step_s, 1e-9):.3g} samples per second"
     doubted = step_s * DOUBTED_HZ < 1.0 or (len(numbers) >= DOUBTED_ROWS and step_s * len(numbers) < DOUBTED_S)
-    if doubted:
-        likely = (key for key in ("min", "h", "d") if 1.0 / DOUBTED_HZ < step * TIMES[key] / 1e9 < _SLOWEST_S)
-        why = f"{name} has {1.0 / max(step_s, 1e-9):.0f} samples per second in {unit_name}, which is doubtful"
-        unit_name = next(likely, unit_name)
-    return ColumnFinding([name], unit_name, why, not doubted)
+    if doubted or step_s > _SLOWEST_S:
+        usual = (key for key in ("s", "ms", "us", "min", "h", "d") if 1e9 / DOUBTED_HZ < step * TIMES[key] < 1e9)
+        return ColumnFinding([name], next(usual, unit_name), f"{why}, which is doubtful", False)
+    if above or unit_name == stated:
+        why = "the lines above the rows say so" if above else f"{name} says {unit_name}"
+    return ColumnFinding([name], unit_name, why + (": at least 20 are needed" if step_s * 19.5 > 1.0 else ""))
 
 
 def _scales(sheet: Sheet) -> dict[str, str]:
@@ -268,7 +264,11 @@ def completed(sheet: Sheet) -> Sheet:
         if not np.any(np.all(np.isfinite(three.values), axis=1)):
             _merge_rows(sheet, three)
     if "linear" in threes and "gravity" in threes and "accel" not in threes:
-        total = threes["linear"].values + threes["gravity"].values
+        linear, gravity = threes["linear"].values, threes["gravity"].values
+        total, valid = linear + gravity, np.all(np.isfinite(gravity), axis=1)
+        if np.all(np.isnan(total)) and np.any(valid):  # in rows of their own
+            t_s = since_first_s(sheet.times(0, ""))
+            total = linear + np.column_stack([np.interp(t_s, t_s[valid], axis[valid]) for axis in gravity.T])
         stated = stated_unit(sheet.columns[threes["linear"].places[0]])
         sheet.columns += [f"total acceleration {axis}" + (f" ({stated})" if stated else "") for axis in "xyz"]
         sheet.cells += list(total.T)
@@ -294,7 +294,9 @@ def _find_triples(sheet: Sheet) -> list[_Triple]:
     stems: dict[str, dict[str, int]] = {}
     for place, name in enumerate(sheet.columns):
         for stem, axis in _split_axis(name):
-            stems.setdefault(stem, {}).setdefault(axis, place)
+            while axis in stems.setdefault(stem, {}):
+                stem += " "  # another sensor with the same names
+            stems[stem][axis] = place
     found, used = [], set()
     for stem, axes in stems.items():
         groups = ["xyz"] if set("xyz") <= set(axes) else _numbered(axes)
@@ -333,7 +335,7 @@ def _side_by_side(sheet: Sheet) -> list[_Triple]:
     numeric = [
         place
         for place, name in enumerate(sheet.columns)
-        if _numeric(sheet, [place]) and not _TIME.search(plain(name)) and not _increasing(sheet, place)
+        if _numeric(sheet, [place]) and not TIME_NAME.search(plain(name)) and not _increasing(sheet, place)
         if np.nanstd(sheet.numbers(place)) > 0.0 and not _KNOWN.search(plain(name))
     ]
     runs = [numeric[k : k + 3] for k in range(0, len(numeric) - 2, 3)] if len(numeric) > 5 else []
@@ -370,7 +372,7 @@ def _split_axis(name: str) -> Iterable[tuple[str, str]]:
         yield sensor + (head + last[:-1]).strip(), last[-1]
     elif len(whole) > 1 and whole[0] in "xyz":
         yield sensor + whole[1:], whole[0]
-    elif (match := re.fullmatch(r"(.*?)(\d{1,2})", whole)) and not bare.startswith("#"):
+    elif (match := re.fullmatch(r"(.*?)(\d{1,2})", whole)) and (colon or not bare.startswith("#")):
         yield sensor + match[1], match[2]
 
 
@@ -404,7 +406,7 @@ def stated_unit(name: str) -> str:
 
 def _kind(stem: str) -> str:
     sensor, _, stem = stem.rpartition(":")
-    for text in (stem.replace(" ", ""), *stem.split()[-1:], sensor):
+    for text in (re.sub(r"[ \d]", "", stem), *re.sub(r"\d", "", stem).split()[-1:], sensor):
         for kind, words in _KINDS.items():
             if text and re.search(words, text):
                 return kind
@@ -421,7 +423,8 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
     unnamed, scales = [*kinds["either"], *kinds[""]], _scales(sheet)
     possible = [*kinds["accel"], *kinds["either"], *([] if kinds["accel"] else kinds[""])]
     without = kinds["linear"] or kinds["accel"]
-    accel = _first_with_gravity(possible, seconds) or _first_with_gravity(kinds["linear"], seconds)
+    accel = _first_with_gravity(possible, seconds)
+    accel = accel or next((three for three in kinds["linear"] if _has_gravity(three, seconds, near=True)), None)
     accel = accel or next((three for three in kinds["accel"] if not _is_linear(three, seconds)), None)
     exchanged = None if accel else _first_with_gravity(kinds["gyro"], seconds)
     rates = _partner(accel, kinds["gyro"]) or _partner(accel, [three for three in unnamed if three is not accel])

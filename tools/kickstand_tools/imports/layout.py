@@ -18,8 +18,8 @@ import numpy as np
 
 from ..logs.csv_reader import Cells, cells_of, columns_of, columns_of_text, filled, numbers_of, separator_of
 from .files import RecordingFile
-from .recording import Sheet
-from .units import ACCELERATIONS, MOMENT, RATES, SPEEDS, TIMES, unit
+from .recording import Sheet, plain
+from .units import ACCELERATIONS, MOMENT, RATES, SPEEDS, TIME_NAME, TIMES, unit
 
 LOOKED_AT = 400  # lines used to find the layout
 SEPARATORS = "\t;, "  # if two separators split the same lines into the same number of cells, the first is used
@@ -85,7 +85,7 @@ def joined_sheet(files: list[RecordingFile]) -> Sheet | None:
     for k, (name, sheet) in enumerate(there):
         begin = sum(rows[:k])
         for column, values in zip(sheet.columns[1:], sheet.cells[1:]):
-            if _increases(numbers_of(values)) or MOMENT.fullmatch(str(values[0])):
+            if TIME_NAME.search(plain(column)):
                 continue  # another time, which only the rows of this file have
             wide = np.full(total, np.nan)
             wide[begin : begin + rows[k]] = numbers_of(values)
@@ -136,7 +136,7 @@ def _rows(lines: Sequence[str], separator: str) -> tuple[int, int, Grid] | None:
     """Return the number of rows, the number of numbers, and the grid for cells separated in this way. None if the lines
     do not fit."""
     split = [split_row(line, separator) for line in lines]
-    counts = [sum(bool(_NUMBER.fullmatch(cell) or MOMENT.fullmatch(cell)) for cell in cells) for cells in split]
+    counts = [_numbers_in(cells) for cells in split]
     widths = Counter(len(cells) for cells, count in zip(split, counts) if count >= FEWEST_CELLS)
     if not widths:
         return None
@@ -144,10 +144,6 @@ def _rows(lines: Sequence[str], separator: str) -> tuple[int, int, Grid] | None:
     rows = [k for k, count in enumerate(counts) if count >= FEWEST_CELLS and len(split[k]) == width]
     numbers = int(np.median([counts[k] for k in rows]))
     first = next(k for k, count in enumerate(counts) if count >= FEWEST_CELLS and len(split[k]) in widths)
-    while first and len(split[first - 1]) > 2 and len(split[first - 1]) in (*widths, width) and counts[first - 1]:
-        if any(cell and not _NUMBER.fullmatch(cell) for cell in split[first - 1][1:]):
-            break
-        first -= 1  # a row with few numbers, because its other cells are empty
     above = [k for k in range(first - 1, -1, -1) if lines[k].strip()]
     width, names = next(((w, k) for k in above[:3] for w in (width, *widths) if _has_names(lines[k], w)), (width, None))
     if names not in above[:1] and not (above and _all_units(split_row(lines[above[0]].lstrip(_MARKS), separator))):
@@ -155,6 +151,13 @@ def _rows(lines: Sequence[str], separator: str) -> tuple[int, int, Grid] | None:
     if len(rows) < 2 and names is None:
         return None
     return len(rows), numbers, Grid(names, first, separator, width)
+
+
+def _numbers_in(cells: list[str]) -> int:
+    """The number of numbers and times. Empty cells count in a wide row that has nothing else."""
+    count = sum(bool(_NUMBER.fullmatch(cell) or MOMENT.fullmatch(cell)) for cell in cells)
+    empty = cells.count("")
+    return len(cells) if len(cells) > 6 and count > 1 and count + empty == len(cells) else count
 
 
 def _has_names(line: str, width: int) -> bool:

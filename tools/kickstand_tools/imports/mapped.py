@@ -97,19 +97,28 @@ def read_mapped(
     check_keys(columns, units)
     places = {key: _place(sheet, key, wanted) for key, wanted in columns.items()}
     _check_apart(places, columns)
-    _check_units(sheet, places if why is None else {k: v for k, v in places.items() if k != "speed"}, units)
-    t_unit = units.get("t") or unit_in(sheet.columns[places["t"]])
-    t_unit = time_unit(sheet.cells[places["t"]], t_unit if unit(t_unit) in TIMES else "")
+    _check_units(sheet, places, units)
+    said = unit(_unit(units, ("t",), sheet.columns[places["t"]]))
+    t_unit = time_unit(sheet.cells[places["t"]], said if said in TIMES else "")
     time_ns = sheet.times(places["t"], t_unit)
+    if said not in TIMES and why is None and rate_hz(time_ns) > findings.DOUBTED_HZ:
+        raise InputError(
+            f"{sheet.name}: {rate_hz(time_ns):.0f} samples per second: add the unit of t, as in --units t=min"
+        )
     units = _with_counts(sheet, time_ns, places, dict(units))
     force, rates = (_scaled(sheet, places, units, axes) for axes in (ACCEL, GYRO))
     _check_rates(sheet.name, since_first_s(time_ns), force, rates)
-    accel = _sensor(sheet, time_ns, places, units, "accelerometer", force)
-    accel.taken.insert(0, Taken("time", sheet.named([places["t"]]), t_unit))
-    gyro = _sensor(sheet, time_ns, places, units, "gyro", rates)
+    time = Taken("time", sheet.named([places["t"]]), t_unit)
+    accel, gyro = (
+        RecordedSensor(
+            quantity, time_ns, values, sheet.left_out, _taken(sheet, time_ns, places, units, quantity, values)
+        )
+        for quantity, values in (("accelerometer", force), ("gyro", rates))
+    )
+    accel.taken.insert(0, time)
     lat, lon = (factor(units.get(key, "deg"), ANGLES, key) for key in ("lat", "lon"))
     speed, speed_unit, notices = _speed(sheet, time_ns, places, units, (lat, lon))
-    if "lat" in places and "lon" in places:
+    if why is not None and "lat" in places and "lon" in places:
         north, east = sheet.numbers(places["lat"]) * lat, sheet.numbers(places["lon"]) * lon
         doubt = doubt_of_positions(time_ns, sheet.numbers(places.get("speed")), north, east)
         if doubt:
@@ -129,11 +138,10 @@ def table_in(files: list[RecordingFile]) -> MappedTable | None:
     together, return the largest."""
     largest = max(files, key=lambda file: len(file.text))
     sheet = sheet_in(largest)
-    sheet = sheet and findings.completed(sheet)
-    found = None if sheet is None else findings.find(sheet)
+    found = None if sheet is None else findings.find(findings.completed(sheet))
     if len(files) > 1 and (found is None or found.lacking):
         joined = joined_sheet(files)
-        of_all = None if joined is None else findings.find(joined)
+        of_all = None if joined is None else findings.find(findings.completed(joined))
         if joined and of_all and (found is None or len(of_all.lacking) < len(found.lacking)):
             return MappedTable(joined.name, joined, of_all, True)
     if sheet is None or found is None or not ({"a", "g"} & set(found.found) or len(sheet.columns) >= len(REQUIRED)):
@@ -191,8 +199,6 @@ def unknown(files: list[RecordingFile], source: str, table: MappedTable | None =
             f"{source}: not a file of an app that is known{several}, and no time found in it: write the time of each "
             "row, such as millis(), or switch the time stamps of the serial monitor on"
         )
-    if "speed" in found.found and not found.found["speed"].unit:
-        del found.found["speed"]  # its unit is unknown
     keys = [key for key in (*REQUIRED, *OPTIONAL) if key in (*REQUIRED, *found.columns)]
     given = [f"{key}={_column_as_typed(table, key)}" for key in keys]
     units = ",".join(f"{key}={name}" for key, name in found.units.items())
@@ -324,43 +330,37 @@ def _place(sheet: Sheet, key: str, wanted: str) -> int:
     return place
 
 
-def _factors(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, str], axes: tuple[str, ...]) -> Array:
-    """Return the factors of three axes to g or deg/s, shape (3)."""
-    kinds = UNIT_KEYS[axes[0]]
-    return np.array([factor(_unit(units, (axis, axis[0]), sheet.columns[places[axis]]), kinds, axis) for axis in axes])
-
-
 def _scaled(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, str], axes: tuple[str, ...]) -> Array:
     """Return the readings of three axes in g or deg/s, shape (n, 3)."""
-    return sheet.table([places[axis] for axis in axes]) * _factors(sheet, places, units, axes)
+    names = {axis: _unit(units, (axis, axis[0]), sheet.columns[places[axis]]) for axis in axes}
+    scale = np.array([factor(name, UNIT_KEYS[axis], axis) for axis, name in names.items()])
+    return sheet.table([places[axis] for axis in axes]) * scale
 
 
-def _sensor(
+def _taken(
     sheet: Sheet,
     time_ns: Nanoseconds,
     places: Mapping[str, int],
     units: Mapping[str, str],
     quantity: str,
     values: Array,
-) -> RecordedSensor:
+) -> list[Taken]:
     axes = ACCEL if quantity == "accelerometer" else GYRO
     names = [_unit(units, (axis, axis[0]), sheet.columns[places[axis]]) for axis in axes]
-    scale = _factors(sheet, places, units, axes)
-    source = sheet.named([places[axis] for axis in axes])
-    sign = "as it is" if np.all(scale > 0.0) else "turned" if np.all(scale < 0.0) else "turned in part"
+    turned = [name.startswith("-") for name in names]
+    sign = "turned" if all(turned) else "turned in part" if any(turned) else "as it is"
     shown = ", ".join(dict.fromkeys(text.lstrip("-") for text in names))
     hz = rate_hz(time_ns[np.all(np.isfinite(values), axis=1)])
-    return RecordedSensor(quantity, time_ns, values, sheet.left_out, [Taken(quantity, source, shown, hz, sign)])
+    return [Taken(quantity, sheet.named([places[axis] for axis in axes]), shown, hz, sign)]
 
 
 def _check_units(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, str]) -> None:
     """Raise InputError if the unit of a column is neither given nor in its name. The error names all such columns."""
     unknown: dict[str, list[str]] = {}
-    for key in (*ACCEL, *GYRO, "speed"):
-        if key in places:
-            column, all_of = sheet.columns[places[key]], key if key == "speed" else key[0]
-            if key not in units and all_of not in units and unit(_unit({}, (), column)) not in UNIT_KEYS[key]:
-                unknown.setdefault(all_of, []).append(column)
+    for key in (*ACCEL, *GYRO):
+        column = sheet.columns[places[key]]
+        if key not in units and key[0] not in units and unit(_unit({}, (), column)) not in UNIT_KEYS[key]:
+            unknown.setdefault(key[0], []).append(column)
     if unknown:
         ask = ",".join(f"{key}={next(iter(UNIT_KEYS[key]))}" for key in unknown)
         choice = "; ".join(f"{key} is one of {', '.join(UNIT_KEYS[key])}" for key in unknown)

@@ -40,7 +40,8 @@ def doubt_of_positions(time_ns: Nanoseconds, speed: Array, lat: Array, lon: Arra
     def spread(north: Array, east: Array) -> float:
         moved = _moved_mps(time_ns, north, east)
         fast = np.isfinite(moved) & (moved > 3.0) & (speed > 0.0)
-        return float(np.std(np.log(moved[fast] / speed[fast]))) if np.count_nonzero(fast) > 20 else np.nan
+        ratio = np.log(moved[fast] / speed[fast])
+        return float(np.median(np.abs(ratio - np.median(ratio)))) if len(ratio) > 20 else np.nan
 
     exchanged = np.all(np.abs(lon[np.isfinite(lon)]) <= 90.0) and spread(lon, lat) < 0.5 * spread(lat, lon)
     return "latitude and longitude are exchanged" if exchanged and spread(lat, lon) > 0.05 else ""

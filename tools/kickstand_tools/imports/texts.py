@@ -3,6 +3,7 @@
 Spreadsheets and apps write numbers as their user's country does: -1,029.5 may be -1.029,5 or U+2212 and digits.
 """
 
+import contextlib
 import csv
 import io
 import json
@@ -53,8 +54,10 @@ def _rows_of_json(text: str) -> str:
         found = list(_objects(text))
     if isinstance(found, dict):
         lists = {name: values for name, values in found.items() if isinstance(values, list)}
-        of_objects = [values for values in lists.values() if values and isinstance(values[0], dict)]
-        found = max(of_objects, key=len) if of_objects else [dict(zip(lists, row)) for row in zip(*lists.values())]
+        found = [row | {"sensor": name} for name, rows in lists.items() for row in rows if isinstance(row, dict)]
+        found = found or [dict(zip(lists, row)) for row in zip(*lists.values())]
+        with contextlib.suppress(TypeError):
+            found.sort(key=lambda row: next(iter(row.values())))  # by time
     rows = [dict(_flat(row)) for row in found if isinstance(row, dict)]
     if len(rows) < FEWEST_ROWS:
         return text

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -60,6 +61,7 @@ def site_files() -> dict[str, bytes]:
     (package,) = (name for name in files if name.startswith("numpy/"))
     files["numpy/numpy.zip"], files["numpy/licence.txt"] = archives.numpy_archive(files.pop(package))
     files["font.json"] = json.dumps({code: list(rows) for code, rows in ROM.items()}).encode()
+    files["boards.json"] = json.dumps(shop_boards()).encode()
     sizes = {name: len(data) for name, data in files.items() if name.startswith(LATER)}
     files["sizes.json"] = json.dumps(sizes).encode()
     version = hashlib.sha256(b"".join(name.encode() + data for name, data in sorted(files.items()))).hexdigest()[:12]
@@ -93,6 +95,22 @@ def home() -> str:
     except metadata.PackageNotFoundError:
         named = []
     return dict(one.split(", ", 1) for one in named).get("Homepage", "")
+
+
+def shop_boards() -> dict[str, dict[str, str]]:
+    """Return {name of a board: {setting: value as a Python literal}} from the table of boards in settings.md.
+
+    >>> shop_boards()["Waveshare RP2040-Zero"]["BUTTON_PIN"]
+    '15'
+    """
+    text = (firmware_path.documents() / "firmware" / "docs" / "settings.md").read_text(encoding="utf-8")
+    boards = {}
+    for line in re.findall(r"(?m)^\| board \| `SENSOR_SDA`.*\n\|.*\n((?:\|.*\n)+)", text)[0].splitlines():
+        name, sensor, display, button, more, _ = (cell.strip() for cell in line.strip("|").split("|"))
+        pins = re.findall(r"\d+", re.sub(r"\(.*?\)", "", f"{sensor} {display} {button}"))
+        names = "SENSOR_SDA", "SENSOR_SCL", "LCD_SDA", "LCD_SCL", "BUTTON_PIN"
+        boards[name] = dict(zip(names, pins, strict=True)) | dict(re.findall(r"`(\w+) = (\w+)`", more))
+    return boards
 
 
 def _filled(name: str, **values: Any) -> bytes:

@@ -73,24 +73,24 @@ def export(
         raise InputError(f"{name} needs {library}: " + extra("rides"))
     ride = replace(ride, log=read_twice(ride.log))
     log = ride.log.source if isinstance(ride.log, Stretch) else ride.log
-    whole = _first_pass(log)
-    start_s = whole.start_s
-    if form == "gpx" and not len(whole.places.t_s):
+    extent = _first_pass(log)
+    start_s = extent.start_s
+    if form == "gpx" and not len(extent.places.t_s):
         raise InputError(f"{ride.name} has no positions (lat_deg, lon_deg), so there is no track to write")
-    if form in _DATED and whole.utc_s is not None:
-        start_s = whole.utc_s
+    if form in _DATED and extent.utc_s is not None:
+        start_s = extent.utc_s
     elif form in _DATED and start_s < _CLOCK_S:
         written_s = Path(log).stat().st_mtime if isinstance(log, (Path, str)) else time.time()
-        start_s = float(max(0, int(written_s - whole.seconds)))
+        start_s = float(max(0, int(written_s - extent.seconds)))
     step_s = STEP_S[form]
     if step_s:  # start and times are both rounded, so that different times stay different
         start_s = round(start_s / step_s) * step_s
-    count = given = 0
+    count = sample_count = 0
 
     def measured() -> Iterator[Channels]:
-        nonlocal given
+        nonlocal sample_count
         for block in ride.blocks(progress, notices):
-            given += len(block.t_s)
+            sample_count += len(block.t_s)
             yield block
 
     def rows() -> Iterator[Channels]:
@@ -98,12 +98,12 @@ def export(
         for block in downsampled(measured(), step_s, rounded=True) if step_s else measured():
             if form == "gpx":
                 block = block.part(np.isfinite(block.lat_deg) & np.isfinite(block.lon_deg))
-            if form in ("gpx", "vbo") and len(whole.speeds):
+            if form in ("gpx", "vbo") and len(extent.speeds):
                 # Every row of a VBO file needs a speed. Without interpolation, rows between two speeds would have a
                 # speed of 0.
-                block.speed_mps = np.interp(block.t_s, *whole.speeds.T)
+                block.speed_mps = np.interp(block.t_s, *extent.speeds.T)
             if form == "vbo":
-                block.lat_deg, block.lon_deg = whole.places.at(block.t_s)
+                block.lat_deg, block.lon_deg = extent.places.at(block.t_s)
             block.lean_sigma_deg = np.where(block.trusted, block.lean_sigma_deg, np.nan)  # as in the output of `replay`
             if step_s:
                 block.t_s = rounded_to(block.t_s, step_s)
@@ -112,13 +112,13 @@ def export(
 
     with whole_file(Path(out)) as temporary:
         _WRITE[form](temporary, rows(), start_s)
-    if notices is not None and step_s and count < given:
-        notices.append(RowsShare(given, count, step_s))
+    if notices is not None and step_s and count < sample_count:
+        notices.append(RowsShare(sample_count, count, step_s))
     return count
 
 
 @dataclass
-class _Whole:
+class _Extent:
     """The data that the first pass finds in a log.
 
     start_s: time of the first sample, in the log's own time.
@@ -136,14 +136,14 @@ class _Whole:
     utc_s: float | None
 
 
-def _first_pass(log: Source) -> _Whole:
-    start_s, seconds, speeds, places, starts_utc_s = 0.0, 0.0, [], [], []
+def _first_pass(log: Source) -> _Extent:
+    start_s, seconds, speeds, tracks, starts_utc_s = 0.0, 0.0, [], [], []
     for block in read_blocks(log, lines=False):
         start_s, seconds = block.start_s, float(block.t_s[-1])
-        there = ~np.isnan(block.speed_mps)
-        speeds.append(np.column_stack((block.t_s[there], block.speed_mps[there])))
-        places.append(track(block))
+        valid = ~np.isnan(block.speed_mps)
+        speeds.append(np.column_stack((block.t_s[valid], block.speed_mps[valid])))
+        tracks.append(track(block))
         starts_utc_s.append((block.utc_s - block.t_s)[np.isfinite(block.utc_s)])
-    found = np.concatenate(starts_utc_s)
-    utc_s = float(np.median(found)) if len(found) else None
-    return _Whole(start_s, seconds, np.concatenate(speeds), joined(places), utc_s)
+    offsets_s = np.concatenate(starts_utc_s)
+    utc_s = float(np.median(offsets_s)) if len(offsets_s) else None
+    return _Extent(start_s, seconds, np.concatenate(speeds), joined(tracks), utc_s)

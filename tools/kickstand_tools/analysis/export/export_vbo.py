@@ -60,28 +60,28 @@ def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
     start_s: time of the log's t_s = 0, in s since 1970.
     """
     first = next(blocks)  # the first block shows which channels the log has; a missing channel is NaN in all blocks
-    other = [column for column in OTHER if not np.all(np.isnan(getattr(first, column[2])))]
-    lean = "lean-angle in degrees, > 0 to the right; " if OTHER[0] in other else ""
+    extra_columns = [column for column in OTHER if not np.all(np.isnan(getattr(first, column[2])))]
+    lean = "lean-angle in degrees, > 0 to the right; " if OTHER[0] in extra_columns else ""
     satellites = f"satellites {_SATELLITES} stands for a position, 0 for none"
     comments = [f"Kickstand: {lean}{satellites}", "Log Rate (Hz) : at most 100.00"]
     if np.all(np.isnan(first.speed_mps)):
         comments.append("no speed in the log: velocity 0 stands for none")
-    row_form = _STANDARD_ROW + " %+.6E" * len(other) + "\r\n"
+    row_form = _STANDARD_ROW + " %+.6E" * len(extra_columns) + "\r\n"
     head = [
         time.strftime("File created on %d/%m/%Y at %H:%M:%S", time.gmtime(start_s)),
         "",
         "[header]",
         *[title for title, _ in STANDARD],
-        *[name for name, _, _ in other],
+        *[name for name, _, _ in extra_columns],
         "",
         "[channel units]",
-        *[unit for _, unit, _ in other],
+        *[unit for _, unit, _ in extra_columns],
         "",
         "[comments]",
         *comments,
         "",
         "[column names]",
-        " ".join([name for _, name in STANDARD] + [name for name, _, _ in other]),
+        " ".join([name for _, name in STANDARD] + [name for name, _, _ in extra_columns]),
         "",
         "[data]",
     ]
@@ -100,7 +100,7 @@ def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
                     course_deg.of(block.lat_deg, block.lon_deg),
                     block.forward_g,
                     block.lateral_g,
-                    *[getattr(block, channel) for _, _, channel in other],
+                    *[getattr(block, channel) for _, _, channel in extra_columns],
                 )
             )
             file.write("".join([row_form % tuple(row) for row in np.nan_to_num(table).tolist()]))
@@ -120,18 +120,18 @@ class _Heading:
         """
         lat, lon = (np.concatenate((last, now)) for last, now in zip(self._last, (lat_deg, lon_deg)))
         east, north = distance_m(lat[:-1], lon[:-1], lat[1:], lon[1:])
-        found = np.concatenate((self._last[2], np.degrees(np.arctan2(east, north)) % 360.0))
+        heading = np.concatenate((self._last[2], np.degrees(np.arctan2(east, north)) % 360.0))
         # A distance of NaN counts as a movement, because a gap ends the track.
         moved = np.concatenate(([True], ~(np.hypot(east, north) <= _SAME_M)))
-        found = found[np.maximum.accumulate(np.where(moved, np.arange(len(found)), 0))]
-        first = np.flatnonzero(np.isnan(found[:-1]) & np.isfinite(lat[:-1]))
-        found[first] = found[first + 1]
-        self._last = np.array([[lat[-1]], [lon[-1]], [found[-1]]])
-        return found[1:]
+        heading = heading[np.maximum.accumulate(np.where(moved, np.arange(len(heading)), 0))]
+        first = np.flatnonzero(np.isnan(heading[:-1]) & np.isfinite(lat[:-1]))
+        heading[first] = heading[first + 1]
+        self._last = np.array([[lat[-1]], [lon[-1]], [heading[-1]]])
+        return heading[1:]
 
 
 def _clock(seconds: np.ndarray) -> np.ndarray:
     """Convert seconds to the time of day, as the number HHMMSS.SS."""
     hundredths = np.rint(seconds * 100.0).astype(np.int64) % (86400 * 100)
-    whole, part = np.divmod(hundredths, 100)
-    return (whole // 3600) * 10000 + (whole // 60 % 60) * 100 + whole % 60 + part / 100.0
+    full_s, part = np.divmod(hundredths, 100)
+    return (full_s // 3600) * 10000 + (full_s // 60 % 60) * 100 + full_s % 60 + part / 100.0

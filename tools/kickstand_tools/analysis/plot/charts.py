@@ -145,41 +145,41 @@ class Charts:
     warnings: list[str]
 
 
-def charts(seen: Overview) -> Charts:
+def charts(overview: Overview) -> Charts:
     """Make the charts of a ride.
 
     A car has no chart of the lean, and a log without a speed has no chart of the speed.
     """
-    course, car = seen.course, seen.ride.car
+    course, car = overview.course, overview.ride.car
     lateral, forward = (smoothed(values, course.t_s, SMOOTH_S) for values in (course.lateral_g, course.forward_g))
-    over_time = [] if car else [_lean(seen)]
-    over_time += [_speed(seen)] if seen.has_speed else []
-    over_time.append(_forces(seen, lateral, forward))
-    below = [_g_against_g(seen, lateral, forward), *([] if car else [_shares(seen)]), _alignment(seen)]
-    return Charts(title(seen), over_time, below, [f"Warning: {notice.line()}." for notice in seen.notices])
+    over_time = [] if car else [_lean(overview)]
+    over_time += [_speed(overview)] if overview.has_speed else []
+    over_time.append(_forces(overview, lateral, forward))
+    below = [_g_against_g(overview, lateral, forward), *([] if car else [_shares(overview)]), _alignment(overview)]
+    return Charts(title(overview), over_time, below, [f"Warning: {notice.line()}." for notice in overview.notices])
 
 
-def shown_lean_deg(seen: Overview) -> Array:
+def shown_lean_deg(overview: Overview) -> Array:
     """Return the lean at each sample of the course, shape (n); NaN where the display shows no lean."""
-    return np.where(seen.course.trusted, seen.course.lean_deg, np.nan)
+    return np.where(overview.course.trusted, overview.course.lean_deg, np.nan)
 
 
-def title(seen: Overview) -> str:
+def title(overview: Overview) -> str:
     """Return one line with name, length and maxima of the ride."""
-    total = seen.summary
-    said = [seen.ride.stem, clock(total.duration_s)]
-    if not seen.ride.car:
-        how = "smoothed lean" if seen.ride.smoothed else "lean as displayed"
+    total = overview.summary
+    parts = [overview.ride.stem, clock(total.duration_s)]
+    if not overview.ride.car:
+        lean_name = "smoothed lean" if overview.ride.smoothed else "lean as displayed"
         left, right = peak_words(total.left_deg, "{:.0f}°")[0], peak_words(total.right_deg, "{:.0f}°")[0]
-        said.append(f"{how} {left} left, {right} right")
+        parts.append(f"{lean_name} {left} left, {right} right")
     brake, accel = peak_words(total.brake_g, "{:.2f} g")[0], peak_words(total.accel_g, "{:.2f} g")[0]
-    said.append(f"braking {brake}, acceleration {accel}")
-    return "  ·  ".join(said)
+    parts.append(f"braking {brake}, acceleration {accel}")
+    return "  ·  ".join(parts)
 
 
-def lean_limit(seen: Overview) -> float:
+def lean_limit(overview: Overview) -> float:
     """Return the end of the lean's axis on each side, in degrees."""
-    return max(20.0, 1.2 * max(seen.summary.left_deg.value, seen.summary.right_deg.value))
+    return max(20.0, 1.2 * max(overview.summary.left_deg.value, overview.summary.right_deg.value))
 
 
 def envelope(time: Array, values: Array, points: int, gap_s: float = np.inf) -> tuple[Array, Array]:
@@ -191,116 +191,120 @@ def envelope(time: Array, values: Array, points: int, gap_s: float = np.inf) -> 
     points: approximate limit of the number of samples. A shorter line keeps all samples.
     Returns times and values of the samples that are left, in their order.
     """
-    there = ~np.isnan(values)
-    time, values = time[there], values[there]
-    before = np.flatnonzero(np.diff(time) > gap_s)
-    middles = (time[before] + time[before + 1]) / 2.0
+    valid = ~np.isnan(values)
+    time, values = time[valid], values[valid]
+    gaps = np.flatnonzero(np.diff(time) > gap_s)
+    middles = (time[gaps] + time[gaps + 1]) / 2.0
     if len(values) > points:
         starts = np.arange(0, len(values), -(-len(values) * 2 // points))
         order = np.lexsort((values, np.repeat(np.arange(len(starts)), np.diff(starts, append=len(values)))))
-        kept = np.unique(order[np.concatenate((starts, np.append(starts[1:], len(values)) - 1))])
-        time, values = time[kept], values[kept]
-    place = np.searchsorted(time, middles)
-    return np.insert(time, place, middles), np.insert(values, place, np.nan)
+        selected = np.unique(order[np.concatenate((starts, np.append(starts[1:], len(values)) - 1))])
+        time, values = time[selected], values[selected]
+    position = np.searchsorted(time, middles)
+    return np.insert(time, position, middles), np.insert(values, position, np.nan)
 
 
-def _maxima(seen: Overview) -> list[tuple[Peak, float]]:
+def _maxima(overview: Overview) -> list[tuple[Peak, float]]:
     """Return the largest lean to each side, and its sign in the chart."""
-    peaks = ((seen.summary.left_deg, -1.0), (seen.summary.right_deg, 1.0))
+    peaks = ((overview.summary.left_deg, -1.0), (overview.summary.right_deg, 1.0))
     return [(peak, sign) for peak, sign in peaks if peak.time_s is not None]
 
 
-def _over_time(seen: Overview, words: str, traces: list[Trace], height: float, y_range: tuple[float, float]) -> Chart:
-    begin, end = float(seen.course.t_s[0]), float(seen.course.t_s[-1])
+def _over_time(
+    overview: Overview, words: str, traces: list[Trace], height: float, y_range: tuple[float, float]
+) -> Chart:
+    begin, end = float(overview.course.t_s[0]), float(overview.course.t_s[-1])
     step = tick_s(end - begin)
     ticks = {tick: clock(tick) for tick in np.arange(step * np.ceil(begin / step), end, step).tolist()}
     return Chart(words, traces, height, (begin, max(end, begin + 1e-3)), y_range, ticks=ticks)
 
 
-def _lean(seen: Overview) -> Chart:
-    limit = lean_limit(seen)
+def _lean(overview: Overview) -> Chart:
+    limit = lean_limit(overview)
     words = "Lean, degrees (right up, left down)"
-    traces: list[Trace] = [Sides(seen.course.t_s, shown_lean_deg(seen), GAP_S)]
-    doubtful = seen.course.doubtful >= 0.5
+    traces: list[Trace] = [Sides(overview.course.t_s, shown_lean_deg(overview), GAP_S)]
+    doubtful = overview.course.doubtful >= 0.5
     if np.any(doubtful):
         words = "Lean, degrees (right up; yellow: less exact)"  # a phone has no room for more words
         along = np.where(doubtful, -1.05 * limit, np.nan)
-        traces.append(Line(seen.course.t_s, along, DOUBT_COLOUR, gap_s=GAP_S, width=DOUBT_WIDTH))
-    made = _over_time(seen, words, traces, _HIGH, ((-1.1 if np.any(doubtful) else -1.0) * limit, limit))
-    for peak, sign in _maxima(seen):
+        traces.append(Line(overview.course.t_s, along, DOUBT_COLOUR, gap_s=GAP_S, width=DOUBT_WIDTH))
+    chart = _over_time(overview, words, traces, _HIGH, ((-1.1 if np.any(doubtful) else -1.0) * limit, limit))
+    for peak, sign in _maxima(overview):
         word, side = ("left", "below") if sign < 0 else ("right", "above")
-        made.notes.append(Note(peak.time_s or 0.0, sign * peak.value, f"{peak.value:.0f}° {word}", side))
-    return made
+        chart.notes.append(Note(peak.time_s or 0.0, sign * peak.value, f"{peak.value:.0f}° {word}", side))
+    return chart
 
 
-def _speed(seen: Overview) -> Chart:
-    speed = Line(seen.course.t_s, 3.6 * seen.course.speed_mps, SPEED_COLOUR, "speed", SPEED_GAP_S)
-    return _over_time(seen, "Speed, km/h", [speed], _LOW, (0.0, 1.05 * float(np.nanmax(speed.y))))
+def _speed(overview: Overview) -> Chart:
+    speed = Line(overview.course.t_s, 3.6 * overview.course.speed_mps, SPEED_COLOUR, "speed", SPEED_GAP_S)
+    return _over_time(overview, "Speed, km/h", [speed], _LOW, (0.0, 1.05 * float(np.nanmax(speed.y))))
 
 
-def _forces(seen: Overview, lateral: Array, forward: Array) -> Chart:
-    words = "Acceleration, g" + (" (grey: stops and their MFDD, m/s²)" if seen.stops else "")
-    left = Line(seen.course.t_s, lateral, LATERAL_COLOUR, "to the left", GAP_S)
-    ahead = Line(seen.course.t_s, forward, BRAKE_COLOUR, "forward", GAP_S)
-    both = np.concatenate((lateral, forward))
-    lowest, highest = float(np.min(both)), float(np.max(both))
+def _forces(overview: Overview, lateral: Array, forward: Array) -> Chart:
+    words = "Acceleration, g" + (" (grey: stops and their MFDD, m/s²)" if overview.stops else "")
+    left_line = Line(overview.course.t_s, lateral, LATERAL_COLOUR, "to the left", GAP_S)
+    forward_line = Line(overview.course.t_s, forward, BRAKE_COLOUR, "forward", GAP_S)
+    forces = np.concatenate((lateral, forward))
+    lowest, highest = float(np.min(forces)), float(np.max(forces))
     margin = max(0.05 * (highest - lowest), 0.01)
-    made = _over_time(seen, words, [left, ahead], _HIGH, (lowest - margin, highest + margin))
-    made.spans = [(stop.start_s, stop.stop_s, f"{stop.mfdd_mps2:.1f}") for stop in seen.stops]
-    return made
+    chart = _over_time(overview, words, [left_line, forward_line], _HIGH, (lowest - margin, highest + margin))
+    chart.spans = [(stop.start_s, stop.stop_s, f"{stop.mfdd_mps2:.1f}") for stop in overview.stops]
+    return chart
 
 
-def _g_against_g(seen: Overview, lateral: Array, forward: Array) -> Chart:
+def _g_against_g(overview: Overview, lateral: Array, forward: Array) -> Chart:
     """Forward against lateral acceleration, with left bends on the left, as the rider sees them."""
     reach = max(0.5, float(np.percentile(np.abs(np.concatenate((lateral, forward))), 99.99)))
     bins = int(np.ceil(reach / GG_BIN_G)) + 2
     edges = np.arange(-bins, bins + 1, dtype=float) * GG_BIN_G
-    moving = seen.course.resting < 0.5
+    moving = overview.course.resting < 0.5
     counts = np.histogram2d(forward[moving], -lateral[moving], bins=(edges, edges))[0]
-    cells = CellMap(edges, counts * spacing_s(seen.course), "seconds")
+    cells = CellMap(edges, counts * spacing_s(overview.course), "seconds")
     angle = np.linspace(0.0, 2.0 * np.pi, 100)
     rings = [Line(r * np.cos(angle), r * np.sin(angle), GUIDE_COLOUR) for r in np.arange(0.5, edges[-1] + 0.01, 0.5)]
     span = (float(edges[0]), float(edges[-1]))
-    made = Chart("g against g", [cells, *rings], _SQUARE, span, span, square=True)
-    made.x_title, made.y_title = "left turn  ·  right turn", "braking  ·  acceleration"
-    return made
+    chart = Chart("g against g", [cells, *rings], _SQUARE, span, span, square=True)
+    chart.x_title, chart.y_title = "left turn  ·  right turn", "braking  ·  acceleration"
+    return chart
 
 
-def _shares(seen: Overview) -> Chart:
+def _shares(overview: Overview) -> Chart:
     """Histogram of the time at each lean. The bars of small leans are cut off if they are by far the highest."""
-    middle, seconds = (BINS_DEG[:-1] + BINS_DEG[1:]) / 2.0, seen.summary.histogram_s
+    middle, seconds = (BINS_DEG[:-1] + BINS_DEG[1:]) / 2.0, overview.summary.histogram_s
     share = 100.0 * seconds / max(float(np.sum(seconds)), 1e-9)
     leaning = np.abs(middle) > _UPRIGHT_DEG
     most = 1.05 * float(np.max(share))
     top = min(most, max(1.5 * float(np.max(share[leaning], initial=0.0)), 1.0))
-    limit = lean_limit(seen)
+    limit = lean_limit(overview)
     bars = Bars(middle, share, BIN_DEG, "share")
-    made = Chart("How long at which lean, %", [bars], _SQUARE, (-limit, limit), (0.0, max(top, 1e-3)))
-    made.right = f"{np.sum(share[~leaning]):.0f} % upright" if top < most else ""
-    for peak, sign in _maxima(seen):
-        at = sign * peak.value
-        made.traces.append(Line(np.array([at, at]), np.array([0.0, _MARKED * top]), "#555555", dotted=True))
+    chart = Chart("How long at which lean, %", [bars], _SQUARE, (-limit, limit), (0.0, max(top, 1e-3)))
+    chart.right = f"{np.sum(share[~leaning]):.0f} % upright" if top < most else ""
+    for peak, sign in _maxima(overview):
+        lean_deg = sign * peak.value
+        chart.traces.append(
+            Line(np.array([lean_deg, lean_deg]), np.array([0.0, _MARKED * top]), "#555555", dotted=True)
+        )
         beside = "left" if sign < 0 else "right"  # labels of small leans go to the side, to avoid overlap
         side = "above" if peak.value > 0.3 * limit else beside
-        made.notes.append(Note(at, _MARKED * top, f"{peak.value:.0f}°", side))
-    made.x_title = "left  ·  degrees  ·  right"
-    made.ticks = {tick: f"{abs(tick):.0f}" for tick in np.arange(-180.0, 181.0, 20.0).tolist() if abs(tick) <= limit}
-    return made
+        chart.notes.append(Note(lean_deg, _MARKED * top, f"{peak.value:.0f}°", side))
+    chart.x_title = "left  ·  degrees  ·  right"
+    chart.ticks = {tick: f"{abs(tick):.0f}" for tick in np.arange(-180.0, 181.0, 20.0).tolist() if abs(tick) <= limit}
+    return chart
 
 
-def _alignment(seen: Overview) -> Chart:
+def _alignment(overview: Overview) -> Chart:
     """Forces on the straights, and the line on which they would be with the estimated yaw error."""
-    found, fits = seen.quality, judged(seen)
-    most = float(np.max(np.abs(found.forward_g), initial=0.0))
+    quality, fits = overview.quality, judged(overview)
+    most = float(np.max(np.abs(quality.forward_g), initial=0.0))
     reach = max(0.5, 1.1 * most)
     traces: list[Trace] = [Line(np.zeros(2), np.array([-reach, reach]), GUIDE_COLOUR)]
-    traces.append(Dots(-found.lateral_g, found.forward_g, LATERAL_COLOUR, "straights"))
-    if found.yaw_deg is not None and fits:
+    traces.append(Dots(-quality.lateral_g, quality.forward_g, LATERAL_COLOUR, "straights"))
+    if quality.yaw_deg is not None and fits:
         ends = np.array([-most, most])
-        traces.append(Line(-np.tan(np.radians(found.yaw_deg)) * ends, ends, BRAKE_COLOUR))
-    words = (angles(found) or ["not enough straight riding"]) if fits else ["not judged"]
-    words += ["at rest", f"{found.gravity_g:.3f} g"] if fits and found.gravity_g is not None else []
+        traces.append(Line(-np.tan(np.radians(quality.yaw_deg)) * ends, ends, BRAKE_COLOUR))
+    words = (angles(quality) or ["not enough straight riding"]) if fits else ["not judged"]
+    words += ["at rest", f"{quality.gravity_g:.3f} g"] if fits and quality.gravity_g is not None else []
     span = (-reach, reach)
-    made = Chart("Alignment: g on the straights", traces, _SQUARE, span, span, square=True, left="\n".join(words))
-    made.x_title, made.y_title = "left  ·  g  ·  right", "braking  ·  acceleration"
-    return made
+    chart = Chart("Alignment: g on the straights", traces, _SQUARE, span, span, square=True, left="\n".join(words))
+    chart.x_title, chart.y_title = "left  ·  g  ·  right", "braking  ·  acceleration"
+    return chart

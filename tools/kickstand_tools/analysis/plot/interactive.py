@@ -59,8 +59,10 @@ def figure(charts: Charts, linked: bool = False) -> dict[str, Any]:
 
     linked: the mouse selects a moment anywhere in a chart over time, not only at its lines.
     """
-    each = [*charts.over_time, *charts.below]
-    data = [drawn | _axes(k) for k, chart in enumerate(each) for trace in chart.traces for drawn in _traces(trace)]
+    all_charts = [*charts.over_time, *charts.below]
+    data = [
+        drawn | _axes(k) for k, chart in enumerate(all_charts) for trace in chart.traces for drawn in _traces(trace)
+    ]
     layouts = {kind: _layout(charts, kind == "narrow", linked) for kind in ("layout", "narrow")}
     return {"data": data} | layouts
 
@@ -99,10 +101,10 @@ def _traces(trace: Trace) -> list[dict[str, Any]]:
         drawn = _OWN_WORDS | {"type": "bar", "marker": {"color": colours, "line": {"width": 0}}, "width": trace.width}
         return [drawn | {"name": trace.name, "x": plain(trace.x), "y": plain(trace.y)}]
     centres = plain((trace.edges[1:] + trace.edges[:-1]) / 2.0, 4)
-    there = trace.values > 0.0
-    logs = np.log10(np.where(there, trace.values, np.nan))
+    occupied = trace.values > 0.0
+    logs = np.log10(np.where(occupied, trace.values, np.nan))
     drawn: dict[str, Any] = _OWN_WORDS | {"type": "heatmap", "colorscale": _OFTEN, "showscale": False}
-    if np.any(there):
+    if np.any(occupied):
         drawn |= {"zmin": float(np.nanmin(logs)), "zmax": float(np.nanmax(logs))}
     return [drawn | {"name": f"{trace.name}, log10", "x": centres, "y": centres, "z": [plain(row) for row in logs]}]
 
@@ -110,25 +112,25 @@ def _traces(trace: Trace) -> list[dict[str, Any]]:
 def _filled(name: str, x: Array, y: Array, colour: str) -> dict[str, Any]:
     """Return a trace that is filled from zero to y, shape (n). Only the two ends of each run of zeros are kept."""
     leans = y != 0.0
-    kept = leans.copy()
-    kept[1:] |= leans[:-1]
-    kept[:-1] |= leans[1:]
+    selected = leans.copy()
+    selected[1:] |= leans[:-1]
+    selected[:-1] |= leans[1:]
     drawn = _OWN_WORDS | {"type": "scattergl", "mode": "lines", "line": {"color": colour, "width": 1.2}}
-    return drawn | {"fill": "tozeroy", "name": name, "x": plain(x[kept]), "y": plain(y[kept])}
+    return drawn | {"fill": "tozeroy", "name": name, "x": plain(x[selected]), "y": plain(y[selected])}
 
 
 def _layout(charts: Charts, narrow: bool, linked: bool) -> dict[str, Any]:
-    each, rows = [*charts.over_time, *charts.below], len(charts.over_time)
-    heights = [round(_INCH * chart.height) for chart in (each if narrow else each[: rows + 1])]
+    all_charts, rows = [*charts.over_time, *charts.below], len(charts.over_time)
+    heights = [round(_INCH * chart.height) for chart in (all_charts if narrow else all_charts[: rows + 1])]
     gap, margin = (_NARROW_GAP, _NARROW_MARGIN) if narrow else (_GAP, _MARGIN)
     inner = sum(heights) + gap * (len(heights) - 1)
     words = html.escape(charts.title).split("  ·  ")  # plotly treats < as the start of a tag
     lines = words if narrow else ["  ·  ".join(words[:2]), "  ·  ".join(words[2:])]
-    made: dict[str, Any] = PAPER | {"height": inner + margin["t"] + margin["b"], "margin": margin}
-    made["title"] = {"text": "<br>".join(filter(None, lines)), "x": 0.05, "font": {"size": 14}}
-    made |= {"annotations": [], "shapes": []} | ({"hovermode": "x"} if linked else {})
+    layout: dict[str, Any] = PAPER | {"height": inner + margin["t"] + margin["b"], "margin": margin}
+    layout["title"] = {"text": "<br>".join(filter(None, lines)), "x": 0.05, "font": {"size": 14}}
+    layout |= {"annotations": [], "shapes": []} | ({"hovermode": "x"} if linked else {})
     wide = (1.0 - _ASIDE * (len(charts.below) - 1)) / len(charts.below)
-    for k, chart in enumerate(each):
+    for k, chart in enumerate(all_charts):
         row, column = (k, 0) if narrow else (min(k, rows), max(0, k - rows))
         left, right = (0.0, 1.0) if narrow or k < rows else (column * (wide + _ASIDE), column * (wide + _ASIDE) + wide)
         top = (inner - sum(heights[:row]) - gap * row) / inner
@@ -144,14 +146,14 @@ def _layout(charts: Charts, narrow: bool, linked: bool) -> dict[str, Any]:
             across |= {"matches": "x"} if k else {}
             across |= {"hoverformat": ".1f"} if linked else {}
         along |= {"scaleanchor": x} if chart.square else {}
-        made[x.replace("x", "xaxis")], made[y.replace("y", "yaxis")] = _AXIS | across, _AXIS | along
-        made["annotations"] += _annotations(chart, x, y, narrow)
-        made["shapes"] += [
+        layout[x.replace("x", "xaxis")], layout[y.replace("y", "yaxis")] = _AXIS | across, _AXIS | along
+        layout["annotations"] += _annotations(chart, x, y, narrow)
+        layout["shapes"] += [
             {"type": "rect", "x0": begin, "x1": end, "y0": 0, "y1": 1, "xref": x, "yref": f"{y} domain"}
             | {"fillcolor": "grey", "opacity": 0.2, "line": {"width": 0}}
             for begin, end, _ in chart.spans
         ]
-    return made
+    return layout
 
 
 def _annotations(chart: Chart, x: str, y: str, narrow: bool) -> list[dict[str, Any]]:
@@ -166,9 +168,9 @@ def _annotations(chart: Chart, x: str, y: str, narrow: bool) -> list[dict[str, A
         if isinstance(trace, Line) and trace.name
     ]
     title = chart.title.replace(" (", "<br>(") if narrow and len(names) > 1 else chart.title  # else too long
-    said = title + (f":{'<br>' if narrow else ' '}{', '.join(names)}" if len(names) > 1 else "")
+    heading = title + (f":{'<br>' if narrow else ' '}{', '.join(names)}" if len(names) > 1 else "")
     words = [
-        within | _note(Note(0.0, 1.0, said, "above")) | {"xanchor": "left", "align": "left"},
+        within | _note(Note(0.0, 1.0, heading, "above")) | {"xanchor": "left", "align": "left"},
         within
         | _note(Note(0.0, 1.0, chart.left.replace("\n", "<br>"), "below"))
         | {"xanchor": "left", "align": "left", "bgcolor": "rgba(255,255,255,0.75)"},
@@ -177,9 +179,9 @@ def _annotations(chart: Chart, x: str, y: str, narrow: bool) -> list[dict[str, A
     words += [{"xref": x, "yref": y} | _note(note) for note in chart.notes]
     spans = (Note((begin + end) / 2.0, 1.0, text, "below") for begin, end, text in chart.spans)
     words += [within | {"xref": x} | _note(span) for span in spans]
-    return [one for one in words if one["text"]]
+    return [annotation for annotation in words if annotation["text"]]
 
 
 def _note(note: Note) -> dict[str, Any]:
-    where = {"x": note.x, "y": note.y, "text": note.text, "showarrow": False} | _SMALL
-    return where | _SIDES[note.side]
+    annotation = {"x": note.x, "y": note.y, "text": note.text, "showarrow": False} | _SMALL
+    return annotation | _SIDES[note.side]

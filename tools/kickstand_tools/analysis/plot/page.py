@@ -25,17 +25,17 @@ TILES_URL = TILES_HOST + "/rastertiles/voyager/{z}/{x}/{y}.png"
 MOST_ZOOM = 19
 
 
-def draw(path: Path, seen: Overview, tiles: bool = False) -> None:
+def draw(path: Path, overview: Overview, tiles: bool = False) -> None:
     """Write the page, with a map beside the charts if the log has positions.
 
     tiles: show streets in the map. The page loads them from a server.
     """
     library = files("plotly").joinpath("package_data/plotly.min.js").read_text(encoding="utf-8")
-    text = page(seen, f"<script>{library}</script>", source_hash(library), tiles, warnings=True)
+    text = page(overview, f"<script>{library}</script>", source_hash(library), tiles, warnings=True)
     path.write_text(text, encoding="utf-8")
 
 
-def page(seen: Overview, library: str, allowed: str, tiles: bool = False, warnings: bool = False) -> str:
+def page(overview: Overview, library: str, allowed: str, tiles: bool = False, warnings: bool = False) -> str:
     """Return the page's HTML.
 
     The content security policy allows only the page's own scripts, and images of the map's tiles. It also allows
@@ -47,12 +47,12 @@ def page(seen: Overview, library: str, allowed: str, tiles: bool = False, warnin
     tiles: see draw().
     warnings: show the warnings above the charts.
     """
-    drawn, points = charts(seen), track_map.map_points(seen)
-    beside = None
+    ride_charts, points = charts(overview), track_map.map_points(overview)
+    map_data = None
     if points is not None:
-        beside = {"map": track_map.figure(points, seen), "axes": interactive.time_axes(drawn)}
-        beside["shape"] = track_map.shape(points)
-        beside["tiles"] = tiles_at(points) if tiles else None
+        map_data = {"map": track_map.figure(points, overview), "axes": interactive.time_axes(ride_charts)}
+        map_data["shape"] = track_map.shape(points)
+        map_data["tiles"] = tiles_at(points) if tiles else None
     policy = (
         "default-src 'none'; base-uri 'none'; form-action 'none'; style-src 'unsafe-inline'; "
         f"img-src data: blob:{' ' + TILES_HOST if tiles else ''}; "
@@ -61,11 +61,11 @@ def page(seen: Overview, library: str, allowed: str, tiles: bool = False, warnin
     return filled(
         _HERE / "page.html",
         policy=policy,
-        title=seen.ride.stem,
+        title=overview.ride.stem,
         library=library,
-        warnings=drawn.warnings if warnings else [],
-        charts=interactive.figure(drawn, linked=points is not None),
-        map=beside,
+        warnings=ride_charts.warnings if warnings else [],
+        charts=interactive.figure(ride_charts, linked=points is not None),
+        map=map_data,
         scripts=SCRIPTS,
     )
 

@@ -37,36 +37,36 @@ _SIDES: dict[str, Any] = {  # position of the words beside a point
 }
 
 
-def draw(path: Path, seen: Overview) -> None:
+def draw(path: Path, overview: Overview) -> None:
     """Write a PNG."""
-    figure_of(seen).savefig(path, dpi=100)
+    figure_of(overview).savefig(path, dpi=100)
 
 
-def figure_of(seen: Overview) -> Any:
+def figure_of(overview: Overview) -> Any:
     """Draw the picture as a Figure of matplotlib."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    wanted = charts.charts(seen)
-    said = [line for words in wanted.warnings for line in textwrap.wrap(words, _CHARACTERS)]
-    heights = [chart.height for chart in wanted.over_time] + [wanted.below[0].height]
-    families, title = _fonts(wanted.title)
+    ride_charts = charts.charts(overview)
+    warning_lines = [line for words in ride_charts.warnings for line in textwrap.wrap(words, _CHARACTERS)]
+    heights = [chart.height for chart in ride_charts.over_time] + [ride_charts.below[0].height]
+    families, title = _fonts(ride_charts.title)
     with rc_context(_STYLE | {"font.family": families}):
-        figure = Figure(figsize=(11, sum(heights) + _LINE * len(said)), layout="constrained")
+        figure = Figure(figsize=(11, sum(heights) + _LINE * len(warning_lines)), layout="constrained")
         FigureCanvasAgg(figure)
         aside: Any = {"x": 0.01, "ha": "left", "parse_math": False}  # a name may contain $
         figure.suptitle(title, fontsize=12, **aside)
-        if said:
-            figure.supxlabel("\n".join(said), fontsize=8, color=charts.BRAKE_COLOUR, **aside)
-        rows = figure.add_gridspec(len(heights), len(wanted.below), height_ratios=heights)
+        if warning_lines:
+            figure.supxlabel("\n".join(warning_lines), fontsize=8, color=charts.BRAKE_COLOUR, **aside)
+        rows = figure.add_gridspec(len(heights), len(ride_charts.below), height_ratios=heights)
         first = None
-        for k, chart in enumerate(wanted.over_time):
+        for k, chart in enumerate(ride_charts.over_time):
             axes = figure.add_subplot(rows[k, :], sharex=first)
             first = first or axes
             draw_chart(axes, chart)
-            axes.tick_params(labelbottom=chart is wanted.over_time[-1])
-        for k, chart in enumerate(wanted.below):
+            axes.tick_params(labelbottom=chart is ride_charts.over_time[-1])
+        for k, chart in enumerate(ride_charts.below):
             draw_chart(figure.add_subplot(rows[-1, k]), chart)
         figure.canvas.draw()
     return figure
@@ -80,17 +80,17 @@ def _fonts(text: str) -> tuple[list[str], str]:
     from matplotlib import font_manager
 
     families = ["DejaVu Sans"]
-    here = {font.name: font.fname for font in font_manager.fontManager.ttflist}
-    fonts = [font_manager.get_font(here["DejaVu Sans"])]
-    for family in (name for name in sorted(here) if _OTHER_LETTERS.search(name)):
+    installed = {font.name: font.fname for font in font_manager.fontManager.ttflist}
+    fonts = [font_manager.get_font(installed["DejaVu Sans"])]
+    for family in (name for name in sorted(installed) if _OTHER_LETTERS.search(name)):
         if all(any(font.get_char_index(ord(c)) for font in fonts) for c in text):
             break
-        font = font_manager.get_font(here[family])
+        font = font_manager.get_font(installed[family])
         if any(font.get_char_index(ord(c)) and not any(f.get_char_index(ord(c)) for f in fonts) for c in text):
             families.append(family)
             fonts.append(font)
-    known = [any(font.get_char_index(ord(c)) for font in fonts) for c in text]
-    return families, "".join(c if there else ascii(c)[1:-1] for c, there in zip(text, known))
+    drawable = [any(font.get_char_index(ord(c)) for font in fonts) for c in text]
+    return families, "".join(c if has_glyph else ascii(c)[1:-1] for c, has_glyph in zip(text, drawable))
 
 
 def draw_chart(axes: Any, chart: charts.Chart) -> None:
@@ -135,6 +135,6 @@ def _draw_trace(axes: Any, trace: charts.Trace) -> None:
         colours = np.where(trace.x < 0.0, charts.LEFT_COLOUR, charts.RIGHT_COLOUR).tolist()
         axes.bar(trace.x, trace.y, width=trace.width, color=colours, linewidth=0)
     else:
-        shown = np.ma.masked_equal(trace.values, 0.0)
-        scale = LogNorm(0.2 * float(shown.min()), float(shown.max()))  # the lowest value must not be white
-        axes.pcolormesh(trace.edges, trace.edges, shown, cmap="YlGnBu", norm=scale, rasterized=True)
+        seconds = np.ma.masked_equal(trace.values, 0.0)
+        scale = LogNorm(0.2 * float(seconds.min()), float(seconds.max()))  # the lowest value must not be white
+        axes.pcolormesh(trace.edges, trace.edges, seconds, cmap="YlGnBu", norm=scale, rasterized=True)

@@ -19,12 +19,12 @@ def check(directory: Path) -> None:
     check_directory(directory)
 
 
-def draw(seen: Overview, directory: Path, tiles: bool = False) -> list[Path]:
+def draw(overview: Overview, directory: Path, tiles: bool = False) -> list[Path]:
     """Write both files and return their paths. tiles: see page.draw(). Raises InputError."""
-    paths = [directory / f"{seen.ride.stem}.png", directory / f"{seen.ride.stem}.html"]
+    paths = [directory / f"{overview.ride.stem}.png", directory / f"{overview.ride.stem}.html"]
     with new_directory(directory):
         with whole_file(paths[0]) as path:
-            picture.draw(path, seen)
+            picture.draw(path, overview)
         with whole_file(paths[1]) as path:
-            page.draw(path, seen, tiles)
+            page.draw(path, overview, tiles)
     return paths

@@ -46,30 +46,30 @@ class MapPoints:
     lon_deg: float
 
 
-def map_points(seen: Overview) -> MapPoints | None:
+def map_points(overview: Overview) -> MapPoints | None:
     """Return the track of a ride; None without positions. Points are on straight lines between the log's positions."""
-    places = track(seen.course)
-    if len(places.t_s) < 2:
+    positions = track(overview.course)
+    if len(positions.t_s) < 2:
         return None
-    time_s, speed_kmh = seen.course.t_s, 3.6 * seen.course.speed_mps
-    t_s = _times(places, float(time_s[-1]))
-    lat, lon = places.at(t_s)
+    time_s, speed_kmh = overview.course.t_s, 3.6 * overview.course.speed_mps
+    t_s = _times(positions, float(time_s[-1]))
+    lat, lon = positions.at(t_s)
     lat = np.clip(lat, -MOST_LAT_DEG, MOST_LAT_DEG)
     lat_deg, lon_deg = float(np.nanmedian(lat)), float(lon[0])
     away_deg = (lon - lon_deg + 180.0) % 360.0 - 180.0
     scale_m = EARTH_M * np.cos(np.radians(lat_deg))
     east = scale_m * np.radians(away_deg)
     north = scale_m * (_mercator(lat) - _mercator(np.array([lat_deg])))
-    kept = _moved(east, north)
-    t_s, east, north = t_s[kept], east[kept], north[kept]
+    selected = _moved(east, north)
+    t_s, east, north = t_s[selected], east[selected], north[selected]
     row = np.minimum(np.searchsorted(time_s, t_s), len(time_s) - 1)
-    known = ~np.isnan(speed_kmh)
-    none = np.full(len(t_s), np.nan)
-    speed = np.interp(t_s, time_s[known], speed_kmh[known]) if np.any(known) else none
-    return MapPoints(t_s, east, north, shown_lean_deg(seen)[row], speed, lat_deg, lon_deg)
+    has_speed = ~np.isnan(speed_kmh)
+    no_speed = np.full(len(t_s), np.nan)
+    speed = np.interp(t_s, time_s[has_speed], speed_kmh[has_speed]) if np.any(has_speed) else no_speed
+    return MapPoints(t_s, east, north, shown_lean_deg(overview)[row], speed, lat_deg, lon_deg)
 
 
-def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
+def figure(points: MapPoints, overview: Overview) -> dict[str, Any]:
     """Return the map for plotly.js: {"data": traces, "layout": ...}, in plain numbers and lists, with None for NaN.
 
     The first trace is the track as a line. Its customdata are time (s), lean (degrees) and speed (km/h), None if
@@ -81,18 +81,18 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
     rows = [plain(row, 1) for row in np.column_stack((points.t_s, points.lean_deg, points.speed_kmh))]
     line = {"type": "scattergl", "mode": "lines", "line": {"width": 1.5, "color": "#8a8a8a"}, "hoverinfo": "skip"}
     dots: dict[str, Any] = {"size": 6, "color": SPEED_COLOUR}
-    known = np.isfinite(points.east_m)
-    if not seen.ride.car:
-        limit = max(LEAST_LEAN_DEG, float(round(lean_limit(seen) / 1.2)))
-        known &= np.isfinite(points.lean_deg)
-        lean = plain(points.lean_deg[known], 1)
+    drawable = np.isfinite(points.east_m)
+    if not overview.ride.car:
+        limit = max(LEAST_LEAN_DEG, float(round(lean_limit(overview) / 1.2)))
+        drawable &= np.isfinite(points.lean_deg)
+        lean = plain(points.lean_deg[drawable], 1)
         dots |= {"color": lean, "colorscale": _COLOURS, "cmin": -limit, "cmax": limit}
         bar = {"title": {"text": "left  ·  lean, °  ·  right", "side": "top"}, "orientation": "h", "thickness": 10}
         bar |= {"x": 1.0, "y": 1.0, "xanchor": "right", "yanchor": "bottom", "ypad": 5, "len": 0.6, "ticks": "outside"}
         ticks = [f"{limit:.0f}", "0", f"{limit:.0f}"]
         dots["colorbar"] = bar | {"tickvals": [-limit, 0.0, limit], "ticktext": ticks, "outlinewidth": 0}
-    at = {"x": plain(points.east_m[known], 1), "y": plain(points.north_m[known], 1)}
-    at |= {"customdata": plain(points.t_s[known], 1), "marker": dots}
+    points_trace = {"x": plain(points.east_m[drawable], 1), "y": plain(points.north_m[drawable], 1)}
+    points_trace |= {"customdata": plain(points.t_s[drawable], 1), "marker": dots}
     paper = {"xref": "paper", "yref": "paper", "showarrow": False}
     thin = {"arrowhead": 0, "arrowwidth": 1}
     layout = PAPER | {
@@ -118,7 +118,10 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
         ],
     }
     track_line = line | {"x": x, "y": y, "customdata": rows}
-    return {"data": [track_line, {"type": "scattergl", "mode": "markers", "hoverinfo": "none"} | at], "layout": layout}
+    return {
+        "data": [track_line, {"type": "scattergl", "mode": "markers", "hoverinfo": "none"} | points_trace],
+        "layout": layout,
+    }
 
 
 def shape(points: MapPoints) -> float:
@@ -127,9 +130,9 @@ def shape(points: MapPoints) -> float:
     return float(np.clip((east or 1.0) / (north or 1.0), *_SHAPES))
 
 
-def _times(places: LogTrack, seconds: float) -> Array:
+def _times(positions: LogTrack, seconds: float) -> Array:
     """Return the times of the points: at most POINTS, evenly spaced over the ride."""
-    first, last = float(places.t_s[0]), min(seconds, float(places.t_s[-1]))
+    first, last = float(positions.t_s[0]), min(seconds, float(positions.t_s[-1]))
     count = int(np.clip((last - first) / SHORTEST_S, 1, POINTS)) + 1
     return np.linspace(first, last, count)
 
@@ -143,10 +146,10 @@ def _moved(east: Array, north: Array) -> Ints:
 
     These are the points over SAME_M from the last kept point, the first in each gap, and the first after each gap.
     """
-    kept, (last_x, last_y) = [0], (east[0], north[0])
+    selected, (last_x, last_y) = [0], (east[0], north[0])
     for k, (x, y) in enumerate(zip(east.tolist(), north.tolist())):
         begins_or_ends_gap = (x != x) != (last_x != last_x)
         if begins_or_ends_gap or abs(x - last_x) + abs(y - last_y) > SAME_M:
-            kept.append(k)
+            selected.append(k)
             last_x, last_y = x, y
-    return np.array(kept)
+    return np.array(selected)

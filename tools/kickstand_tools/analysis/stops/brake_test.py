@@ -114,18 +114,18 @@ def stops_of(ride: Channels, still: NDArray[np.bool_]) -> list[Stop]:
     still: True where the vehicle stands still, shape (n).
     """
     delay_s = speed_delay_s(ride)
-    found, after = [], 0
+    stops, earlier_end = [], 0
     for start, end in stretches(still):
-        first = max(after, int(np.searchsorted(ride.t_s, ride.t_s[start] - LONGEST_S)))
+        first = max(earlier_end, int(np.searchsorted(ride.t_s, ride.t_s[start] - LONGEST_S)))
         last = min(int(end), int(np.searchsorted(ride.t_s, ride.t_s[start] + REST_S, side="right")))
         gaps = np.flatnonzero(np.diff(ride.t_s[first:last]) > GAP_S)
         first += int(gaps[-1]) + 1 if len(gaps) else 0
         if start - first > FEWEST and last - start > FEWEST:
-            stop = _stop(ride.part(slice(first, last)), start - first, delay_s, 0 < first == after)
+            stop = _stop(ride.part(slice(first, last)), start - first, delay_s, 0 < first == earlier_end)
             if stop:
-                found.append(stop)
-        after = int(end)
-    return found
+                stops.append(stop)
+        earlier_end = int(end)
+    return stops
 
 
 def mfdd_mps2(speed_mps: Array, distance_m: Array) -> float:
@@ -163,39 +163,39 @@ def stops_by_speed(ride: Channels) -> bool:
 
     The force may not show this stop.
     """
-    there = ~np.isnan(ride.speed_mps)
-    time, speed = ride.t_s[there], ride.speed_mps[there]
+    valid = ~np.isnan(ride.speed_mps)
+    time, speed = ride.t_s[valid], ride.speed_mps[valid]
     for end in np.flatnonzero((speed[1:] < STANDING_MPS) & (speed[:-1] >= STANDING_MPS)) + 1:
-        before = slice(int(np.searchsorted(time, time[end] - SPEED_S)), end)
-        fall = speed[before] / (time[end] - time[before])
-        if np.any((speed[before] > MIN_SPEED_MPS) & (fall > SURELY_MPS2)):
+        window = slice(int(np.searchsorted(time, time[end] - SPEED_S)), end)
+        fall = speed[window] / (time[end] - time[window])
+        if np.any((speed[window] > MIN_SPEED_MPS) & (fall > SURELY_MPS2)):
             return True
     return False
 
 
-def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | None:
+def _stop(part: Channels, standstill: int, delay_s: float, from_rest: bool) -> Stop | None:
     """Return the stop that ends in a standstill; None without a stop.
 
     part: the ride up to some time after the beginning of the standstill.
-    rest: index in `part` at which the standstill begins.
+    standstill: index in `part` at which the standstill begins.
     delay_s: delay of the log's speed.
     from_rest: True if `part` begins at the end of the previous standstill.
     """
     time = part.t_s
-    acceleration, pitch_rate, yaw_rate = _acceleration(part, rest)
+    acceleration, pitch_rate, yaw_rate = _acceleration(part, standstill)
     integrated = integral(time, acceleration)
     # Integrate the speed backwards from the standstill. Correct the speed for the motion of the sensor when the bike
     # pitches.
     speed = integrated - integrated[-1] + SENSOR_HEIGHT_M * np.radians(pitch_rate)
     smooth = smoothed(acceleration, time, SMOOTH_S)
-    begin = _onset(smooth, time, rest)
+    begin = _onset(smooth, time, standstill)
     if begin is None:
         return None
-    known = "integrated"
+    source = "integrated"
     fitted = fitted_speed(part, begin, speed, acceleration, delay_s)
     if fitted is not None:
-        speed, known = fitted, "log"
-    elif from_rest and not closes(float(speed[0]), float(time[rest] - time[0])):
+        speed, source = fitted, "log"
+    elif from_rest and not closes(float(speed[0]), float(time[standstill] - time[0])):
         return None
     smooth = smoothed(np.gradient(speed, time), time, SMOOTH_S)
     v = speed[begin:]
@@ -222,14 +222,14 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
         float(np.max(np.abs(smoothed(np.gradient(smooth, time), time, SMOOTH_S)[braked]))),
         float(integral(t, v * np.sin(np.radians(heading - straight)))[-1]),
         float(heading[-1]),
-        known,
+        source,
     )
-    if known == "integrated" and not plausible(stop.initial_speed_mps, stop.side_m, stop.heading_deg):
+    if source == "integrated" and not plausible(stop.initial_speed_mps, stop.side_m, stop.heading_deg):
         return None
     return stop
 
 
-def _acceleration(part: Channels, rest: int) -> tuple[Array, Array, Array]:
+def _acceleration(part: Channels, standstill: int) -> tuple[Array, Array, Array]:
     """Compute acceleration and rates. The values at standstill are subtracted.
 
     Returns:
@@ -238,8 +238,8 @@ def _acceleration(part: Channels, rest: int) -> tuple[Array, Array, Array]:
         yaw_rate: yaw rate, shape (n), in deg/s.
     """
     time = part.t_s
-    settled = int(np.searchsorted(time, time[rest] + SETTLE_S))
-    still = slice(settled if settled < len(time) - 5 else rest, len(time))
+    settled = int(np.searchsorted(time, time[standstill] + SETTLE_S))
+    still = slice(settled if settled < len(time) - 5 else standstill, len(time))
     lean = np.radians(np.nan_to_num(part.lean_deg))
     pitch_rate = part.pitch_rate_dps - np.mean(part.pitch_rate_dps[still])
     yaw_rate = part.yaw_rate_dps - np.mean(part.yaw_rate_dps[still])
@@ -250,9 +250,9 @@ def _acceleration(part: Channels, rest: int) -> tuple[Array, Array, Array]:
     return STANDARD_GRAVITY * (part.forward_g - np.sin(pitch)), level_pitch_rate, yaw_rate
 
 
-def _onset(smooth: Array, time: Array, rest: int) -> int | None:
+def _onset(smooth: Array, time: Array, standstill: int) -> int | None:
     """Return the index at which the braking begins that ends in this standstill; None without braking."""
-    braking = -smooth[:rest]
+    braking = -smooth[:standstill]
     hard = np.flatnonzero(braking > 0.5 * MIN_MFDD_MPS2)
     if not len(hard):
         return None

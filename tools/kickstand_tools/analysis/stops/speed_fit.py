@@ -28,19 +28,19 @@ def speed_delay_s(ride: Channels) -> float:
 
     Returns the delay in s; 0 if the ride does not show a delay.
     """
-    there = np.flatnonzero(~np.isnan(ride.speed_mps))
-    there = there[np.unique(np.floor(ride.t_s[there]), return_index=True)[1]]  # one speed per second
-    time, changes = ride.t_s[there], np.diff(ride.speed_mps[there])
+    valid = np.flatnonzero(~np.isnan(ride.speed_mps))
+    valid = valid[np.unique(np.floor(ride.t_s[valid]), return_index=True)[1]]  # one speed per second
+    time, changes = ride.t_s[valid], np.diff(ride.speed_mps[valid])
     pushed = integral(ride.t_s, STANDARD_GRAVITY * ride.forward_g)
-    if len(there) < ENOUGH_SPEEDS or np.std(changes) < ENOUGH_CHANGE_MPS:
+    if len(valid) < ENOUGH_SPEEDS or np.std(changes) < ENOUGH_CHANGE_MPS:
         return 0.0
 
     def earlier(by_s: float) -> tuple[Array, Array] | None:
         pushes = np.diff(np.interp(time - by_s, ride.t_s, pushed))
         return (changes, pushes[:, None]) if np.std(pushes) >= ENOUGH_CHANGE_MPS else None
 
-    found = best_lag(DELAYS_S, earlier)
-    return found.lag_s if found and found.inside else 0.0
+    lag = best_lag(DELAYS_S, earlier)
+    return lag.lag_s if lag and lag.inside else 0.0
 
 
 def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, delay_s: float) -> Array | None:
@@ -65,21 +65,21 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
     time = part.t_s
     values = np.flatnonzero(~np.isnan(part.speed_mps))
     # Indices of the samples at which the vehicle really had the logged speeds.
-    wanted = np.minimum(np.searchsorted(time, time[values] - delay_s - 1e-6), len(time) - 1)
-    values, wanted = (these[time[wanted] >= time[begin] - LEAD_S] for these in (values, wanted))
-    if len(wanted) < 2 or wanted[-1] < begin:
+    sample_index = np.minimum(np.searchsorted(time, time[values] - delay_s - 1e-6), len(time) - 1)
+    values, sample_index = (these[time[sample_index] >= time[begin] - LEAD_S] for these in (values, sample_index))
+    if len(sample_index) < 2 or sample_index[-1] < begin:
         return None
-    knots = np.arange(float(time[-1]), float(min(time[wanted[0]], time[begin])) - KNOT_S, -KNOT_S)
+    knots = np.arange(float(time[-1]), float(min(time[sample_index[0]], time[begin])) - KNOT_S, -KNOT_S)
     hats = np.column_stack([np.interp(time, knots[::-1], row[::-1]) for row in np.eye(len(knots))])
     pushed = np.column_stack([integral(time, hat) for hat in hats.T])
     pushed = pushed[-1] - pushed  # the integral from each sample to the end
-    terms = np.column_stack((speed, pushed, -smoothed(acceleration, time, SMOOTH_S)))[wanted]
-    error = part.speed_mps[values] - speed[wanted]
+    terms = np.column_stack((speed, pushed, -smoothed(acceleration, time, SMOOTH_S)))[sample_index]
+    error = part.speed_mps[values] - speed[sample_index]
     prior = _prior(len(knots))
     weighted = np.vstack((terms / SIGMA_SPEED_MPS, prior))
-    known = np.concatenate((error / SIGMA_SPEED_MPS, np.zeros(len(prior))))
-    found = np.linalg.lstsq(weighted, known, rcond=None)[0]
-    scale, slope = 1.0 + found[0], found[1:-1]
+    right_side = np.concatenate((error / SIGMA_SPEED_MPS, np.zeros(len(prior))))
+    solution = np.linalg.lstsq(weighted, right_side, rcond=None)[0]
+    scale, slope = 1.0 + solution[0], solution[1:-1]
     return scale * speed + pushed @ slope
 
 

@@ -37,10 +37,10 @@ def standing(ride: Channels) -> Bools:
     still = _quiet(ride)
     if not np.any(still):
         still = _rests_of_filter(ride)
-    there = ~np.isnan(ride.speed_mps)
-    latest = np.maximum.accumulate(np.where(there, np.arange(len(there)), 0))
-    known = there[latest] & (ride.t_s - ride.t_s[latest] < STALE_S)
-    return np.where(known, ride.speed_mps[latest] < STANDING_MPS, still)
+    valid = ~np.isnan(ride.speed_mps)
+    latest = np.maximum.accumulate(np.where(valid, np.arange(len(valid)), 0))
+    recent = valid[latest] & (ride.t_s - ride.t_s[latest] < STALE_S)
+    return np.where(recent, ride.speed_mps[latest] < STANDING_MPS, still)
 
 
 def _quiet(ride: Channels) -> Bools:

@@ -77,6 +77,16 @@ export class Fields {
     return Object.fromEntries([...this.#place.querySelectorAll("[name]")].map(({ name, value }) => [name, value.trim() || null]));
   }
 
+  /** Set some fields. settings: {name: value as a Python literal, or "" for the default}. */
+  set(settings) {
+    for (const [name, value] of Object.entries(settings)) {
+      const input = this.#place.querySelector(`[name=${name}]`);
+      input.value = value;
+      if (value) input.closest("details").open = true;
+    }
+    this.#place.dispatchEvent(new Event("change"));
+  }
+
   /** Show a fault beside a field, and remove the earlier fault. name: the setting, or null to show no fault. */
   mark(name, text) {
     if (this.#marked) {

@@ -4,6 +4,7 @@
 
 import { ASKING, choosePort, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
+import { offerBoards } from "./boards.mjs";
 import { connectImage } from "./image.mjs";
 import { Fields } from "./fields.mjs";
 
@@ -40,7 +41,10 @@ async function look() {
   byHand = by_hand;
   byId("by-hand").textContent = byHand ? `The board’s own ${byHand}. It stays as it is.` : "";
   byId("settings").hidden = Boolean(byHand);
-  if (!byHand) fields.fill(settings, usual);
+  if (!byHand) {
+    fields.fill(settings, usual);
+    await offerBoards(byId("shop-board"), name, (pins) => fields.set(pins)).catch((error) => tell(error.message));
+  }
   byId("config").hidden = false;
   const kept = others.map((line) => `${line}. `).join("");
   tell(`${name} is there. ${kept}${byHand ? "Press" : "Look through its settings, then press"} Install.`);
@@ -132,7 +136,7 @@ async function copyStatus() {
 }
 
 function atWork(on) {
-  for (const id of ["look", "install", "fields", "image", "image-file", "status", "check"]) byId(id).disabled = on;
+  for (const id of ["look", "install", "fields", "shop-board", "image", "image-file", "status", "check"]) byId(id).disabled = on;
 }
 
 byId("look").addEventListener("click", look);
