@@ -139,8 +139,9 @@ def find(sheet: Sheet) -> Findings:
     time = _time(sheet)
     if time is None:
         findings.lacking.append("time")
-        named = [name for name in sheet.columns if TIME_NAME.search(plain(name))]
-        findings.remarks += [f"its column {named[0]} does not increase like a time"] if named else []
+        named = [k for k, name in enumerate(sheet.columns) if TIME_NAME.search(plain(name))][:1]
+        shown = [f"{sheet.columns[k]} (first {as_text(sheet.cells[k])[0][:30]!a})" for k in named]
+        findings.remarks += [f"its column {text} is no time that increases" for text in shown]
     else:
         findings.found["t"] = time
     seconds = _seconds(sheet, time)
