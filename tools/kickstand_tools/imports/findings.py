@@ -256,13 +256,11 @@ def completed(sheet: Sheet) -> Sheet:
     if scale and not _time_unit_of(scale):
         sheet.columns[0], sheet.cells[0] = f"{sheet.columns[0]} (s)", sheet.numbers(0) * scale
     for fraction, size in _FRACTIONS.items():
-        k = next(
-            (k for k, name in enumerate(names) if k and name.removesuffix("s").endswith(fraction.removesuffix("s"))), 0
-        )
+        k = next((k for k, name in enumerate(names) if k and name.removesuffix("s").endswith(fraction)), 0)
         if k and re.search(r"secs?$|seconds?$|stamp$|time$", names[k - 1]) and names[k - 1] != names[k]:
             whole, part = sheet.cells[k - 1], sheet.numbers(k)
-            if whole.dtype.kind == "i" and np.nanmin(part) >= 0.0 and np.nanmax(part) * size < 10**9:
-                part_ns = np.nan_to_num(part * size).astype(np.int64)
+            if whole.dtype.kind == "i" and np.all((part >= 0.0) & (part * size < 10**9)):
+                part_ns = (part * size).astype(np.int64)
                 sheet.columns.append(f"time {sheet.columns[k - 1]} + {sheet.columns[k]} (ns)")
                 sheet.cells.append(whole.astype(np.int64) * 10**9 + part_ns)
                 break
@@ -281,9 +279,9 @@ def completed(sheet: Sheet) -> Sheet:
     return sheet
 
 
-# The ends of names of columns with fractions of a second, and the ns of their unit
+# The ends of names of columns with fractions of a second, without a plural s, and the ns of their unit
 _FRACTIONS = {"nsec": 1, "nanosec": 1, "nanosecond": 1, "usec": 1000, "microsecond": 1000, "msec": 10**6}
-_FRACTIONS |= {"millisecond": 10**6, "millis": 10**6}
+_FRACTIONS |= {"millisecond": 10**6, "milli": 10**6}
 
 
 def _merge_rows(sheet: Sheet, three: _Triple) -> None:
