@@ -57,7 +57,7 @@ def test_a_difference_is_that_of_the_leans(comparison):
         assert difference.rms_deg == pytest.approx(np.hypot(change.mean(), change.std()))
         assert difference.moving_deg == pytest.approx(change.std())
         assert (difference.p95_deg, difference.worst_deg) == pytest.approx((np.percentile(rest, 95.0), rest.max()))
-        assert difference.expected_deg > 0.0 and 0.0 <= difference.within_1 <= difference.within_2 <= 1.0
+        assert 0.1 < difference.expected_deg < 3.0 and 0.0 <= difference.within_1 <= difference.within_2 <= 1.0
 
 
 def test_output_in_words_json_and_a_picture(tmp_path, pair, comparison, monkeypatch):
