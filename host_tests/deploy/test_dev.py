@@ -92,20 +92,6 @@ def test_moved_checkout_gets_a_new_venv(project):
     assert project.steps("") == ["venv .venv", UV, "pip install ."]
 
 
-def test_working_venv_of_another_python_is_kept(project, capsys):
-    """The user may have made the .venv on purpose, and installed other packages in it."""
-    project.steps("")
-    stamp = project.root / ".venv" / "installed.txt"
-    stamp.write_text(stamp.read_text().replace("Python ", "Python 0.", 1))
-    capsys.readouterr()
-    assert project.steps("") == []
-    assert capsys.readouterr().out.startswith(".venv has Python 0.3")
-    project.python('[ "$2 $3" != "pip --version" ] || exit 1')
-    (project.root / "python").write_text("#!/bin/sh\nexit 1\n")
-    with pytest.raises(project.dev.SetupStopped, match=r"\.venv cannot be created"):  # its pip no longer runs
-        project.steps("test")
-
-
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
