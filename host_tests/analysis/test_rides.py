@@ -55,6 +55,14 @@ def test_frozen_readings_are_left_out():
     assert part.frozen_s == part.missing_s == 0.0  # the frozen part is not in the stretch
 
 
+@pytest.mark.parametrize(("calibration", "codes"), [(ALIGNED, ["readings-misfit"]), (CAR, [])])
+def test_readings_that_contradict_each_other_are_noticed(tmp_path, calibration, codes):
+    """From 14 s on, the gyro about forward measures 30 % of the rate."""
+    log = api.read_log(analysis_rides.short(tmp_path, rate_hz=50))
+    log.gyro_dps[log.t_s > 14.0, 2] *= 0.3
+    assert [notice.code for notice in read(log, calibration)[1]] == codes
+
+
 def test_a_car_has_no_lean():
     (block,) = car_channels(standing_log(), CAR)
     assert np.all(np.isnan(block.lean_deg) & np.isnan(block.lean_formula_deg)) and len(block.t_s) == 400
