@@ -68,8 +68,6 @@ axis-ill|sensor: {0} {1} {2}, so there is no lean: switch it off and on; if that
 clips|sensor: {0} at the end of its range: mount the sensor softly, on foam or rubber
 no-such-pin|config.py: {0} = {1} is not a pin of this board ({2})
 i2c-pins|config.py: {1}_SDA = {2} and {1}_SCL = {3} do not belong to I2C {4} ({5})
-i2c-number|config.py: {1}_SDA = {2} and {1}_SCL = {3} are not SDA and SCL of I2C {4}: set SENSOR_I2C and LCD_I2C to \
-the I2C of their pins, or exchange the pins
 uart-pins|config.py: GPS_TX = {1} and GPS_RX = {2} do not belong to UART {3} ({4})
 """
 # one sentence for all faults of a recording; only the display names the fault

@@ -120,18 +120,21 @@ def fill(settings, config, refusal):
     _check(settings, config)
 
 
+_WHICH_I2C = "set SENSOR_I2C and LCD_I2C to the I2C of their pins, or exchange SDA and SCL"
+
+
 def _check_i2c(settings):
     """Raise SettingsError if the pins of a bus belong to the other I2C, or if both buses have the same I2C.
 
     The I2C functions of an RP2040's pins repeat every four pins: SDA and SCL of I2C 0, then SDA and SCL of I2C 1 (data
     sheet, section 1.4.3)."""
+    if not settings.one_bus and settings.SENSOR_I2C == settings.LCD_I2C:
+        raise SettingsError("one-i2c", "LCD_I2C", settings.LCD_I2C)
     for name in ("SENSOR", "LCD"):
         sda, scl, number = [getattr(settings, name + end) for end in ("_SDA", "_SCL", "_I2C")]
         if (sda % 4, scl % 4) != (2 * number, 2 * number + 1):
             settings.LCD_I2C = settings.LCD_SDA // 2 % 2  # the display can then show the refusal
-            raise SettingsError("i2c-number", name + "_SDA", name, sda, scl, number)
-    if not settings.one_bus and settings.SENSOR_I2C == settings.LCD_I2C:
-        raise SettingsError("one-i2c", "LCD_I2C", settings.LCD_I2C)
+            raise SettingsError("i2c-pins", name + "_SDA", name, sda, scl, number, _WHICH_I2C)
 
 
 def _check(settings, config):

@@ -8,16 +8,12 @@ import numpy as np
 import pytest
 from kickstand_tools.analysis.plot import charts, interactive, page, picture
 from kickstand_tools.analysis.plot.charts import (
-    LEFT_COLOUR,
-    RIGHT_COLOUR,
     Chart,
     Charts,
-    Line,
-    Sides,
 )
 from kickstand_tools.checks.mount import UpOff
 from kickstand_tools.estimation.smooth import NotTheBikes
-from small_rides import overview_of, quality_of, samples
+from small_rides import overview_of, samples
 
 NAN = np.nan
 HELD = np.where(np.arange(6000) > 3000, 40.0, 0.0)  # a lean to the right in the second half
@@ -76,20 +72,6 @@ def test_the_chart_of_g_against_g_counts_seconds():
     assert len(rings) == 1 and cells.edges[-1] == pytest.approx((21 + 2) * 0.025)
 
 
-def test_the_alignment_chart_has_the_line_of_the_yaw():
-    """Forces to the left are on the left. The line that shows the yaw error goes through the points."""
-    ride_overview = overview_of(samples(600), quality_of(1.0, None, 45.0, 1.01, [0.3, -0.2], [0.8, -0.6]))
-    alignment = chart_of(ride_overview, "Alignment")
-    guide, dots, line = alignment.traces
-    assert alignment.x_range == pytest.approx((-0.88, 0.88)) and guide.y == pytest.approx([-0.88, 0.88])
-    assert dots.x.tolist() == [-0.3, 0.2] and line.x == pytest.approx([0.8, -0.8]) and line.y.tolist() == [-0.8, 0.8]
-    assert alignment.left == "roll +1.0°\nyaw +45.0°\nat rest\n1.010 g"
-    unjudged = chart_of(replace(ride_overview, notices=[UpOff(20.0, False)]), "Alignment")
-    assert unjudged.left == "not judged" and len(unjudged.traces) == 2
-    empty = chart_of(overview_of(samples(600), quality_of()), "Alignment")
-    assert empty.left == "not enough straight riding" and empty.x_range == (-0.5, 0.5) and len(empty.traces) == 2
-
-
 @pytest.mark.parametrize(
     ("columns", "how", "words"),
     [
@@ -103,41 +85,11 @@ def test_the_title_names_the_maxima(columns, how, words):
     assert title == f"RIDE  ·  1:00  ·  {words}"
 
 
-def test_an_envelope_keeps_peaks_and_breaks_the_line_in_gaps():
-    time, values = np.array([0.0, 1.0, 4.0, 5.0]), np.array([1.0, 2.0, 3.0, 4.0])
-    x, y = charts.envelope(time, values, 10, gap_s=2.0)
-    assert x.tolist() == [0.0, 1.0, 2.5, 4.0, 5.0] and np.isnan(y[2]) and y[:2].tolist() == [1.0, 2.0]
-    assert len(charts.envelope(time, values, 10, gap_s=3.0)[0]) == 4
-    few = charts.envelope(np.arange(8.0), np.array([0.0, 9.0, 1.0, -9.0, 2.0, 2.0, 5.0, 1.0]), 4)
-    assert few[0].tolist() == [1.0, 3.0, 6.0, 7.0]  # of each four values the smallest and the largest
-    time = np.arange(100_003.0)
-    values = np.sin(time / 50.0)
-    values[[17, 55_555, 100_002]], values[30:40] = (9.0, -8.0, 7.0), np.nan
-    x, y = charts.envelope(time, values, 2000)
-    assert 1000 < len(x) <= 2002 and np.all(np.diff(x) > 0) and {9.0, -8.0, 7.0} <= set(y)
-
-
 def drawn(*traces, **options):
     """Return the figure of a page with one chart of these traces, and an empty one below."""
     above = Chart("above", list(traces), 2.0, (0.0, 9.0), (-1.0, 1.0), **options)
     below = Chart("below", [], 3.0, (0.0, 1.0), (0.0, 1.0))
     return interactive.figure(Charts("a  ·  1:00  ·  <b>  ·  c", [above], [below], []))
-
-
-def test_a_page_draws_lines_and_areas_without_gaps():
-    x, y = np.array([0.0, 1.0, 2.0]), np.array([1.0, NAN, 3.0])
-    plain, dotted = drawn(Line(x, y, "red", "speed"), Line(x, y, "blue", dotted=True, width=2.0))["data"]
-    assert (plain["x"], plain["y"], plain["name"], plain["line"]["color"]) == ([0.0, 2.0], [1.0, 3.0], "speed", "red")
-    assert "name" not in dotted and dotted["line"]["width"] == 2.0 * plain["line"]["width"]
-    assert (plain["line"]["dash"], dotted["line"]["dash"], plain["xaxis"], plain["yaxis"]) == ("solid", "dot", "x", "y")
-    x, y = np.array([0.0, 1.0, 2.0, 5.0, 6.0]), np.array([-1.0, -2.0, 3.0, 4.0, 0.0])
-    left, right = drawn(Sides(x, y, 2.0))["data"]
-    assert (left["name"], right["name"]) == ("left", "right")
-    assert (left["line"]["color"], right["line"]["color"]) == (LEFT_COLOUR, RIGHT_COLOUR)
-    assert left["x"] == [0.0, 1.0, 2.0, 2.0, 3.5, 5.0] and left["y"] == [-1.0, -2.0, 0.0, 0.0, None, 0.0]
-    assert right["x"] == [1.0, 2.0, 2.0, 3.5, 5.0, 5.0, 6.0] and right["y"] == [0.0, 3.0, 0.0, None, 0.0, 4.0, 0.0]
-    zeros, _ = drawn(Sides(np.arange(8.0), np.array([0, 0, 0, -1, 0, 0, 0, -2.0]), 9.0))["data"]
-    assert zeros["x"] == [2.0, 3.0, 4.0, 6.0, 7.0] and zeros["y"] == [0.0, -1.0, 0.0, 0.0, -2.0]
 
 
 def test_the_picture_draws_the_same_charts(short_overview):

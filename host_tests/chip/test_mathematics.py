@@ -14,9 +14,7 @@ from kickstand.drive_alignment.quality import MIN_EVENTS
 from kickstand_tools.common import unix_port
 from kickstand_tools.deploy import bytecode
 from kickstand_tools.replay import replay_engine
-from kickstand_tools.rides import block_reader
 from kickstand_tools.signals import rotation_vector
-from kickstand_tools.simulated_board.gps import sentence
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 from support.emulated import PART, esp32, modules, pico
@@ -78,50 +76,6 @@ def test_the_same_log_gives_the_same_lean_on_an_esp32():
         code = "import replay_engine\nout = open('out', 'wb')\n"
         device.exec(code + "replay_engine.run(open('records', 'rb'), out)\nout.close()", 60.0)
         assert_equal_leans([host_result(), device.files()["out"]])
-
-
-_SENTENCE = sentence("GPRMC,235959.97,A,8959.99999,S,17959.99998,W,19.438,084.4,311226,,,A")
-_PLACE = """
-import gc
-from time import ticks_diff, ticks_ms, ticks_us
-from kickstand.rides.block import RideBlock
-from kickstand.speed.gps import Gps
-class Uart:
-    data = %r
-    def any(self):
-        return len(self.data)
-    def read(self, n):
-        data, self.data = self.data[:n], self.data[n:]
-        return data
-class Chip:
-    accel_lsb_per_g, gyro_lsb_per_dps, gyro_delay_s = 4096, 65.5, 0.0134
-    def temperature_c(self, counts):
-        return 31.25
-gps = Gps(Uart())
-block = RideBlock(5000)
-block.begin(512, 7, 3, 5, Chip(), 200, bytes(80))
-gps.poll(990)
-gps.poll(1000)
-gc.collect()
-heap, begin_us = gc.mem_alloc(), ticks_us()
-place = gps.place(1000)
-duration_us, heap = ticks_diff(ticks_us(), begin_us), gc.mem_alloc() - heap
-block.add_place(place)
-block.add([200] * 7, 2, 10000)
-block.close()
-print(duration_us, heap)
-print("".join("%%02x" %% byte for byte in block.buffer[:512]))
-"""
-
-
-@pytest.mark.long
-def test_position_on_the_chip_is_exact_fast_and_small(at_prompt):
-    costs, block = at_prompt.exec(_PLACE % _SENTENCE.encode(), 20.0).split("\n")[:2]
-    place = block_reader.parse(bytes.fromhex(block.strip())).turns[0].place
-    assert place == block_reader.Place(-89.0 - 59.99999 / 60, -179.0 - 59.99998 / 60, 1_798_761_599.97)
-    duration_us, heap = map(int, costs.split())
-    assert duration_us < 2000
-    assert heap < 200
 
 
 # The code before this script defines mount, clock, elapsed and allocated. After each sample of 50 ms come samples

@@ -7,7 +7,6 @@ import socket
 import pytest
 from kickstand_emulator import image
 from kickstand_emulator.console_server import ConsoleServer
-from kickstand_emulator.i2c_wires import Wires
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.i2c import Bus
@@ -35,115 +34,6 @@ class Memory:
 
     def read_byte(self):
         return self.sends.pop(0)
-
-
-class Pins:
-    """A controller in software: it drives the wires bit by bit, as the I2C standard says."""
-
-    def __init__(self, *devices):
-        self.bus = Bus(Clock(), 4, 5)
-        for device in devices:
-            self.bus.attach(device)
-        self.sda_in = self.scl_in = -1
-        self.sda = self.scl = 1
-        self.wires = Wires(self.bus, lambda level: setattr(self, "sda_in", level), self._scl_seen)
-
-    def _scl_seen(self, level):
-        self.scl_in = level
-
-    def drive(self, sda=None, scl=None):
-        self.sda = self.sda if sda is None else sda
-        self.scl = self.scl if scl is None else scl
-        self.wires.driven(self.sda, self.scl)
-
-    def start(self):
-        self.drive(sda=1)
-        self.drive(scl=1)
-        self.drive(sda=0)
-        self.drive(scl=0)
-
-    def stop(self):
-        self.drive(sda=0)
-        self.drive(scl=1)
-        self.drive(sda=1)
-
-    def bit(self, level):
-        self.drive(sda=level)
-        self.drive(scl=1)
-        level = self.sda_in
-        self.drive(scl=0)
-        return level
-
-    def write(self, value):
-        """Write a byte. Return True if a device acknowledges the byte."""
-        for place in range(7, -1, -1):
-            self.bit(value >> place & 1)
-        return not self.bit(1)
-
-    def read(self, more):
-        value = 0
-        for _ in range(8):
-            value = value << 1 | self.bit(1)
-        self.bit(0 if more else 1)
-        return value
-
-
-def test_bits_on_pins_write_and_read_a_device():
-    device = Memory(sends=b"\xa5\x00\xff\x01")
-    pins = Pins(device)
-    assert (pins.sda_in, pins.scl_in) == (1, 1)
-    pins.start()
-    assert [pins.write(value) for value in (ADDRESS << 1, 0x3C, 0xFF, 0x00)] == [True] * 4
-    assert pins.bus.open
-    pins.stop()
-    assert not pins.bus.open
-    assert (device.starts, device.written) == ([False], [0x3C, 0xFF, 0x00])
-    pins.start()
-    assert pins.write(ADDRESS << 1 | 1)
-    assert [pins.read(more) for more in (True, True, True, False)] == [0xA5, 0x00, 0xFF, 0x01]
-    pins.stop()
-    assert device.starts == [False, True]
-    assert device.written == [0x3C, 0xFF, 0x00]
-
-
-def test_a_repeated_start_turns_from_writing_to_reading():
-    device = Memory(sends=b"\x68")
-    pins = Pins(device)
-    pins.start()
-    assert pins.write(ADDRESS << 1) and pins.write(0x75)
-    pins.start()
-    assert pins.write(ADDRESS << 1 | 1)
-    assert pins.read(more=False) == 0x68
-    pins.stop()
-    assert (device.starts, device.written) == ([False, True], [0x75])
-    assert pins.bus.transfers == {ADDRESS: 1}
-
-
-def test_an_absent_or_full_device_does_not_acknowledge():
-    device = Memory(stores=1)
-    pins = Pins(device)
-    pins.start()
-    assert not pins.write(0x50 << 1) and not pins.write(0x12)
-    pins.stop()
-    pins.start()
-    assert not pins.write(0x50 << 1 | 1) and pins.read(more=False) == 0xFF
-    pins.stop()
-    pins.start()
-    assert [pins.write(value) for value in (ADDRESS << 1, 1, 2)] == [True, True, False]
-    pins.stop()
-    assert device.written == [1, 2]
-
-
-def test_clock_pulses_free_a_device_that_holds_the_wire():
-    pins = Pins(Memory())
-    pins.bus.hang(3)
-    pins.wires.show()
-    levels = []
-    for _ in range(4):
-        levels.append(pins.sda_in)
-        pins.drive(scl=0)
-        pins.drive(scl=1)
-    assert levels == [0, 0, 0, 1]
 
 
 def test_one_client_at_a_time_talks_to_the_console():

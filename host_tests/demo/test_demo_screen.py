@@ -1,15 +1,14 @@
 """The demo's picture, its score, its keys, and the check of a user's program."""
 
 import os
-import sys
 from typing import Any
 
 import pytest
 from kickstand_tools.common import unix_port
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.demo import keyboard, user_program
+from kickstand_tools.demo import user_program
 from kickstand_tools.demo.score import Score, State, table
-from kickstand_tools.demo.screen import bike, oled_lines, screen
+from kickstand_tools.demo.screen import oled_lines, screen
 from rich.console import Console
 
 STATE: State = {
@@ -71,26 +70,6 @@ def test_the_picture_fits_eighty_columns_with_title_and_time(paused, of_s, end):
         assert len(lines) == len(drawn()) - (of_s is None) and max(len(line.rstrip()) for line in lines) <= 80
 
 
-def columns(lean_deg, shown_deg, style):
-    """Return the columns of a style in the upper half of the bike's picture, from its middle."""
-    text, found = bike(lean_deg, shown_deg), []
-    for line in text.split("\n")[:6]:
-        for column, character in enumerate(line.plain):
-            styles = {str(span.style) for span in line.spans if span.start <= column < span.end}
-            if character != " " and style in styles:
-                found.append(column - 18.5)
-    return found
-
-
-@pytest.mark.parametrize("side", [-1, 1])
-def test_bike_and_dashed_line_lean_to_their_sides(side):
-    head = columns(30.0 * side, None, "cyan")
-    assert sum(head) / len(head) * side > 4.0
-    line = columns(0.0, 30.0 * side, "yellow")
-    assert line and all(column * side > 1.0 for column in line)
-    assert columns(0.0, None, "yellow") == []
-
-
 def test_each_pixel_of_an_oled_has_its_dot():
     """A braille character has two columns of four dots."""
     dots = {(0, 0): 0x01, (0, 1): 0x02, (0, 2): 0x04, (1, 0): 0x08, (1, 2): 0x20, (0, 3): 0x40, (1, 3): 0x80}
@@ -125,22 +104,6 @@ def test_the_score_compares_each_turn_by_hand():
         ["all", "4", "-10.0", "-10.0", "1.9", "-3.0"],
     ]
     assert lines_of(table(scored())) == ["The lean was not shown yet."]
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
-def test_keys_of_a_terminal_come_without_enter(monkeypatch):
-    import termios
-
-    ours, theirs = os.openpty()
-    with open(theirs) as terminal:
-        monkeypatch.setattr(sys, "stdin", terminal)
-        mode = termios.tcgetattr(terminal)
-        with keyboard.keyboard() as keys:
-            os.write(ours, b"b\x1b[Ca")
-            assert keys(5.0) == ["b", "right", "a"] and keys(0.0) == []
-            assert not termios.tcgetattr(terminal)[3] & termios.ICANON
-        assert termios.tcgetattr(terminal) == mode
-    os.close(ours)
 
 
 @pytest.mark.parametrize("engine", ["CPython", "MicroPython"])

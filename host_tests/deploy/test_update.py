@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from kickstand.rides import flash_ring
 from kickstand_tools.deploy import bytecode, firmware_files, flash, update
-from kickstand_tools.deploy.board_files import BoardFiles, fingerprint, survey
+from kickstand_tools.deploy.board_files import BoardFiles, fingerprint
 from kickstand_tools.deploy.update import needed_blocks, plan, refuse_without_room
 from littlefs_board import BLOCK, PORTS, LittlefsBoard
 from support import command, fake_board
@@ -65,15 +65,6 @@ def test_flat_modules_of_old_versions_are_removed(monkeypatch, ending):
     assert board.files() == expected
     assert board.folders() == {path.rpartition("/")[0] for path in expected} - {""}
     assert result and "files that are no longer part of the firmware" in result.out
-
-
-@pytest.mark.parametrize("name", ["/kickstand/lean", "/kickstand/errors/notes.txt", "/kickstand"])
-def test_file_in_the_way_is_reported_before_any_change(monkeypatch, name):
-    files = {"/main.py": contents(".py")["/main.py"], name: b"mine"}
-    board = fake_board.plug_in(monkeypatch, board_with(files))
-    result = command.run("flash")
-    assert result.status == 2 and f"{name[1:]} on the board is in the way of the firmware: move it" in result.err
-    assert board.files() == files and board.resets == 1
 
 
 SMALL_OLD = {
@@ -138,35 +129,6 @@ def test_interrupted_update_starts_nothing_and_is_repeatable():
     assert result.copied_bytes == 3 + 3000 + 3 + 3000 + 3000 and not result.config_differs
 
 
-def versions():
-    rows = [("nothing", ".mpy", "rp2"), ("flat .mpy", ".mpy", "esp32"), ("nested .mpy", ".py", "rp2")]
-    rest = [(version, ending, port) for port in PORTS for ending in (".mpy", ".py")
-            for version in ("nothing", "flat .mpy", "flat .py", "nested .mpy", "nested .py")]  # fmt: skip
-    return rows + [pytest.param(*row, marks=pytest.mark.long) for row in rest if row not in rows]
-
-
-@pytest.mark.parametrize(("version", "ending", "port"), versions())
-def test_reported_free_space_is_enough(monkeypatch, port, ending, version):
-    """With one free block less than reported, the update is refused and changes nothing. If the flash is full of rides,
-    the message says what to do."""
-    files = earlier(version)
-    board = fake_board.plug_in(monkeypatch, board_with(files | {"/rides/000/01/00000.rid": bytes(9999)}, port, ending))
-    present = survey(board)
-    blocks = needed_blocks(plan(contents(ending), present, False), present)
-    board.fill("/rides/000/01/00001.rid", blocks - 1)
-    before = board.files()
-    result = command.run("flash")
-    assert result.status == 2 and result.err.count("\n") == 1
-    needed_kb, free_kb = blocks * BLOCK // 1000, (blocks - 1) * BLOCK // 1000
-    assert f"not enough room on the board: {needed_kb} kB needed, {free_kb} kB free" in result.err
-    advice = "kickstand pull --delete, then flash again" if "nested" in version else "remove files of your own"
-    assert advice in result.err
-    assert board.files() == before and board.resets == 1
-    board.fill("/rides/000/01/00001.rid", blocks)
-    command.works("flash")
-    assert (contents(ending) | (CONFIG if files else {})).items() <= board.files().items()
-
-
 def listed(files, free_blocks=0):
     """Return a board with these files, as survey() lists it."""
     folders = frozenset(str(folder) for path in files for folder in PurePosixPath(path).parents) - {"/"}
@@ -185,12 +147,6 @@ def test_ring_of_rides_knows_the_size_of_the_firmware():
     ring treats the rest of the flash as space for rides."""
     used = board_with(contents(".mpy")).system.used_block_count * BLOCK
     assert used <= flash_ring.FIRMWARE <= used + 10 * BLOCK
-
-
-def test_plain_mpremote_needs_the_documented_space():
-    """Plain mpremote copies each .py file, and the .mpy file beside it stays on the board."""
-    blocks = sum(update.most_blocks(len(data), BLOCK) for data in contents(".py").values())
-    assert 0.9 * 730 < blocks * BLOCK / 1024 <= 730
 
 
 @pytest.mark.parametrize(

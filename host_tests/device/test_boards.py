@@ -55,11 +55,6 @@ def test_board_without_usual_pins_touches_none(machine, run):
     assert f"for this board ({chips.MACHINES[machine]}): set {NAMES}" in record.console
 
 
-def test_status_lists_the_missing_pins(status):
-    words = f"config.py: no usual pins are known for this board ({chips.MACHINES['s3']}): set {NAMES}"
-    assert status(machine="s3")[1] == "Settings     " + words
-
-
 SHOWN = {"LCD_SDA": 6, "LCD_SCL": 7}
 KEPT = "but it must be a number from 0 to 48, no pin of the chip's own"
 
@@ -70,16 +65,12 @@ KEPT = "but it must be a number from 0 to 48, no pin of the chip's own"
         ("c3", WIRED, SHOWN, "BUTTON_PIN", "set BUTTON_PIN"),
         ("c3", WIRED, {**SHOWN, "BUTTON_PIN": 10}, "SENSOR_SDA", "set SENSOR_SDA"),
         ("c3", WIRED, {**PINS, "SIDE": "rigth"}, "SIDE", "SIDE = 'rigth'"),
-        ("c3", WIRED, {**PINS, "SENSOR_SDA": 18}, "SENSOR_SDA", "SENSOR_SDA = 18"),
         # pins of the console, pins of the flash, and pins that are only inputs and would always read as pressed
         *[
             ("esp32", {}, {"BUTTON_PIN": pin}, "BUTTON_PIN", f"BUTTON_PIN = {pin}, {KEPT}")
             for pin in (1, 6, 11, 34, 39)
         ],
-        ("esp32 unicore", {}, {"BUTTON_PIN": 11}, "BUTTON_PIN", f"BUTTON_PIN = 11, {KEPT}"),
         ("esp32", {}, {"SENSOR_SDA": 6}, "SENSOR_SDA", f"SENSOR_SDA = 6, {KEPT}"),
-        ("esp32", {}, {"SPEED": "wheel", "WHEEL_PIN": 6}, "WHEEL_PIN", f"WHEEL_PIN = 6, {KEPT}"),
-        ("esp32", {}, {**GPS, "GPS_TX": 6}, "GPS_TX", f"GPS_TX = 6, {KEPT}"),
         ("esp32", {}, {**CARD, "SD_CS": 6}, "SD_CS", f"SD_CS = 6, {KEPT}"),
         # the PSRAM uses the usual pins of a GPS receiver
         ("esp32 spiram", {}, {"SPEED": "gps"}, "GPS_TX", "set GPS_TX, GPS_RX"),
@@ -95,17 +86,6 @@ def test_missing_or_wrong_pin_is_shown(machine, board, config, name, words, run)
     assert record.touched == ([6, 7] if machine == "c3" else [18, 19])
 
 
-@pytest.mark.parametrize(
-    ("machine", "config", "touched"),
-    [("c3", {**PINS, "LCD_SDA": 18}, {6, 7, 10}), ("pico", {"LCD_SDA": 2, "LCD_SCL": 2}, {2, 3})],
-)
-def test_display_with_wrong_pins_drives_no_other_pin(machine, config, touched, run):
-    record = run(on(machine, config, **WIRED))
-    assert record.ends == ["returned"]
-    assert "Kickstand stopped. config.py: " in record.console and "LCD_S" in record.console
-    assert set(record.touched) <= touched
-
-
 @pytest.mark.parametrize("driver", ["legacy", "new"])
 def test_stalled_bus_never_stops_the_loop_of_an_esp32(driver, run):
     """A fault holds the sensor's wires for a second, then the display's wires for a moment. Sensor and display work
@@ -118,18 +98,6 @@ def test_stalled_bus_never_stops_the_loop_of_an_esp32(driver, run):
     assert record.first("Raw   25°", 2.5) < 3.8
     assert record.first("Raw   30°", 5.0) < 6.3
     assert record.last[0].startswith("Raw   30°")
-
-
-@pytest.mark.parametrize("bits", [8, 60])
-def test_device_that_hangs_on_an_esp32_is_freed(bits, run):
-    """SoftI2C does not notice that a device holds SDA. Its clock pulses free the device. If they do not help, the
-    firmware rejects the readings."""
-    faults = [["stuck_sda", [2.0, bits]], ["stuck_sda", [2.0, bits, True]]]
-    record = run({**on("esp32", {}, 4), "lean": [[0, 25], [2.2, 35]], "faults": faults})
-    assert record.ends == ["off"]
-    assert record.first("Raw   3[1-5]°", 2.2) < 3.0
-    shown = {int(line[5:8]) for t_s, line, _ in record.frames if t_s > 1.0 and line.startswith("Raw")}
-    assert shown <= set(range(25, 36))  # only readings from before and after the fault are used
 
 
 @pytest.mark.parametrize("machine", ["pico", "esp32", "s3"])

@@ -82,20 +82,6 @@ def test_car_finds_its_alignment_and_shows_the_next_step(engine, run, stored):
 
 
 @pytest.mark.long
-def test_car_by_its_wheel_stores_at_standstill_only(run, stored, tmp_path):
-    """The alignment becomes ready in a braking event that ends at a slower speed, not at a stop."""
-    moving = [["brake", 4.0, 3.0], ["straight", 2.0], ["accelerate", 15.0, 6.0], ["straight", 5.0]]
-    ride = [["wait", 6.0], *town(2), ["accelerate", 15.0, 6.0], ["straight", 5.0], *moving * 4]
-    end_s = 66.0 + 11.0 + 4 * 16.0 + 13.0
-    files = []
-    plan = car("wheel", 2, wheel={"bounce_us": 2000})
-    plan |= {"ride": [*ride, ["brake", 0.0, 5.0], ["wait", 8.0]], "until": end_s}
-    record = run(plan, fit=lambda board: board.at(end_s - 9.0, lambda: files.extend(tmp_path.iterdir())))
-    assert files == [] and record.first("Ready:") < end_s - 20.0
-    assert record.first("Aligned by drive") > end_s - 9.0 and forward_error_deg(stored(), 3) < 1.5
-
-
-@pytest.mark.long
 def test_car_finds_out_that_its_sensor_was_remounted(run, stored, tmp_path):
     old = Calibration().with_alignment(sensor_errors.Sensor(seed=3).vehicle_from_sensor, [0.0] * 3, 0.0, True)
     Store(0x68, 8, str(tmp_path)).save(old)
@@ -138,28 +124,6 @@ def test_confirmed_kickstand_side_is_not_asked_for_again(run, stored):
     assert not stored().by_drive
 
 
-def test_press_for_a_page_does_not_answer_a_hidden_question(run, stored):
-    """The page with the sensor's information hides the question."""
-    page = [[BEGIN_S + 13.0, LONG], *([BEGIN_S + 15.0 + k, SHORT] for k in range(3)), [BEGIN_S + 18.0, LONG]]
-    record = run(wrong_side(*page, [ASKED_S, LONG], until_s=ASKED_S + 2.0))
-    assert record.at(ASKED_S - 0.5)[0].startswith("MPU6050")
-    assert record.at(ASKED_S + 1.5)[1].startswith("next")  # the menu
-    assert not stored().by_drive
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("model", "config"), [({"until_s": 65.0}, {}), ({}, {"PULSES_PER_METRE": 0.25})])
-def test_misleading_wheel_does_not_spoil_the_lean(model, config, run):
-    """If the wheel's wire breaks during the ride, the measured speed stays 0. With a second magnet the measured speed
-    is twice the true speed. The display reports either fault at the next stop."""
-    record = run(bike("wheel", 6, wheel=model, config=config))
-    for k in range(6):
-        assert record.lean_at(BEGIN_S + BLOCK_S * k + 9.0) == pytest.approx(-25 if k % 2 else 20, abs=4)
-    shown_s = record.first("Speed (stuck at|2.0 times)")
-    assert stops(shown_s, BEGIN_S)
-    assert record.at(shown_s + 2.0) == record.at(shown_s)  # the report stays until the rider answers or rides on
-
-
 @pytest.mark.long
 def test_errors_of_both_poses_are_found_while_riding(run, stored):
     """A pitch of two degrees on the kickstand gives a yaw error of almost ten degrees. The firmware refines forward at
@@ -186,25 +150,10 @@ def test_moved_mount_hides_the_lean_despite_other_messages(run):
     assert not record.leans(moved_s, 500.0)
 
 
-@pytest.mark.long
-def test_requested_drive_keeps_the_old_alignment_until_ready(aligned, run, stored):
-    """The rider has remounted the sensor and starts alignment by driving in the menu. During the drive the sensor
-    fails for a moment, without harm."""
-    old, kept = list(stored().vehicle_from_sensor), []
-    menu = [[2, LONG], *([4 + t, SHORT] for t in range(4)), [9, LONG]]
-    plan = {"ride": [["upright", 18.0], *town(5)], "seed": 8, "config": {"SPEED": "gps"}, "gps": {"hz": 5}}
-    plan |= {"presses": menu, "faults": [["nack_for", [0x68, 70.0, 2.0]]], "until": 170.0}
-    record = run(plan, fit=lambda board: board.at(60.0, lambda: kept.extend(stored().vehicle_from_sensor)))
-    assert kept == old
-    assert record.at(8.5)[0] == "→Align by drive " and record.first("Brakings") < 12.0
-    assert record.first("Aligned by drive") < INFINITE and forward_error_deg(stored(), 8) < 2.0
-
-
 @pytest.mark.parametrize(
     ("source", "model", "config", "blocks", "words"),
     [
         ("gps", {"faults": [["void", 0, 1000]]}, {}, 1, "GPS: no fix"),
-        pytest.param("gps", {"faults": [["stuck", 40, 1000]]}, {}, 2, "GPS: no fix", marks=LONG_TEST),
         pytest.param("gps", {"latency_s": 2.5}, {}, 5, "Speed 2.. s late", marks=LONG_TEST),
         pytest.param("wheel", {}, {"PULSES_PER_METRE": 0.5 / 3.6}, 5, "Speed 3.. times", marks=LONG_TEST),
         ("wheel", {"until_s": 40.0}, {}, 3, "Speed stuck at"),
@@ -214,12 +163,3 @@ def test_unusable_speed_is_reported_and_nothing_is_stored(source, model, config,
     record = run({**car(source, blocks, config=config), source: model})
     assert record.first(words) < INFINITE
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.long
-def test_temporary_loss_of_speed_is_reported_and_harmless(run, stored):
-    faults = [["unplugged", 15, 30], ["garbled", 45, 62]]
-    record = run(car("gps", 6, gps={"faults": faults}))
-    assert record.first("GPS silent") == pytest.approx(21.0, abs=3.0)
-    assert record.first("GPS garbled") == pytest.approx(51.0, abs=4.0)
-    assert record.first("Aligned by drive") < INFINITE and forward_error_deg(stored(), 3) < 1.5

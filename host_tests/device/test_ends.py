@@ -53,16 +53,3 @@ def test_display_at_another_address_is_found_without_a_loop(aligned, run, status
     assert run(plan | {"presses": [[0.0, 1.0]]}).last[0] == "Safe mode       "
     assert run(plan | {"config": {"SIDE": "up"}}).last == ("config.py: wrong", "SIDE            ")
     assert "Display      LCD at 0x24" in status(**board)
-
-
-@pytest.mark.usefixtures("aligned")
-def test_streamed_ride_ends_without_a_lean(boards, run):
-    """`kickstand record` starts the app, not main.py."""
-
-    def fit(board):
-        boards.append(board)
-        board.at(3.0, lambda: 1 / 0)
-
-    with pytest.raises(ZeroDivisionError):
-        run(LEAN | {"stream": True}, fit=fit)
-    assert tuple(boards[0].lcd.text()) == STOPPED

@@ -7,8 +7,6 @@ import subprocess
 
 import pytest
 from kickstand_tools.common import firmware_path, unix_port
-from kickstand_tools.deploy import bytecode
-from support import emulated
 
 # This code defines for each function: (the function in use, name of its plain version).
 _CHOSEN = """
@@ -79,29 +77,10 @@ def test_wrong_machine_code_is_not_used(tmp_path, path, name):
     assert chosen == [f"{other} {'plain' if other == name else 'quick'}" for other in NAMES]
 
 
-@pytest.mark.parametrize(
-    ("path", "error"),
-    [
-        ("imu/fifo_frames_viper.py", 'MemoryError("no memory to run it from")'),
-        ("calibration/transform_viper.py", 'ValueError("incompatible .mpy arch")'),
-        ("rides/block_viper.py", 'MemoryError("no memory to run it from")'),
-        ("lean/kalman_viper.py", 'MemoryError("no memory to run it from")'),
-    ],
-)
-def test_machine_code_that_cannot_be_loaded_is_not_used(tmp_path, path, error):
+@pytest.mark.parametrize("path", sorted({path for path, _ in MISTAKES}))
+def test_machine_code_that_cannot_be_loaded_is_not_used(tmp_path, path):
     """An ESP32 runs machine code from a separate memory, which may be too small. The lean meter works without machine
     code."""
     without = [name for other, name in MISTAKES if other == path]
-    chosen = imported(tmp_path, path, error=error)
+    chosen = imported(tmp_path, path, error='MemoryError("no memory to run it from")')
     assert chosen == [f"{name} {'plain' if name in without else 'quick'}" for name in NAMES]
-
-
-@pytest.mark.chip
-@pytest.mark.long
-def test_a_picos_status_reports_wrong_machine_code(tmp_path):
-    path = "imu/fifo_frames_viper.py"
-    write_broken(path, "add_up", tmp_path / "broken.py")
-    wrong = {f"/kickstand/{path[:-3]}.mpy": bytecode.cross_compiled(tmp_path / "broken.py")}
-    with emulated.pico(emulated.leaning(20), emulated.modules() | wrong) as pico:
-        said = pico.exec("import kickstand\nkickstand.status()", 20)
-    assert "Machine code not used for add_up_python: slower code runs instead" in said

@@ -1,6 +1,5 @@
 """How a rider uses the device: two presses and a ride, refused poses, pages, menu, power-off."""
 
-import random
 import re
 from typing import Any
 
@@ -68,28 +67,6 @@ def test_unusable_poses_are_refused_and_repeated(lean, complaint, run, tmp_path)
     assert list(tmp_path.iterdir()) == []  # nothing was stored in flash
 
 
-@pytest.mark.parametrize(("share", "aligned"), [(0.5, False), (-1.0, False), (0.95, True), (1.05, True)])
-def test_poses_are_compared_with_the_gyro(share, aligned, run):
-    """The sensor's axes are the bike's, so the bike rolls about the sensor's z. share: the gyro's scale about z."""
-
-    def fit(board):
-        world = board.sensor.world
-        board.sensor.world = lambda t_s: (*world(t_s)[:5], share * world(t_s)[5], 25.0)
-
-    record = run({"lean": POSES, "presses": [[2, SHORT], [9, SHORT]], "until": 14}, fit=fit)
-    assert (record.first("Aligned!") < 14) == aligned
-    assert (record.first("Tilt 12°, gyro") < 14) != aligned
-    assert ("not aligned: between the poses are 12.0 degrees" in record.console) != aligned
-
-
-def test_knock_during_a_pose_repeats_it(run):
-    lean = [[0, -12], [4, -20], [4.1, -12], [16, 0]]
-    record = run({"lean": lean, "presses": [[2, SHORT], [9, SHORT], [17, SHORT]], "until": 22})
-    assert record.at(7)[0].startswith("Moved!")
-    assert record.at(9.6)[0].startswith("Stand: hold")
-    assert record.first("Aligned!") < 22
-
-
 def test_refused_alignment_keeps_the_old_one(aligned, run):
     files = {path.name: path.read_bytes() for path in aligned.iterdir()}
     menu_align = [[2, LONG], [4, LONG], [6, SHORT], [11, SHORT]]
@@ -127,23 +104,6 @@ def test_pages_and_menu(run):
     info = {record.at(menu_s + after_s)[1] for after_s in (15.5, 17.5)}
     assert len(info & {"6pos no  ali yes", "0 gaps 1 starts ", "samples lost   0", "I2C address 0x68"}) == 2
     assert record.last[0].startswith("Max left")
-
-
-@pytest.mark.parametrize(("engine", "display"), [("cpython", "lcd"), ("micropython", "ssd1306")])
-def test_presses_and_unplugs_at_random(engine, display, run):
-    """Every menu and wizard has ended 45 s after the last press. Then a page is shown as usual."""
-    dice = random.Random(3)
-    presses, faults = [[2, SHORT], [12, SHORT]], []
-    for k in range(100):
-        at_s = 18.0 + 0.2 * k
-        if dice.random() < 0.6:
-            presses.append([at_s, dice.choice((0.1, SHORT, 0.9))])
-        else:
-            faults.append(["unplug_lcd", [at_s, dice.choice((0.001, 0.05, 0.25))]])
-    plan = {"presses": presses, "until": 83, "board": {"display": display}, "faults": faults}
-    record = run({"ride": RIDE, **plan}, engine)
-    assert record.ends == ["off"]
-    assert record.last[0].strip() not in ("", "?")
 
 
 @pytest.mark.long

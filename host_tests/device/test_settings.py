@@ -1,12 +1,11 @@
 """The limits of each setting in config.py, the settings that do not fit together, and the words of errors."""
 
-import sys
 import types
 from typing import Any
 
 import pytest
 from kickstand import console
-from kickstand.errors import CardError, Notice, Refusal, SettingsError, attempt, checked, tried
+from kickstand.errors import Notice, SettingsError
 from kickstand_tools.simulated_board.simulator import Board
 from support.board_access import level
 
@@ -75,7 +74,9 @@ def test_value_beyond_the_limits_is_replaced(name):
     ("config", "code", "values"),
     [
         ({"BUTTON_PIN": 4}, "pin-twice", ("",)),
-        ({"LCD_I2C": 0}, "one-i2c", ("LCD_I2C", 0)),
+        ({"LCD_I2C": 0, "LCD_SDA": 8, "LCD_SCL": 9}, "one-i2c", ("LCD_I2C", 0)),
+        ({"LCD_SDA": 8, "LCD_SCL": 9}, "i2c-number", ("LCD_SDA", "LCD", 8, 9, 1)),
+        ({"SENSOR_SDA": 2}, "i2c-number", ("SENSOR_SDA", "SENSOR", 2, 5, 0)),
         ({"VEHICLE": "car"}, "needs-speed", ("SPEED",)),
         ({"SAMPLE_HZ": 100, "DLPF": 2}, "aliasing", ("DLPF", 2, 100)),
         ({"SD_SPI": 0}, "card-pins", ("SD_SCK",)),
@@ -83,6 +84,8 @@ def test_value_beyond_the_limits_is_replaced(name):
         ({**CARD, "SD_CS": None}, "card-pins", ("SD_CS",)),
         ({**CARD, "SD_CS": 15}, "pin-twice", ("",)),
         ({"SPEED": "gps", "GPS_RX": 15}, "pin-twice", ("",)),
+        ({"SENSOR_SDA": 2}, "i2c-pins", ("SENSOR_SDA", "SENSOR", 2, 5, 0)),
+        ({"LCD_SDA": 8, "LCD_SCL": 9}, "i2c-pins", ("LCD_SDA", "LCD", 8, 9, 1)),
         ({"SIDES": "left"}, "no-setting", ("SIDES",)),
         ({"side": "left"}, "no-setting", ("side",)),
     ],
@@ -99,71 +102,22 @@ def test_other_names_and_a_complete_card_are_accepted():
 
 
 @pytest.mark.parametrize(
-    ("config", "hz"),
-    [
-        ({}, 100_000),
-        ({"DISPLAY": "sh1106"}, 400_000),
-        ({"LCD_BUS_HZ": 200_000}, 200_000),
-        ({"SENSOR_BUS_HZ": 150_000, "DISPLAY": "ssd1306"}, 150_000),
-    ],
-)
-def test_shared_bus_runs_at_the_slower_clock(config, hz):
-    values, error = settings(LCD_SDA=4, LCD_SCL=5, **config)
-    assert error is None and values.one_bus and values.LCD_I2C == values.SENSOR_I2C
-    assert values.SENSOR_BUS_HZ == values.LCD_BUS_HZ == hz
-    assert not settings()[0].one_bus
-
-
-@pytest.mark.parametrize(
     ("name", "config", "code", "values"),
     [
-        ("SENSOR", {"SENSOR_SDA": 2}, "i2c-pins", ("SENSOR_SDA / SCL", "SENSOR", 2, 5, 0)),
-        ("LCD", {"LCD_SDA": 8, "LCD_SCL": 9}, "i2c-pins", ("LCD_SDA / SCL", "LCD", 8, 9, 1)),
         ("button", {"BUTTON_PIN": 47}, "no-such-pin", ("BUTTON_PIN", 47)),
         ("speed", {"SPEED": "gps", "GPS_RX": 11}, "uart-pins", ("GPS_TX / GPS_RX", 8, 11, 1)),
     ],
 )
 def test_pins_that_the_chip_cannot_use_are_named(name, config, code, values, on_board):
     def opened(board, settings):
-        from kickstand.devices import open_bus, open_button
+        from kickstand.devices import open_button
         from kickstand.speed.source import open_speed
 
-        others = {"button": open_button, "speed": open_speed}
         with pytest.raises(SettingsError) as refused:
-            others[name](settings) if name in others else open_bus(settings, name, 400_000)
+            {"button": open_button, "speed": open_speed}[name](settings)
         return refused.value.code, refused.value.values[: len(values)]
 
     assert on_board(opened, config) == (code, values)
-
-
-def test_sensor_has_its_settings(on_board):
-    def opened(board, settings):
-        from kickstand.devices import open_sensor
-
-        sensor = open_sensor(settings)
-        sensor.set_up()
-        chip = sensor.chip
-        return chip.address, chip.accel_range_g, chip.accel_lsb_per_g, round(chip.gyro_lsb_per_dps, 1), chip.period_ms
-
-    config = {"ACCEL_RANGE_G": 4, "GYRO_RANGE_DPS": 1000, "DLPF": 4, "SAMPLE_HZ": 100, "SENSOR_ADDRESS": 0x69}
-    assert on_board(opened, config, sensor_address=0x69) == (0x69, 4, 8192, 32.8, 10)
-
-
-@pytest.mark.parametrize(("config", "too_fast"), [({}, False), ({"LCD_BUS_HZ": 400_000}, True)])
-@pytest.mark.parametrize("wiring", [1, 3])
-def test_display_has_its_clock_and_wiring(config, too_fast, wiring, on_board):
-    """A PCF8574 allows 100 kHz."""
-
-    def shown(board, settings):
-        from kickstand.devices import open_lcd
-
-        board.lcd.wiring = wiring
-        lcd = open_lcd(settings)
-        lcd.show("one", "two")
-        lcd.flush()
-        return board.too_fast, [text.strip() for text in board.lcd.text()], lcd.address
-
-    assert on_board(shown, {**config, "LCD_WIRING": wiring}) == (too_fast, ["one", "two"], 0x27)
 
 
 @pytest.mark.parametrize(
@@ -171,53 +125,10 @@ def test_display_has_its_clock_and_wiring(config, too_fast, wiring, on_board):
     [
         (Notice("gyro-scale", "z", -31.4), "about z with -31 %: another sensor"),
         (Notice("gyro-tilt", 11.26, 7.0), "between the poses are 11.3 degrees, but by the gyro 7.0:"),
-        (Notice("unknown-chip", 0x0C), "WHO_AM_I 0x0c: set ACCEPT_WHO_AM_I = 0x0c in"),
         (SettingsError("aliasing", "DLPF", 2, 100, 3), "alias at SAMPLE_HZ = 100: set DLPF = 3"),
         (SettingsError("not-allowed", "SIDE", "up", "left"), "config.py: SIDE = 'up', but it must be left"),
-        (CardError("card-fault", "EIO"), "recording stopped: EIO"),
     ],
 )
 def test_sentence_has_the_values_of_its_refusal(refusal, words):
     sentence = console.sentence(refusal)
     assert words in sentence and "\n" not in sentence and "|" not in sentence
-
-
-def test_words_are_found_by_the_whole_code():
-    table = "\na|first {}\nab|second {} of {}\nc|third\n"
-    assert Notice("ab", 1, 2).words(table) == "second 1 of 2"
-    assert Notice("a", 5).words(table) == "first 5"
-    assert Refusal("c").words(table) == "third"
-    assert Notice("x", 7).words(table, "other {}") == "other 7" and Notice("b").words(table) == ""
-
-
-def test_missing_module_or_memory_is_a_notice(capsys):
-    def lacking():
-        sys.modules["half_imported"] = types.ModuleType("half_imported")
-        raise ImportError("no module")
-
-    def full():
-        raise MemoryError("no heap")
-
-    for function, code, text in ((lacking, "incomplete", "no module"), (full, "no-memory", "no heap")):
-        notice = tried(function)
-        assert notice and (notice.code, notice.values) == (code, (text,))
-        assert "half_imported" not in sys.modules
-    assert tried(len, "x") is None and attempt(len, "x") is None
-    with pytest.raises(ZeroDivisionError):
-        tried(lambda: 1 / 0)
-
-
-@pytest.mark.parametrize(
-    ("result", "change", "used"), [(0, 0, True), (1, 0, False), (0, 1, False)], ids=["same", "result", "change"]
-)
-def test_machine_code_with_other_results_is_not_used(result, change, used, capsys):
-    def plain(values, n):
-        values[0] += n
-        return n
-
-    def quick(values, n):
-        values[0] += n + change
-        return n + result
-
-    assert checked(quick, plain, bytearray(2), 3) is (quick if used else plain)
-    assert (capsys.readouterr().out == "") is used

@@ -1,13 +1,9 @@
 """The start by main.py: safe mode, wrong settings, incomplete firmware, too little memory."""
 
-import subprocess
 import sys
 
 import pytest
-from kickstand.errors import StoreError, report
-from kickstand_tools.common import firmware_path
-from support import mpy
-from support.device_runs import FreshFirmware, take_firmware
+from support.device_runs import FreshFirmware
 
 INCOMPLETE, NO_MEMORY = ["Incomplete:     ", "flash it again  "], ["No memory for it", "restart it      "]
 RAW = {"lean": [[0, 25]]}
@@ -106,7 +102,6 @@ def test_too_little_memory_for_the_settings_is_shown_before_a_restart(without, r
     [
         ("ui.align_wizard", 0, ImportError),
         ("calibration.pose_taker", 1, MemoryError),
-        ("rides.recorder", 4, ImportError),
     ],
 )
 def test_failed_import_of_a_menu_entry_is_shown_each_time(module, entry, error, without, run):
@@ -134,8 +129,6 @@ CARD = {"SD_SPI": 0, "SD_SCK": 18, "SD_MOSI": 19, "SD_MISO": 16, "SD_CS": 17}
         ("rides.recorder", MemoryError, {"RECORD": True}, NO_MEMORY),
         ("rides.card_trial", ImportError, {"RECORD": True, **CARD}, INCOMPLETE),
         ("live.radio", ImportError, {"LIVE": True}, INCOMPLETE),
-        ("live.live", ImportError, {"LIVE": True}, INCOMPLETE),
-        ("live.radio", MemoryError, {"LIVE": True}, ["No Bluetooth:   ", "no memory       "]),
         ("live.live", MemoryError, {"LIVE": True}, ["No Bluetooth:   ", "no memory       "]),
     ],
 )
@@ -148,59 +141,3 @@ def test_lean_continues_without_recorder_or_radio(module, error, config, lines, 
     words = "incomplete firmware (no module" if error is ImportError else "memory allocation"
     assert 1 <= record.console.count(words) <= 2
     assert not boards[0].radio.active
-
-
-@pytest.mark.parametrize("error", [ImportError, MemoryError])
-@pytest.mark.usefixtures("aligned")
-def test_oled_without_its_pictures_shows_lines(error, without, run):
-    without("ui.glance", error)
-    record = run({**RAW, "board": {"display": "ssd1306"}, "until": 4})
-    assert record.ends == ["off"] and record.last[0].startswith("Lean  25° right")
-    assert record.console.count("incomplete firmware" if error is ImportError else "no memory for that") == 1
-
-
-def test_display_without_its_driver_is_probed_less_often(without, run):
-    """The pauses between attempts are 0.4, 0.8, 1.6, 3.2, 6.4 and 12.8 s."""
-    without("board.oled", ImportError)
-    record = run({**RAW, "board": {"display": "ssd1306"}, "until": 30})
-    assert record.ends == ["off"] and 6 <= record.console.count("incomplete firmware") <= 8
-
-
-def test_failed_import_can_be_repeated(tmp_path):
-    """If an import is interrupted, MicroPython keeps the incomplete module. The next import must load it again."""
-    (tmp_path / "outer.py").write_text("import inner\n\n\nclass Outer:\n    inner = inner.Inner\n")
-    (tmp_path / "inner.py").write_text("import memory\n\nmemory.take()\n\n\nclass Inner:\n    pass\n")
-    (tmp_path / "memory.py").write_text(
-        "left = [0, 1]\n\n\ndef take():\n    if not left.pop():\n        raise MemoryError('none')\n"
-    )
-    script = f"""
-import sys
-sys.path[1:1] = [{str(tmp_path)!r}, {firmware_path.search_path()!r}]
-import memory
-from kickstand.errors import attempt
-def use():
-    from outer import Outer
-    objects.append(Outer())
-objects = []
-memory.left.reverse()
-first = attempt(use)
-print(first.code, first.values, objects, sorted(name for name in sys.modules if name in ("outer", "inner", "memory")))
-print(attempt(use), len(objects))
-"""
-    cpython = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
-    for output in (cpython, mpy.run_mpy(script)):
-        assert output.splitlines()[1:] == ["no-memory ('none',) [] ['memory']", "None 1"]
-
-
-def test_report_without_its_words_gives_its_code(without, on_board, capsys):
-    """After a failure of flash or heap, the module with the words may not load."""
-    on_board(lambda *_: report(StoreError("not-written", "EIO")))
-    take_firmware()
-    without("console", ImportError)
-    on_board(lambda *_: report(StoreError("not-written", "EIO")))
-    assert capsys.readouterr().out == "calibration not saved: EIO; the old one is kept\nnot-written\n"
-
-
-def test_table_of_settings_leaves_the_heap_again(on_board):
-    on_board(lambda board, settings: None)
-    assert "kickstand.setting_table" not in sys.modules and not hasattr(sys.modules["kickstand"], "setting_table")

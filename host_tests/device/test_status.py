@@ -3,7 +3,6 @@
 import re
 
 import pytest
-from kickstand_tools.simulation.scripted import script, sensor_errors
 from support.board_access import rough
 
 
@@ -39,14 +38,6 @@ def test_memory_and_the_time_to_write_flash(status, tmp_path):
     words = line(status(fit=lambda board: board.faults.slow_flash(0.0, 60.0, 0.037)), "Memory")
     assert re.fullmatch(r"117 KB free; flash \d+ KB free, 3[789] ms to write a block", words)
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.usefixtures("aligned")
-def test_alignment_is_printed(status):
-    lines = status()
-    assert line(lines, "Calibration").startswith("six positions: no, aligned: yes; ")
-    rows = [[float(x) for x in text.split()[1:]] for text in lines if text.split()[0] in ("left", "up", "forward")]
-    assert [max(row) > 0.999 for row in rows] == [True] * 3
 
 
 @pytest.mark.parametrize(
@@ -98,20 +89,4 @@ def test_last_run_has_its_worst_values(status):
     assert 245.0 < float(words[1]) < 275.0 and 15 <= int(words[2]) <= 25
     assert line(lines, "Vibration") == (
         "largest force 0.5 0.3 0.8 g of 16; 0.00 % of the readings lost at the end of the range"
-    )
-
-
-@pytest.mark.usefixtures("aligned")
-def test_reading_that_did_not_fit_is_named(status):
-    """From 12 s on the force to the left is 0.5 g too large, as with a sensor that has moved."""
-    ride = script.Ride([*map(tuple, (script.upright(2.0), script.accelerate(15.0, 4.0), script.straight(60.0)))])
-    world = sensor_errors.Sensor().world(ride.motion)
-
-    def shifted(t_s):
-        reading = world(t_s)
-        return (reading[0] + 0.5 * (t_s > 12.0), *reading[1:])
-
-    lines = status(world=shifted, ride_s=30.0)
-    assert line(lines, "Sensor odd").startswith(
-        "the readings did not fit, again and again: force to the left. Check SIDE"
     )

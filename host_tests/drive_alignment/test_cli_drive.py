@@ -102,14 +102,6 @@ def test_several_logs_of_one_mount_are_combined(tmp_path):
         assert len(times) >= 3 and times == pytest.approx(list(ends[: len(times)]), abs=2.0)
 
 
-def test_a_drive_that_begins_in_motion_counts_from_its_beginning(tmp_path):
-    """The gyro's bias is known only from the stop at the end, and is subtracted from the whole drive."""
-    legs = [*around(6, stands=False)[1:], [20.0, -1.0, 0.0], list(STAND)]
-    log = record(tmp_path / "drive.csv", legs, start_mps=12.0)
-    command.works("calibrate", "drive", log, "--out", tmp_path / "CAL.json")
-    assert max(errors(matrix_in(tmp_path / "CAL.json"), MOUNT)) < 0.5
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_a_motorcycle_whose_pitch_changed_on_the_kickstand(tmp_path, side):

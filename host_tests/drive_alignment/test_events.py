@@ -192,28 +192,3 @@ def test_the_quality_of_a_drive_by_numpy():
     assert quality.halves_deg == pytest.approx(abs(np.mean(angles[3:]) - np.mean(angles[:3])), rel=1e-3)
     assert quality.good and quality.agree and quality.parts.count == 6
     assert quality.mount_problem is None and quality.speed_problem is None
-
-
-@pytest.mark.parametrize(
-    ("drive", "events", "good", "speed", "mount"),
-    [
-        ({"counted": 4}, {}, False, None, None),
-        ({"counted": 5}, {}, True, None, None),
-        ({"counted": 1, "lag_s": 2.0}, {}, False, None, None),
-        ({"counted": 2, "lag_s": 2.0}, {}, False, ("speed-late", 2.0), None),
-        ({}, {"ratio": 1 / 3.6}, True, ("speed-unit", pytest.approx(3.6, rel=1e-3)), None),
-        ({}, {"pitches": [0.0] * 3 + [6.8] * 3}, True, None, None),
-        ({}, {"pitches": [0.0] * 3 + [7.5] * 3}, True, None, ("mount-moved", "parts")),
-        ({"is_car": False}, {"pitches": [0.0] * 3 + [7.5] * 3}, True, None, None),
-        ({}, {"pitches": [-4.1] * 3 + [4.1] * 3}, True, None, ("mount-moved", "vertical", pytest.approx(8.2))),
-        ({}, {"pitches": [8.5]}, True, None, ("mount-moved", "since-standing", pytest.approx(8.5))),
-        ({}, {"angles": [0.0] * 3 + [29.0] * 3}, False, None, None),
-        ({}, {"angles": [0.0] * 3 + [31.0] * 3}, False, None, ("mount-moved", "forward")),
-    ],
-)
-def test_faults_of_speed_and_mount_have_their_limits(drive, events, good, speed, mount):
-    quality = Drive(**drive).judge(**{"angles": [0.0] * 6, **events})
-    problems = [
-        problem and (problem.code, *problem.values) for problem in (quality.speed_problem, quality.mount_problem)
-    ]
-    assert (quality.good, *problems) == (good, speed, mount)

@@ -9,6 +9,16 @@ PRIOR = Prior.of_pose(six_done=True)
 PLACE = {int(index): k for k, index in enumerate(PRIOR.unknown)}  # the place of each estimated parameter
 
 
+def test_six_positions_make_the_accelerometer_certain():
+    """Without them, the data sheet's limits hold. Bikes differ in geometry, tyres and fork."""
+    for six_done, sensor in ((True, [0.001, 0.003, 0.003, 0.004]), (False, [0.04, 0.04, 0.04, 0.015])):
+        assert Prior.of_pose(six_done).sigma[[21, 22, 23, of.UP_SCALE]].tolist() == sensor
+    assert np.degrees(PRIOR.sigma[of.ROTATION]) == pytest.approx([1.5, 5.0, 2.0])
+    bike = [of.HEIGHT, of.AHEAD, of.TYRES, of.DELAY, of.DIVE]
+    assert PRIOR.mean[bike].tolist() == [0.5, 0.6, 0.07, 0.4, 0.026]
+    assert PRIOR.sigma[bike].tolist() == [0.3, 0.5, 0.06, 0.4, 0.035]
+
+
 def test_a_measured_gyro_is_not_estimated_again():
     sigma = np.full((3, 3), 0.003)
     sigma[0, 0] = 0.05

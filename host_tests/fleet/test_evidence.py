@@ -59,20 +59,6 @@ def test_a_bend_is_speed_times_yaw_rate_to_the_left():
     assert driven.weight[5:15] == pytest.approx(1.0 / (1.0 + (12.0 / 20.0) ** 2), rel=0.03)
 
 
-def test_a_motorcycle_has_no_force_to_the_left_and_no_sway():
-    log, c = log_of(20.0, 10.0, 12.0), 10.0 * np.radians(12.0) / G
-    log.accel_g[:] = [0.0, np.sqrt(1.0 + c * c), 0.0]
-    driven = intervals(log, "motorcycle")
-    assert driven.terms == pytest.approx(np.tile([np.sqrt(1.0 + c * c), 0.0, 0.0, 0.0], (20, 1)))
-    assert not driven.sway.any() and driven.weight == pytest.approx([1.0] * 20)
-
-
-def test_a_late_speed_belongs_to_an_earlier_time():
-    log = log_of(20.0, lambda t_s: np.clip(t_s - 10.0, 0.0, 5.0))
-    driven = intervals(Log(log.t_s, log.accel_g, log.gyro_dps, np.roll(log.speed_mps, 25), name="late"), lag_s=0.5)
-    assert driven.t_s[0] == pytest.approx(0.5) and driven.force[:, 2] == pytest.approx(driven.terms[:, 1], abs=0.002)
-
-
 def test_blocks_are_sums_over_eight_seconds_of_one_log():
     driven = intervals(log_of(32.0, lambda t_s: 10.0 + 3.0 * np.sin(t_s)))
     empty = evidence.Intervals(*(values[:0] for values in vars(driven).values()))

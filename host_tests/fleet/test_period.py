@@ -1,7 +1,6 @@
 """The result of one mount of one vehicle: its status, its reasons, its rows, and what a bad log costs."""
 
 import errno
-import os
 from pathlib import Path
 
 import numpy as np
@@ -123,25 +122,6 @@ def test_a_bad_log_costs_its_own_row_only(fleet, results):
     assert [(row["log"], row["reason"]) for row in result.errors] == [(str(vehicle.paths[0]), "unreadable")]
     assert (result.alignment["logs"], result.alignment["logs_left_out"]) == (len(vehicle.paths) - 1, 1)
     assert result.alignment["status"] == "aligned" and result.brake_tests
-
-
-def test_a_vehicle_without_any_log_has_an_error(tmp_path):
-    """A log that was read but refused makes it refused. Names that are not UTF-8 are printable."""
-    for name in ("bad", "bad\udcff"):
-        (tmp_path / f"{name}.csv").write_text("nothing")
-    result_of(tmp_path, without_speed(drive(21, seconds=60.0)[0]))
-    os.mkfifo(tmp_path / "pipe.csv")
-    for names, status, reasons in (
-        (["bad", "none", "bad\udcff", "pipe"], "error", ["unreadable"] * 4),
-        (["bad", "1"], "refused", ["unreadable", "no-speed"]),
-    ):
-        paths = tuple(str(tmp_path / f"{name}.csv") for name in names)
-        result = work_on_period(Period("v\udcff", "m", "car", paths))
-        row = result.alignment
-        assert (row["vehicle"], row["mount"], row["status"], row["reason"]) == ("v\\udcff", "m", status, reasons[-1])
-        assert (row["logs"], row["logs_left_out"], row["plot"]) == (0, len(names), "")
-        assert [row["reason"] for row in result.errors] == reasons
-        assert [row["log"] for row in result.errors] == [files.printable(path) for path in paths]
 
 
 @pytest.mark.parametrize(

@@ -107,25 +107,6 @@ def test_an_export_replays_as_the_ride_it_was_made_from(tmp_path, name):
         assert log.utc_s[valid] - START_UTC_S == pytest.approx(t_s[valid], abs=0.02)
 
 
-def test_a_phyphox_file_with_all_sensors_is_read(tmp_path):
-    """If an experiment combines sensors, "Raw Data.csv" has a column with the time before the columns of each
-    sensor."""
-    ride = riding().every(2)
-    late = ride.every(2, 1)
-    names = ["Time (s)", *[f"Acceleration {axis} (m/s^2)" for axis in "xyz"]]
-    names += ["Gyroscope time (s)", *[f"Gyroscope {axis} (rad/s)" for axis in "xyz"]]
-    rows = []
-    for k, t in enumerate(ride.t_s):
-        row = [f"{value:.6f}" for value in (t, *(9.81 * ride.phone_g[k]))]
-        row += [f"{v:.6f}" for v in (late.t_s[k], *late.phone_rad[k])] if k < len(late.t_s) else [""] * 4
-        rows.append(row)
-    (tmp_path / "Raw Data.csv").write_text(app_exports.lines([f'"{name}"' for name in names], rows))
-    imported = api.import_recording(tmp_path / "Raw Data.csv")
-    assert [round(taken.rate_hz) for taken in imported.taken] == [100, 50]
-    rates = np.interp(imported.log.t_s + imported.log.start_s, ride.t_s, np.degrees(ride.phone_rad[:, 1]))
-    assert imported.log.gyro_dps[:, 1] == pytest.approx(rates, abs=3.0)
-
-
 def test_a_pause_of_phyphox_is_a_gap(tmp_path):
     """The time of an experiment stops during a pause. The file meta/time.csv shows how long the pause was."""
     files = app_exports.phyphox(riding().every(2))

@@ -187,7 +187,7 @@ READ = {
     )),
     "axes by words": text_of(
         ROW, head='"Format","MoTeC CSV File"\n\n"Time","G Force Long","G Force Lat","G Force Vert","Gyro Roll Rate",'
-        '"Gyro Pitch Velocity","Gyro Yaw Velocity"\n"s","G","G","G","deg/s","deg/s","deg/s"\n',
+        '"Gyro Pitch Rate","Gyro Yaw Rate"\n"s","G","G","G","deg/s","deg/s","deg/s"\n',
     ),
     "axes of a web page": text_of(
         "{0:.0f},0.1,0.2,-0.1,{1:.4f},{2:.4f},{3:.4f},{6:.4f},{4:.4f},{5:.4f}", 1e3, G, 1.0, "timeStamp,"

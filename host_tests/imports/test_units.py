@@ -117,24 +117,6 @@ def test_gravity_shows_the_unit_of_accelerations(length, stated, unit, certain):
     assert finding.why.startswith("gravity at rest is ")
 
 
-@pytest.mark.parametrize(
-    ("most", "moving", "unit"),
-    [(2.9, True, "rad/s"), (3.1, True, "deg/s"), (999.0, True, "deg/s"), (1001.0, True, "mdeg/s"),
-     (0.1, False, "deg/s"), (0.1 / 57.3, False, "rad/s"), (100.0, False, "mdeg/s"), (1.75, False, "mrad/s")],
-)  # fmt: skip
-def test_the_size_of_rates_suggests_their_unit(most, moving, unit):
-    """At rest the noise shows the unit, because it is about 0.1 deg/s. In motion the 90th percentile shows it. The
-    finding is uncertain."""
-    force, rates = still(1.0), np.random.default_rng(1).normal(0.0, most, (200, 3))
-    if moving:
-        force[::2, 0] += 0.2
-        rates = np.zeros((200, 3))
-        rates[::2, 0], rates[1::2, 0] = most, -most
-    accel = findings.ColumnFinding([], "g")
-    finding = findings.gyro(force, rates, accel, None)
-    assert (finding.unit, finding.certain) == (unit, False)
-
-
 @pytest.mark.parametrize(("accel", "gyro"), [(16384, 131), (8192, 65.5), (4096, 32.8), (2048, 16.4), (99, 131)])
 def test_counts_of_a_gyro_follow_the_accelerometers_range(accel, gyro):
     finding = findings.gyro(still(1.0), np.full((200, 3), 30.0), findings.ColumnFinding([], f"counts/{accel}"), None)

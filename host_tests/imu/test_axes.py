@@ -152,31 +152,6 @@ def one_look(column=None, values=(), clipped=0, gyro_clipped=0, end=(1,), shaken
 
 
 @pytest.mark.parametrize(
-    ("gyro_range", "dlpf", "column", "looks", "fault"),
-    [
-        (1, 3, 0, 1, "Accel x stuck"),
-        (1, 4, 0, 4, "Accel x stuck"),
-        (1, 5, 1, 15, "Accel y stuck"),
-        (1, 6, 2, 80, "Accel z stuck"),
-        (1, 3, 6, 1, "Gyro z dead"),
-        (0, 4, 6, 3, "Gyro z dead"),
-        (0, 6, 4, 11, "Gyro x dead"),
-        (2, 4, 5, 10, "Gyro y dead"),
-        (3, 3, 4, 14, "Gyro x dead"),
-        (2, 5, 4, 62, "Gyro x dead"),
-        (2, 6, 6, None, None),  # the noise is too small to judge
-        (3, 4, 5, None, None),
-    ],
-)
-def test_an_axis_without_noise_is_ill_after_its_looks(gyro_range, dlpf, column, looks, fault):
-    """The limits are for the noise of the quietest chip. The counts have two values."""
-    judged = Judged(gyro_range, dlpf)
-    for _ in range(looks or 90):
-        judged.feed(one_look(column, (3, 4)))
-    assert [words for words, _, _ in judged.looks] == [None] * ((looks or 91) - 1) + ([fault] if fault else [])
-
-
-@pytest.mark.parametrize(
     ("share", "notice", "fault"),
     [
         ({"clipped": 7}, None, None),

@@ -1,12 +1,13 @@
 """The class Sensor keeps the chip working, through faults of the simulated board. Also the bus, and Ctrl-C."""
 
+import gc
 import math
 import re
 import textwrap
+import warnings
 from typing import Any
 
 import pytest
-from kickstand.errors import Notice
 from kickstand_tools.simulated_board.simulator import Board
 from support.board_access import level, on_board, write
 
@@ -137,31 +138,6 @@ def test_a_missing_or_unknown_chip_is_looked_for_every_50_ms(board, code):
     assert 1.2 < run.changes[-1][0] < 1.29 and run.changes[-1][2] == 1
 
 
-def test_the_fifo_is_tested_if_set_ups_do_not_help():
-    """The test runs at the third fault in a row, if each fault comes soon after a set-up. It runs only once, because it
-    takes 0.3 s. A sample ends the fault."""
-    calls = []
-
-    def explain(chip, error):
-        calls.append(error)
-        return Notice("sensor-fifo", "stays empty"), []
-
-    def dead_fifo(board):
-        push = board.sensor.fifo.push
-        board.at(1.0, lambda: vars(board.sensor.fifo).update(push=lambda *data, **kind: True))
-        board.at(2.5, lambda: vars(board.sensor.fifo).update(push=push))
-
-    run = Run(dead_fifo, explain=explain)
-    assert run.codes() == [*STARTED, "sensor-silent", "sensor-fifo", None] and calls == [None]
-    assert [restarts for time_s, _, restarts in run.changes if time_s < run.since("sensor-fifo")][-1] == 3
-
-    def slow(board):
-        for k in range(5):
-            board.at(1.0 + 1.5 * k, lambda: write(board.sensor, 0x6B, 0x41))
-
-    assert Run(slow, 9.0, lambda chip, error: 1 / 0).codes() == STARTED + ["sensor-silent", None] * 5
-
-
 def test_clipped_samples_are_skipped_and_a_faulty_axis_gives_none():
     def overdriven(board):
         def world(t_s):
@@ -177,11 +153,11 @@ def test_clipped_samples_are_skipped_and_a_faulty_axis_gives_none():
 
 def test_the_example_in_the_drivers_docstring_runs(capsys):
     """The example runs for a second. It prints the chip's name and temperature, then about 200 samples."""
-    from kickstand.imu import mpu6050
-
-    example = re.search(r"\n\n((?:    .*\n|\n)+)", mpu6050.__doc__ or "")
-    assert example
     with Board(lambda t_s: (0.25, -0.5, 1.0, 10.0, -20.0, 30.0, 30.0)) as board:
+        from kickstand.imu import mpu6050
+
+        example = re.search(r"\n\n((?:    .*\n|\n)+)", mpu6050.__doc__ or "")
+        assert example
         assert board.run(lambda: exec(textwrap.dedent(example[1]), {}), 1.3) == "off"
     first, *samples = capsys.readouterr().out.splitlines()
     assert first.startswith("MPU6050 30.") and 190 < len(samples) < 260 and samples[-1] == "[0.25, -0.5, 1.0] g"
@@ -230,4 +206,8 @@ def test_the_watchdog_stops_after_ctrl_c(gap_us, monkeypatch, tmp_path):
         except KeyboardInterrupt:
             sleep_ms(20_000)
 
-    assert on_board(program, 100, world=level)[0] == "returned"
+    outcome = on_board(program, 100, world=level)[0]
+    with warnings.catch_warnings():  # on a board the reset closes a file that the second Ctrl-C has left open
+        warnings.simplefilter("ignore", ResourceWarning)
+        gc.collect()
+    assert outcome == "returned"

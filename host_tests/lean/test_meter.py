@@ -1,7 +1,7 @@
 """Tests when the meter shows a lean, its maxima, and the effect of gaps. Also runs on MicroPython."""
 
 from array import array
-from math import degrees, pi, radians
+from math import degrees
 
 from bike_motion import DT_US, force_and_rate, meter, near, nose_up, reading, ride, roll, speed_up
 from kickstand.calibration.parameters import Calibration
@@ -147,20 +147,6 @@ def test_a_distrusted_lean_is_hidden_and_no_maximum():
     assert shown.suppressed_reason is None
 
 
-def test_only_a_long_gap_restarts_the_filter():
-    """The filter computes the movement during a short gap from the rate at its end."""
-    shown = ride(meter(), 3.0)
-    shown.update(reading(*force_and_rate(4.0, roll_dps=10.0)), 400_000)
-    near(shown.lean_deg, 4.0, 0.3)
-    shown.update(reading(*force_and_rate(-20.0, roll_dps=50.0)), 600_000)
-    near(shown.lean_deg, -20.0, 0.01)  # the force alone gives this lean, without the rate
-    assert shown.filter.variance == pi * pi and not shown.trusted and not shown.at_rest
-    for lost_us, trusted in ((150_000, True), (300_000, False)):
-        shown = ride(meter(), 3.0)
-        shown.update(STILL, lost_us)
-        assert shown.trusted is trusted
-
-
 def test_a_restart_resets_the_ride_and_keeps_the_maxima():
     shown = ride(roll(ride(meter(), 3.0), 0.0, 20.0), 0.2, lean_deg=20.0)
     for again in (shown.restart, lambda: shown.use(shown.calibration)):
@@ -169,24 +155,6 @@ def test_a_restart_resets_the_ride_and_keeps_the_maxima():
         assert not shown.trusted
         near(shown.max_right_deg, 20.0, 0.5)
         ride(shown, 3.0)
-
-
-def test_a_certain_trim_is_kept_at_rest():
-    for angle_deg, sigma_deg, calibrated_deg, mps, keeps in (
-        (1.0, 0.3, 0.0, 0.0, True),
-        (-1.0, 0.3, 0.0, 0.0, True),
-        (1.0, 0.8, 0.0, 0.0, False),
-        (1.0, 0.3, 0.9, 0.0, False),  # saving wears the flash
-        (1.0, 0.3, 0.0, 15.0, False),
-    ):
-        calibration = Calibration()
-        calibration.trim_deg = calibrated_deg
-        shown = ride(meter(calibration), 3.0)
-        shown.filter.trim.angle, shown.filter.trim.variance = radians(angle_deg), radians(sigma_deg) ** 2
-        speed_up(shown, 0.0, mps, 5.0 if mps else 0.01)
-        assert shown.keep_trim() is keeps, (angle_deg, sigma_deg, calibrated_deg)
-        near(calibration.trim_deg, angle_deg if keeps else calibrated_deg, 1e-5)
-        assert not shown.keep_trim()  # the same trim is not kept again
 
 
 def test_the_delay_of_the_low_pass_is_compensated():

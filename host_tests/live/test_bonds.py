@@ -42,11 +42,3 @@ def test_saved_keys_are_read_back_with_the_same_pin_only(flash):
 def test_a_damaged_file_means_no_keys(flash, text):
     flash.write_text(text)
     assert Bonds("123456").get(1, 0, None) is None
-
-
-def test_flash_that_cannot_be_written_is_no_error(flash):
-    flash.mkdir()
-    bonds = Bonds("123456")
-    bonds.put(1, b"a", b"one")
-    bonds.save()
-    assert bonds.get(1, 0, b"a") == b"one"

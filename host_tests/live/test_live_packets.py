@@ -2,8 +2,6 @@
 
 import pytest
 from hypothesis import given, strategies as st
-from kickstand.calibration.parameters import Calibration
-from kickstand.lean.meter import LeanMeter
 from kickstand.live import packets
 from support.radio_decoder import channels, own
 
@@ -32,13 +30,6 @@ def test_racechrono_gets_each_number_back(buffer):
     )
     size = packets.speed(buffer, 33.333)
     assert channels(buffer[:size]) == pytest.approx({"speed": 33.33})
-
-
-def test_packet_of_the_ride_has_maxima_and_lost_samples(buffer):
-    meter = LeanMeter(Calibration())
-    meter.max_left_deg, meter.max_accel_g, meter.max_brake_g = 41.26, 0.4567, 0.9
-    ride = own("ride", buffer[: packets.ride(buffer, 67, meter, 70_000)])
-    assert list(ride.values()) == [1, 67, 413, 0, 457, 900, 0, 65535]
 
 
 def test_unknown_values_are_unknown(buffer):
@@ -88,10 +79,3 @@ def test_invalid_commands_change_nothing(data):
     assert not packets.take_filter(bytes(data), asked)
     assert packets.take_rate(bytes(data), asked) == (len(data) == 2)
     assert asked[:3] == [40, 50, 60] and asked[3] in (70, 256 * (data == [1, 0]), 40)
-
-
-@pytest.mark.parametrize(("data", "interval"), [([0, 0], 0), ([40, 0], 40), ([1, 0], 40), ([0, 1], 256)])
-def test_rate_sets_the_interval_of_our_page(data, interval):
-    asked = [40, 50, 60, 70]
-    assert packets.take_rate(bytes(data), asked)
-    assert asked == [40, 50, 60, interval]

@@ -63,11 +63,3 @@ def test_a_motion_that_occurs_twice_is_refused():
     t_s = np.arange(1200) / 40.0
     twice = bike(np.tile(rates(CELLS_S), (2, 1)))
     assert outcome(twice, Telemetry(t_s, rates(t_s + 12.0))) == "the camera turns like the bike at several times"
-
-
-def test_vibration_does_not_count():
-    """It changes from cell to cell, and is as large as the common motion."""
-    t_s = np.arange(1600) / 40.0
-    vibration = np.where(np.arange(len(CELLS_S)) % 2, 30.0, -30.0)[:, None] * [1.0, 0.0, 0.0]
-    result = outcome(bike(rates(CELLS_S) + vibration), Telemetry(t_s, rates(t_s + 7.0)))
-    assert result == pytest.approx(7.0, abs=0.05)

@@ -161,17 +161,3 @@ def test_file_that_is_not_a_video_is_refused(tmp_path, ride, film):
     for name in ("text.mp4", "half.mp4"):
         arguments = "--video", tmp_path / name, "--offset", 1, "--out", tmp_path / "out.mp4"
         command.refused(tmp_path, "overlay", ride, *arguments, words="is not a video that ffmpeg can read")
-
-
-def test_stopped_overlay_leaves_the_older_clip(ffmpeg, tmp_path, parked):
-    log, calibration = parked
-    (tmp_path / "clip.mov").write_text("an older clip")
-
-    def stop(done: int, total: int) -> None:
-        if (done, total) == (20, 50):
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        api.overlay(log, tmp_path / "clip.mov", calibration, to_s=50.0, fps=1.0, live=True, progress=stop)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["bin", "clip.mov"] and not ffmpeg.running
-    assert (tmp_path / "clip.mov").read_text() == "an older clip"

@@ -1,13 +1,11 @@
 """ffmpeg's answers about a video, how it is started and stopped, and the gyro of a GoPro in a video."""
 
-import struct
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.overlay import gpmf, video
+from kickstand_tools.overlay import video
 
 
 def described(ffmpeg, rate="30 fps", size="1920x1080", more="", **counted):
@@ -85,71 +83,4 @@ def test_ffmpeg_that_fails_says_why(ffmpeg, words, message, deaf):
         video.write_video(Path("o.mp4"), ["-f", "rawvideo"], [bytes(1_000_000)] * 3)
 
 
-def test_ffmpeg_is_killed_after_an_interruption(ffmpeg):
-    def pictures():
-        yield b"1"
-        while not (ffmpeg.folder / "pictures").exists():  # until ffmpeg runs
-            pass
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        video.write_video(Path("o.mp4"), ["-f", "rawvideo"], pictures())
-    assert not ffmpeg.running
-
-
 # The gyro of a GoPro
-
-
-def item(name: bytes, kind: bytes, size: int, body: bytes) -> bytes:
-    return struct.pack(">4scBH", name, kind, size, len(body) // size) + body + bytes(-len(body) % 4)
-
-
-def packet(*items: bytes) -> bytes:
-    """Return a packet of a camera with one stream of these items."""
-    stream = item(b"STRM", b"\0", 1, b"".join(items))
-    return item(b"DEVC", b"\0", 1, item(b"DVNM", b"c", 1, b"camera") + item(b"STRM", b"s", 1, b"odd!") + stream)
-
-
-def scale(*values: int) -> bytes:
-    return item(b"SCAL", b"s", 2, struct.pack(f">{len(values)}h", *values))
-
-
-ROWS = struct.pack(">6h", 100, 200, 300, -100, 0, 50)
-GYRO = item(b"GYRO", b"s", 6, ROWS)
-
-
-@pytest.mark.parametrize(
-    ("items", "rates"),
-    [
-        ([scale(100), GYRO], [[1.0, 2.0, 3.0], [-1.0, 0.0, 0.5]]),
-        ([scale(1, 2, 4), GYRO], [[100.0, 100.0, 75.0], [-100.0, 0.0, 12.5]]),
-        ([GYRO], [[100.0, 200.0, 300.0], [-100.0, 0.0, 50.0]]),
-        ([scale(10), item(b"GYRO", b"s", 8, ROWS[:8])], [[10.0, 20.0, 30.0]]),  # of four axes, three are read
-        ([scale(10), item(b"GYRO", b"s", 4, ROWS)], None),  # two axes are not a gyro
-        ([item(b"STNM", b"c", 1, b"text!"), item(b"GYRO", b"?", 4, b"wxyz"), scale(100), GYRO[:14]], [[1.0, 2.0, 3.0]]),
-    ],
-)
-def test_a_gyro_is_divided_by_its_scale(items, rates):
-    found = [values.tolist() for values in gpmf.streams(packet(*items), b"GYRO")]
-    assert found == ([] if rates is None else [rates])
-
-
-def test_readings_of_a_packet_are_spread_over_its_time(ffmpeg):
-    """The second packet lasts no time, and the rates of the third are impossible. Times are in ticks of 1 ms."""
-    gyro = item(b"GYRO", b"f", 12, struct.pack(">12f", *[0.5] * 12))
-    good, absurd = packet(gyro), packet(item(b"GYRO", b"f", 12, struct.pack(">3f", 1e3, 0.0, 0.0)))
-    sizes = len(good), len(absurd)
-    listed = "#tb 0: 1/1000\n" + "".join(
-        f"0, 0, {begin}, {lasts}, {size}, 0xab\n"
-        for begin, lasts, size in ((1000, 2000, sizes[0]), (3000, 0, sizes[0]), (3000, 1000, sizes[1]))
-    )
-    film = described(ffmpeg, more="  Stream #0:3(eng): Data: (gpmd / 0x1)\n")
-    ffmpeg.answers(listed=listed)
-    (ffmpeg.folder / "packets").write_bytes(good + good + absurd)
-    found = gpmf.telemetry(film)
-    assert found is not None
-    assert found.t_s == pytest.approx([1.25, 1.75, 2.25, 2.75]) and found.rate_dps == pytest.approx(np.degrees(0.5))
-    for listed in ("x", "#tb 0: 1/1000\n0, no, list\n"):
-        ffmpeg.answers(listed=listed)
-        assert gpmf.telemetry(film) is None
-    assert gpmf.telemetry(described(ffmpeg)) is None  # without a stream of readings

@@ -76,31 +76,6 @@ def test_full_blocks_keep_speeds_places_and_calibration(length, every):
         assert len(used) - len(used.rstrip(b"\0")) < 16 + 60
 
 
-@pytest.mark.parametrize("length", range(700, 720, 3))
-def test_worst_pass_and_a_position_fit_into_any_block(length):
-    """A pass of the loop with quiet readings needs few bits. In a pass with violent readings after quiet passes, every
-    number needs the longest code."""
-    quiet = [800] * 7, 8, 40_000
-    count = 0
-    # the first round counts the quiet passes; in the second round the last pass has violent readings
-    for violent in (False, True):
-        block = RideBlock(5000)
-        for sequence in range(2):  # only the second block reserves room for a position from its beginning on
-            ride_writer.begun(length, sequence, block)
-            block.add_place(ride_writer.place(0))
-            while not block.full() and (not violent or not sequence or block.count < count - 1):
-                block.add(*quiet)
-        if violent:
-            block.add_speed(1 << 24)
-            block.add_place(ride_writer.place(1))
-            block.add([-32768] * 7, 1, 1 << 29)
-        count = block.count
-        stored = ride_writer.ended(block)
-        assert len(places([stored])) == 1 + violent
-    assert stored.turns[-1].sums == (-32768,) * 6 and {turn.sums for turn in stored.turns[:-1]} == {(800,) * 6}
-    assert len(stored.turns) == count - 1 > 90
-
-
 @pytest.mark.parametrize(
     ("date", "lat", "lon", "place"),
     [

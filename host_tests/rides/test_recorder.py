@@ -72,19 +72,6 @@ def test_after_a_gap_the_recorded_time_is_over_half_a_second(waited_us, step_us,
     assert steps == [TURN_US] * 3 + [pytest.approx(step_us, abs=1000)] + [TURN_US] * 3 and steps[3] > 500_000
 
 
-def test_position_and_speed_belong_to_the_next_pass_only(recorder, root, clock):
-    """A pass of the loop may have a position without a speed, or a speed without a position. Zero is a valid speed."""
-    start(recorder)
-    for fixes in ([(None, 0), (None, 1)], [], [(5.0, None), (0.0, None)], [(6.0, 2)]):
-        for speed, number in fixes:  # the newest position is recorded
-            recorder.add_fix(speed, None if number is None else ride_writer.place(number))
-        add(recorder, 1, clock)
-    recorder.stop()
-    turns = stored(root)[1]
-    hundredths = [turn.place and turn.place.utc_s and round(100 * turn.place.utc_s % 100) for turn in turns]
-    assert hundredths == [20, None, None, 30] and [turn.speed_mps for turn in turns] == [None, None, 0.0, 6.0]
-
-
 @pytest.mark.parametrize("code", ["flash-fault", "out-of-room"])
 def test_failure_ends_the_ride_once_with_one_notice(code, recorder, root, clock):
     """A file in the place of the directory of rides stops the beginning, a full flash the first block."""

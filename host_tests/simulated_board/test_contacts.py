@@ -2,7 +2,7 @@
 
 import pytest
 from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.contacts import Button, Wheel
+from kickstand_tools.simulated_board.contacts import Button
 from kickstand_tools.simulated_board.gps import Gps, sentence
 
 
@@ -29,31 +29,6 @@ def test_a_button_bounces_for_4_ms_and_then_stays():
         assert times[0] == 0 and times == sorted(times) and 3600 < times[-1] <= 3996
         assert all(666 * k - 333 < time_us <= 666 * k for k, time_us in enumerate(times[1:], 1))
     assert changes == press()[1] != press(2)[1]
-
-
-def test_a_capacitor_holds_the_pin_low():
-    clock = Clock()
-    button = Button(clock)
-    button.charge_us = 300
-    clock.advance(1000)
-    assert [button.low(pulled_us) for pulled_us in (800, 700, 0)] == [True, False, False]
-    button.closed = True
-    assert button.low(0)
-
-
-def test_a_wheel_follows_its_speed_bounces_breaks_and_picks_up_noise():
-    clock = Clock()
-    wheel = Wheel(clock, lambda t_s: 0.0 if t_s < 0.5 else 50.0)
-    assert edges(wheel, clock, 499_999) == [] and 500_000 <= edges(wheel, clock, 600_000)[0][0] <= 541_000
-    clock = Clock()
-    changes = edges(Wheel(clock, lambda t_s: 10.0, bounce_us=400, until_s=0.4), clock, 1_000_000)
-    begin_us = changes[0][0]
-    assert [(t_us - begin_us, level) for t_us, level in changes[:5]] == [(100 * k, k % 2) for k in range(5)]
-    assert max(time_us for time_us, level in changes if level == 0) < 400_000
-    clock = Clock()
-    wheel = Wheel(clock, lambda t_s: 0.0)
-    wheel.noise_hz = 200
-    assert sum(level == 0 for _, level in edges(wheel, clock, 1_000_000)) == pytest.approx(200, abs=6)
 
 
 def heard(seconds, **kind):

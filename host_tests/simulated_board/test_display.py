@@ -148,25 +148,6 @@ def test_a_stuck_bus_is_freed(board, display):
     check_lines(board, display, NEW, 200)
 
 
-def test_a_reset_in_the_middle_of_a_part_leaves_no_old_text():
-    """The display keeps its power and its text. The next start of the firmware must replace the text."""
-    for kind in KINDS:
-        for count in range(1, 12, 2):
-
-            def program(board, count=count):
-                display = open_display(board)
-                check_lines(board, display, OLD)
-                display.show(*NEW)
-                turns(board, display, count)
-                board.lcd_bus.hang(5)
-                restarted = open_display(board)
-                restarted.show("Kickstand", "starting")
-                restarted.flush()
-                assert board.lcd.text() == as_text(("Kickstand", "starting")), (count, board.lcd.text())
-
-            run(program, display=kind)
-
-
 @on_each(kinds=("lcd",))
 def test_the_next_initialisation_repairs_an_lcd_out_of_step(board, display):
     lines = set()

@@ -96,14 +96,6 @@ def test_all_four_quarters_of_the_earth_to_two_centimetres():
         assert fixes(rmc("4807." + digits + ",N"))[0][1][2] == 288700000 + part
 
 
-def test_a_field_that_is_no_angle_gives_a_speed_only():
-    for lat in (",", ",N", "4807038,N", "48:07.038,N", "-4807.03,N", "4807.0.38,N", "9" * 30 + ".0,N", "nan,N"):
-        assert fixes(rmc(lat)) == [(10000, None)], lat
-    for lat, lon in (("4860.000,N", "01131.000,E"), ("9000.00000,S", "01131.000,E"), ("4807.038,N", "18000.000,E")):
-        assert fixes(rmc(lat, lon)) == [(10000, None)]  # 180 degrees is reported as 179 degrees 59.99999'
-    assert fixes(rmc(lon=",")) == fixes(VTG) == [(10000, None)]
-
-
 def test_the_time_of_day_in_ms():
     for time, day_ms in (
         ("000000.00", 0),
@@ -164,23 +156,6 @@ def test_a_delayed_fix_is_rejected_or_has_its_age():
         ):
             speed = hear(gps, wire, rmc(time=f"1200{second:02}.00"), at_ms)
             assert (None if speed is None else gps.age_ms) == age_ms, second
-
-
-def test_an_old_position_is_not_returned_as_new():
-    """No position is returned while only VTG arrives, nor after a silence that ends without a fix."""
-    with Board(level):
-        from kickstand.speed.gps import Gps
-
-        wire = Wire()
-        gps = Gps(wire)
-        assert hear(gps, wire, rmc(), 1000) and gps.place(1000) is not None and gps.place(1010) is None
-        assert hear(gps, wire, VTG, 5000) and gps.place(5000) is None  # there was no RMC for 4 s
-        assert hear(gps, wire, rmc(time="120005.00"), 6000)
-        for ms in (7000, 8000, 9000, 10000):  # the speed of VTG is used if the last RMC is 3 s old
-            assert (hear(gps, wire, VTG, ms) is None) == (ms < 9000) and gps.place(ms) is None, ms
-        assert gps.age_ms == 0
-        assert hear(gps, wire, rmc(time="120011.00"), 12000)
-        assert hear(gps, wire, "$GP", 20000) is None and gps.place(20000) is None
 
 
 def test_faults_of_the_receiver_are_reported_and_end():

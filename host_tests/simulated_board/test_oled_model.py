@@ -4,9 +4,7 @@ from collections import namedtuple
 
 import pytest
 from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.fakes import framebuf
 from kickstand_tools.simulated_board.oled import Oled
-from support.board_access import on_board
 
 SUPPLY = {"ssd1306": (0x8D, 0x14), "sh1106": (0xAD, 0x8B)}
 
@@ -27,27 +25,6 @@ def new_oled(kind="ssd1306", *values):
     commands(oled, *SUPPLY[kind], 0xAF, *values)
     oled.ram[:] = bytes(len(oled.ram))
     return oled
-
-
-@pytest.mark.parametrize(
-    ("kind", "settings", "values", "stored"),
-    [
-        # Page addressing stays within its page. An SH1106 stays at its last column.
-        ("ssd1306", (0xB2, 0x0E, 0x17), (1, 2, 3), {(2, 126): 1, (2, 127): 2, (2, 0): 3}),
-        ("sh1106", (0xB7, 0x02, 0x18), (1, 2, 3), {(7, 130): 1, (7, 131): 3}),
-        # Horizontal and vertical addressing use a window, at first the whole memory
-        ("ssd1306", (0x20, 0, 0x21, 126, 127, 0x22, 6, 7), (1, 2, 3, 4, 5),
-         {(6, 126): 5, (6, 127): 2, (7, 126): 3, (7, 127): 4}),
-        ("ssd1306", (0x20, 1, 0x21, 5, 6, 0x22, 1, 2), (1, 2, 3, 4, 5),
-         {(1, 5): 5, (2, 5): 2, (1, 6): 3, (2, 6): 4}),
-        # The commands for page and column act only in page addressing
-        ("ssd1306", (0x20, 0, 0x05, 0x13), (9,), {(0, 0): 9}),
-    ],
-)  # fmt: skip
-def test_where_bytes_are_stored(kind, settings, values, stored):
-    oled = new_oled(kind, *settings)
-    send(oled, 0x40, *values)
-    assert {divmod(k, len(oled.ram) // 8): value for k, value in enumerate(oled.ram) if value} == stored
 
 
 def lit(oled):
@@ -112,37 +89,6 @@ def text_of(memory, height=64):
 
 
 Meter = namedtuple("Meter", "lean_deg max_left_deg max_right_deg smooth_force max_accel_g max_brake_g")
-
-
-@pytest.mark.parametrize(
-    ("page", "recording", "meter", "lines"),
-    [
-        ("lean", False, (-12.0, 0, 0), ["Lean  12° left  ", " " * 16]),
-        ("lean", True, (48.0, 0, 0), ["Lean  48° right*", " " * 16]),
-        ("lean", False, (0.0, 0, 0), ["Lean   0°       ", " " * 16]),
-        ("lean", True, (0.0, 0, 0), ["Lean   0°      *", " " * 16]),
-        ("maxima", False, (0.0, 7.4, 38.0), ["Max left     7° ", "Max right   38° "]),
-        ("maxima", False, (0.0, 41.0, 9.0), ["Max left    41° ", "Max right    9° "]),
-        ("acceleration", False, (0.0, 0, 0, 0.25), ["Accel    0.25 g ", "pk +0.31 / -0.92"]),
-        ("acceleration", False, (0.0, 0, 0, -0.61), ["Brake    0.61 g ", "pk +0.31 / -0.92"]),
-        ("acceleration", False, (0.0, 0, 0, 1.07), ["Accel    1.07 g ", "pk +0.31 / -0.92"]),
-    ],
-)
-def test_the_firmwares_pictures_are_read(page, recording, meter, lines):
-    def program(board):
-        from kickstand.ui import glance
-
-        lean, left, right, forward_g = (*meter, 0.0)[:4]
-        function, *values = getattr(glance, page)(
-            Meter(lean, left, right, (0.0, 1.0, forward_g), 0.31, 0.92), recording
-        )
-        memory = bytearray(1024)
-        function(framebuf.FrameBuffer(memory, 128, 64, framebuf.MONO_VLSB), *values)
-        shown.extend(text_of(memory))
-
-    shown = []
-    assert on_board(program)[0] == "returned"
-    assert shown == lines
 
 
 def test_a_dark_or_unknown_picture_has_no_text():

@@ -12,12 +12,6 @@ def tilted(t_s):
     return 0.5, -0.25, 1.0, 10.0, -20.0, 30.0, 36.53
 
 
-def numbered(t_s):
-    """Return a reading that encodes its time in ms, in accelerometer x (range 2 g) and gyro z (range 250 deg/s)."""
-    ms = round(t_s * 1000)
-    return ms / 16384, 0.5, 1.0, 0.0, 0.0, ms / 131.0
-
-
 def sensor(world=tilted, who_am_i=0x68, registers=()):
     """Return a sensor that is awake and has sampled, after these (register, value) were written."""
     chip = Mpu6050(Clock(), world, who_am_i)
@@ -28,20 +22,6 @@ def sensor(world=tilted, who_am_i=0x68, registers=()):
         write(chip, register, value)
     chip.clock.advance(100_000)
     return chip
-
-
-def filling(who_am_i=0x68, fifo_en=0x78, divider=0, config=1, world=numbered):
-    """Return a chip whose FIFO was just emptied and enabled, at 1 kHz unless it is changed."""
-    registers = ((CONFIG, config), (DIVIDER, divider), (0x38, 0x11), (FIFO_EN, fifo_en), (USER, 0x04), (USER, 0x40))
-    chip = sensor(world, who_am_i, registers[:2])
-    for register, value in registers[2:]:
-        write(chip, register, value)
-    return chip
-
-
-def waiting(chip):
-    high, low = read(chip, 0x72, 2)
-    return high << 8 | low
 
 
 def test_reset_values_and_the_time_of_a_reset():
@@ -82,20 +62,6 @@ def test_counts_of_each_range(code, lsb_g, lsb_dps):
 def test_temperature_of_each_chip(who_am_i, temp_c, count):
     """Without a temperature the sensor has 25 degrees."""
     assert counts(sensor(lambda t_s: level(t_s) if temp_c is None else (*level(t_s), temp_c), who_am_i))[3] == count
-
-
-@pytest.mark.parametrize(("who_am_i", "size", "frame"), [(0x68, 1024, 12), (0x70, 512, 12), (0x19, 1024, 14)])
-def test_overflow_loses_the_oldest_bytes_and_the_alignment(who_am_i, size, frame):
-    chip = filling(who_am_i)
-    frames = size // frame
-    chip.clock.advance(frames * 1000)
-    assert waiting(chip) == frames * frame and read(chip, 0x3A)[0] & 0x10 == 0
-    chip.clock.advance(1000)
-    assert waiting(chip) == size
-    assert [read(chip, 0x3A)[0] & 0x10 for _ in range(2)] == [0x10, 0]  # cleared by reading
-    read(chip, 0x74, size - frames * frame)  # the rest of the oldest frame, whose beginning is lost
-    data = read(chip, 0x74, frame)
-    assert data[:2] == data[-2:]
 
 
 @pytest.mark.parametrize(("axis", "bit"), [(0, 0x80), (1, 0x40), (2, 0x20)])

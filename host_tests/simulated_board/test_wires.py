@@ -3,7 +3,7 @@
 import errno
 
 import pytest
-from kickstand_tools.simulated_board.fakes import fake_machine, fake_time
+from kickstand_tools.simulated_board.fakes import fake_machine
 from kickstand_tools.simulated_board.fakes.fake_machine import I2C, SPI, Pin, SoftI2C
 from support.board_access import firmware, on_board, raised
 
@@ -61,44 +61,6 @@ def transfer_us(board, i2c, count, code):
     error = raised(i2c.readfrom_mem_into, SENSOR, 0x3B, bytearray(count))
     assert (error.args[0] if error else None) == code, error
     return board.clock.now_us - begin_us
-
-
-@firmware(machine="esp32")
-def test_soft_i2c_does_not_notice_that_sda_is_held(board):
-    """The clock pulses of SoftI2C free the device. If the device keeps holding SDA, SoftI2C reads zeros."""
-    i2c, data = SoftI2C(sda=Pin(21), scl=Pin(22)), bytearray(1)
-    for bits, freed in ((1, True), (8, True), (60, False)):
-        board.sensor_bus.hang(bits)
-        data[0] = 0xFF
-        error = raised(i2c.readfrom_mem_into, SENSOR, 0x75, data)
-        assert (error is not None) == freed and (freed or data == b"\x00"), bits
-    while board.sensor_bus.stuck():
-        raised(i2c.readfrom_mem_into, SENSOR, 0x75, data)
-    assert i2c.readfrom_mem(SENSOR, 0x75, 1) == b"\x68"
-
-
-@pytest.mark.parametrize(
-    ("machine", "pulses_per_s", "during", "after"),
-    [("pico", 300, (5, 7), (0, 1)), ("esp32", 300, (0, 0), (5, 7)), ("esp32", 1000, (0, 0), (8, 9))],
-)
-def test_interrupts_of_an_esp32_wait_for_the_end_of_a_transfer(machine, pulses_per_s, during, after):
-    """During a transfer of 10 ms, an ESP32 keeps at most eight interrupts. Their handlers run after the transfer, and
-    see the pin's level at that time. On a Pico the handlers run at once."""
-
-    def program(board):
-        board.fit_wheel(lambda t_s: 10.0, pulses_per_metre=pulses_per_s / 10.0)
-        pins = {"sda": Pin(4), "scl": Pin(5), "freq": 100_000}
-        i2c = I2C(0, **pins) if machine == "pico" else SoftI2C(**pins)
-        fake_time.sleep_ms(200)
-        levels = []
-        Pin(board.wheel_pin, Pin.IN, Pin.PULL_UP).irq(lambda pin: levels.append(pin.value()))
-        i2c.readfrom_mem_into(SENSOR, 0x3B, bytearray(108))
-        count = len(levels)
-        fake_time.sleep_us(300)
-        late = levels[count:]
-        assert during[0] <= count <= during[1] and after[0] <= len(late) <= after[1] and len(set(late)) <= 1
-
-    check(program, machine=machine, sensor_pins=[4, 5])
 
 
 @pytest.mark.parametrize("bits", [1, 5, 8])

@@ -7,6 +7,7 @@ flash) and prints the record as JSON on the last line.
 
 import json
 import math
+import os
 import sys
 
 from kickstand_tools.simulated_board.simulator import Board
@@ -127,10 +128,11 @@ class Device:
             model["place"] = lambda t_s: (place[0] + place[2] * t_s, place[1] + place[3] * t_s)
         getattr(self.board, "fit_" + source)(lambda t_s: ride.truth(t_s)[1], **model)
 
-    def fit_card(self, formatted=True, fsinfo=True, faults=(), **model):
-        """Fit an SD card, formatted by sd_cards.format_card(). faults: [[at_s, attribute, value], ...]."""
+    def fit_card(self, formatted=True, faults=(), **model):
+        """Fit an SD card with MicroPython's own FAT. faults: [[at_s, attribute, value], ...]."""
         self.board.fit_card(**model)
-        sd_cards.format_card(self.board.card, formatted, fsinfo)
+        if formatted:
+            os.VfsFat.mkfs(self.board.card)  # pyright: ignore[reportAttributeAccessIssue]
         for at_s, attribute, value in faults:
             self.board.at(at_s, lambda attribute=attribute, value=value: setattr(self.board.card, attribute, value))
 

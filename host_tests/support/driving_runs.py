@@ -6,7 +6,6 @@ road is level.
 
 import math
 
-from kickstand.drive_alignment import verdict
 from kickstand.drive_alignment.alignment import DriveAlignment
 from kickstand.drive_alignment.parts import DriveParts
 from kickstand.drive_alignment.regression import Fit, ForwardRegression
@@ -121,7 +120,6 @@ def drive(legs, mount, options):
         samples: arguments of samples().
         gyro_bias: three numbers in deg/s.
         moved: [from_s, mount from then on].
-        against: a matrix with which the result is compared.
     """
     vehicle = options.get("vehicle", "car")
     source = SpeedSource(**options.get("source", {}))
@@ -131,7 +129,6 @@ def drive(legs, mount, options):
     alignment = method(vehicle, options.get("up"), options.get("bias"))
     moved_at, other = options.get("moved", [1e9, mount])
     bias = options.get("gyro_bias", [0.0, 0.0, 0.0])
-    states = []
     made = samples(legs, vehicle, **options.get("samples", {}))
     for k, (force, rate, speed) in enumerate(made):
         m = mount if k < moved_at * RATE_HZ else other
@@ -140,20 +137,14 @@ def drive(legs, mount, options):
         value = source.step_to(speed)
         if value is not None:
             alignment.measure_speed(value)
-        if isinstance(alignment, DriveAlignment) and alignment.state not in states[-1:]:
-            states.append(alignment.state)
     alignment.finish()
     result = {
         "ready": alignment.ready,
-        "states": states,
-        "counted": alignment.counted,
         "stops": alignment.standing.stops,
         "bias": list(alignment.standing.bias),
     }
     if isinstance(alignment, DriveAlignment):
         result["lag"] = alignment.events.lag_s
-    if "against" in options:
-        result["compare"] = verdict.compare(alignment, options["against"])
     out = matrix()
     try:
         alignment.matrix(out)

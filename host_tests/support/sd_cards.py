@@ -1,4 +1,4 @@
-"""Formats the simulated board's SD card before a run and reads it afterwards, with MicroPython's own FAT."""
+"""Reads the simulated board's SD card after a run, with MicroPython's own FAT."""
 
 # pyright: reportAttributeAccessIssue=false
 # Only MicroPython's os has a FAT, so only a run on MicroPython can have a card.
@@ -8,15 +8,6 @@ import os
 
 MOUNT = "/sd"
 READER = "/reader"  # the folder on which a computer would mount the card
-
-
-def format_card(card, formatted=True, fsinfo=True):
-    """Write a FAT file system to the card. Without fsinfo the card has no count of its free space."""
-    if formatted:
-        os.VfsFat.mkfs(card)
-    if not fsinfo:
-        for number in [number for number, content in card.data.items() if content.startswith(b"RRaA")]:
-            del card.data[number]
 
 
 def eject():

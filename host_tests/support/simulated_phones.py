@@ -54,11 +54,6 @@ class Phone:
     def give_pin(self, pin):
         return self._board.radio.give_pin(pin)
 
-    def found(self):
-        """Return the data that the board advertises."""
-        radio = self._board.radio
-        return None if radio.found is None else [list(radio.found), list(radio.named)]
-
     # Called by the radio
 
     def heard(self, handle, data):

@@ -108,27 +108,6 @@ def test_recording_shows_its_duration_and_the_time_left(seconds, room_s, lines):
     assert pages.recording(Recorder(seconds, room_s)) == lines
 
 
-def test_the_sensor_page_shows_each_count_for_two_seconds():
-    """The MPU6050 has 340 counts per degree, and 36.53 degrees at 0."""
-    panel = Panel()
-    sensor, chip = panel.sensor, panel.sensor.chip
-    shown = reading((0, 0, 0, -2730, 0, 0, 0), panel.app.calibration.value)
-    chip.overflows, sensor.restarts, chip.address = 3, 1, 0x69
-    words = ["6pos no  ali yes", "3 gaps 1 starts", "samples lost   7", "I2C address 0x69"]
-    for seconds in range(9):
-        assert pages.sensor_info(sensor, 7, shown, seconds) == (f"MPU6050   28.5{D}C", words[seconds // 2 % 4])
-    chip.overflows, sensor.restarts, chip.who_am_i = 12345, 678, 0x72
-    lines = [pages.sensor_info(sensor, 123456, shown, seconds) for seconds in (2, 4)]
-    assert [line2 for _, line2 in lines] == ["99 gaps 9 starts", "samples lost9999"] and lines[0][0][
-        :10
-    ] == "MPU6500 0 "
-    sensor.fault, sensor.found = Notice("no-sensor"), [0x27, 0x68, 0x77]
-    lines = [pages.sensor_info(sensor, 0, shown, seconds) for seconds in (1, 2, 3, 4)]
-    assert lines == [("No sensor", "check wiring")] + [("On its I2C bus:", "27 68 77")] * 2 + [
-        ("No sensor", "check wiring")
-    ]
-
-
 DONE = Notice("aligned", 0.4)
 BRAKE, SPEED = {"state": alignment.WAITING_FOR_BRAKING}, {"state": alignment.WAITING_FOR_SPEED}
 

@@ -63,23 +63,6 @@ def test_each_page_is_named(stages):
     )
 
 
-def test_the_power_goes_in_a_save_or_by_its_switch(stages):
-    arm, on = ("cut_save", True), ("power", True)
-    stages(
-        ([*RIDING, arm, ("wait", 0.1)], "not sure", 0, "Stop for a new alignment", "kickstand"),
-        ([("cut_save", False), ("wait", 0.1)], "not sure", 5, "That is all", ""),
-        ([arm, STAND, ("wait", 9)], "not sure", 0, "Hold the button for a second", ""),
-        ([LONG, SHORT], "the menu", 0, "Press until the menu says", ""),
-        ([*[SHORT] * 5], "the menu", 0, "Hold the button once more", ""),
-        ([LONG, *ALIGN], "nothing", 0, "after 40 bytes", "power"),
-        ([on, ("wait", 0.1)], "starting", 0, "The board starts", ""),
-        ([("wait", 4)], "not sure", 5, "The old alignment is still there", "ride"),
-        ([RIDE, ("wait", 6)], "not sure", 5, "", ""),
-        ([("power", False), ("wait", 0.2)], "nothing", 0, "The board has no power", "power"),
-        ([("button", True), on, ("wait", 2), ("button", False), ("wait", 0.2)], "safe mode", 0, "Safe mode", "power"),
-    )
-
-
 @pytest.mark.long
 def test_it_rides_straight_until_the_meter_is_sure(stages):
     """If the rider leans too early, the guide asks for a straight and says how long it must be. After that time, the

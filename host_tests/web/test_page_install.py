@@ -4,7 +4,6 @@ The board is a simulated one at a serial port in the test's process. Python star
 page.
 """
 
-import json
 import re
 import types
 
@@ -169,23 +168,6 @@ def test_status_equals_the_output_of_the_command(line, page, board, monkeypatch)
     page.click("#status-copy")
     page.wait_for_selector("#status-said:has-text('Copied')")
     assert page.evaluate("navigator.clipboard.readText()") == report
-
-
-def test_file_that_is_no_esp32_image_is_not_written(line, page, board, tmp_path):
-    """No chip answers in this test."""
-    page.click("a[href='#micropython']")
-    page.click("text=ESP32: a file that ends in .bin")
-    for name, content, words in (
-        ("notes.bin", b"hello", "no image for an ESP32"),
-        ("pico.uf2", b"UF2\n" * 200, "no image for an ESP32"),
-        ("esp32.bin", b"\xe9" + bytes(2000), "no ESP32 answers: hold its button BOOT"),
-    ):
-        (tmp_path / name).write_bytes(content)
-        line.plug_in(RawPrompt(board, deaf=True))
-        page.set_input_files("#image-file", tmp_path / name)
-        page.click("#image")
-        page.wait_for_selector(f"#image-said:has-text({json.dumps(words)})")
-    page.wait_for_selector("#image:enabled")
 
 
 def test_after_its_first_use_the_page_works_without_a_network(line, page, board):

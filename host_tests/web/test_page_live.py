@@ -72,23 +72,6 @@ def test_after_a_new_alignment_another_log_begins(line, page, board, tmp_path):
     assert list(saved(line.rider, tmp_path).values()) == [*recorded(blocks[1]), *recorded(blocks[0])]
 
 
-def test_a_car_shows_g_instead_of_a_lean(line, page, board, tmp_path):
-    """The calibration in the log also says "car". When a motorcycle is connected next, the gauge appears again."""
-    start(line, board, half_seconds(3)[0], vehicle="car")
-    page.wait_for_selector("#lean:has-text(' g')")
-    assert page.get_attribute("#gauge", "aria-label").startswith("Sideways now: ")
-    assert line.rider.text("#max-left-name") == "Peak braking"
-    line.connected = False
-    page.wait_for_selector("#files li")
-    log, calibration = saved(line.rider, tmp_path).values()
-    assert json.loads(calibration)["vehicle"] == "car" and log.count(b"\n") > 100
-    page.wait_for_selector("#start:enabled:visible")
-    start(line, board, half_seconds(3)[0])
-    page.wait_for_selector("#max-left-name:has-text('Most left')")
-    line.connected = False
-    page.wait_for_selector("#start:enabled:visible")
-
-
 def unpacked(data):
     return gzip.decompress(data) if data.startswith(b"\x1f\x8b") else data
 
@@ -220,7 +203,7 @@ def test_lean_over_bluetooth_fills_the_screen_and_returns(on_the_bar, tmp_path):
     page.wait_for_selector("#files li")
     assert page.evaluate("awake") == 0 and page.is_visible("nav")
     log, calibration = saved(rider, tmp_path).values()
-    assert log.startswith(b"t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\n") and log.count(b"\n") > 50
+    assert log.startswith(b"t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\n") and log.count(b"\n") > 10
     assert json.loads(calibration)["aligned"] is True
 
 

@@ -148,21 +148,6 @@ def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):
     assert page.page.inner_text("#report-title") == "B.csv" and page.report()[0] != first
 
 
-def test_wrong_or_changed_file_harms_no_other_ride(page, ride, calibration, tmp_path):
-    """A file that was rewritten after it was chosen cannot be read. A folder is treated in the same way."""
-    wrong, written = tmp_path / "ride.parquet", tmp_path / "written.csv"
-    wrong.write_bytes(b"PAR1" + bytes(40))
-    assert page.give(wrong) == "ride.parquet cannot be used: the list says why." and page.page.is_hidden("#report")
-    assert page.held()["ride.parquet"].startswith("is Parquet, which this page cannot read")
-    assert page.add(ride, calibration) == "" and page.add(wrong) == "" and page.page.is_visible("#report")
-    assert page.page.inner_text("#given-wrong") == "ride.parquet cannot be used: the list says why."
-    written.write_bytes(ride.read_bytes())
-    page.give(written)
-    written.write_text("anew, and of another length")
-    assert page.add(ride, calibration) == "" and page.page.inner_text("#report-title") == "RIDE.csv"
-    assert page.held()["written.csv"].startswith("cannot be read: it is a folder, or was changed")
-
-
 def test_the_columns_of_a_table_can_be_named(page, tmp_path):
     """The page has the same choices as the options --columns and --units of `import`."""
     log, cal = tmp_path / "log.csv", tmp_path / "phone.json"
@@ -200,23 +185,6 @@ def test_a_track_joins_a_ride_without_gps(page, tmp_path):
     assert page.saved("#save-log") == (tmp_path / "joined.csv").read_bytes()
     page.add(phone_tracks.write_gpx(track, api.Track(utc_s, lat[::-1], lon, speed_mps[::-1], "track")))
     assert "ride.gpx is not joined" in page.warnings()
-
-
-def test_sample_ride_is_shown_as_simulated(page):
-    """At first a drawing of a report is beside the place for files. Later the charts are beside the figures."""
-    page.give()
-    drop, drawing = (page.page.locator(one).bounding_box() for one in ("#drop", ".sample svg"))
-    assert drop["height"] > 300 and drawing["y"] + drawing["height"] < page.page.viewport_size["height"]
-    page.page.click("#sample")
-    page.page.wait_for_selector("#report", timeout=WAIT_MS)
-    assert page.said() == "This ride is simulated: nobody has ridden it."
-    assert page.page.inner_text("#report-title") == "simulated-ride.csv.gz"
-    assert page.page.inner_text("#alignment").startswith("Alignment: good.")
-    page.page.frame_locator("#plot").locator("#map .main-svg").first.wait_for()
-    page.page.wait_for_selector("#drawing", state="hidden")
-    assert page.warnings() == "" and page.page.is_hidden("#sample")
-    plot, figures = (page.page.locator(one).bounding_box() for one in ("#plot", "#figures"))
-    assert plot["y"] < figures["y"] and plot["x"] > figures["x"] + figures["width"]
 
 
 PULLED = Path(__file__).with_name("keep_pulled.js").read_text()

@@ -3,9 +3,6 @@
 import io
 import json
 import re
-import signal
-import threading
-import urllib.request
 import zipfile
 from pathlib import Path
 from urllib.parse import urljoin
@@ -14,11 +11,9 @@ import pytest
 from kickstand_tools.deploy.firmware_files import firmware_files
 from kickstand_tools.web import archives, site
 from kickstand_tools.web.documents import documents
-from kickstand_tools.web.documents.markdown import converted
 from support import command
 
 ROOT = Path(__file__).resolve().parents[2]
-HOME = "https://an.example/kickstand"
 LARGE = "esptool/", "firmware.zip", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip", "sample/", "docs/"
 BOARDS_PAGES = re.compile(r'<a href="https://micropython\.org/download/\w+/" target="_blank" rel="noopener">')
 
@@ -149,24 +144,6 @@ def test_a_board_is_offered_for_its_chip(node, described, names):
     assert node(script, {"names": list(site.shop_boards()), "described": described}) == names
 
 
-def test_archives_have_what_the_pages_import_and_no_more(files):
-    numpy = archive(files, "numpy/numpy.zip")
-    assert "numpy/__init__.py" in numpy and not any(f"/{part}/" in name for name in numpy for part in ("tests", "f2py"))
-    assert b"Copyright" in files["numpy/licence.txt"]
-    rides = archive(files, "rides.zip")
-    assert {name.split("/")[0] for name in rides} == {
-        *("kickstand_tools", "kickstand", "fitdecode", "gpxpy", "jinja2", "markupsafe")
-    }
-    assert {"kickstand_tools/web/rides_guest.py", "kickstand_tools/analysis/plot/page.py"} <= set(rides)
-    assert any(name.startswith("kickstand_tools/analysis/") and name.endswith(".js") for name in rides)
-    python = json.loads(files["python.json"])
-    assert {"kickstand_tools/web/device.py", "kickstand_tools/simulated_board/clock.py", "kickstand/app.py"} <= set(
-        python
-    )
-    assert "kickstand_tools/web/serve.py" not in {*rides, *python}
-    assert archives.zipped({"b": b"2", "a/c": b"1"}) == archives.zipped({"a/c": b"1", "b": b"2"})
-
-
 def test_a_page_lists_all_documents_and_its_own_headings(files):
     for name, text in pages(files, "docs/").items():
         listed = re.findall(r'<a href="\./([\w-]+\.html)"', re.findall('<nav class="all".*?</nav>', text, re.S)[0])
@@ -187,63 +164,6 @@ def test_one_page_has_all_the_words(files):
     assert words(together)[-len(single) :] == single
     anchors = re.findall(r' id="([^"]+)"', together)
     assert len(anchors) == len(set(anchors))
-
-
-def test_a_documents_own_marks_do_no_harm():
-    """The conversion handles quotes in a table, an empty table head, an angle bracket and a broken link."""
-    made = converted('# A & B\n\n"one" < two\n\n| | b |\n|---|---|\n| [c](d.md) | `<x>` |\n', lambda link: None, str)
-    assert (made.title, made.about) == ("A & B", '"one" < two')
-    assert "<td></td>" in made.html and "<th>b</th>" in made.html
-    assert "<td>c</td>" in made.html and "<code>&lt;x&gt;</code>" in made.html and "&lt; two" in made.html
-
-
-@pytest.fixture
-def installed_from_github(tmp_path, monkeypatch):
-    """Let the installed package know the project's address."""
-    package = tmp_path / "kickstand_lean-1.dist-info"
-    package.mkdir()
-    urls = f"Project-URL: Issues, {HOME}/issues\nProject-URL: Homepage, {HOME}\n"
-    (package / "METADATA").write_text("Metadata-Version: 2.1\nName: kickstand-lean\nVersion: 1\n" + urls)
-    monkeypatch.syspath_prepend(tmp_path)
-
-
-def test_the_served_site_leads_to_the_project(files, installed_from_github, monkeypatch):
-    """If the project's address is known, the site has another version, so that browsers load it. The command opens
-    the site in the browser."""
-    names = "", "install.html", "docs/settings.html", "docs/your-own-code.html", "service_worker.js"
-    received, addresses = {}, []
-
-    def browser(address):
-        def visit():
-            for name in names:
-                with urllib.request.urlopen(address + name) as answer:
-                    received[name] = answer.read().decode()
-            signal.raise_signal(signal.SIGINT)
-
-        addresses.append(address)
-        threading.Thread(target=visit).start()
-
-    monkeypatch.setattr("webbrowser.open", browser)
-    printed = command.works("web").out
-    assert printed == f"Kickstand in the browser: {addresses[0]} (press Ctrl-C to stop)\n"
-    assert HOME not in "".join(pages(files).values()) and "config.py</a>" not in files["docs/settings.html"].decode()
-    assert all(received[name].count(f'href="{HOME}"') == 1 for name in names[:-1])
-    assert f'href="{HOME}/issues/new/choose"' in received["install.html"]
-    assert f'href="{HOME}/blob/main/firmware/config.py"' in received["docs/settings.html"]
-    assert f'href="{HOME}/tree/main/firmware/examples"' in received["docs/your-own-code.html"]
-    assert received["service_worker.js"] != files["service_worker.js"].decode()
-
-
-def test_a_build_on_github_knows_the_address(monkeypatch):
-    core = pytest.importorskip("hatchling.metadata.core")
-    manager = pytest.importorskip("hatchling.plugin.manager")
-    for server, homepage in ((None, None), ("https://an.example", "https://an.example/rider/kickstand")):
-        monkeypatch.delenv("GITHUB_REPOSITORY", raising=False)
-        if server:
-            monkeypatch.setenv("GITHUB_SERVER_URL", server)
-            monkeypatch.setenv("GITHUB_REPOSITORY", "rider/kickstand")
-        urls = core.ProjectMetadata(str(ROOT), manager.PluginManager()).core.urls
-        assert urls.get("Homepage") == homepage
 
 
 def test_an_existing_file_is_not_overwritten(tmp_path):

@@ -11,7 +11,6 @@ from kickstand_tools.analysis.stops.brake_test import (
     closes,
     find_stops,
     mfdd_mps2,
-    plausible,
 )
 from roads import RATE_HZ, REST_S, Road, braking
 
@@ -102,21 +101,6 @@ def test_a_stop_needs_its_standstill_but_not_the_one_before():
 
 
 @pytest.mark.parametrize(
-    ("missing_s", "mps2", "initial_mps"),
-    [
-        ([(15.001, 15.46)], 5.0, 20.0),  # a gap of up to half a second is bridged
-        ([(15.001, 15.56)], 5.0, 12.2),  # after a longer gap the stop begins at its end
-        ([(14.5, 15.4), (17.0, 17.9)], 2.0, 12.2),  # the last gap counts
-    ],
-)
-def test_readings_are_integrated_after_the_last_long_gap(missing_s, mps2, initial_mps):
-    road = braking(20.0, mps2)
-    missing = np.any([(road.t_s >= begin) & (road.t_s < end - 1e-6) for begin, end in missing_s], axis=0)
-    stop = one_stop(road.channels().part(~missing))
-    assert stop.initial_speed_mps == pytest.approx(initial_mps, rel=0.01)
-
-
-@pytest.mark.parametrize(
     ("engine_mps2", "hard", "earlier_s"),
     [
         (0.2, [(17.2 / 6.0, -6.0)], 0.12),  # below 4 % of the full deceleration, braking has not begun
@@ -148,21 +132,6 @@ def test_jerk_is_the_steepest_change_of_the_force():
     stop = one_stop(road.channels())
     assert stop.jerk_mps3 == pytest.approx(20.0, rel=0.15)  # the force is smoothed twice over 0.2 s
     assert (stop.peak_mps2, stop.initial_speed_mps) == pytest.approx((6.0, lost), rel=0.01)
-
-
-@pytest.mark.parametrize(
-    ("begin_s", "end_s", "more_mps2"),
-    [
-        (2.56, 4.0, 0.0),
-        (0.5, 1.5, 0.49),  # 0.1 g during one of the 2 s counts as a slope of 0.49 m/s2
-        (1.5, 2.5, 0.49),
-    ],
-)
-def test_the_slope_is_that_of_2_seconds_of_the_standstill(begin_s, end_s, more_mps2):
-    """They begin 0.5 s after the stop. The force is wrong by 0.1 g for a while."""
-    ride, after = USUAL.channels(), USUAL.t_s - 18.0
-    ride.forward_g[(after > begin_s - 0.01) & (after < end_s - 0.01)] += 0.1
-    assert one_stop(ride).mfdd_mps2 == pytest.approx(5.0 + more_mps2, rel=0.02 if more_mps2 else 1e-4)
 
 
 def pitched(pitch_deg):
@@ -221,15 +190,6 @@ def test_a_stop_whose_speed_does_not_close_is_rejected(off_g, counts):
     ride.forward_g[(USUAL.t_s > 5.0) & (USUAL.t_s < 14.0)] -= off_g
     assert len(find_stops(ride)) == counts
     assert closes(40.0, seconds=40.0) and not closes(40.0, seconds=20.0)  # after 40 s the integral proves nothing
-
-
-@pytest.mark.parametrize(
-    ("mps", "side_m", "heading_deg", "proven"),
-    [(60.0, 10.0, 20.0, True), (80.0, 0.0, 0.0, False), (20.0, -20.0, 0.0, False), (20.0, 20.0, 0.0, False),
-     (20.0, 0.0, -40.0, False)],
-)  # fmt: skip
-def test_integrated_readings_alone_prove_only_plausible_stops(mps, side_m, heading_deg, proven):
-    assert plausible(mps, side_m, heading_deg) is proven
 
 
 def test_the_speed_in_the_log_corrects_the_integral():

@@ -19,6 +19,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
 from ..common.errors import InputError
+from ..logs.csv_reader import as_text
 from ..signals import Array, moving_mean, moving_spread
 from .rate_fit import RateFit, fit_rates
 from .recording import Sheet, plain, unit_in
@@ -31,6 +32,7 @@ from .units import (
     NO_TIME,
     RATES,
     SPEEDS,
+    TIME_NAME,
     TIMES,
     counts_per,
     since_first_s,
@@ -50,7 +52,6 @@ _KINDS = {  # kinds of sensors, by the words in their columns' names
     "accel": r"acc|force|^ac$|^gf$|^f$|^a$",
     "either": r"^g$",
 }
-_TIME = re.compile(r"time|milli|micro|^(t|ts|ms|us|ns|s|sec|secs|seconds|elapsed\w*)$|epoch|utc|clock|stamp|^monitors$")
 # Words for an axis, longest first: of vehicles, and of web pages, whose alpha turns about z
 _AXES = {"longitudinal": "x", "inline": "x", "long": "x", "roll": "x", "beta": "x", "lateral": "y", "lat": "y"}
 _AXES |= {"pitch": "y", "gamma": "y", "vertical": "z", "vert": "z", "yaw": "z", "alpha": "z"}
@@ -120,8 +121,12 @@ class Findings:
 
     @property
     def units(self) -> dict[str, str]:
-        """The units by "t", "a", "g" and "speed"."""
-        return {key: finding.unit for key, finding in self.found.items() if finding.unit}
+        """The units by "t", "a", "g" and "speed", and of single axes whose name has another unit."""
+        units = {key: finding.unit for key, finding in self.found.items() if finding.unit}
+        for axes, kinds in ((ACCEL, ACCELERATIONS), (GYRO, RATES)):
+            own = {axis: stated_unit(self.columns[axis]) for axis in axes if axis in self.columns}
+            units |= {axis: name for axis, name in own.items() if name in kinds and len(set(own.values())) > 1}
+        return units
 
     @property
     def reasons(self) -> str:
@@ -135,6 +140,9 @@ def find(sheet: Sheet) -> Findings:
     time = _time(sheet)
     if time is None:
         findings.lacking.append("time")
+        named = [k for k, name in enumerate(sheet.columns) if TIME_NAME.search(plain(name))][:1]
+        shown = [f"{sheet.columns[k]} (first {as_text(sheet.cells[k])[0][:30]!a})" for k in named]
+        findings.remarks += [f"its column {text} is no time that increases" for text in shown]
     else:
         findings.found["t"] = time
     seconds = _seconds(sheet, time)
@@ -160,7 +168,7 @@ def _time(sheet: Sheet) -> ColumnFinding | None:
     then the column with the finest steps."""
     usable = []
     for place, name in enumerate(sheet.columns):
-        named = bool(_TIME.search(plain(name.rpartition(":")[2])))
+        named = bool(TIME_NAME.search(plain(name.rpartition(":")[2])))
         stated = stated_unit(name) if stated_unit(name) in TIMES else ""
         values = sheet.cells[place]
         if not (named or stated) and values.dtype.kind == "O" and not MOMENT.fullmatch(str(values[0])):
@@ -249,13 +257,11 @@ def completed(sheet: Sheet) -> Sheet:
     if scale and not _time_unit_of(scale):
         sheet.columns[0], sheet.cells[0] = f"{sheet.columns[0]} (s)", sheet.numbers(0) * scale
     for fraction, size in _FRACTIONS.items():
-        k = next(
-            (k for k, name in enumerate(names) if k and name.removesuffix("s").endswith(fraction.removesuffix("s"))), 0
-        )
+        k = next((k for k, name in enumerate(names) if k and name.removesuffix("s").endswith(fraction)), 0)
         if k and re.search(r"secs?$|seconds?$|stamp$|time$", names[k - 1]) and names[k - 1] != names[k]:
             whole, part = sheet.cells[k - 1], sheet.numbers(k)
-            if whole.dtype.kind == "i" and np.nanmin(part) >= 0.0 and np.nanmax(part) * size < 10**9:
-                part_ns = np.nan_to_num(part * size).astype(np.int64)
+            if whole.dtype.kind == "i" and np.all((part >= 0.0) & (part * size < 10**9)):
+                part_ns = (part * size).astype(np.int64)
                 sheet.columns.append(f"time {sheet.columns[k - 1]} + {sheet.columns[k]} (ns)")
                 sheet.cells.append(whole.astype(np.int64) * 10**9 + part_ns)
                 break
@@ -264,16 +270,20 @@ def completed(sheet: Sheet) -> Sheet:
         if not np.any(np.all(np.isfinite(three.values), axis=1)):
             _merge_rows(sheet, three)
     if "linear" in threes and "gravity" in threes and "accel" not in threes:
-        total = threes["linear"].values + threes["gravity"].values
+        linear, gravity = threes["linear"].values, threes["gravity"].values
+        total, valid = linear + gravity, np.all(np.isfinite(gravity), axis=1)
+        if np.all(np.isnan(total)) and np.any(valid):  # in rows of their own
+            t_s = since_first_s(sheet.times(0, ""))
+            total = linear + np.column_stack([np.interp(t_s, t_s[valid], axis[valid]) for axis in gravity.T])
         stated = stated_unit(sheet.columns[threes["linear"].places[0]])
         sheet.columns += [f"total acceleration {axis}" + (f" ({stated})" if stated else "") for axis in "xyz"]
         sheet.cells += list(total.T)
     return sheet
 
 
-# The ends of names of columns with fractions of a second, and the ns of their unit
+# The ends of names of columns with fractions of a second, without a plural s, and the ns of their unit
 _FRACTIONS = {"nsec": 1, "nanosec": 1, "nanosecond": 1, "usec": 1000, "microsecond": 1000, "msec": 10**6}
-_FRACTIONS |= {"millisecond": 10**6, "millis": 10**6}
+_FRACTIONS |= {"millisecond": 10**6, "milli": 10**6}
 
 
 def _merge_rows(sheet: Sheet, three: _Triple) -> None:
@@ -298,6 +308,11 @@ def _find_triples(sheet: Sheet) -> list[_Triple]:
         groups = ["xyz"] if set("xyz") <= set(axes) else _numbered(axes)
         for axes_of_one in groups:
             places = [axes[axis] for axis in axes_of_one]
+            if _kind(stem) in ("accel", "gyro", "either") and not _numeric(sheet, places):
+                cell = next((cell for place in places for cell in as_text(sheet.cells[place]) if cell), "")
+                sheet.unread = (
+                    f"its columns {', '.join(sheet.columns[k] for k in places)} hold no numbers ({cell[:20]!a})"
+                )
             if not used & set(places) and _numeric(sheet, places):
                 used |= set(places)
                 said = stated_unit(sheet.columns[places[0]])
@@ -331,7 +346,7 @@ def _side_by_side(sheet: Sheet) -> list[_Triple]:
     numeric = [
         place
         for place, name in enumerate(sheet.columns)
-        if _numeric(sheet, [place]) and not _TIME.search(plain(name)) and not _increasing(sheet, place)
+        if _numeric(sheet, [place]) and not TIME_NAME.search(plain(name)) and not _increasing(sheet, place)
         if np.nanstd(sheet.numbers(place)) > 0.0 and not _KNOWN.search(plain(name))
     ]
     runs = [numeric[k : k + 3] for k in range(0, len(numeric) - 2, 3)] if len(numeric) > 5 else []
@@ -368,7 +383,7 @@ def _split_axis(name: str) -> Iterable[tuple[str, str]]:
         yield sensor + (head + last[:-1]).strip(), last[-1]
     elif len(whole) > 1 and whole[0] in "xyz":
         yield sensor + whole[1:], whole[0]
-    elif (match := re.fullmatch(r"(.*?)(\d{1,2})", whole)) and not bare.startswith("#"):
+    elif (match := re.fullmatch(r"(.*?)(\d{1,2})", whole)) and (colon or not bare.startswith("#")):
         yield sensor + match[1], match[2]
 
 
@@ -419,7 +434,8 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
     unnamed, scales = [*kinds["either"], *kinds[""]], _scales(sheet)
     possible = [*kinds["accel"], *kinds["either"], *([] if kinds["accel"] else kinds[""])]
     without = kinds["linear"] or kinds["accel"]
-    accel = _first_with_gravity(possible, seconds) or _first_with_gravity(kinds["linear"], seconds)
+    accel = _first_with_gravity(possible, seconds)
+    accel = accel or next((three for three in kinds["linear"] if _has_gravity(three, seconds, near=True)), None)
     accel = accel or next((three for three in kinds["accel"] if not _is_linear(three, seconds)), None)
     exchanged = None if accel else _first_with_gravity(kinds["gyro"], seconds)
     rates = _partner(accel, kinds["gyro"]) or _partner(accel, [three for three in unnamed if three is not accel])
@@ -436,6 +452,8 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
         of_accel.columns, findings.found["a"] = names, of_accel
         if exchanged is not None:
             of_accel.certain, of_accel.why = False, f"{of_accel.why}, so these columns are the accelerometer's"
+    if sheet.unread and (accel is None or rates is None):
+        findings.remarks.insert(0, sheet.unread)
     if rates is None:
         findings.lacking.append("gyro")
         return

@@ -18,8 +18,8 @@ import numpy as np
 
 from ..logs.csv_reader import Cells, cells_of, columns_of, columns_of_text, filled, numbers_of, separator_of
 from .files import RecordingFile
-from .recording import Sheet
-from .units import ACCELERATIONS, MOMENT, RATES, SPEEDS, TIMES, unit
+from .recording import Sheet, plain
+from .units import ACCELERATIONS, MOMENT, RATES, SPEEDS, TIME_NAME, TIMES, unit
 
 LOOKED_AT = 400  # lines used to find the layout
 SEPARATORS = "\t;, "  # if two separators split the same lines into the same number of cells, the first is used
@@ -85,7 +85,7 @@ def joined_sheet(files: list[RecordingFile]) -> Sheet | None:
     for k, (name, sheet) in enumerate(there):
         begin = sum(rows[:k])
         for column, values in zip(sheet.columns[1:], sheet.cells[1:]):
-            if _increases(numbers_of(values)) or MOMENT.fullmatch(str(values[0])):
+            if TIME_NAME.search(plain(column)):
                 continue  # another time, which only the rows of this file have
             wide = np.full(total, np.nan)
             wide[begin : begin + rows[k]] = numbers_of(values)

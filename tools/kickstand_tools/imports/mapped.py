@@ -138,11 +138,10 @@ def table_in(files: list[RecordingFile]) -> MappedTable | None:
     together, return the largest."""
     largest = max(files, key=lambda file: len(file.text))
     sheet = sheet_in(largest)
-    sheet = sheet and findings.completed(sheet)
-    found = None if sheet is None else findings.find(sheet)
+    found = None if sheet is None else findings.find(findings.completed(sheet))
     if len(files) > 1 and (found is None or found.lacking):
         joined = joined_sheet(files)
-        of_all = None if joined is None else findings.find(joined)
+        of_all = None if joined is None else findings.find(findings.completed(joined))
         if joined and of_all and (found is None or len(of_all.lacking) < len(found.lacking)):
             return MappedTable(joined.name, joined, of_all, True)
     if sheet is None or found is None or not ({"a", "g"} & set(found.found) or len(sheet.columns) >= len(REQUIRED)):
@@ -187,18 +186,19 @@ def unknown(files: list[RecordingFile], source: str, table: MappedTable | None =
     several = f" (of {len(files)} files, the largest is {table.name})" if len(files) > 1 else ""
     columns, found = table.sheet.columns, table.findings
     shown = ", ".join(columns[:40]) + (", ..." if len(columns) > 40 else "")
+    start = f"{source}: not a file of an app that is known{several}"
     named = not all(name.startswith("#") for name in columns)
-    if "gyro" in found.lacking and ("a" in found.found or found.remarks or (named and not found.single)):
+    if "gyro" in found.lacking and not table.sheet.unread and ("a" in found.found or (named and not found.single)):
         return InputError(
-            f"{source}: not a file of an app that is known{several}, and no gyro found in it: without one there is no "
-            f"lean. Record the gyroscope as well. Its columns are {shown}"
+            f"{start}, and no gyro found in it: without one there is no lean. Record the gyroscope as well. Its "
+            f"columns are {shown}"
         )
     if found.remarks:
-        return InputError(f"{source}: not a file of an app that is known{several}{table.lacking}: {found.remarks[0]}")
+        return InputError(f"{start}{table.lacking}: {found.remarks[0]}")
     if found.lacking == ["time"]:
         return InputError(
-            f"{source}: not a file of an app that is known{several}, and no time found in it: write the time of each "
-            "row, such as millis(), or switch the time stamps of the serial monitor on"
+            f"{start}, and no time found in it: write the time of each row, such as millis(), or switch the time "
+            "stamps of the serial monitor on"
         )
     keys = [key for key in (*REQUIRED, *OPTIONAL) if key in (*REQUIRED, *found.columns)]
     given = [f"{key}={_column_as_typed(table, key)}" for key in keys]
@@ -207,7 +207,7 @@ def unknown(files: list[RecordingFile], source: str, table: MappedTable | None =
     ask = "Replace each ?" if table.missing else "Correct what is wrong"
     reasons = f" ({found.reasons})" if found.reasons else ""
     return InputError(
-        f"{source}: not a file of an app that is known{several}{table.lacking}",
+        f"{start}{table.lacking}",
         Remedy(
             f"its columns are {shown}. {ask}{reasons}, and type: kickstand import {shlex.quote(where)} --out RIDE.csv "
             f"--columns {shlex.quote(','.join(given))} --units {units}",

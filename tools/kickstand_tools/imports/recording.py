@@ -29,6 +29,7 @@ class Sheet:
     cells: the cells of each column.
     left_out: number of damaged rows.
     head: the lines above the rows.
+    unread: columns of a sensor that hold no numbers, in words.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Sheet:
     cells: list[Cells]
     left_out: int = 0
     head: str = ""
+    unread: str = ""
 
     def place(self, *names: str) -> int | None:
         """Find the first of these names that a column has, compared by plain(). Return the column's number, or None."""

@@ -28,9 +28,11 @@ def plain_text(text: str) -> str:
     if not text.isascii() or "'" in text:
         text = _BLANK.sub("", _MINUS.sub("-", text))
     votes = [_decimal_comma(line) for line in text.split("\n", LOOKED_AT)[:LOOKED_AT]]
+    if votes.count(False) > len(votes) / 2:
+        return text
     if any("." in cell[0] for cell in _COMMAS.finditer(text)):  # 1,029.5
         return _COMMAS.sub(lambda cell: cell[0].replace(",", ""), text)
-    if sum(vote is True for vote in votes) <= sum(vote is False for vote in votes):
+    if votes.count(True) <= votes.count(False):
         return text
     if any("," in cell[0] for cell in _POINTS.finditer(text)):  # 1.029,5
         text = _POINTS.sub(lambda cell: cell[0].replace(".", ""), text)
@@ -40,7 +42,9 @@ def plain_text(text: str) -> str:
 def _decimal_comma(line: str) -> bool | None:
     """True if the line has numbers with a decimal comma. False if commas separate its cells. None without commas."""
     cells = [cell for cell in _BETWEEN.split(line) if cell.strip(",")]
-    if any(cell.count(",") > 1 or cell.endswith(",") or cell.startswith(",") for cell in cells):
+    if any(cell.endswith(",") or cell.startswith(",") for cell in cells):
+        return False
+    if any(cell.count(",") > 1 and (len(cells) == 1 or not _COMMAS.fullmatch(cell)) for cell in cells):
         return False
     return True if len(cells) > 1 and any(map(_COMMA_NUMBER.fullmatch, cells)) else None
 

@@ -64,6 +64,9 @@ MOMENT = re.compile(
     r"(?:(\d{1,3})([:.]))?(\d{1,2})(?(5)\5|:)(\d{1,2})(?:[.,:](\d+))?\s*(?:([AaPp])\.?[Mm]\.?)?"
     r"\s*(Z|UTC|GMT|[+-]\d\d:?\d\d)?\s*"
 )
+TIME_NAME = re.compile(
+    r"time|milli|micro|^(t|ts|ms|us|ns|s|sec|secs|seconds|elapsed\w*)$|epoch|utc|clock|stamp|^monitors$"
+)
 _COMPACT = re.compile(r"^\s*(\d{4})(\d\d)(\d\d)[T_ ](\d\d)(\d\d)(\d\d)")
 _COUNTS = re.compile(r"(?:counts?|lsb|raw)/(\d+(?:\.\d+)?)")
 
