@@ -58,7 +58,7 @@ def accusations(log: Log) -> set[str]:
 @pytest.mark.parametrize("profile", BENDY)
 def test_no_window_of_bends_is_accused(profile):
     chance = np.random.default_rng(1)
-    for _ in range(6):
+    for _ in range(3):
         assert accusations(window(long_ride(profile, 200.0), chance)) == set()
 
 
@@ -74,25 +74,22 @@ def test_no_window_of_a_recording_is_accused(shared_data):
     """A car is named as a car."""
     chance = np.random.default_rng(3)
     for path in sorted(shared_data.glob("*.csv.gz")):
-        log = read_log(path)
-        for _ in range(2):
-            assert accusations(window(log, chance)) <= ({"not-leaning"} if "car" in path.name else set())
+        car = {"not-leaning"} if "car" in path.name else set()
+        assert accusations(window(read_log(path), chance)) <= car
 
 
-@pytest.mark.parametrize("profile", ["street", *(pytest.param(p, marks=pytest.mark.long) for p in BENDY)])
-def test_mistakes_are_found_in_most_windows_and_named_right(profile):
+@pytest.mark.parametrize(
+    ("profile", "count"), [("street", 3), *(pytest.param(p, 6, marks=pytest.mark.long) for p in (*BENDY, "street"))]
+)
+def test_mistakes_are_found_in_most_windows_and_named_right(profile, count):
     chance = np.random.default_rng(4)
     found = 0
-    for _ in range(6):
+    for _ in range(count):
         log, wrong = window(long_ride(profile, 200.0), chance), WRONG[chance.integers(len(WRONG))]
         notices = read_log(Log(log.t_s, log.accel_g, log.gyro_dps @ wrong.T)).notices
         assert len(notices) <= 1
         for notice in notices:
             found += 1
-            right = (
-                np.array_equal(wrong.T, -np.eye(3))
-                if notice.code == "left-handed"
-                else notice.values == tuple(map(tuple, wrong.T))
-            )
-            assert right or notice.code == "axes-misfit", (notice, wrong)
-    assert found >= 3
+            repair = -np.eye(3) if notice.code == "left-handed" else notice.values
+            assert notice.code == "axes-misfit" or np.array_equal(repair, wrong.T), (notice, wrong)
+    assert found >= count / 2
