@@ -143,6 +143,7 @@ TOOLS = {
         "cli.common",
     },
     "kickstand_workshop": {
+        "api",
         "common",
         "signals",
         "logs",

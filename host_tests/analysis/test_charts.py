@@ -8,12 +8,8 @@ import numpy as np
 import pytest
 from kickstand_tools.analysis.plot import charts, interactive, page, picture
 from kickstand_tools.analysis.plot.charts import (
-    LEFT_COLOUR,
-    RIGHT_COLOUR,
     Chart,
     Charts,
-    Line,
-    Sides,
 )
 from kickstand_tools.checks.mount import UpOff
 from kickstand_tools.estimation.smooth import NotTheBikes
@@ -94,22 +90,6 @@ def drawn(*traces, **options):
     above = Chart("above", list(traces), 2.0, (0.0, 9.0), (-1.0, 1.0), **options)
     below = Chart("below", [], 3.0, (0.0, 1.0), (0.0, 1.0))
     return interactive.figure(Charts("a  ·  1:00  ·  <b>  ·  c", [above], [below], []))
-
-
-def test_a_page_draws_lines_and_areas_without_gaps():
-    x, y = np.array([0.0, 1.0, 2.0]), np.array([1.0, NAN, 3.0])
-    plain, dotted = drawn(Line(x, y, "red", "speed"), Line(x, y, "blue", dotted=True, width=2.0))["data"]
-    assert (plain["x"], plain["y"], plain["name"], plain["line"]["color"]) == ([0.0, 2.0], [1.0, 3.0], "speed", "red")
-    assert "name" not in dotted and dotted["line"]["width"] == 2.0 * plain["line"]["width"]
-    assert (plain["line"]["dash"], dotted["line"]["dash"], plain["xaxis"], plain["yaxis"]) == ("solid", "dot", "x", "y")
-    x, y = np.array([0.0, 1.0, 2.0, 5.0, 6.0]), np.array([-1.0, -2.0, 3.0, 4.0, 0.0])
-    left, right = drawn(Sides(x, y, 2.0))["data"]
-    assert (left["name"], right["name"]) == ("left", "right")
-    assert (left["line"]["color"], right["line"]["color"]) == (LEFT_COLOUR, RIGHT_COLOUR)
-    assert left["x"] == [0.0, 1.0, 2.0, 2.0, 3.5, 5.0] and left["y"] == [-1.0, -2.0, 0.0, 0.0, None, 0.0]
-    assert right["x"] == [1.0, 2.0, 2.0, 3.5, 5.0, 5.0, 6.0] and right["y"] == [0.0, 3.0, 0.0, None, 0.0, 4.0, 0.0]
-    zeros, _ = drawn(Sides(np.arange(8.0), np.array([0, 0, 0, -1, 0, 0, 0, -2.0]), 9.0))["data"]
-    assert zeros["x"] == [2.0, 3.0, 4.0, 6.0, 7.0] and zeros["y"] == [0.0, -1.0, 0.0, 0.0, -2.0]
 
 
 def test_the_picture_draws_the_same_charts(short_overview):

@@ -38,16 +38,6 @@ def points_of(ride_overview):
     return points
 
 
-@pytest.mark.parametrize(
-    ("east_m", "north_m", "shape"),
-    [(100.0, 100.0, 1.0), (900.0, 100.0, 2.2), (100.0, 900.0, 0.6), (150.0, 100.0, 1.5), (0.0, 0.0, 1.0)],
-)
-def test_the_map_has_the_shape_of_its_track_within_limits(east_m, north_m, shape):
-    points = points_of(track(11))
-    turned = replace(points, east_m=np.array([0.0, np.nan, east_m]), north_m=np.array([north_m, np.nan, 0.0]))
-    assert track_map.shape(turned) == pytest.approx(shape)
-
-
 @pytest.mark.parametrize("place", [(-33.9, 151.2), (47.6, 179.999), (-0.001, 0.001)])
 def test_a_metre_of_the_map_is_right_in_both_directions(place):
     """At every latitude, on both sides of the equator and across the meridian of 180 degrees."""
@@ -89,18 +79,6 @@ def track(n=301, step_s=1.0, vehicle="motorcycle", **columns):
     """Return a ride whose positions go north by 1.1 m per sample."""
     positions = {"lat_deg": 10.0 + np.arange(n) * 1e-5, "lon_deg": 8.0} | columns
     return overview_of(samples(n, step_s=step_s, **positions), vehicle=vehicle)
-
-
-def test_a_track_is_in_metres_from_its_middle():
-    """At 60 degrees north, 0.01 degrees of longitude are 556 m, and 0.01 degrees of latitude are 1112 m. The points are
-    at least 0.2 s apart."""
-    steps = np.arange(1001) * 1e-5
-    points = points_of(track(1001, 0.01, lat_deg=60.0 + steps, lon_deg=8.0 + steps, speed_mps=10.0))
-    assert len(points.t_s) == 51 and points.t_s[:2] == pytest.approx([0.0, 0.2])
-    assert (points.lat_deg, points.lon_deg) == pytest.approx((60.005, 8.0))
-    assert points.east_m[[0, -1]] == pytest.approx([0.0, 555.9], abs=0.5)
-    assert points.north_m[[0, -1]] == pytest.approx([-556.0, 556.0], abs=0.5)
-    assert points.speed_kmh == pytest.approx(36.0) and track_map.map_points(track(10, lat_deg=np.nan)) is None
 
 
 @pytest.mark.parametrize(("vehicle", "lean"), [("motorcycle", True), ("car", False)])

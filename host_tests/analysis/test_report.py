@@ -130,6 +130,7 @@ def test_the_command_reports_a_ride(short_ride, monkeypatch):
     for words in "as the display showed it", "Max left", "Over 40°", "Max braking", "MFDD", "km/h", "Alignment":
         assert words in text
     assert max(len(line) for line in text.split("\n")) <= 80
+    assert re.search(r"^ *at +from +time +distance +MFDD +peak +jerk +pulls *$", text, re.M)
     assert re.search(r"^ *0:\d\d +5\d\.\d +2\.\d\d +2\d\.\d( +\d+\.\d\d){2} +\d+ +0\.\d (left|right) *$", text, re.M)
 
 

@@ -9,7 +9,7 @@ from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.simulation.profiles import PROFILES
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
-from support.recordings.drawn_rides import drawn_ride
+from kickstand_workshop.evaluation.drawn_rides import drawn_ride
 
 
 def judged(log, scale=1.0):

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from checked import cells_of, made_up, simulated, words
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.checks.cells import CellTable
-from kickstand_tools.checks.mount import ForwardExchanged, ForwardOff, contradiction
+from kickstand_tools.checks.mount import ForwardOff, contradiction
 from kickstand_tools.common.messages import sentence
 from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.log import Log
@@ -138,25 +137,6 @@ def test_recordings(shared_data):
     assert "calibrate drive again?" in said(log, other(car, "car", up=180.0))
 
 
-SIGN = " Or, if no board wrote this log, do all accelerations have the opposite sign? At rest up reads +1 g"
-
-
-def exchanged_line(car, side, roll_deg=None):
-    return sentence(ForwardExchanged(car, side, roll_deg))
-
-
-def test_what_is_reported():
-    """Forward and backward are exchanged. The message suggests another side of the kickstand. The message also asks
-    whether the log's accelerations have the opposite sign, because then another side would only give a plausible,
-    mirrored report."""
-    assert exchanged_line(False, "left", 0.0).endswith("exchanged: calibrate two --side right?" + SIGN)
-    assert exchanged_line(False, "right", -3.9).endswith("exchanged: calibrate two --side left?" + SIGN)
-    assert exchanged_line(False, "", 0.0).endswith("calibrate two with the other --side?" + SIGN)
-    assert exchanged_line(False, "left", -4.1).endswith("exchanged: were the poses swapped?" + SIGN)
-    assert exchanged_line(False, "left").endswith("calibrate two --side right? Or were the poses swapped?" + SIGN)
-    assert exchanged_line(True, "").endswith("exchanged: calibrate drive again?" + SIGN)
-
-
 def jerky(late_s: int = 0, sign: float = 1.0, seconds: int = 240, mps2: float = 2.0) -> Log:
     """Return a log with 10 samples per second and a random acceleration along z in each second.
 
@@ -208,44 +188,3 @@ def test_of_several_speeds_in_a_second_the_first_counts():
     log = jerky(sign=-1.0)
     log.speed_mps[3::10] = 77.0
     assert exchanged(log)
-
-
-def test_seconds_without_a_speed_or_without_samples():
-    """The log has a gap, and the satellites are lost for 40 s. The rest of the log is still enough. Two parts that are
-    days apart are not judged as one ride."""
-    log = jerky(sign=-1.0)
-    log.speed_mps[500:900] = np.nan
-    assert exchanged(log.part((log.t_s < 100.0) | (log.t_s > 130.0)))
-    far = CellTable()
-    for at_s in 0.0, 4e5:
-        far.add(log.t_s + at_s, log.accel_g, log.gyro_dps, log.speed_mps)
-    assert far.cells() is None
-    assert CellTable().cells() is None
-
-
-def swaying(yaw_dps: float, seconds: float) -> Log:
-    """Return a log whose yaw rate swings with a period of 4 s and an amplitude of yaw_dps. The roll rate has half the
-    amplitude of the yaw rate and a quarter period of delay, similar to a motorcycle."""
-    time = np.arange(0.0, seconds, 0.02)
-    yaw, roll = yaw_dps * np.sin(np.pi / 2 * time), -0.5 * yaw_dps * np.cos(np.pi / 2 * time)
-    return Log(time, np.tile([0.0, 1.0, 0.0], (len(time), 1)), np.column_stack((0 * yaw, yaw, roll)))
-
-
-@pytest.mark.parametrize(
-    ("yaw_dps", "seconds", "shown"), [(1.16, 90.0, False), (1.24, 90.0, True), (3.0, 61.0, False), (3.0, 63.0, True)]
-)
-def test_small_or_short_bends_show_no_forward(yaw_dps, seconds, shown):
-    """The check needs changes of the yaw rate with a standard deviation of 1 deg/s. In this log the standard deviation
-    of these changes is 0.832 yaw_dps:
-
-    * Means over 0.5 s keep 0.974 of the amplitude.
-    * The changes of these means over a second have 1.414 times the amplitude.
-    * Smoothing keeps 0.854 of this amplitude.
-    * The standard deviation of a sine is its amplitude divided by 1.414.
-
-    The check also needs 120 changes. A log of 61 s has 118 changes, and a log of 63 s has 122.
-    """
-    calibration = CalibrationFile(aligned=True)
-    log = swaying(yaw_dps, seconds)
-    assert said(log, calibration) == ""
-    assert ("by the bends of this ride forward is 90 degrees" in said(log, other(calibration, up=90.0))) is shown

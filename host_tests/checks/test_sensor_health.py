@@ -10,7 +10,7 @@ from kickstand_tools.api import Log, replay, smooth
 from kickstand_tools.checks.sensor import NAMES, AxisDead, GyroSaturated, SensorHealth
 from kickstand_tools.common.messages import sentence
 from kickstand_tools.signals import rotation_matrix
-from support.recordings.smoothed_rides import rms, simulated
+from kickstand_workshop.evaluation.smoothed_rides import rms, simulated
 
 
 @pytest.fixture(scope="module")

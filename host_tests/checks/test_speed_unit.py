@@ -5,11 +5,10 @@ import functools
 import numpy as np
 import pytest
 from checked import cells_of, simulated, words
-from kickstand_tools.checks import log as checks_log
 from kickstand_tools.checks.units import speed_unit
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import reader
-from kickstand_tools.logs.log import Block, Log
+from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.simulation.profiles import PROFILES
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
@@ -84,18 +83,6 @@ def test_no_simulated_ride_is_refused(profile):
         assert said(time, force, np.where(np.isnan(speed), np.nan, wrong)) == ""
 
 
-def test_the_force_during_missing_samples_is_unknown():
-    """A logger that sleeps for half of each second records only half of the force. The log's speed must not seem to
-    change too much for this force."""
-    time = np.arange(0.0, 300.0, 0.01)
-    push = 0.4 * np.sign(np.sin(2.0 * np.pi * time / 20.0)) * (time % 10.0 < 4.0)
-    speed = np.where(np.arange(len(time)) % 100 == 99, 20.0 + np.cumsum(push) * 0.01 * 9.80665, np.nan)
-    force = np.column_stack((push, np.ones(len(time)), np.zeros(len(time))))
-    awake = time % 1.0 > 0.5
-    assert said(time[awake], force[awake], speed[awake]) == ""
-    assert "km/h" in said(time, force, speed * KMH)
-
-
 def test_a_speed_that_has_nothing_to_do_with_the_ride():
     """None of a hundred logs with random forces and speeds may look like a wrong unit by chance."""
     rng = np.random.default_rng(0)
@@ -113,18 +100,3 @@ def test_recordings(shared_data):
         if log.name.startswith("car-urban"):
             assert "it is in km/h" in said(time, force, speed * KMH)
             assert "it is in mph or knots" in said(time, force, speed * MPH)
-
-
-def test_the_unit_is_judged_once_in_20_s_while_a_log_is_read(monkeypatch):
-    """The log comes in blocks of 8 s. The unit is judged after 24 s, after 48 s and at the end."""
-    judged_s = []
-    monkeypatch.setattr(checks_log, "speed_unit", lambda cells: judged_s.append(round(len(cells.known) * 0.1)))
-    checks = checks_log.Checks("ride.csv")
-    missing, sound = np.full(400, np.nan), np.zeros(400, dtype=bool)
-    readings = np.tile([0.0, 1.0, 0.0, 20.0, 0.0, 0.0, 0.0], (400, 1))
-    for begin in range(0, 2800, 400):
-        time_us = 20_000 * np.arange(begin, begin + 400)
-        checks.add(Block(time_us, readings, missing, missing, missing, missing, sound, True, 0.0, 0))
-    assert judged_s == [24, 48]
-    assert checks.remarks() == []
-    assert judged_s == [24, 48, 56]

@@ -1,16 +1,14 @@
 """The emulated Pico as a program sees it: the bus and the flash take time, I2C errors are those of the chip, and the
 console is quiet. Also its pins as speed sources, and the machine code that it accepts."""
 
-import json
 import os
 import subprocess
 import sys
-from typing import Any
 
 import pytest
 from kickstand_tools.deploy import bytecode
 from support import emulated
-from support.emulated import CHIPS, modules, pico
+from support.emulated import pico
 
 pytestmark = pytest.mark.chip
 
@@ -130,57 +128,5 @@ def test_flash_operations_take_time(board):
     assert 500 < us < 1000
 
 
-def test_idle_console_takes_no_processor_time(board):
-    """One pass of an empty loop takes 3.1 us. If the console sent empty USB packets, the pass would take three times as
-    long."""
-    code = (
-        "def f():\n    t = ticks_us()\n    for i in range(1000): pass\n    return ticks_diff(ticks_us(), t)\nprint(f())"
-    )
-    first, second = int(board.exec(code)), int(board.exec(code))
-    assert first < 3500
-    assert abs(first - second) < 10
-
-
 def test_image_accepts_the_compiled_files(at_prompt):
     assert at_prompt.exec("import sys\nprint(sys.implementation._mpy)") == f"{bytecode.PICO}\n"
-
-
-_LISTEN = """
-from time import sleep_ms, ticks_add, ticks_diff, ticks_ms
-from kickstand.settings import Settings
-from kickstand.speed.source import open_speed
-def opened(source):
-    class Config:
-        SPEED = source
-    return open_speed(Settings(Config))
-speeds = [opened(source) for source in %r]
-received, end = [[] for _ in speeds], ticks_add(ticks_ms(), 1800)
-while ticks_diff(end, ticks_ms()) > 0:
-    for i in range(len(speeds)):
-        new = speeds[i].poll(ticks_ms())
-        if new is not None:
-            received[i].append(new)
-    sleep_ms(10)
-print(received)
-"""
-
-
-@pytest.mark.parametrize(
-    ("chip", "sources"),
-    [
-        ("pico", ["wheel"]),
-        pytest.param("esp32", ["wheel", "gps"], marks=[pytest.mark.esp32, pytest.mark.long]),
-    ],
-)
-def test_wheel_and_gps_measure_the_speed(chip, sources):
-    """The contact of the wheel sensor bounces."""
-    board: Any = CHIPS[chip](files=modules(chip))
-    with board as device:
-        device.fit_wheel(lambda t_s: 15.0, bounce_us=1000)
-        if "gps" in sources:
-            device.fit_gps(lambda t_s: 15.0)
-        speeds_of_sources = json.loads(device.exec(_LISTEN % sources, 20.0).splitlines()[-1])
-    assert len(speeds_of_sources) == len(sources)
-    for speeds in speeds_of_sources:
-        assert len(speeds) >= 2
-        assert speeds == pytest.approx([15.0] * len(speeds), abs=0.3)

@@ -93,7 +93,7 @@ def test_calibration_with_another_word_is_refused(entry, value, tmp_path):
 def test_escapes_in_names_do_not_reach_the_terminal(tmp_path):
     assert printable("a\x1b]0;T\x07\nb\t\u65e5\x9b") == "a\\x1b]0;T\\x07\nb\t\u65e5\\x9b"
     with zipfile.ZipFile(tmp_path / "export.zip", "w") as file:
-        for sensor, unit in (("Accelerometer", "m/s^2"), ("Gyroscope", "rad/s")):
+        for sensor, unit in (("Acceleration", "m/s^2"), ("Gyroscope", "rad/s")):
             header = ",".join(f'"{sensor} {axis} ({unit})"' for axis in "xyz")
             rows = "".join(f"{k / 100},0.1,{9.8 + k % 7 / 100},{k % 5 / 50}\n" for k in range(3000))
             file.writestr(f"a\x1b[2J/{sensor}.csv", f'"Time (s)",{header}\n{rows}')

@@ -1,7 +1,6 @@
 """`kickstand demo` as a user runs them: printed to a file, in a terminal, and by hand."""
 
 import itertools
-import json
 import re
 import sys
 
@@ -111,46 +110,6 @@ def test_in_a_terminal_by_hand():
 
 
 # A short program takes the place of the device
-
-
-STATE = {"of_s": 60.0, "lean_deg": -30.04, "speed_mps": 15.0, "phase": "held turn", "pressed": False}
-OFF = {"ended": "off"}
-
-
-@pytest.fixture
-def device(monkeypatch, capsys):
-    """Return a function that runs demo() with a device that prints these messages, and returns the printed lines."""
-
-    def run(*messages, **options):
-        lines = [message if isinstance(message, str) else json.dumps(message) for message in messages]
-        program = "print('''" + "\n".join(lines) + "''')"
-        monkeypatch.setattr(unix_port, "command", lambda *_: [sys.executable, "-X", "utf8", "-c", program])
-        demo(**options)
-        return capsys.readouterr().out.splitlines()
-
-    return run
-
-
-@no_micropython
-def test_a_changed_page_is_printed_at_once_and_its_values_every_250_ms(device):
-    shown = [
-        (1.0, "Lean  27° left", ""),
-        (1.05, "Lean  27° left", ""),
-        (1.2, "Lean  28° left", ""),
-        (1.25, "Lean  29° left", "x"),
-        (1.3, "Max   29°", ""),
-        (1.35, "?", ""),  # a picture of an OLED that is not complete yet
-        (1.4, "Lean  30° left", ""),
-    ]
-    lines = device(*({**STATE, "t_s": t_s, "lcd": lcd} for t_s, *lcd in shown), OFF)
-    assert [line.split()[0] for line in lines if " s  " in line] == ["1.00", "1.25", "1.30", "1.40"]
-    frame = [
-        "  1.00 s  held turn, true lean 30.0° left",
-        "+----------------+",
-        "|Lean  27° left  |",
-        "|" + 16 * " " + "|",
-    ]
-    assert lines[:4] == frame
 
 
 def test_the_device_obeys_its_commands():

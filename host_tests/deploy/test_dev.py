@@ -71,9 +71,7 @@ UV = "pip install uv"
 
 def test_dev_installs_again_only_if_needed(project):
     assert project.steps("", "") == ["venv .venv", UV, "pip install ."]
-    assert project.steps("test", "", "mutants", "test", "") == [
-        UV, "pip install .[test]", UV, "pip install .[mutants]",
-    ]  # fmt: skip
+    assert project.steps("test", "", "test", "") == [UV, "pip install .[test]"]
     project.require("two")
     assert project.steps("test") == [UV, "pip install .[test]"]
 
@@ -92,20 +90,6 @@ def test_moved_checkout_gets_a_new_venv(project):
     stamp = project.root / ".venv" / "installed.txt"
     stamp.write_text(stamp.read_text().replace(str(project.root), "/elsewhere", 1))
     assert project.steps("") == ["venv .venv", UV, "pip install ."]
-
-
-def test_working_venv_of_another_python_is_kept(project, capsys):
-    """The user may have made the .venv on purpose, and installed other packages in it."""
-    project.steps("")
-    stamp = project.root / ".venv" / "installed.txt"
-    stamp.write_text(stamp.read_text().replace("Python ", "Python 0.", 1))
-    capsys.readouterr()
-    assert project.steps("") == []
-    assert capsys.readouterr().out.startswith(".venv has Python 0.3")
-    project.python('[ "$2 $3" != "pip --version" ] || exit 1')
-    (project.root / "python").write_text("#!/bin/sh\nexit 1\n")
-    with pytest.raises(project.dev.SetupStopped, match=r"\.venv cannot be created"):  # its pip no longer runs
-        project.steps("test")
 
 
 @pytest.mark.parametrize(
@@ -166,8 +150,8 @@ def test_all_checks_run_and_any_failure_counts(project, capfd, failing):
     project.steps("test")
     project.python(f'echo "of $2"; case "$2 $3" in "{failing}"*) exit 1; esac')
     (project.root / "ran").unlink()
-    assert project.dev.test(["-k", "lean"]) == 1
+    assert project.dev.test(["--all", "-k", "lean"]) == 1
     ran = (project.root / "ran").read_text()
     for tool in ("-m ruff check", "-m ruff format", "-m pyright", "-m pytest", "-k lean"):
         assert tool in ran
-    assert capfd.readouterr().out.splitlines()[-1] == "failed: " + failing.replace(" check", "")
+    assert capfd.readouterr().out.splitlines()[-1].endswith("failed: " + failing.replace(" check", ""))

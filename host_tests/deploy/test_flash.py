@@ -6,7 +6,7 @@ import re
 from typing import Any
 
 import pytest
-from kickstand_tools.common import errors, firmware_path
+from kickstand_tools.common import firmware_path
 from kickstand_tools.deploy import bytecode, firmware_files
 from support import command, fake_board
 
@@ -229,22 +229,3 @@ def test_byte_order_mark_is_never_copied(encode, board, config):
     put(board, {"config.py": encode(content)})
     command.works("flash")
     assert root_files(board)["config.py"] == content
-
-
-def test_installed_package_uses_config_of_the_current_folder(board, tmp_path, monkeypatch):
-    """Riders should not edit the config.py in site-packages, because the next update replaces it."""
-    package = tmp_path / "site-packages" / "kickstand_tools"
-    (package / "firmware").mkdir(parents=True)
-    (package / "firmware" / "config.py").write_text("# as shipped\n")
-    (package / "firmware" / "main.py").write_text("")
-    (tmp_path / "mine").mkdir()
-    monkeypatch.chdir(tmp_path / "mine")
-    monkeypatch.setattr(firmware_path, "TOOLS", package.parent)
-    output = command.works("flash", "--config").out
-    assert f"config.py is {package / 'firmware' / 'config.py'}\n" in output
-    assert "to change settings, copy that file to a folder of your own" in output
-    (tmp_path / "mine" / "config.py").write_text('SIDE = "right"\n')
-    output = command.works("flash", "--config").out
-    assert f"config.py is {tmp_path / 'mine' / 'config.py'}\n" in output and "to change settings" not in output
-    assert root_files(board)["config.py"] == b'SIDE = "right"\n'
-    assert '-m pip install "kickstand-lean[rides]"' in errors.extra("rides")

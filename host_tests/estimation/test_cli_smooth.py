@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from kickstand_tools.calibration.file import CalibrationFile, write_calibration
 from kickstand_tools.logs.csv_lines import write_table
+from kickstand_workshop.evaluation.drawn_rides import drawn_ride
+from kickstand_workshop.evaluation.smoothed_rides import simulated
 from support import command
 from support.command import refused, works
 from support.recordings import analysis_rides
-from support.recordings.drawn_rides import drawn_ride
-from support.recordings.smoothed_rides import simulated
 from window_input import still_log
 
 

@@ -13,8 +13,8 @@ from kickstand_tools.estimation.smooth import PoseOff
 from kickstand_tools.estimation.unknowns import DIVE, Prior
 from kickstand_tools.estimation.windows import windows_of
 from kickstand_tools.signals import rotation_matrix
-from support.recordings.drawn_rides import drawn_ride
-from support.recordings.smoothed_rides import other, rms, simulated
+from kickstand_workshop.evaluation.drawn_rides import drawn_ride
+from kickstand_workshop.evaluation.smoothed_rides import other, rms, simulated
 from window_input import still_log
 
 ALIGNED = CalibrationFile(aligned=True)

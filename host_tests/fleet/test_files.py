@@ -41,20 +41,6 @@ def test_a_store_works_as_a_directory_does(base):
         assert (log.name, log.gyro_dps[:, 2].tolist()) == (f"{base}/{name}", [0, 1, 2, 3, 4])
 
 
-@pytest.mark.parametrize(
-    ("info", "mark"),
-    [
-        ({"ETag": "e", "mtime": "m", "LastModified": "l"}, "1-e"),
-        ({"mtime": "m", "LastModified": "l"}, "1-m"),
-        ({"LastModified": "l"}, "1-l"),
-    ],
-)
-def test_a_mark_in_a_store_has_the_etag_or_a_time(store, info, mark):
-    files.write_bytes("failing:///a/b.csv", b"x")
-    store.marks = info
-    assert files.identities(["failing:///a/b.csv"]) == {"failing:///a/b.csv": mark}
-
-
 @pytest.mark.parametrize("error", [FileNotFoundError("x"), PermissionError(errno.EACCES, "no\n  right")])
 @pytest.mark.parametrize(
     ("action", "missing", "what"),

@@ -9,8 +9,6 @@ from fleet_drives import TROUBLES
 from kickstand.units import STANDARD_GRAVITY as G
 from kickstand_fleet import files
 from kickstand_fleet.simulation.fleet import make_fleet
-from kickstand_fleet.simulation.route import random_route
-from kickstand_fleet.simulation.vehicle import HANDLING
 from kickstand_tools.common.errors import InputError
 from support import command
 
@@ -58,33 +56,6 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "drives").write_text("")
     with pytest.raises(InputError, match="drives"):
         make_fleet(tmp_path, 1)
-
-
-@pytest.mark.parametrize(
-    ("kind", "cruise_mps", "speed_up", "brake", "lateral"),
-    [
-        ("car", (8.0, 19.0), (1.0, 2.4), (1.3, 3.4), 3.0),
-        ("bus", (7.0, 14.0), (0.7, 1.3), (1.0, 2.0), 1.6),
-        ("motorcycle", (9.0, 22.0), (1.5, 3.2), (1.6, 4.5), 4.0),
-    ],
-)
-def test_routes_are_as_fast_and_hard_as_their_vehicles(kind, cruise_mps, speed_up, brake, lateral):
-    routes = [random_route(np.random.default_rng(seed), HANDLING[kind], 120.0, 20.0) for seed in range(12)]
-    fastest = [route.speed.max() for route in routes]
-    assert cruise_mps[0] <= min(fastest) and 0.8 * cruise_mps[1] < max(fastest) <= cruise_mps[1] + 1e-9
-    hardest = [(route.acceleration.max(), -route.acceleration.min()) for route in routes]
-    for values, (low, high) in zip(zip(*hardest), (speed_up, brake)):
-        assert 0.9 * low < min(values) and 0.85 * high < max(values) < 1.02 * high
-    sideways = [np.abs(route.speed * route.yaw_rate).max() for route in routes]
-    assert 0.8 * lateral < max(sideways) < 1.1 * lateral
-    for route in routes:
-        assert 105.0 < route.time[-1] < 190.0 and route.time[1] == pytest.approx(0.05)
-        assert np.all(route.speed[route.time < 6.5] == 0.0) and np.all(route.speed[-60:] < 0.01)
-        assert route.acceleration == pytest.approx(np.gradient(route.speed, 0.05))
-    turns = {np.sign(np.sum(route.yaw_rate)) for route in routes}
-    assert turns == {-1.0, 1.0}
-    stops = [np.count_nonzero(np.diff((route.speed < 0.05).astype(int)) > 0) for route in routes]
-    assert min(stops) >= 1 and max(stops) >= 3
 
 
 COUNT_G, COUNT_DPS = 1.0 / 16384.0, 1.0 / 131.0

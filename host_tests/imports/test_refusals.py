@@ -165,32 +165,6 @@ def test_a_contradiction_with_gravity_is_refused(tmp_path, head, row, units, wor
     refused(tmp_path, tmp_path / "log.csv", words, "--columns", columns, "--units", f"t=ms,a=g,{units}")
 
 
-@pytest.mark.parametrize(
-    ("head", "row", "words"),
-    [
-        ("time,ax,ay,az,speed", "{:.2f},0,1,0,3", "and no gyro found in it: without one there is no lean"),
-        (
-            "INDEX,LAP,TIME,SPEED_KPH,LATERALG,LINEALG,LEAN_DEG",
-            "{1},1,{0},80,0.{1},0.{2},{1}.5",
-            "and no gyro found in it",
-        ),
-        ("time,ax,ay,az,gx,gy,gz", "{:.2f},0,1,0,?,?,?", "its columns gx, gy, gz hold no numbers ('?')"),
-        ("time,ax,ay,az,gx,gy,gz", "1.7e9,0,1,0,0.{1},0,0.1", "its column time does not increase like a time"),
-        ("ax,ay,az,gx,gy,gz", "0,1,0,0,0,0.1", "no time found in it: write the time of each row, such as millis()"),
-        (
-            "time,lin_ax,lin_ay,lin_az,gx,gy,gz",
-            "{:.2f},0.0{},0.01,0,{},-{},0.1",
-            "gravity has been taken off its acceleration",
-        ),
-    ],
-)
-def test_missing_columns_of_a_table_are_reported(tmp_path, head, row, words):
-    (tmp_path / "log.csv").write_text(
-        "\n".join([head, *(row.format(0.02 * k, k % 7, k % 5, k % 3) for k in range(40))]) + "\n"
-    )
-    refused(tmp_path, tmp_path / "log.csv", words)
-
-
 @pytest.mark.parametrize("name", ["my log.csv", "it's.csv"])
 def test_an_uncertain_table_gives_a_command_line_that_works(tmp_path, monkeypatch, name):
     """At rest nothing shows the unit of the rates for certain. The proposed line works without a change."""

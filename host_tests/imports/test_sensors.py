@@ -124,18 +124,6 @@ def test_a_fix_is_only_in_the_nearest_row():
     assert np.flatnonzero(np.isfinite(log.utc_s)).tolist() == [0] and log.utc_s[0] == 1.0
 
 
-def test_markers_and_repetitions_of_a_receiver_are_dropped():
-    """A phone writes -1 for an unknown speed, and perhaps 0, 0 for an unknown position. A logger may write the last
-    value in each row; at a standstill it is kept once per second."""
-    track = track_of([0, 1, 2, 3], [-1.0, 3.0, -1.0, 4.0], [0.0, 52.0, 91.0, 52.1], [0.0, 13.0, 13.0, 13.1])
-    assert (track.speed_mps.tolist(), track.lat_deg.tolist()) == ([3.0, 4.0], [52.0, 52.1])
-    edges = track_of([0, 1, 2, 3, 4, 5], 0.0, [0, 90, 90.1, 1, 0, 1], [0, 180, 1, 180.1, 1, 0])
-    assert np.isfinite(edges.lat_deg).tolist() == [False, True, False, False, True, True]
-    still = track_of(np.arange(80) * 0.05, np.repeat([0.0, 5.0], 40), 52.0, 13.0)
-    assert (still.time_ns // MS).tolist() == [0, 1000, 2000, 3000]
-    assert still.speed_mps.tolist() == [0.0, 0.0, 5.0, 5.0] and len(track_of([0.0]).time_ns) == 0
-
-
 def test_repeated_and_shuffled_rows_of_an_export(tmp_path):
     """Sensor Kinetics writes the same time for several samples. The times are spread. Late rows are sorted."""
     imported = api.import_recording(app_exports.into(tmp_path / "k", app_exports.sensor_kinetics(riding())))

@@ -10,9 +10,8 @@ from joining.known_roads import another_device, turned
 from kickstand_tools import api
 from kickstand_tools.calibration.file import write_calibration
 from kickstand_tools.joining import agreement
-from kickstand_tools.joining.clocks import Clocks
+from kickstand_workshop.evaluation.drawn_rides import drawn_ride
 from support import command
-from support.recordings.drawn_rides import drawn_ride
 
 LATER_S, SLOW, DELAY_S = 7.3, 80e-6, 0.04
 
@@ -57,7 +56,7 @@ def test_a_difference_is_that_of_the_leans(comparison):
         assert difference.rms_deg == pytest.approx(np.hypot(change.mean(), change.std()))
         assert difference.moving_deg == pytest.approx(change.std())
         assert (difference.p95_deg, difference.worst_deg) == pytest.approx((np.percentile(rest, 95.0), rest.max()))
-        assert difference.expected_deg > 0.0 and 0.0 <= difference.within_1 <= difference.within_2 <= 1.0
+        assert 0.1 < difference.expected_deg < 3.0 and 0.0 <= difference.within_1 <= difference.within_2 <= 1.0
 
 
 def test_output_in_words_json_and_a_picture(tmp_path, pair, comparison, monkeypatch):
@@ -102,40 +101,3 @@ def test_the_difference_is_that_of_both_errors():
         assert difference is not None and difference.rms_deg <= sum(errors) + 0.01
         assert difference.slope == pytest.approx(1.0, abs=0.05)
         assert difference.delay_s == pytest.approx(0.0, abs=0.02)
-
-
-def test_words_name_each_side():
-    for sign, side, side_of_lean, delay, pace in (
-        (1.0, "after A", "to the right", "later", "slow"),
-        (-1.0, "before A", "to the left", "earlier", "fast"),
-    ):
-        difference = agreement.Difference(90.0, 2.0, sign * 1.5, 1.0, 1.9, 3.0, 1.03, sign * 0.04, 1.2, 0.5, 0.9)
-        clocks = Clocks(sign * 7.25, sign * 80e-6, 0.95, 150.0)
-        first, live, *rest = agreement.words(agreement.Agreement(clocks, None, difference, np.zeros(1), {}))
-        assert "7.25 s " + side in first and "2.5 minutes" in first and "80 ppm " + pace in first
-        assert "hardly anywhere" in live and "1.50 more " + side_of_lean in rest[0]
-        assert rest[1].endswith("1.030 times A's, and 40 ms " + delay)
-        assert "2.00 degrees rms over 1.5 minutes" in rest[0] and "50 %" in rest[2] and "90 %" in rest[2]
-
-
-def test_a_picture_shows_both_leans_and_their_difference(tmp_path, monkeypatch):
-    """matplotlib would show text between two dollar signs as a formula, so names are not parsed."""
-    figures = []
-    figure_class = pytest.importorskip("matplotlib.figure").Figure
-    monkeypatch.setattr(figure_class, "savefig", lambda figure, path, dpi: figures.append((figure, path)))
-    names = ("live A", "live B", "smoothed A", "smoothed B")
-    leans = {name: np.full(3, value) for name, value in zip(names, (1.0, 3.0, 10.0, 17.0))}
-    difference = agreement.Difference(90.0, 2.0, 1.5, 1.0, 1.9, 3.0, 1.03, 0.04, 1.2, 0.5, 0.9)
-    comparison = agreement.Agreement(
-        Clocks(0.0, 0.0, 0.9, 9.0), None, difference, np.array([0.0, 60.0, 120.0]), leans, {}, ("x/$A$.csv", "B.csv")
-    )
-    agreement.draw(tmp_path / "c.png", comparison)
-    (figure, _) = figures[0]
-    above, below = figure.axes
-    lines = [(line.get_label(), line.get_ydata()[0]) for line in (*above.lines, *below.lines)]
-    assert lines == [
-        ("smoothed A: $A$.csv", 10.0), ("smoothed B: B.csv", 17.0), ("live, B less A", 2.0),
-        ("smoothed, B less A", 7.0),
-    ]  # fmt: skip
-    assert above.get_xlim() == (0.0, 120.0) and below.xaxis.get_major_formatter()(60.0, 0) == "1:00"
-    assert not any(text.get_parse_math() for axis in figure.axes for text in axis.get_legend().get_texts())

@@ -8,7 +8,7 @@ from kickstand.lean import lean_filter
 from kickstand.lean.meter import MAX_VARIANCE
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.api import replay
-from support.recordings.drawn_rides import drawn_ride
+from kickstand_workshop.evaluation.drawn_rides import drawn_ride
 
 HZ, GRAVITY_MPS2 = 100, STANDARD_GRAVITY
 DT_US = 1_000_000 // HZ

@@ -7,7 +7,7 @@ import pytest
 from kickstand_tools.api import Log, Stretch
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import reader
-from kickstand_tools.logs.reader import read_blocks, read_log, split_stretch
+from kickstand_tools.logs.reader import read_blocks, read_log
 from support import command
 
 FORCE, RATE = [0.1, 0.2, 0.9], [1.0, 2.0, 3.0]
@@ -64,20 +64,6 @@ def test_a_log_in_memory_comes_in_blocks(small_blocks):
     assert [block.start_s for block in blocks] == [7.0] * 3 and not blocks[0].has_temp
     assert blocks[0].speed_mps[0] == 5.0 and blocks[1].t_s == pytest.approx([0.04, 0.05, 0.06, 0.07])
     assert blocks[1].time_text == ["7.040000", "7.050000", "7.060000", "7.070000"]
-
-
-@pytest.mark.parametrize(
-    ("from_s", "to_s", "first", "last"),
-    [(0.2, 0.5, 20, 50), (-0.5, None, 50, 100), (None, -0.9, 0, 10), (0.0, 9.0, 0, 100), (-0.5, -0.4, 50, 60)],
-)
-def test_a_stretch_holds_both_of_its_ends(from_s, to_s, first, last):
-    stretch = Stretch(log_of(101, 7.0), from_s, to_s)
-    log = read_log(stretch)
-    assert log.start_s == pytest.approx(7.0 + first / 100.0)
-    assert log.time_us.tolist() == [10_000 * k for k in range(last - first + 1)]
-    whole, same = split_stretch(stretch)
-    assert whole is stretch.source and same is not None
-    assert same.from_s == (None if from_s is None else pytest.approx(first / 100.0))
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,11 @@
 """ffmpeg's answers about a video, how it is started and stopped, and the gyro of a GoPro in a video."""
 
-import struct
 import sys
 from pathlib import Path
 
 import pytest
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.overlay import gpmf, video
+from kickstand_tools.overlay import video
 
 
 def described(ffmpeg, rate="30 fps", size="1920x1080", more="", **counted):
@@ -85,37 +84,3 @@ def test_ffmpeg_that_fails_says_why(ffmpeg, words, message, deaf):
 
 
 # The gyro of a GoPro
-
-
-def item(name: bytes, kind: bytes, size: int, body: bytes) -> bytes:
-    return struct.pack(">4scBH", name, kind, size, len(body) // size) + body + bytes(-len(body) % 4)
-
-
-def packet(*items: bytes) -> bytes:
-    """Return a packet of a camera with one stream of these items."""
-    stream = item(b"STRM", b"\0", 1, b"".join(items))
-    return item(b"DEVC", b"\0", 1, item(b"DVNM", b"c", 1, b"camera") + item(b"STRM", b"s", 1, b"odd!") + stream)
-
-
-def scale(*values: int) -> bytes:
-    return item(b"SCAL", b"s", 2, struct.pack(f">{len(values)}h", *values))
-
-
-ROWS = struct.pack(">6h", 100, 200, 300, -100, 0, 50)
-GYRO = item(b"GYRO", b"s", 6, ROWS)
-
-
-@pytest.mark.parametrize(
-    ("items", "rates"),
-    [
-        ([scale(100), GYRO], [[1.0, 2.0, 3.0], [-1.0, 0.0, 0.5]]),
-        ([scale(1, 2, 4), GYRO], [[100.0, 100.0, 75.0], [-100.0, 0.0, 12.5]]),
-        ([GYRO], [[100.0, 200.0, 300.0], [-100.0, 0.0, 50.0]]),
-        ([scale(10), item(b"GYRO", b"s", 8, ROWS[:8])], [[10.0, 20.0, 30.0]]),  # of four axes, three are read
-        ([scale(10), item(b"GYRO", b"s", 4, ROWS)], None),  # two axes are not a gyro
-        ([item(b"STNM", b"c", 1, b"text!"), item(b"GYRO", b"?", 4, b"wxyz"), scale(100), GYRO[:14]], [[1.0, 2.0, 3.0]]),
-    ],
-)
-def test_a_gyro_is_divided_by_its_scale(items, rates):
-    found = [values.tolist() for values in gpmf.streams(packet(*items), b"GYRO")]
-    assert found == ([] if rates is None else [rates])

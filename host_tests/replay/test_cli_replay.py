@@ -90,19 +90,6 @@ def test_an_engine_that_is_not_there_or_fails_is_reported_in_one_line(tmp_path, 
         refused(log, cal, "ValueError: no such luck", "--engine", "micropython")
 
 
-@pytest.mark.parametrize(
-    ("calibration", "words", "sigma"),
-    [
-        ({"vehicle_from_sensor": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}, "is not aligned", True),
-        ({"vehicle": "car"}, "a car's, whose display shows no lean", False),
-    ],
-)
-def test_a_calibration_without_a_lean_works_with_a_warning(calibration, words, sigma, tmp_path):
-    lean, warning = replayed(ride(tmp_path / "log.csv", 5.0), command.write_cal(tmp_path / "CAL.json", **calibration))
-    assert warning.startswith("warning: ") and words in warning and warning.count("\n") == 1 and len(lean) == 500
-    assert not np.any(np.isnan(lean["forward_g"])) and (sigma or np.all(np.isnan(lean["lean_sigma_deg"])))
-
-
 def test_the_trim_that_riding_found_is_used(tmp_path):
     """The trim is the error of the upright pose. At standstill the lean is the accelerometer's lean minus the trim.
     Without a trim the lean would be 0."""

@@ -3,7 +3,7 @@
 import pytest
 from kickstand_tools.simulated_board.clock import Clock, PowerOff
 from kickstand_tools.simulated_board.fakes import fake_bluetooth, fake_machine, fake_time
-from kickstand_tools.simulated_board.fakes.fake_machine import WDT, Pin
+from kickstand_tools.simulated_board.fakes.fake_machine import WDT
 from kickstand_tools.simulated_board.radio import EVENT_S, ROOM, Radio
 from kickstand_tools.simulated_board.simulator import Board
 from support.board_access import level, on_board, raised
@@ -80,23 +80,6 @@ def test_watchdogs_and_what_stops_them():
         (wait(13 * 86_400_000), "esp32", "reset"),  # an ESP32 counts in 32 bits
     ):
         assert on_board(program, 100_000.0, port=port)[0] == outcome
-
-
-@pytest.mark.parametrize(
-    ("machine", "pin", "outcome"),
-    [("esp32", 6, "reset"), ("lora32", 11, "reset"), ("esp32", 12, "returned"),
-     ("c3", 6, "returned"), ("pico", 6, "returned")],
-)  # fmt: skip
-def test_a_classic_esp32_crashes_if_a_flash_pin_is_driven(machine, pin, outcome):
-    def program(board):
-        Pin(pin)  # creating a Pin without a mode changes nothing
-        if machine == "esp32":
-            assert isinstance(raised(Pin, 34, Pin.OPEN_DRAIN), ValueError)
-            # Pin 34 has no pull-up, so it floats
-            assert [Pin(k, Pin.IN, Pin.PULL_UP).value() for k in (34, 33)] == [0, 1]
-        Pin(pin, Pin.OPEN_DRAIN)
-
-    assert on_board(program, machine=machine)[0] == outcome
 
 
 def test_the_power_is_cut_in_the_middle_of_a_file(tmp_path):

@@ -1,14 +1,12 @@
 """The firmware's small drivers: the button, the SD card, an OLED's letters, and the differences between boards."""
 
 import errno
-import importlib
 import sys
 import types
 
 import pytest
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.contacts import Button as Contact
-from kickstand_tools.simulated_board.fakes import chips
 from kickstand_tools.simulated_board.fakes.fake_machine import SPI, Pin
 from kickstand_tools.simulated_board.simulator import Board
 from support.board_access import level, on_board
@@ -139,55 +137,3 @@ def test_any_fault_of_the_cards_driver_is_a_card_error(kind, pins, reason):
         assert raised.value.args[: len(reason)] == reason
 
     on_card(program, **kind)
-
-
-@pytest.fixture
-def port_of(monkeypatch):
-    """Return port_of(machine, use): the result of use(module) with the module `port`, as this board imports it."""
-
-    def load(machine, use=lambda port: types.SimpleNamespace(**vars(port))):
-        monkeypatch.setitem(chips.MACHINES, "tested", machine)
-        result = []
-
-        def program(board):
-            from kickstand.board import port
-
-            result.append(use(importlib.reload(port)))
-
-        try:
-            assert on_board(program, machine="tested")[0] == "returned"
-            return result[0]
-        finally:
-            assert on_board(program)[0] == "returned"  # the board of the other tests is a Pico
-
-    return load
-
-
-CLASSIC = (1, 3, 6, 7, 8, 9, 10, 11)
-
-
-@pytest.mark.parametrize(
-    ("chip", "taken"),
-    [
-        ("ESP32", CLASSIC),
-        ("ESP32-UNICORE", CLASSIC),
-        ("ESP32-PICO-D4", (*CLASSIC, 16, 17)),  # the flash in the package
-        ("ESP32-D2WD", (*CLASSIC, 16, 17)),
-        ("ESP32-S2", (19, 20)),
-        ("ESP32S3", (19, 20)),
-        ("ESP32C3", (18, 19)),
-        ("ESP32C5", (13, 14)),
-        ("ESP32C6", (12, 13)),
-        ("ESP32H2", (26, 27)),
-        ("ESP32P4", (24, 25)),
-    ],
-)
-def test_pins_that_the_chip_needs_are_taken(chip, taken, port_of):
-    """An output on a pin that the chip itself needs would stop the board. Only a classic chip has pins without
-    outputs. An unknown board has no usual pins."""
-    port = port_of(f"Some board with {chip}")
-    assert port.IS_ESP32 and port.TAKEN_PINS == taken
-    assert port.INPUT_PINS == ((34, 35, 36, 37, 38, 39) if taken[:8] == CLASSIC else ())
-    assert (
-        port.SENSOR_PINS == port.LCD_PINS == port.GPS_PINS == (None, None) and port.BUTTON_PIN is port.WHEEL_PIN is None
-    )

@@ -1,7 +1,7 @@
 """A wheel's pulses, and the limits of any speed: periods, bounces, stops, storms. Also runs on MicroPython."""
 
 from kickstand_tools.simulated_board.simulator import Board
-from speed_runs import Contact, drive
+from speed_runs import Contact
 from support.board_access import level
 
 
@@ -133,46 +133,6 @@ def test_a_storm_turns_the_interrupt_off_for_5_s():
         assert abs(speeds[-1] - 10.0) < 0.01 and wheel.fault(wait()) is None
 
     on_wheel(test)
-
-
-def test_an_esp32_counts_pulses_that_fall_into_a_transfer():
-    """Interrupts wait during a transfer. If a contact closes and opens during a transfer, two interrupts see only the
-    open contact. A contact may also bounce during a transfer."""
-    for pulses, mps, bounce_us, tolerance in (
-        (0.5, 26.6, 0, 0.025),
-        (3.0, 49.8, 0, 0.025),
-        (50.0, 5.8, 0, 0.025),
-        (0.5, 1.3, 2000, 0.01),
-        (0.5, 7.77, 2000, 0.01),
-        (0.5, 33.3, 2000, 0.01),
-    ):
-        config = {"SPEED": "wheel", "PULSES_PER_METRE": pulses}
-        kind = {"pulses_per_metre": pulses, "bounce_us": bounce_us}
-        speeds, faults = drive(config, lambda board, v=mps, k=kind: board.fit_wheel(lambda t_s: v, **k), 21.0, "esp32")
-        late = [speed for t_s, speed, _ in speeds if t_s > 1.0]
-        mean = sum(late) / len(late)
-        assert abs(mean - mps) < tolerance * mps and faults[20] is None, (pulses, mps, mean)
-        assert bounce_us or sum([(speed - mean) ** 2 for speed in late]) < len(late) * (0.1 * mean) ** 2
-
-
-def quick_for_3_s(t_s):
-    return 20.0 if 4.0 < t_s < 7.0 else 5.0
-
-
-def test_a_wheel_too_fast_for_an_esp32_is_reported():
-    """The board loses some of the wheel's pulses. Without the report, the speed would be too low."""
-    for pulses in (20, 100):
-        config = {"SPEED": "wheel", "PULSES_PER_METRE": pulses}
-
-        def fit(board, pulses=pulses):
-            board.fit_wheel(quick_for_3_s, pulses_per_metre=pulses)
-
-        speeds, faults = drive(config, fit, 12.0, "esp32")
-        assert faults[6] == ("Wheel: too quick", "fewer pulses/m"), pulses
-        assert not [1 for t_s, _, _ in speeds if 4.4 < t_s < 7.0]
-        slow = [speed for t_s, speed, _ in speeds if 1.0 < t_s < 4.0 or t_s > 8.0]
-        assert (len(slow) > 50 and faults[3] is faults[10] is None) == (pulses < 60)
-        assert all(abs(speed - 5.0) < 0.7 for speed in slow)
 
 
 class Source:

@@ -1,5 +1,6 @@
 import pytest
 from kickstand_tools.simulated_board.simulator import Board
+from panel import panels
 from support.board_access import level
 
 
@@ -10,3 +11,5 @@ def board(tmp_path, monkeypatch):
     with Board(level, display="ssd1306") as board:
         board.fit_wheel(lambda t_s: 0.0)
         yield board
+        while panels:
+            panels.pop().app.rides.stop()

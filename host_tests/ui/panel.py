@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from kickstand.calibration.parameters import Calibration
 
+panels = []  # those of the present test, whose recordings the fixture `board` ends
 SHORT, LONG = 1, 2  # as in board/button.py
 RATE_HZ = 200
 G_LSB, DPS_LSB = 2048, 65.5  # counts per g and per deg/s of the ranges of 16 g and 500 deg/s
@@ -41,6 +42,7 @@ class Panel:
         if aligned:
             self.app.calibration.save(self.app.calibration.value.with_alignment(AXES, (0.0, 0.0, 0.0)))
         self.sensor: Any = sensor
+        panels.append(self)
         self.screen: Any = self.app.screen
         self.meter: Any = self.app.meter
         self.now_ms = 0

@@ -144,24 +144,6 @@ def test_a_board_is_offered_for_its_chip(node, described, names):
     assert node(script, {"names": list(site.shop_boards()), "described": described}) == names
 
 
-def test_archives_have_what_the_pages_import_and_no_more(files):
-    numpy = archive(files, "numpy/numpy.zip")
-    assert "numpy/__init__.py" in numpy and not any(f"/{part}/" in name for name in numpy for part in ("tests", "f2py"))
-    assert b"Copyright" in files["numpy/licence.txt"]
-    rides = archive(files, "rides.zip")
-    assert {name.split("/")[0] for name in rides} == {
-        *("kickstand_tools", "kickstand", "fitdecode", "gpxpy", "jinja2", "markupsafe")
-    }
-    assert {"kickstand_tools/web/rides_guest.py", "kickstand_tools/analysis/plot/page.py"} <= set(rides)
-    assert any(name.startswith("kickstand_tools/analysis/") and name.endswith(".js") for name in rides)
-    python = json.loads(files["python.json"])
-    assert {"kickstand_tools/web/device.py", "kickstand_tools/simulated_board/clock.py", "kickstand/app.py"} <= set(
-        python
-    )
-    assert "kickstand_tools/web/serve.py" not in {*rides, *python}
-    assert archives.zipped({"b": b"2", "a/c": b"1"}) == archives.zipped({"a/c": b"1", "b": b"2"})
-
-
 def test_a_page_lists_all_documents_and_its_own_headings(files):
     for name, text in pages(files, "docs/").items():
         listed = re.findall(r'<a href="\./([\w-]+\.html)"', re.findall('<nav class="all".*?</nav>', text, re.S)[0])

@@ -18,7 +18,7 @@ from .journal import Journal, StoreJournal
 from .manifest import Period
 from .period import AFTERWARDS, CHANGED, DISK_FULL, PeriodResult, failed, work_on_period
 from .show import plot
-from .show.page import Glance
+from .show.page import FleetSummary
 
 RESULTS_VERSION = 4  # version of the results; a new number makes the next run recompute all earlier results
 PLOTS, SIGNALS = "plots", "signals"
@@ -41,7 +41,7 @@ class FleetRun:
     vehicles: int
     new: int
     damaged: int
-    seen: Glance
+    seen: FleetSummary
 
 
 def run_fleet(
@@ -122,21 +122,21 @@ def run_fleet(
         return FleetRun(len(keys), len(todo), journal.damaged, summary)
 
 
-def write_results(directory: str, results: Iterable[PeriodResult], expected: int) -> Glance:
+def write_results(directory: str, results: Iterable[PeriodResult], expected: int) -> FleetSummary:
     """Write the tables and the page of the results so far. Return the summary that the page shows.
 
     expected: number of results at the end of the run. Raises InputError if a file cannot be written.
     """
-    glance = Glance()
+    summary = FleetSummary()
 
     def counted() -> Iterator[PeriodResult]:
         for result in results:
-            glance.add(result)
+            summary.add(result)
             yield result
 
     tables.write_tables(directory, counted())
-    files.write_bytes(files.join(directory, "index.html"), glance.page(expected).encode())
-    return glance
+    files.write_bytes(files.join(directory, "index.html"), summary.page(expected).encode())
+    return summary
 
 
 def _note_changed(period: Period, marks: dict[str, str], result: PeriodResult) -> bool:

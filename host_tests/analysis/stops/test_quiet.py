@@ -60,22 +60,6 @@ def test_standstill_needs_a_second_of_quiet(seconds, stands):
     assert standing(ridden).any() == stands
 
 
-def test_rest_of_the_filter_is_extended_back():
-    """The road is smooth and does not shake the bike. The bike brakes until 12 s, and then its fork rebounds for 0.3 s.
-    The filter finds a rest only from 13.5 s on. The standstill begins after the rebound."""
-    road = Road((8.0, 0.0), (4.0, -4.0), (4.0, 0.0))
-    ride = road.channels(resting=(road.t_s >= 13.5).astype(float))
-    ride.forward_g += 0.03
-    ride.forward_g[(road.t_s >= 12.0) & (road.t_s < 12.3)] += 0.1
-    still = standing(ride)
-    assert ride.t_s[still][0] == pytest.approx(12.3, abs=0.07)
-    assert still[ride.t_s > 12.4].all()
-    ride.forward_g[(road.t_s >= 12.6) & (road.t_s < 12.9)] += 0.018  # 0.018 g is below the limit of 0.02 g
-    assert ride.t_s[standing(ride)][0] == pytest.approx(12.3, abs=0.07)
-    ride.forward_g[(road.t_s >= 12.6) & (road.t_s < 12.9)] += 0.006
-    assert ride.t_s[standing(ride)][0] == pytest.approx(12.9, abs=0.07)
-
-
 def test_rest_from_the_beginning_is_found():
     road = Road((4.0, 0.0), (4.0, 3.0))
     ride = road.channels(resting=((road.t_s >= 2.0) & (road.t_s < 4.0)).astype(float))

@@ -59,9 +59,7 @@ def place(k):
     return array("i", (date, day_ms, -203_212_345 + 7 * k, -1_079_999_999 + 11 * k))
 
 
-def blocks(
-    count, ride=1, length=block_length, sequence=0, time_us=2_000_000, trim_deg=0.0, speed=False, places_every=0
-):
+def blocks(count, ride=1, length=block_length, trim_deg=0.0, speed=False, places_every=0):
     """Return `count` full blocks, and the passes of the loop that they contain, each as (six sums, n, dt_us).
 
     speed: True for a speed in every hundredth pass. places_every: number of passes between two positions, 0 for no
@@ -70,9 +68,9 @@ def blocks(
     block = RideBlock(5000)
     body = pack(CHIP.who_am_i, CHIP.accel_range_g, calibration(trim_deg))
     written, held = [], []
-    source = turns(1_000_000, seed=ride)
+    source, time_us = turns(1_000_000, seed=ride), 2_000_000
     for index in range(count):
-        block.begin(length(index), ride, sequence + index, time_us, CHIP, 200, body)
+        block.begin(length(index), ride, index, time_us, CHIP, 200, body)
         while not block.full():
             sums, n, dt_us = next(source)
             if speed and len(held) % 100 == 0:

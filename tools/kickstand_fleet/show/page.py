@@ -41,7 +41,7 @@ _DAY_S = 86_400.0
 _BLUE, _ORANGE = "var(--truth)", "var(--accent)"  # colours of the page
 
 
-class Glance:
+class FleetSummary:
     """A summary of many results for the page. add() takes the results one by one, so memory hardly grows with them.
 
     count: Number of results.
@@ -116,7 +116,7 @@ class Glance:
         return filled(
             _PAGE,
             policy=_POLICY,
-            glance=self,
+            summary=self,
             expected=expected,
             tiles=tiles,
             why=defaultdict(str, _WORDS),

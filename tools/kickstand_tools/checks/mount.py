@@ -22,7 +22,7 @@ from ..signals import Array, Lag, best_lag, correlation, rotated, rotation_vecto
 from .cells import CELL_S, LogCells
 
 MEAN_S = 0.5  # means over this time are used to judge up and the bends
-UP_DEG, FORWARD_DEG = 15.0, 20.0  # if up or forward differs by more, the calibration belongs to another mount
+UP_DEG, FORWARD_DEG = 15.0, 25.0  # if up or forward differs by more, the calibration belongs to another mount
 # If the two poses were swapped, "up" is the up axis of the bike on the kickstand. That axis leans by up to LEANED_DEG.
 LEANED_DEG = 25.0
 BACKWARD_DEG = 150.0  # if forward differs by more than this, forward and backward are exchanged

@@ -140,8 +140,9 @@ def find(sheet: Sheet) -> Findings:
     time = _time(sheet)
     if time is None:
         findings.lacking.append("time")
-        named = [name for name in sheet.columns if TIME_NAME.search(plain(name))]
-        findings.remarks += [f"its column {named[0]} does not increase like a time"] if named else []
+        named = [k for k, name in enumerate(sheet.columns) if TIME_NAME.search(plain(name))][:1]
+        shown = [f"{sheet.columns[k]} (first {as_text(sheet.cells[k])[0][:30]!a})" for k in named]
+        findings.remarks += [f"its column {text} is no time that increases" for text in shown]
     else:
         findings.found["t"] = time
     seconds = _seconds(sheet, time)
@@ -256,13 +257,11 @@ def completed(sheet: Sheet) -> Sheet:
     if scale and not _time_unit_of(scale):
         sheet.columns[0], sheet.cells[0] = f"{sheet.columns[0]} (s)", sheet.numbers(0) * scale
     for fraction, size in _FRACTIONS.items():
-        k = next(
-            (k for k, name in enumerate(names) if k and name.removesuffix("s").endswith(fraction.removesuffix("s"))), 0
-        )
+        k = next((k for k, name in enumerate(names) if k and name.removesuffix("s").endswith(fraction)), 0)
         if k and re.search(r"secs?$|seconds?$|stamp$|time$", names[k - 1]) and names[k - 1] != names[k]:
             whole, part = sheet.cells[k - 1], sheet.numbers(k)
-            if whole.dtype.kind == "i" and np.nanmin(part) >= 0.0 and np.nanmax(part) * size < 10**9:
-                part_ns = np.nan_to_num(part * size).astype(np.int64)
+            if whole.dtype.kind == "i" and np.all((part >= 0.0) & (part * size < 10**9)):
+                part_ns = (part * size).astype(np.int64)
                 sheet.columns.append(f"time {sheet.columns[k - 1]} + {sheet.columns[k]} (ns)")
                 sheet.cells.append(whole.astype(np.int64) * 10**9 + part_ns)
                 break
@@ -282,9 +281,9 @@ def completed(sheet: Sheet) -> Sheet:
     return sheet
 
 
-# The ends of names of columns with fractions of a second, and the ns of their unit
+# The ends of names of columns with fractions of a second, without a plural s, and the ns of their unit
 _FRACTIONS = {"nsec": 1, "nanosec": 1, "nanosecond": 1, "usec": 1000, "microsecond": 1000, "msec": 10**6}
-_FRACTIONS |= {"millisecond": 10**6, "millis": 10**6}
+_FRACTIONS |= {"millisecond": 10**6, "milli": 10**6}
 
 
 def _merge_rows(sheet: Sheet, three: _Triple) -> None:

@@ -10,9 +10,9 @@ from kickstand_tools.api import replay, smooth
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation.ride import ride
-from kickstand_workshop.evaluation.runs import as_log, calibrated_by_poses
 
-from support.recordings.other_bike import other_ride
+from .other_bike import other_ride
+from .runs import as_log, calibrated_by_poses
 
 
 @dataclass

@@ -4,7 +4,7 @@ The rides come from the second simulator (other_bike.py). On request, a ride use
 kickstand_tools.simulation: the sensor with the data sheet's errors and its calibration by six positions. Parameters of
 the estimators are fitted with even seeds only, and figures are reported for odd seeds:
 
-    OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.drawn_rides odd 100
+    OMP_NUM_THREADS=1 .venv/bin/python -m kickstand_workshop.evaluation.drawn_rides odd 100
 """
 
 import sys
@@ -19,7 +19,7 @@ from kickstand_tools.simulation import hands, poses
 from kickstand_tools.simulation.hands import Hand
 from kickstand_tools.simulation.physics.chip import GYRO_DPS_PER_G, Chip
 
-from support.recordings.other_bike import (
+from .other_bike import (
     FINE_HZ,
     KINDS,
     G,
@@ -30,7 +30,7 @@ from support.recordings.other_bike import (
     random_tolerances,
     smooth_noise,
 )
-from support.recordings.smoothed_rides import Known, rms
+from .smoothed_rides import Known, rms
 
 # The share of rides with each mount. A "foreign" mount shakes or bends, so the sensor measures the mount's own
 # accelerations.
