@@ -11,7 +11,7 @@ from kickstand_tools.logs.log import Log
 
 def noisy(step_s=0.05, speed=9.0):
     noise = np.random.default_rng(1).normal(size=(100, 3))
-    return Log(np.arange(100) * step_s, noise, noise, np.full(100, speed), name="n")
+    return Log(np.linspace(0.0, 99.0 * step_s, 100), noise, noise, np.full(100, speed), name="n")
 
 
 @pytest.mark.parametrize(

@@ -52,6 +52,9 @@ def test_nothing_stored(store, tmp_path):
     loaded = store.load()
     assert (loaded.aligned, loaded.six_done, store.message) == (False, False, "not calibrated")
     assert list(tmp_path.iterdir()) == []  # load() writes nothing
+    store.save(calibration(1))
+    store.load()
+    assert store.message == "record 1"
 
 
 @pytest.mark.parametrize("sign", [-1, 1])

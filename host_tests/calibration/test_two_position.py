@@ -23,18 +23,24 @@ def poses(mounting, tilt_deg, side="left"):
     return mounting.T @ leaned(tilt_deg if side == "right" else -tilt_deg), mounting.T @ leaned(0.0)
 
 
+def aligned_by(forces, side, calibration=None):
+    """Return the calibration aligned by the forces of two poses, and the tilt between them."""
+    kickstand, upright = map(Pose, forces)
+    return align(calibration or Calibration(), kickstand, upright, side)
+
+
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_every_mounting_is_recovered(side):
     chance = np.random.default_rng(3)
     for _ in range(40):
         mounting, tilt_deg = random_rotation(chance), chance.uniform(5.1, 59.0)
-        aligned, tilt = align(Calibration(), *map(Pose, poses(mounting, tilt_deg, side)), side)
+        aligned, tilt = aligned_by(poses(mounting, tilt_deg, side), side)
         assert_allclose(np.reshape(aligned.vehicle_from_sensor, (3, 3)), mounting, atol=2e-5)
         assert tilt == pytest.approx(tilt_deg, abs=1e-3)
 
 
 def test_the_wrong_side_turns_forward_into_backward():
-    aligned, _ = align(Calibration(), *map(Pose, poses(np.eye(3), 12, "right")), "left")
+    aligned, _ = aligned_by(poses(np.eye(3), 12, "right"), "left")
     assert_allclose(aligned.vehicle_from_sensor, np.diag([-1, 1, -1]).ravel(), atol=1e-6)
 
 
@@ -64,10 +70,10 @@ def test_after_the_six_positions_a_pose_reads_1_g_more_closely(spoilt, size):
     forces = np.array([leaned(-12), leaned(0)])
     forces[spoilt] *= size
     calibration = Calibration()
-    align(calibration, *map(Pose, forces), "left")
+    aligned_by(forces, "left", calibration)
     calibration.six_done = True
     with pytest.raises(AlignmentError) as refusal:
-        align(calibration, *map(Pose, forces), "left")
+        aligned_by(forces, "left", calibration)
     assert refusal.value.values[0] == ("kickstand", "upright")[spoilt]
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from checked import cells_of, made_up
 from kickstand_tools import api
-from kickstand_tools.checks.course import course_agrees, positions_exchanged
+from kickstand_tools.checks.course import course_agrees
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
@@ -110,16 +110,3 @@ def test_errors_of_the_positions_are_no_turns(seed):
     rates = np.column_stack((0 * t_s, 2.0 * np.sin(t_s + seed), 0 * t_s))
     up = np.tile([0.0, 1.0, 0.0], (len(t_s), 1))
     assert course_agrees(cells_of(Log(t_s, up, rates, lat_deg=lat, lon_deg=lon))) is None
-
-
-@pytest.mark.parametrize("latitude", [47.6, -33.0])
-def test_exchanged_latitude_and_longitude_are_found_by_the_speed(latitude):
-    """The ride goes round in circles at 10 m/s. A degree is 111.19 km, and shorter along a parallel."""
-    t_s = np.arange(0.0, 60.0)
-    lat = latitude + 100.0 * np.sin(0.1 * t_s) / 111_190.0
-    lon = 8.0 + 100.0 * np.cos(0.1 * t_s) / (111_190.0 * np.cos(np.radians(latitude)))
-    speed = np.full(60, 10.0)
-    assert not positions_exchanged(t_s, speed, lat, lon)
-    assert positions_exchanged(t_s, speed, lon, lat)
-    assert not positions_exchanged(t_s, 1.3 * speed, lat, lon)  # another unit fits neither order
-    assert not positions_exchanged(t_s, np.full(60, np.nan), lon, lat)

@@ -1,5 +1,4 @@
-"""What a table's accelerations and positions show: gravity in a long bend, gravity in columns of its own, and exchanged
-positions."""
+"""What a table's accelerations show: gravity in a long bend, and gravity in columns of its own."""
 
 import numpy as np
 import pytest
@@ -31,15 +30,3 @@ def test_gravity_and_the_acceleration_without_it_are_added(tmp_path):
     gravity = np.tile([0.0, -1.0, 0.0], (len(T_S), 1))
     log = imported(tmp_path, f"time_s,{names},{GX}", SHAKE, gravity, 30.0 * SHAKE).log
     assert log.accel_g == pytest.approx(SHAKE + gravity, abs=1e-4)
-
-
-def test_exchanged_latitude_and_longitude_are_put_right(tmp_path):
-    """The bike rides in circles at 10 m/s. The speed fits only one order of latitude and longitude."""
-    lat = 47.6 + 100.0 * np.sin(0.1 * T_S) / 111_190.0
-    lon = 8.0 + 100.0 * np.cos(0.1 * T_S) / (111_190.0 * np.cos(np.radians(47.6)))
-    force, rates = SHAKE + [0.0, 1.0, 0.0], SHAKE + [0.0, -5.7, 0.0]
-    speed = np.full(len(T_S), 36.0)
-    columns = force, rates, lon, lat, speed
-    found = imported(tmp_path, f"time_s,{AX},{GX},lat,lon,speed_kmh", *columns)
-    assert "import-exchanged" in [notice.code for notice in found.notices]
-    assert np.nanmedian(found.log.lat_deg) == pytest.approx(47.6, abs=0.1)

@@ -17,9 +17,6 @@ ENOUGH = 8  # fewer usable seconds give no result
 # Least correlation of course and gyro, of either sign, and by how many standard errors it must differ from 0. The
 # errors of the positions turn the course too: in few seconds with small turns, they correlate with the gyro by chance.
 CLEAR, SIGMAS = 0.6, 5.0
-# Latitude and longitude are exchanged if the speed fits the exchanged positions much better: if the rms of the
-# logarithm of their ratio is under BETTER times that of the positions as they are, which is then over OFF.
-BETTER, OFF = 0.5, 0.05
 LAGS_S = np.arange(0.0, 2.1, 0.25)  # delays of the positions that are tried
 LONGEST_S = 2.5  # longest time between two positions
 
@@ -66,31 +63,3 @@ def log_agrees(time_s: Array, accel_g: Array, gyro_dps: Array, lat_deg: Array, l
     table.add(time_s, accel_g, gyro_dps, np.full(len(time_s), np.nan), lat_deg, lon_deg)
     cells = table.cells()
     return None if cells is None else course_agrees(cells)
-
-
-def positions_exchanged(time_s: Array, speed_mps: Array, lat_deg: Array, lon_deg: Array) -> bool:
-    """True if latitude and longitude are exchanged, which makes the track a mirror image.
-
-    A degree of longitude is shorter than a degree of latitude, so the speed fits only one of the two orders. Near the
-    equator it fits both.
-
-    time_s, speed_mps, lat_deg, lon_deg: shape (n); NaN for no new value.
-    """
-    placed, known = np.isfinite(lat_deg) & np.isfinite(lon_deg), np.isfinite(speed_mps)
-    rows = np.flatnonzero(placed)
-    rows = rows[np.unique(np.floor(time_s[rows]), return_index=True)[1]]
-    step_s = np.diff(time_s[rows])
-    if np.count_nonzero(known) < ENOUGH or len(rows) < ENOUGH:
-        return False
-    middle_s = 0.5 * (time_s[rows][1:] + time_s[rows][:-1])
-    speed = np.interp(middle_s, time_s[known], speed_mps[known])
-
-    def misfit(lat: Array, lon: Array) -> float:
-        moved = np.hypot(*distance_m(lat[:-1], lon[:-1], lat[1:], lon[1:])) / step_s
-        moving = (step_s < LONGEST_S) & (speed > SLOWEST_MPS) & (moved > SLOWEST_MPS)
-        ratio = np.log(moved[moving] / speed[moving])
-        return float(np.sqrt(np.mean(ratio**2))) if np.count_nonzero(moving) >= ENOUGH else 0.0
-
-    lat, lon = lat_deg[rows], lon_deg[rows]
-    as_is = misfit(lat, lon)
-    return as_is > OFF and bool(np.all(np.abs(lon) <= 90.0)) and misfit(lon, lat) < BETTER * as_is

@@ -9,7 +9,7 @@ from zipfile import is_zipfile
 
 import numpy as np
 
-from ..checks.course import log_agrees, positions_exchanged
+from ..checks.course import log_agrees
 from ..common.errors import InputError
 from ..common.messages import AT_REST, Message, Remedy
 from ..estimation.first_guess import MIN_RIDING_S
@@ -77,13 +77,6 @@ class ImportSign(Message):
         f"{AT_REST}, else the ride is mirrored and --units a=-g or a=-m/s2 puts it right",
         f"{AT_REST}, else the ride is mirrored and left is shown as right",
     )
-
-
-class ImportExchanged(Message):
-    """Latitude and longitude were exchanged, and have been put right."""
-
-    code = "import-exchanged"
-    text = "latitude and longitude are exchanged, because the speed fits them only so: they have been put right"
 
 
 @dataclass(eq=False)
@@ -174,9 +167,6 @@ def import_of_app(source: Path) -> Imported | None:
 
 def _imported(recording: AppRecording, name: str, start_s: float | None = None, end_s: float | None = None) -> Imported:
     log, damaged = join(recording, name)
-    if len(log.lat_deg) and positions_exchanged(log.t_s, log.speed_mps, log.lat_deg, log.lon_deg):
-        log.lat_deg, log.lon_deg = log.lon_deg, log.lat_deg
-        recording.notices.append(ImportExchanged())
     _check_sign(recording, log)
     if damaged:
         recording.notices.append(ImportDamaged(damaged))
