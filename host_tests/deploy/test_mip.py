@@ -9,9 +9,7 @@ from pathlib import Path
 import pytest
 from kickstand_tools.deploy import firmware_files
 from mpremote import mip
-from mpremote.transport_serial import SerialTransport
-from support import emulated_port, fake_board
-from support.emulated import CHIPS
+from support import fake_board
 
 FIRMWARE = Path(__file__).resolve().parents[2] / "firmware"
 
@@ -48,21 +46,3 @@ def sources():
 def test_mip_installs_from_a_local_server(install, tmp_path):
     install(fake_board.FakeBoard(tmp_path))
     assert fake_board.files(tmp_path) == sources()
-
-
-@pytest.mark.long
-@pytest.mark.chip
-def test_mip_installation_starts_on_the_emulated_pico(install, monkeypatch):
-    """The board also gets main.py and config.py, as firmware/docs/settings.md describes."""
-    with CHIPS["pico"]() as device:
-        emulated_port.plug_in(monkeypatch, device)
-        device.run(1.0)
-        transport = SerialTransport(emulated_port.NAME, timeout=10)
-        transport.enter_raw_repl()
-        install(transport)
-        for name in ("main.py", "config.py"):
-            transport.fs_writefile(name, (FIRMWARE / name).read_bytes())
-        assert {f"/{path}" for path in device.files()} >= sources().keys()
-        device.power_off()
-        device.power_on()
-        device.run_until(lambda: "stand" in device.lcd()[0], 10.0)

@@ -7,7 +7,7 @@ import pytest
 from kickstand_fleet.manifest import Period
 from kickstand_fleet.period import failed
 from kickstand_fleet.show import plot
-from kickstand_fleet.show.page import Glance
+from kickstand_fleet.show.page import FleetSummary
 
 DAY_S = 86_400.0
 
@@ -29,11 +29,11 @@ def move(turned_deg, vehicle="v2"):
     return moment | {"vehicle": vehicle, "mount": "", "turned_deg": turned_deg, "turned_sigma_deg": 1.0, "sigmas": 9.0}
 
 
-def glance_of(*results):
-    glance = Glance()
+def summary_of(*results):
+    summary = FleetSummary()
     for outcome in results:
-        glance.add(outcome)
-    return glance
+        summary.add(outcome)
+    return summary
 
 
 def words_of(html):
@@ -41,7 +41,7 @@ def words_of(html):
 
 
 def test_a_summary_counts_results_and_names_the_worst():
-    glance = glance_of(
+    summary = summary_of(
         result("/a/b/1", 0.4, moved=[move(4.0), move(9.0)]),
         result("/a/bc/2", 1.2, tests=[(None, 5.0)]),
         result("/a/b/3", status="refused", reason="mount-moved"),
@@ -49,28 +49,28 @@ def test_a_summary_counts_results_and_names_the_worst():
             "/a/b/4", status="error", reason="unreadable", errors=[{"vehicle": "4", "log": "", "message": "gone"}] * 4
         ),
     )
-    assert (glance.count, glance.driven_s, glance.below) == (4, 7200.0, "/a/")
-    assert glance.statuses == {"aligned": 2, "refused": 1, "error": 1}
-    assert glance.reasons == {("refused", "mount-moved"): 1, ("error", "unreadable"): 1}
-    assert (glance.moved_count, glance.moved_vehicles, glance.errors) == (2, 2, 4)
-    assert glance.first_errors == [("4", "gone")] * 3
-    assert [row["quality_deg"] for row in glance.worst] == [1.2, 0.4]
-    assert [row["turned_deg"] for row, _ in glance.moved] == [9.0, 4.0]
-    assert np.isnan(glance.decelerations[0][0]) and list(glance.decelerations[1]) == [5.0]
-    assert glance_of(result("x"), result("y")).below == "" and Glance().below is None
+    assert (summary.count, summary.driven_s, summary.below) == (4, 7200.0, "/a/")
+    assert summary.statuses == {"aligned": 2, "refused": 1, "error": 1}
+    assert summary.reasons == {("refused", "mount-moved"): 1, ("error", "unreadable"): 1}
+    assert (summary.moved_count, summary.moved_vehicles, summary.errors) == (2, 2, 4)
+    assert summary.first_errors == [("4", "gone")] * 3
+    assert [row["quality_deg"] for row in summary.worst] == [1.2, 0.4]
+    assert [row["turned_deg"] for row, _ in summary.moved] == [9.0, 4.0]
+    assert np.isnan(summary.decelerations[0][0]) and list(summary.decelerations[1]) == [5.0]
+    assert summary_of(result("x"), result("y")).below == "" and FleetSummary().below is None
 
 
 def test_the_page_has_the_numbers_of_the_fleet():
     tests = [(1.79e9 + k * DAY_S, 4.0 + k) for k in range(3)]
-    glance = glance_of(
+    summary = summary_of(
         result("v1", 0.4, tests=tests, driven_s=16_200.0, plot="plots/v1.svg"),
         result("v2", 0.6, mount="front", moved=[move(12.34)]),
         result("v3", status="refused", reason="mount-moved", message="turn <back>"),
         result("v4", status="error", reason="new-reason"),
     )
-    html = glance.page(8)
+    html = summary.page(8)
     words = words_of(html)
-    assert "Fleet: 4 of 8 mounted sensors so far" in words and "Fleet: 4 mounted sensors " in words_of(glance.page(4))
+    assert "Fleet: 4 of 8 mounted sensors so far" in words and "Fleet: 4 mounted sensors " in words_of(summary.page(4))
     for text in (
         " 2 aligned (50 %)",
         " 1 refused: ",
@@ -110,7 +110,7 @@ def test_fleet_page_is_readable_in_a_browser(chromium, results, tmp_path):
     """It has the style of the site, axe finds nothing, and a zero does not have the colour of a fault."""
     from support.web.rider import LAPTOP, PHONE, Rider
 
-    (tmp_path / "index.html").write_text(glance_of(*list(results.values())[1:4:2]).page(2), encoding="utf-8")
+    (tmp_path / "index.html").write_text(summary_of(*list(results.values())[1:4:2]).page(2), encoding="utf-8")
     rider = Rider(chromium, (tmp_path / "index.html").as_uri(), **PHONE)
     assert rider.text("h1") == "Kickstand" and rider.text("header p") == "Fleet: 2 mounted sensors"
     for device in PHONE, LAPTOP:

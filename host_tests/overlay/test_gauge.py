@@ -136,6 +136,12 @@ def test_speed_has_its_unit_and_may_be_missing():
     assert not says(without, "72") and not says(without, "km/h")
 
 
+def test_the_scale_has_30_and_60_on_both_sides(gauge):
+    picture, middle = drawn(gauge, lean_deg=NAN), round(0.6 * gauge.height)
+    for half in (picture[:, :middle], picture[:, middle : 2 * middle]):
+        assert says(half, "30") and says(half, "60")
+
+
 def test_maxima_have_a_mark_on_their_side(gauge):
     middle = 0.6 * gauge.height
     for side, name in ((-1, "left_deg"), (1, "right_deg")):

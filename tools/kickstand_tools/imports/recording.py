@@ -77,8 +77,9 @@ class Sheet:
         return numbers_of(self.cells[place]).astype(float)
 
     def table(self, places: list[int]) -> Array:
-        """Return several columns as numbers, shape (n, columns)."""
-        return np.column_stack([self.numbers(place) for place in places])
+        """Return several columns as numbers, shape (n, columns). Numbers whose sums would overflow are NaN."""
+        values = np.column_stack([self.numbers(place) for place in places])
+        return np.where(np.abs(values) < 1e12, values, np.nan)
 
 
 def plain(name: str) -> str:

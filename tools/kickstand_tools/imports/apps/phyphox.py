@@ -31,7 +31,7 @@ from ..units import EPOCH_NS, RATES, Nanoseconds, of_seconds, unit
 
 NAME = "phyphox"
 _AXIS = re.compile(
-    r"^(?:((?:linear )?acceleration.*|gyroscope.*|gravity.*)\s+)?([xyz]) \((m/s\^2|rad/s)\)$", re.IGNORECASE
+    r"^(?:((?:linear )?acceleration.*|accelerometer|gyroscope.*|gravity.*)\s+)?([xyz]) \((m/s\^2|rad/s)\)$", re.IGNORECASE
 )
 _SIGN = "+1 g up, on every phone"
 _WITHOUT_GRAVITY = "linear"  # part of the name of a sensor without gravity
@@ -76,6 +76,8 @@ def _is_ours(file: RecordingFile) -> bool:
     if _is_meta(file) or len(first) < 2 or not re.fullmatch(r"(.*\s)?time \(s\)", first[0], re.IGNORECASE):
         return False
     axes = [_AXIS.match(column) for column in first if re.search(r"\b[xyz]\b", column, re.IGNORECASE)]
+    if "accelerometer x (m/s^2)" in map(str.lower, first) and not file.name.endswith("Accelerometer.csv"):
+        return False  # other loggers name their columns like the sensor, too, but not their files
     return bool(axes and all(axes)) or "latitude" in map(plain, first)
 
 
