@@ -71,7 +71,6 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "chip: runs the firmware on the emulated Pico, which takes its time")
     config.addinivalue_line("markers", "machine: its result can depend on the machine; conftest.py marks these tests")
     config.addinivalue_line("markers", "esp32: on the emulated ESP32, where its library is")
-    config.addinivalue_line("markers", "nightly: an older name of long")
     config.addinivalue_line("markers", "long: belongs to the long tier: runs only with --all")
 
 
@@ -102,8 +101,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Func
         if item.path in on_machine:
             item.add_marker("machine")
     if not config.getoption("--all"):
-        long = [item for item in items if item.get_closest_marker("long") or item.get_closest_marker("nightly")]
-        items[:] = [item for item in items if item not in set(long)]
+        long = [item for item in items if item.get_closest_marker("long")]
+        items[:] = [item for item in items if not item.get_closest_marker("long")]
         config.hook.pytest_deselected(items=long)
 
 

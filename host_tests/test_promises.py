@@ -4,7 +4,7 @@ import ast
 from pathlib import Path
 
 TESTS = Path(__file__).resolve().parent
-PRIVATE_USES, REPLACED_PARTS = 800, 650
+PRIVATE_USES, REPLACED_PARTS = 20, 110
 REPLACE = ("setattr", "setitem", "delattr", "delitem", "patch")
 
 

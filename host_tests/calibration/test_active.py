@@ -82,36 +82,6 @@ def test_save_replaces_and_refine_corrects(made):
     assert changes == [True, True, False]
 
 
-def test_the_trim_is_saved_once_a_minute_at_most(made):
-    """Each write wears the flash. The trim is never saved in the first minute. If there is no new trim after a minute,
-    the next new trim is saved."""
-    active, meter, _ = made
-    active.chip_started(Chip())
-    active.save(aligned())
-    for now_ms, trim, kept in (
-        (59_999, 1.0, 0.0),
-        (60_001, 1.0, 1.0),
-        (60_101, 2.0, 1.0),
-        (120_002, 2.0, 2.0),
-        (200_000, None, 2.0),
-        (200_100, 3.0, 3.0),
-        (260_099, 1.5, 3.0),
-        (260_100, 1.5, 1.5),
-    ):
-        meter.new_trim = trim
-        active.keep_trim(now_ms)
-        assert stored().trim_deg == kept, now_ms
-
-
-def test_without_an_alignment_there_is_no_trim(made, tmp_path):
-    active, meter, _ = made
-    active.chip_started(Chip())
-    meter.new_trim = 1.0
-    active.keep_trim(100_000)
-    assert meter.new_trim == 1.0
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_restart_saves_the_trim_and_uses_the_stored_values(made):
     active, meter, changes = made
     active.chip_started(Chip())
@@ -121,20 +91,6 @@ def test_a_restart_saves_the_trim_and_uses_the_stored_values(made):
     active.restart()
     assert stored().trim_deg == active.value.trim_deg == 1.25
     assert (meter.used, len(changes)) == (used + 1, changed)
-
-
-def test_no_trim_overwrites_a_record_that_was_misread(made, tmp_path):
-    active, meter, _ = made
-    for offset in (0.1, 0.2):
-        Store(0x68, 8).save(aligned(offset))
-    newest = tmp_path / FILES[0]
-    content = newest.read_bytes()
-    newest.write_bytes(b"")
-    active.chip_started(Chip())
-    newest.write_bytes(content)
-    meter.new_trim = 1.0
-    active.keep_trim(100_000)
-    assert newest.read_bytes() == content
 
 
 def test_an_unwritable_flash_is_reported_and_retried_later(made, tmp_path, capsys):

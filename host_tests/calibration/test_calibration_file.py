@@ -2,7 +2,6 @@
 
 import io
 import json
-import os
 from array import array
 
 import numpy as np
@@ -99,19 +98,6 @@ def test_a_directory_a_missing_and_a_huge_file_are_refused(tmp_path):
             read_calibration(tmp_path / name)
 
 
-def test_missing_labels_follow_from_the_numbers():
-    """A file from another program may lack the labels. Only a matrix other than the identity is an alignment."""
-    plain = read(aligned=None, six_positions=None)
-    assert (plain.aligned, plain.six_done, plain.vehicle, plain.gyro_delay_s) == (False, False, "", None)
-    assert read(aligned=None, vehicle_from_sensor=TURNED).aligned
-    assert not read(vehicle_from_sensor=TURNED).aligned
-    assert not read(aligned=1).aligned
-    assert read(six_positions=None, accel_slope=[1, 1.01, 1]).six_done
-    assert read(six_positions=None, accel_offset_g=[0, 0.01, 0]).six_done
-    assert read(trim_deg=None).trim_deg == 0.0
-    assert read(gyro_delay_s=0).delay_s() == 0.0 < plain.delay_s()
-
-
 def complete():
     """Return a calibration with a value in each entry."""
     return CalibrationFile(
@@ -155,16 +141,6 @@ def test_a_rides_calibration_is_beside_it(tmp_path):
     assert calibration_path(tmp_path / "RIDE.csv.gz") == tmp_path / "RIDE.cal.json"
 
 
-def test_a_gyros_errors_are_turned_with_its_axes():
-    sigma = np.arange(9.0).reshape(3, 3) / 1000.0
-    found = CalibrationFile(vehicle_from_sensor=np.array(TURNED, float), gyro_sigma=sigma).gyro_sigma_in_vehicle()
-    assert found == pytest.approx(sigma[[1, 0, 2]][:, [1, 0, 2]])
-    part = CalibrationFile(
-        vehicle_from_sensor=np.array([[0.8, 0.6, 0], [-0.6, 0.8, 0], [0, 0, 1]]), gyro_sigma=np.eye(3)
-    )
-    assert part.gyro_sigma_in_vehicle()[0, 0] == pytest.approx(np.sqrt(0.64**2 + 0.36**2))
-
-
 def test_a_calibration_is_applied_alike_by_numpy_and_by_the_firmware():
     c, reading = complete(), np.array([0.3, -0.5, 0.8, 25.0, 50.0, -30.0, 70.0])
     force = c.accel_matrix @ (c.accel_slope * reading[:3] + c.accel_offset_g)
@@ -185,46 +161,3 @@ def test_a_calibration_is_applied_alike_by_numpy_and_by_the_firmware():
         assert np.degrees(found[1]) == pytest.approx(in_vehicle[1], abs=0.1)
     assert of_sensor[0] == pytest.approx(force, abs=0.001)
     assert of_sensor[1] == pytest.approx(rate, abs=0.02)
-
-
-@pytest.fixture
-def inputs(tmp_path):
-    return command.still(tmp_path / "log.csv", (0, 0, 1)), "--calibration", command.write_cal(tmp_path / "CAL.json")
-
-
-def test_a_write_that_fails_leaves_the_old_file_and_no_other(tmp_path, monkeypatch, inputs):
-    (tmp_path / "LEAN.csv").write_text("the one from yesterday\n")
-
-    def full(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "replace", full)
-    command.refused(tmp_path, "replay", *inputs, "--out", tmp_path / "LEAN.csv", words="No space left")
-
-
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("", "is a directory"),
-        ("none/LEAN.csv", "there is no directory"),
-        ("link.csv", "is also an input"),
-        ("CAL.json", "is also an input"),
-        pytest.param(
-            "pipe", "ordinary file", marks=pytest.mark.skipif(os.name == "nt", reason="named pipes are of Unix")
-        ),
-    ],
-)
-def test_harmful_outputs_are_refused(tmp_path, inputs, name, words):
-    (tmp_path / "link.csv").symlink_to(inputs[0])
-    if name == "pipe":
-        os.mkfifo(tmp_path / name)
-    command.refused(tmp_path, "replay", *inputs, "--out", tmp_path / name, words=words)
-    assert name != "pipe" or (tmp_path / name).is_fifo()
-
-
-def test_a_link_is_written_through(tmp_path, inputs):
-    (tmp_path / "kept").mkdir()
-    (tmp_path / "LEAN.csv").symlink_to(tmp_path / "kept" / "LEAN.csv")
-    command.works("replay", *inputs, "--out", tmp_path / "LEAN.csv")
-    assert (tmp_path / "LEAN.csv").is_symlink()
-    assert (tmp_path / "kept" / "LEAN.csv").read_text().startswith("t_s,")

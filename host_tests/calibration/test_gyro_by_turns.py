@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from kickstand.calibration.sensor_fit import SensorFit
 from kickstand.calibration.turn import Turn
-from kickstand.errors import GyroError
 from kickstand_tools.calibration.procedure import fit_procedure
 from kickstand_tools.common.errors import InputError, RefusedInput
 from kickstand_tools.logs.log import Log
@@ -52,47 +51,6 @@ def test_the_turns_calibrate_fifty_gyros(hand):
     left = np.array([errors_left(seed, hand)[0] for seed in range(100, 150)])
     assert rms(left[:, DIAGONAL]) < 0.004
     assert rms(left[:, ~DIAGONAL]) < 0.005
-
-
-def test_a_turn_is_integrated_as_by_matrices_in_double():
-    chance = np.random.default_rng(1)
-    bias = np.array([3.0, -2.0, 0.5])
-    rates = (
-        150.0 * np.sin(np.linspace(0, np.pi, 200))[:, None] * chance.normal(size=3)
-        + chance.normal(size=(200, 3))
-        + bias
-    )
-    counts = np.rint(rates * 65.5).astype(int)
-    turn = Turn(65.5, 5000)
-    turn.start(bias.tolist())
-    exact = np.eye(3)
-    for pair in counts.reshape(100, 2, 3):
-        turn.add([0, 0, 0, 0, *pair.sum(axis=0).tolist()], 2, 10_000)
-        for count in pair:
-            x, y, z = np.radians(count / 65.5 - bias) * 0.005
-            size = np.sqrt(x * x + y * y + z * z)
-            k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-            exact = exact @ (np.eye(3) + np.sin(size) / size * k + (1 - np.cos(size)) / size**2 * k @ k)
-    turn.end()
-    r = np.array(turn.attitude(bias.tolist(), 0.5)).reshape(3, 3)
-    assert np.max(np.abs(r - exact)) < 3e-4  # 3e-4 rad are 0.02 degrees
-    assert turn.seconds == pytest.approx(1.0)
-    # a scale error that is the same on all axes makes the turn about the mean axis longer
-    scale = np.array(turn.packed(bias.tolist())[9:]).reshape(3, 9)[:, [0, 4, 8]].sum(axis=1)
-    assert np.linalg.norm(scale) == pytest.approx(turn.angle(), rel=1e-5)
-
-
-@pytest.mark.parametrize(("spoilt", "angle_deg"), [(True, 10.0), (False, 8.0)])
-def test_samples_of_a_pose_that_is_spoilt_count_after_all(spoilt, angle_deg):
-    """The sensor turns by 20 deg/s. The last 0.1 s belong to a pose, unless it is spoilt."""
-    turn = Turn(65.5, 5000)
-    turn.start([0.0] * 3)
-    for k in range(50):
-        turn.add([0, 0, 0, 0, 131 * 20, 0, 0], 2, 10_000, hold=k >= 40)
-    if spoilt:
-        turn.add([0] * 7, 2, 10_000)
-    turn.end()
-    assert np.degrees(turn.angle()) == pytest.approx(angle_deg, abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -142,15 +100,6 @@ def test_an_ideal_gyro_needs_no_correction_also_on_micropython():
         "fit.finish()\nprint(list(fit.gyro_matrix) + fit.gyro_sigma)\n"
     )
     assert eval(run_mpy(script)) == pytest.approx([*fit.gyro_matrix, *fit.gyro_sigma], abs=3e-4)
-
-
-def test_an_axis_that_no_turn_has_measured_is_unproved():
-    assert fitted([None] * len(measured()[1])).unproved == ["x", "y", "z"]
-
-
-def test_a_gross_misfit_is_no_plausible_fit():
-    with pytest.raises(GyroError):
-        fitted(measured()[1][::-1])
 
 
 @pytest.mark.parametrize("axis", [0, *(pytest.param(axis, marks=pytest.mark.long) for axis in (1, 2))])

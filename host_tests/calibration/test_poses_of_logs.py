@@ -56,12 +56,6 @@ def test_captures_that_are_not_six_sides_are_refused(captures, words):
         poses.fit_six_positions(captures)
 
 
-def test_axes_beyond_the_data_sheet_are_named():
-    assert poses.beyond_sheet([0.05, -0.05, 0.08], [1.0299, 0.9701, 1.0]) == []
-    assert poses.beyond_sheet([0.051, -0.051, 0.081], [1.0] * 3) == ["x", "y", "z"]
-    assert poses.beyond_sheet([0.0] * 3, [1.031, 0.969, 1.0]) == ["x", "y"]
-
-
 def test_a_pose_is_the_mean_of_its_samples_also_without_a_temperature():
     readings = still(SLANTED, count=20, bias_dps=(1.0, 2.0, -3.0))
     readings[:, 3] = np.nan
@@ -69,23 +63,6 @@ def test_a_pose_is_the_mean_of_its_samples_also_without_a_temperature():
     assert (found.name, found.samples) == ("n", 20)
     assert found.accel_g == pytest.approx(readings[:, :3].mean(axis=0))
     assert found.gyro_dps == pytest.approx(readings[:, 4:].mean(axis=0))
-
-
-@pytest.mark.parametrize(("sample", "place"), [(0, "n, sample 1: "), (56, "n, sample 57: ")])
-def test_a_saturated_sample_is_named_by_its_number(sample, place):
-    """An axis is saturated from 1.99 g on."""
-    readings = still([0.0, 0.0, 0.0], noise=0.0005)
-    readings[:, 1] += 1.95 - readings[0, 1]
-    readings[sample, 1] = 1.9899
-    assert poses.take_pose("n", readings, "again").samples == 400
-    readings[sample, 1] = 1.9901
-    with pytest.raises(RefusedInput, match=f"^{place}.*saturated.*: again$"):
-        poses.take_pose("n", readings, "again")
-
-
-def test_a_pose_that_is_refused_as_a_whole_has_no_number():
-    with pytest.raises(RefusedInput, match=r"^n: pose refused.*too short: 19 samples, at least 20 needed"):
-        poses.take_pose("n", still(SLANTED, count=19), "again")
 
 
 def test_the_same_path_twice_is_refused(tmp_path):
@@ -136,20 +113,6 @@ def test_one_recording_has_all_poses_and_turns(handled):
     assert found.calibration.accel_offset_g == pytest.approx([0.0] * 3, abs=0.002)
     assert found.free_pose_error_g == pytest.approx(0.0, abs=0.002)
     assert [float(np.round(side.accel_g[k // 2])) for k, side in enumerate(found.sides)] == [1, -1, 1, -1, 1, -1]
-
-
-def test_a_turn_at_the_end_of_the_range_is_left_out(handled):
-    """A rate of 250 deg/s is the end of a range. All turns over 237.5 deg/s are then left out."""
-    readings = handled.copy()
-    quickest = np.unravel_index(np.argmax(np.abs(readings[:, 4:])), (len(readings), 3))
-    readings[quickest[0], 4 + quickest[1]] = 250.0
-    assert procedure_of(readings).turns == 5
-
-
-def test_a_turn_with_missing_readings_is_left_out(handled):
-    log = Log.from_readings(handled, 200.0)
-    log.t_s[np.argmax(np.linalg.norm(handled[:, 4:], axis=1)) :] += 0.5
-    assert fit_procedure(log).turns == 5
 
 
 def test_a_recording_without_movement_or_too_short_is_refused():

@@ -1,7 +1,6 @@
 """The firmware's functions for vectors and matrices give the same results as numpy."""
 
 import numpy as np
-import pytest
 from kickstand import rotation
 from motions import random_rotation
 from numpy.testing import assert_allclose
@@ -32,16 +31,3 @@ def test_a_matrix_with_one_wrong_row_or_a_mirror_is_no_rotation():
         assert not any(rotation.is_rotation(matrix.ravel().tolist()) for matrix in wrong)
     for value in (float("nan"), float("inf")):
         assert not rotation.is_rotation([value] * 9)
-
-
-@pytest.mark.parametrize("vector", [[3.0, -4.0, 12.0], [0.0, 0.0, 2e-9]])
-def test_a_direction_has_length_1(vector):
-    direction = rotation.vector(*vector)
-    assert rotation.normalize(direction) == pytest.approx(np.linalg.norm(vector), rel=1e-6)
-    assert_allclose(direction, np.array(vector) / np.linalg.norm(vector), rtol=1e-6)
-
-
-@pytest.mark.parametrize("vector", [[0.0, 0.0, 0.0], [5e-10, 0.0, 0.0], [float("nan"), 0.0, 1.0]])
-def test_a_null_vector_has_no_direction(vector):
-    with pytest.raises(ValueError, match="no direction"):
-        rotation.normalize(rotation.vector(*vector))

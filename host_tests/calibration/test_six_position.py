@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from kickstand.calibration import six_position
 from kickstand.calibration.parameters import Calibration, six_position_calibration
-from kickstand.errors import CalibrationError
 from motions import SIDES, random_rotation, tipped
 from numpy.testing import assert_allclose
 from support import engines
@@ -53,21 +52,6 @@ def test_impossible_captures_are_refused(readings, reason):
     answer = engines.firmware_calls.call("fit", (readings.tolist(),))
     assert reason in engines.words(answer)
     assert all(len(line) <= 16 for line in answer["lcd"])
-
-
-def test_two_poses_of_the_same_side_give_no_parameters():
-    readings = SIDES.copy()
-    readings[0] = readings[2] = [0.9, 0.9, 0.0]
-    with pytest.raises(CalibrationError) as refusal:
-        six_position.fit(readings.tolist())
-    assert refusal.value.code == "unclear"
-
-
-def test_the_free_pose_proves_the_fit():
-    slanted = (np.array([1, 1, 1]) / np.sqrt(3)).tolist()
-    assert six_position.check_free_pose([0, 0, 0], [1, 1, 1], slanted) == pytest.approx(0, abs=1e-6)
-    answer = engines.firmware_calls.call("free_pose", ([0.05, 0, 0], [1, 1, 1], slanted))
-    assert "reads 1.03" in engines.words(answer)
 
 
 def test_the_result_of_the_six_positions_and_of_an_alignment():

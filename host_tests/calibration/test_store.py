@@ -3,12 +3,10 @@ never raises an error."""
 
 import struct
 from binascii import crc32
-from math import degrees
 
 import pytest
 from kickstand.calibration.parameters import Calibration
 from kickstand.calibration.store import FILES, Store
-from kickstand.lean.upright_trim import MAX_TRIM
 
 IDENTITY = [1, 0, 0, 0, 1, 0, 0, 0, 1]
 # All values are exact as 32-bit floats
@@ -57,14 +55,6 @@ def test_nothing_stored(store, tmp_path):
     assert store.message == "record 1"
 
 
-@pytest.mark.parametrize("sign", [-1, 1])
-def test_the_largest_trim_that_the_filter_finds_is_loaded_again(store, sign):
-    new = calibration(1)
-    new.trim_deg = sign * degrees(MAX_TRIM)
-    store.save(new)
-    assert store.load().trim_deg == pytest.approx(sign * degrees(MAX_TRIM))
-
-
 @pytest.mark.parametrize(("six_done", "how"), [(1, 1), (1, 2), (0, 1), (0, 0)])
 def test_records_are_read_and_written_as_by_the_first_release(store, tmp_path, six_done, how):
     """how: how the sensor was aligned. 0 means not aligned, 1 by two poses, 2 by driving."""
@@ -107,12 +97,6 @@ def test_the_matrices_are_kept_through_a_new_alignment(store):
     assert loaded.whole
 
 
-@pytest.mark.parametrize(("index", "value"), [(0, 1.2), (10, -0.2), (14, float("nan")), (20, 0.06), (26, -0.001)])
-def test_implausible_matrices_are_not_loaded(store, index, value):
-    store.save(calibration(1, [*MATRICES[:index], value, *MATRICES[index + 1 :]]))
-    assert not store.load().aligned
-
-
 @pytest.mark.parametrize(
     ("field", "value"),
     [(0, 0.6), (3, 1.3), (3, 0.7), (6, 61.0), (9, 1.1), (17, -1.0), (18, 4.0), (9, float("nan")), (0, float("inf"))],
@@ -148,12 +132,6 @@ def test_the_fault_of_a_record_is_reported(store, tmp_path, content, problem):
     assert store.message == f"record 7 (other record: {FILES[1]} {problem})"
 
 
-def test_a_record_of_another_range_stays_valid(store, tmp_path):
-    (tmp_path / FILES[1]).write_bytes(record(chip=(0x68, 16)))
-    assert store.load().aligned
-    assert store.message == "record 7"
-
-
 @pytest.mark.parametrize("matrices", [None, MATRICES])
 @pytest.mark.parametrize("saved_before", [0, 1, 2])
 def test_after_a_power_cut_at_any_byte_the_previous_record_counts(store, tmp_path, saved_before, matrices):
@@ -181,20 +159,3 @@ def test_every_damaged_byte_is_noticed(store, tmp_path, matrices):
     for k in range(len(content)):
         path.write_bytes(content[:k] + bytes([content[k] ^ 0x10]) + content[k + 1 :])
         assert mark_of(store.load()) == 1
-
-
-def test_a_trim_may_be_stored_beside_a_foreign_record(store, tmp_path):
-    """A foreign record is from another chip, or is empty after a power cut."""
-    store.save(calibration(1))
-    store.save(calibration(2))
-    for mark in 3, 4:
-        other = Store(0x70, 8, str(tmp_path))
-        other.load()
-        other.save(calibration(mark))
-        assert other.unchanged()
-        again = Store(0x70, 8, str(tmp_path))
-        assert mark_of(again.load()) == mark
-        assert again.unchanged()
-        for name in FILES:
-            if tmp_path / name != newest_file(tmp_path):
-                (tmp_path / name).write_bytes(b"")

@@ -31,7 +31,8 @@ from ..units import EPOCH_NS, RATES, Nanoseconds, of_seconds, unit
 
 NAME = "phyphox"
 _AXIS = re.compile(
-    r"^(?:((?:linear )?acceleration.*|accelerometer|gyroscope.*|gravity.*)\s+)?([xyz]) \((m/s\^2|rad/s)\)$", re.IGNORECASE
+    r"^(?:((?:linear )?acceleration.*|accelerometer|gyroscope.*|gravity.*)\s+)?([xyz]) \((m/s\^2|rad/s)\)$",
+    re.IGNORECASE,
 )
 _SIGN = "+1 g up, on every phone"
 _WITHOUT_GRAVITY = "linear"  # part of the name of a sensor without gravity

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE
-from kickstand_tools.calibration.drive import fit_drive, fit_logs, usable
-from kickstand_tools.calibration.file import CalibrationFile
+from kickstand.drive_alignment.alignment import CAR
+from kickstand_tools.calibration.drive import fit_drive, usable
 from kickstand_tools.common.errors import InputError, RefusedInput
 from kickstand_tools.logs.log import Log
 
@@ -29,24 +28,6 @@ def test_a_log_needs_a_speed_and_20_samples_a_second(log, others, words):
 
 
 STANDING = Log(np.arange(300) / 100.0, np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3)), np.zeros(300))
-
-
-@pytest.mark.parametrize(
-    ("given", "vehicle", "kind"),
-    [
-        (None, None, CAR),
-        (CalibrationFile(aligned=True), None, MOTORCYCLE),
-        (CalibrationFile(aligned=True, vehicle="car"), None, CAR),
-        (CalibrationFile(aligned=True), CAR, CAR),
-        (CalibrationFile(), MOTORCYCLE, MOTORCYCLE),
-    ],
-)
-def test_the_vehicle_follows_from_the_calibration(given, vehicle, kind):
-    """A short log is refused, but the result says which vehicle was assumed."""
-    found = fit_logs([STANDING], given, vehicle)
-    assert (found.vehicle, found.status, found.used, found.ready_s) == (kind, "refused", 0, 0.0)
-    assert found.poses is None and found.calibration == (given or CalibrationFile())
-    assert ("taken for a car" in str(found.refusal)) is (vehicle is None and kind == CAR)
 
 
 def test_a_refused_drive_raises():
