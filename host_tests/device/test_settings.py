@@ -75,8 +75,8 @@ def test_value_beyond_the_limits_is_replaced(name):
     [
         ({"BUTTON_PIN": 4}, "pin-twice", ("",)),
         ({"LCD_I2C": 0, "LCD_SDA": 8, "LCD_SCL": 9}, "one-i2c", ("LCD_I2C", 0)),
-        ({"LCD_SDA": 8, "LCD_SCL": 9}, "i2c-number", ("LCD_SDA", "LCD", 8, 9, 1)),
-        ({"SENSOR_SDA": 2}, "i2c-number", ("SENSOR_SDA", "SENSOR", 2, 5, 0)),
+        ({"LCD_SDA": 8, "LCD_SCL": 9}, "i2c-pins", ("LCD_SDA", "LCD", 8, 9, 1)),
+        ({"SENSOR_SDA": 2}, "i2c-pins", ("SENSOR_SDA", "SENSOR", 2, 5, 0)),
         ({"VEHICLE": "car"}, "needs-speed", ("SPEED",)),
         ({"SAMPLE_HZ": 100, "DLPF": 2}, "aliasing", ("DLPF", 2, 100)),
         ({"SD_SPI": 0}, "card-pins", ("SD_SCK",)),

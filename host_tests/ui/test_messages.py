@@ -15,7 +15,6 @@ INDIRECT = {"other-side", "mount-moved", "incomplete", "no-memory", "out-of-memo
 INDIRECT |= {"sensor-lost", "sensor-frozen", "sensor-silent", "sensor-reset", "flash-fault", "card-fault", "usb-fault"}
 # Codes for which the display shows the setting's name
 OTHER_SETTINGS = {
-    "i2c-number",
     "not-allowed",
     "card-pins",
     "one-i2c",
