@@ -117,7 +117,7 @@ class SlowFoldersFirst:
 
 TESTS_PER_COLLECTION = 200
 _tests = itertools.count(1)
-_seconds_of_tests = Counter()  # folder of the tests -> processor time
+_seconds_of_tests: Counter[str] = Counter()  # folder of the tests -> processor time
 
 
 def pytest_collection_finish() -> None:
@@ -145,7 +145,8 @@ def pytest_runtest_protocol(item: pytest.Item):
     try:
         return (yield)
     finally:
-        _seconds_of_tests[item.path.relative_to(ROOT / "host_tests").parts[0]] += _processor_s() - begin_s
+        folder = item.path.relative_to(ROOT / "host_tests").parts[0]
+        _seconds_of_tests.update({folder: _processor_s() - begin_s})  # pyright: ignore[reportCallIssue, reportArgumentType]
 
 
 def _processor_s() -> float:
@@ -154,7 +155,7 @@ def _processor_s() -> float:
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     if hasattr(session.config, "workeroutput"):  # a worker of pytest-xdist
-        session.config.workeroutput["seconds_of_tests"] = dict(_seconds_of_tests)
+        getattr(session.config, "workeroutput")["seconds_of_tests"] = dict(_seconds_of_tests)  # noqa: B009 of xdist
 
 
 @pytest.hookimpl(optionalhook=True)

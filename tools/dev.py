@@ -2,9 +2,9 @@
 """One command per task, on a machine with only Python 3.11 or newer:
 
     python3 tools/dev.py demo            the firmware on a simulated board, live in the terminal
-    python3 tools/dev.py test            ruff, pyright on changed files, and the tests: five minutes on two cores
+    python3 tools/dev.py test            ruff, pyright and the default tier of the tests: five minutes on two cores
     python3 tools/dev.py test --changed  only the tests that the changed files can reach by imports
-    python3 tools/dev.py test --all      also the long tier, and pyright on every file
+    python3 tools/dev.py test --all      also the long tier
 
 Further arguments of `test` go to pytest.
 
@@ -51,24 +51,19 @@ def main(arguments):
 def test(arguments):
     """Run ruff, pyright and the tests, and show the time. Returns 0 if all succeed, otherwise 1.
 
-    Without --all, the tests of the long tier are left out, and pyright reads only the files that git shows as changed.
-    --changed runs only the test files that the changed files can reach by imports.
+    Without --all, the tests of the long tier are left out. --changed runs only the test files that the changed files
+    can reach by imports.
     """
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # if set, each process that a test starts compiles its imports
     begin = time.time()
     complete = "--all" in arguments
-    files = changed_files()
     if "--changed" in arguments:
-        arguments = [a for a in arguments if a != "--changed"] + reached_tests(files)
+        arguments = [a for a in arguments if a != "--changed"] + reached_tests(changed_files())
     beside = [  # these run beside the tests, because each uses one processor for a part of the time
         start("ruff", "-m", "ruff", "check", "."),
         start("ruff format", "-m", "ruff", "format", "--check", "."),
+        start("pyright", "-m", "pyright"),
     ]
-    typed = [] if complete else [name for name in files if name.endswith(".py") and not name.startswith("firmware/")]
-    if complete or typed:
-        beside.append(start("pyright", "-m", "pyright", *typed))
-    else:
-        say("pyright: no Python file of tools or host_tests has changed (--all checks every file)")
     subprocess.call([PYTHON, "-c", COMPILE], cwd=ROOT)
     processes = (os.cpu_count() or 1) + complete  # the long tier has tests of pages, which often wait
     pytest = ("-m", "pytest", "-n", str(processes), "--dist", "loadfile", "--no-loadscope-reorder", "--durations", "10")

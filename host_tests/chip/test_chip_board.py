@@ -171,7 +171,7 @@ def test_esp32_has_safe_mode_and_refuses_pins_of_its_flash():
         assert device.resets == 0
         device.power_off()
         device.put_files(firmware("esp32"))
-        device.board.button.turn(True, device.clock.now_us)
+        device.board.button.turn(True, device.board.clock.now_us)
         device.run(0.1)
         device.power_on()
         device.run_until(lambda: b"safe mode" in device.said, 4.0)

@@ -9,7 +9,7 @@ import sys
 from .clock import to_us
 
 if sys.implementation.name == "micropython":
-    from micropython import heap_lock, heap_unlock
+    from micropython import heap_lock, heap_unlock  # type: ignore[import-not-found]
 else:  # CPython cannot lock its heap
     heap_lock = heap_unlock = int
 
