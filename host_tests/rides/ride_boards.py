@@ -34,17 +34,37 @@ class RideBoard(fake_board.FakeBoard):
         return sorted(path.relative_to(self.root / "rides").as_posix() for path in self.root.glob("rides/**/*"))
 
 
+class Clocks:
+    """The computer's clocks. Only waiting takes time. While the computer sleeps, its monotonic clock stops."""
+
+    now_s = asleep_s = 0.0
+
+    @classmethod
+    def monotonic(cls):
+        return cls.now_s
+
+    @classmethod
+    def time(cls):
+        return cls.now_s + cls.asleep_s
+
+    @classmethod
+    def sleep(cls, seconds):
+        cls.now_s += seconds
+
+
 class Stream(fake_board.Serial):
     """A serial port with the output of a board that streams a ride.
 
-    end: the event after this output: a signal, bytes, an exception, or the seconds for which the computer sleeps.
+    blocks: the blocks of the ride. first: the output before them.
+    end: the event after the blocks: "ctrl-c" or another signal, bytes, an exception, or the seconds for which the
+        computer sleeps.
     last: the board's output after Ctrl-C.
     """
 
-    def __init__(self, output, end=None, last=b""):
+    def __init__(self, blocks, end=None, last=b"", first=b""):
         super().__init__()
-        self.data, self.end, self.last = output, end, last
-        self.now_s = self.asleep_s = 0.0
+        self.data, self.last = first + b"".join(map(streamed, blocks)), last
+        self.end = signal.SIGINT if end == "ctrl-c" else end
 
     def inWaiting(self):
         if not self.data and self.end is not None:
@@ -54,7 +74,7 @@ class Stream(fake_board.Serial):
             elif isinstance(end, bytes):
                 self.data = end
             elif isinstance(end, float):
-                self.asleep_s = end
+                Clocks.asleep_s = end
             else:
                 raise end
         return len(self.data)
@@ -64,26 +84,22 @@ class Stream(fake_board.Serial):
         if data == b"\x03":
             self.data += self.last + b"\x04\x04>"
 
-    def sleep(self, seconds):
-        self.now_s += seconds
 
-
-class StreamingBoard(fake_board.FakeBoard):
-    """A board whose app runs until the stream ends. Only waiting takes time."""
-
-    def __init__(self, root, stream):
-        super().__init__(root)
-        self.serial = stream
+class Streaming(fake_board.FakeBoard):
+    """A board whose app runs until its stream ends. Set `serial` to a Stream."""
 
     def exec_raw_no_follow(self, command):
         self.resets += "machine.reset()" in command
 
-    def plug_in(self, monkeypatch):
-        stream = self.serial
-        monkeypatch.setattr(time, "monotonic", lambda: stream.now_s)
-        monkeypatch.setattr(time, "time", lambda: stream.now_s + stream.asleep_s)
-        monkeypatch.setattr(time, "sleep", stream.sleep)
-        return fake_board.plug_in(monkeypatch, self)
+
+def plug_in(monkeypatch, root, stream):
+    """Connect a board with this stream, and replace the computer's clocks. Returns the board."""
+    board = Streaming(root)
+    board.serial = stream
+    Clocks.now_s = Clocks.asleep_s = 0.0
+    for name in ("monotonic", "time", "sleep"):
+        monkeypatch.setattr(time, name, getattr(Clocks, name))
+    return fake_board.plug_in(monkeypatch, board)
 
 
 def streamed(block):

@@ -14,8 +14,9 @@ import time
 from pathlib import Path
 
 import pytest
+import ride_boards
 from kickstand_tools.logs.reader import read_log
-from ride_boards import RideBoard, Stream, StreamingBoard, half_seconds, streamed
+from ride_boards import RideBoard, Stream, half_seconds
 from support import command, fake_board
 from support.recordings import ride_writer
 
@@ -101,11 +102,10 @@ class Record(Scene):
         super().__init__(place)
         self.keep("out/old.csv", b"yesterday\n")
         self.arguments = ["record", "--out", self.out / "ride.csv.gz"]
-        stream = Stream(b"".join(map(streamed, half_seconds(12)[0])), signal.SIGINT)
-        self.board = StreamingBoard(place, stream)
+        self.place, self.stream = place, Stream(half_seconds(12)[0], "ctrl-c")
 
     def plug(self, patch):
-        self.board.plug_in(patch)
+        ride_boards.plug_in(patch, self.place, self.stream)
 
 
 class Flash(Scene):

@@ -8,7 +8,7 @@ import signal
 
 import pytest
 from kickstand_tools.logs.reader import read_log
-from ride_boards import Stream, StreamingBoard, half_seconds, streamed
+from ride_boards import Clocks, Stream, Streaming as Streaming, half_seconds, plug_in, streamed
 from support import command
 from support.recordings import ride_writer
 from support.watched_stderr import Watched, watched
@@ -22,8 +22,7 @@ def stream(tmp_path, monkeypatch):
     """Return stream(blocks, end, ...), which connects a board that streams these blocks, and `first` before them."""
 
     def connect(blocks, end=None, last=b"", first=b""):
-        output = first + b"".join(map(streamed, blocks))
-        return StreamingBoard(tmp_path, Stream(output, end, last)).plug_in(monkeypatch)
+        return plug_in(monkeypatch, tmp_path, Stream(blocks, end, last, first))
 
     return connect
 
@@ -132,12 +131,12 @@ def test_lean_or_force_is_shown_live(vehicle, aligned, turns, words, absent, str
 )
 def test_data_before_a_broken_stream_are_kept(end, words, stream, tmp_path):
     data, turns = half_seconds(3)
-    board = stream(data, end)
+    stream(data, end)
     result = command.works("record", "--out", tmp_path / "ride.csv.gz")
     assert result.err.startswith(f"warning: /dev/ttyACM0: {words}") and result.err.count("\n") == 1
     assert result.err.endswith(": the log up to there is kept\n")
     assert len(gzip.decompress((tmp_path / "ride.csv.gz").read_bytes()).splitlines()) == len(turns) + 1
-    assert (board.serial.now_s > 10) is (end is None)  # after a sleep, the end is noticed in 5 s
+    assert (Clocks.now_s > 10) is (end is None)  # after a sleep, the end is noticed in 5 s
 
 
 # Refusals
