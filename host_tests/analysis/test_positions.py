@@ -89,25 +89,6 @@ def vbo_rows(path):
     return dict(zip(names, table.T))
 
 
-def test_vbo_interpolates_positions_for_every_row(tmp_path):
-    rows = vbo_rows(exported("vbo", tmp_path))
-    clock, placed = rows["time"], rows["sats"] == 4
-    midnight = datetime.fromtimestamp(START_S, UTC).replace(hour=0, minute=0, second=0, microsecond=0).timestamp()
-    t_s = clock // 10000 * 3600 + clock // 100 % 100 * 60 + clock % 100 + midnight - START_S
-    assert set(rows["sats"]) == {0.0, 4.0} and t_s[0] == pytest.approx(0.0, abs=0.006)
-    times_s = log().t_s[np.isfinite(log().lat_deg)]
-    gap = np.flatnonzero(np.diff(times_s) > 5.0)[0]
-    first, second = (times_s[0], times_s[gap]), (times_s[gap + 1], times_s[-1])
-    assert np.array_equal(placed, np.any([(t_s > a - 0.005) & (t_s < b + 0.005) for a, b in (first, second)], axis=0))
-    # not 0, because a row's time is rounded to 0.01 s
-    assert np.max(away_m(rows["lat"] / 60, -rows["long"] / 60, t_s)[placed]) < 0.2 and np.all(rows["lat"][~placed] == 0)
-    ride = app_exports.riding()
-    east, north = np.gradient(ride.lon_deg) * np.cos(np.radians(52.5)), np.gradient(ride.lat_deg)
-    course = np.degrees(np.interp(t_s, ride.t_s, np.unwrap(np.arctan2(east, north))))
-    moving = placed & (np.interp(t_s, ride.t_s, ride.speed_mps) > 3.0)
-    assert np.max(np.abs((rows["heading"] - course + 180.0) % 360.0 - 180.0)[moving]) < 5.0
-
-
 @pytest.mark.parametrize("form", ["gpx", "racechrono", "vbo"])
 @pytest.mark.parametrize(("start_s", "from_s", "to_s"), [(1.2e9, None, None), (0.0, 12.5, 25.0)])
 def test_the_time_of_the_satellites_is_preferred(tmp_path, form, start_s, from_s, to_s):

@@ -3,10 +3,9 @@
 import socket
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-from kickstand_emulator import esp32_library, image
+from kickstand_emulator import esp32_library
 from support import command
 from support.emulated import need
 from support.terminal import Terminal
@@ -41,19 +40,6 @@ def test_without_its_library_an_esp32_is_refused(words, tmp_path, monkeypatch):
     monkeypatch.setenv(esp32_library.VARIABLE, str(tmp_path))
     refusal = command.refused(tmp_path, *words, words="no emulated ESP32: libqemu-xtensa.so is missing")
     assert str(tmp_path) in refusal
-
-
-@pytest.mark.parametrize("chip", ["rp2040", "esp32"])
-def test_emulate_reports_its_start_at_once(tmp_path, monkeypatch, chip):
-    """The program also reports a missing file at once. The message says where to get the file and where to put it."""
-    monkeypatch.setattr(Path, "home", lambda: tmp_path)
-    monkeypatch.setattr(image, "URL", "http://127.0.0.1:9/" + image.NAME)
-    monkeypatch.setenv(esp32_library.VARIABLE, str(tmp_path))
-    process = command.run("emulate", "--chip", chip)
-    assert process.status == 2
-    assert process.out.startswith("starting: ")
-    source = {"rp2040": f"http://127.0.0.1:9/{image.NAME}", "esp32": "micropython.org"}[chip]
-    assert source in process.err and str(tmp_path) in process.err
 
 
 def test_an_esp32_needs_no_emulator_of_the_pico():

@@ -2,7 +2,6 @@
 
 import os
 import re
-import signal
 import subprocess
 import sys
 import zipfile
@@ -136,17 +135,3 @@ def test_slow_commands_show_progress_on_a_terminal(tmp_path, monkeypatch):
     arguments = [*SIMULATE.split(), tmp_path / "ride"]
     assert command.works(*arguments).err == ""
     assert "simulating a ride" in watched(monkeypatch, Watched(), *arguments)
-
-
-@pytest.mark.long
-@pytest.mark.skipif(os.name == "nt", reason="signals are of Unix")
-def test_pages_are_served_until_ctrl_c(monkeypatch):
-    opened = []
-    monkeypatch.setattr("webbrowser.open", lambda url: opened.append(url) or signal.raise_signal(signal.SIGINT))
-    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        result = command.run("web")
-    finally:
-        signal.signal(signal.SIGINT, handler)
-    assert opened and opened[0].startswith("http://127.0.0.1:") and result.status in (0, 130)
-    assert result.out == f"Kickstand in the browser: {opened[0]} (press Ctrl-C to stop)\n"

@@ -116,20 +116,6 @@ def test_failed_installation_gives_the_reason_and_the_log(project):
 
 
 @pytest.mark.parametrize(
-    ("fault", "steps"),
-    [
-        ('[ "$2" != uv ] || exit 1', [UV, "pip install .[test]", "pip install .[test]"]),
-        ('[ "$6" != --only-binary ] || exit 1', [UV, "pip install .[test]"]),
-        ("""[ "$3" != config ] || echo "global.index-url='x'\"""", ["pip install .[test]"]),
-    ],
-)
-def test_uv_installs_or_else_pip(project, fault, steps):
-    project.steps("")
-    project.python(fault)
-    assert project.steps("test") == steps
-
-
-@pytest.mark.parametrize(
     ("arguments", "words"),
     [(["fly"], "dev.py: no task is named"), ([], "dev.py: no task is named")],
 )

@@ -73,16 +73,3 @@ def test_mutated_answer_gives_one_line(folder, monkeypatch, arguments):
     good = b"('/rides', 'motorcycle')\n(1, 0, 700, '/rides/000/01/00000.rid')\n('micropython', '1.26.1', 'Pico')\n"
     for number in range(30):
         refused_in_one_line(monkeypatch, folder, arguments, broken_logs.broken([good], number)[1], number % 3)
-
-
-def test_ride_longer_than_announced_is_abandoned(folder, monkeypatch):
-    class Long(fake_board.FakeBoard):
-        def exec_raw(self, command, timeout=10):
-            return b"('/rides', 'car')\n(1, 0, 100, '/rides/000/01/00000.rid')\n", b""
-
-        def exec_raw_no_follow(self, command):
-            self.serial.data += b"AAAA\n" * 100_000
-
-    fake_board.plug_in(monkeypatch, Long(folder / "flash"))
-    line = command.refused(folder / "out", "pull", "--out", "out", words="did not arrive completely")
-    assert "the program on the board does not end" in line

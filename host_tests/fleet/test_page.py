@@ -2,7 +2,6 @@
 
 import re
 
-import numpy as np
 import pytest
 from kickstand_fleet.manifest import Period
 from kickstand_fleet.period import failed
@@ -38,26 +37,6 @@ def summary_of(*results):
 
 def words_of(html):
     return re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", html))
-
-
-def test_a_summary_counts_results_and_names_the_worst():
-    summary = summary_of(
-        result("/a/b/1", 0.4, moved=[move(4.0), move(9.0)]),
-        result("/a/bc/2", 1.2, tests=[(None, 5.0)]),
-        result("/a/b/3", status="refused", reason="mount-moved"),
-        result(
-            "/a/b/4", status="error", reason="unreadable", errors=[{"vehicle": "4", "log": "", "message": "gone"}] * 4
-        ),
-    )
-    assert (summary.count, summary.driven_s, summary.below) == (4, 7200.0, "/a/")
-    assert summary.statuses == {"aligned": 2, "refused": 1, "error": 1}
-    assert summary.reasons == {("refused", "mount-moved"): 1, ("error", "unreadable"): 1}
-    assert (summary.moved_count, summary.moved_vehicles, summary.errors) == (2, 2, 4)
-    assert summary.first_errors == [("4", "gone")] * 3
-    assert [row["quality_deg"] for row in summary.worst] == [1.2, 0.4]
-    assert [row["turned_deg"] for row, _ in summary.moved] == [9.0, 4.0]
-    assert np.isnan(summary.decelerations[0][0]) and list(summary.decelerations[1]) == [5.0]
-    assert summary_of(result("x"), result("y")).below == "" and FleetSummary().below is None
 
 
 def test_the_page_has_the_numbers_of_the_fleet():

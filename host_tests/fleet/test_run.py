@@ -2,11 +2,10 @@
 
 import errno
 import os
-import sys
 from pathlib import Path
 
 import pytest
-from kickstand_fleet.manifest import Period, by_pattern
+from kickstand_fleet.manifest import Period
 from kickstand_fleet.run import run_fleet
 from kickstand_fleet.tables import TABLES, schema
 from kickstand_tools.common.errors import InputError
@@ -122,15 +121,6 @@ def test_a_full_store_keeps_the_row_and_ends_the_run(periods, workers, results, 
     second = run_fleet(periods[:1], OUT, with_signals=signals)
     assert (second.new, second.seen.errors, second.seen.statuses["aligned"]) == (1, 0, 1)
     assert run_fleet(periods[:1], OUT, with_signals=signals).new == 0
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="only Linux has names that are no UTF-8")
-def test_file_name_that_is_not_utf8_is_processed(workers, tmp_path):
-    for name in (b"/a.csv", b"/b\xff.csv"):
-        Path(os.fsdecode(os.fsencode(tmp_path) + name)).write_bytes(b"no log")
-    assert run_fleet(by_pattern(f"{tmp_path}/*.csv"), tmp_path / "out").seen.statuses == {"error": 2}
-    assert table(tmp_path / "out", "errors")[1]["log"].endswith("b\\udcff.csv")
-    assert "b\\udcff" in (tmp_path / "out" / "index.html").read_text()
 
 
 def test_the_command_says_what_it_found(periods, results, workers, fleet, tmp_path):

@@ -57,15 +57,3 @@ class Wires:
 )
 def test_a_device_is_named_by_its_registers(chips, address, registers, named):
     assert chips.name_of(Wires(address, registers), address) == named
-
-
-@pytest.mark.parametrize(
-    ("place", "value"),
-    [(0, 0x60), (0, 0x3A), (1, 0x60), (2, 0x33), (3, 0x08), (4, 0x00), (4, 0x32), (5, 0x13), (5, 0x00), (6, 0x9A)],
-)
-def test_no_clock_shows_such_a_time(chips, place, value):
-    time = list(DS3231)
-    time[place] = value
-    assert chips.is_clock(Wires(0x68, dict(enumerate(DS3231))), 0x68)
-    assert not chips.is_clock(Wires(0x68, dict(enumerate(time))), 0x68)
-    assert not chips.is_clock(Wires(0x69, dict(enumerate(DS3231))), 0x68)

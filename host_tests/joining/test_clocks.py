@@ -49,22 +49,3 @@ def test_two_devices_on_one_bike_have_one_clock(seconds, device, apart_deg, word
     assert relation.correlation > 0.99
     assert relation.apart_deg == pytest.approx(apart_deg, abs=2.0 if device else 0.3)
     assert relation.common_s == pytest.approx(min(device.get("to_s", seconds), seconds) - from_s, abs=0.3)
-
-
-def test_motion_subtracts_the_bias_and_marks_gaps():
-    """The rate is 5 deg/s for 2 s, then 25 deg/s for 0.5 s. Samples are missing from 1.0 to 1.5 s. Cells have 50 ms."""
-    t_s = np.arange(500) / 200.0
-    t_s = t_s[(t_s < 1.0) | (t_s >= 1.5)]
-    noise = np.random.default_rng(1).normal(0.0, 1.0, (2, len(t_s), 3))
-    gyro = np.outer(np.where(t_s < 2.0, 5.0, 25.0), [0.0, 1.0, 0.0]) + 0.01 * noise[0]
-    log = api.Log(t_s, np.tile([0.0, 0.6, 0.8], (len(t_s), 1)) + 1e-3 * noise[1], gyro)
-    cells = motion(log)
-    assert (len(cells.there), cells.seconds, cells.t_s[0]) == (50, pytest.approx(2.5), pytest.approx(0.025))
-    assert not cells.there[21:29].any() and cells.there[:20].all() and cells.there[31:].all()
-    assert np.all(cells.rate_dps[21:29] == 0.0) and np.all(cells.force_g[21:29] == 0.0)
-    assert cells.rate_dps[[5, 45]] == pytest.approx(np.array([[0.0, 0.0, 0.0], [0.0, 20.0, 0.0]]), abs=0.05)
-    assert cells.force_g[5] == pytest.approx([0.0, 0.6, 0.8], abs=0.005)
-    assert cells.up == pytest.approx([0.0, 0.6, 0.8], abs=0.005)
-    assert (cells.speed, cells.positions) == (False, False)
-    log.speed_mps[7], log.lat_deg[8] = 3.0, 48.0
-    assert (motion(log).speed, motion(log).positions) == (True, True)

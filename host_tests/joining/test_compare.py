@@ -86,18 +86,3 @@ def test_another_ride_or_a_missing_calibration_is_refused(tmp_path, pair):
     command.refused(tmp_path, "compare", *files, words="no calibration")
     calibration_b = "--calibration-b", tmp_path / "A.cal.json"
     command.refused(tmp_path, "compare", *files, *calibration_b, words="at no time do they turn alike")
-
-
-@pytest.mark.long
-def test_the_difference_is_that_of_both_errors():
-    """The difference of two leans is at most the sum of their errors."""
-    ride = drawn_ride(1, 130.0, ["firm", "firm"], "street")
-    comparison = api.compare_rides(*ride.logs, *ride.calibrations)
-    for kind, difference in (("live", comparison.live), ("smoothed", comparison.smoothed)):
-        leans = [comparison.leans[f"{kind} {name}"] for name in "AB"]
-        riding = ~np.isnan(leans[0] + leans[1])
-        true = np.interp(comparison.t_s[riding] + ride.logs[0].t_s[0], ride.time_s, ride.lean_deg)
-        errors = [np.sqrt(np.mean((lean[riding] - true) ** 2)) for lean in leans]
-        assert difference is not None and difference.rms_deg <= sum(errors) + 0.01
-        assert difference.slope == pytest.approx(1.0, abs=0.05)
-        assert difference.delay_s == pytest.approx(0.0, abs=0.02)

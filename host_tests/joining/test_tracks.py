@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from joining.known_roads import points
 from kickstand_tools import api
-from kickstand_tools.joining.track import Course, course, segments, without_trend
+from kickstand_tools.joining.track import course
 from support.recordings import broken_logs, phone_tracks
 
 METRE = 1.0 / 111_194.9  # in degrees of latitude, at the equator also of longitude
@@ -36,20 +36,6 @@ def test_a_course_turns_to_the_left():
 )  # fmt: skip
 def test_a_step_is_good_between_a_walk_and_a_jump(step_s, step_m, good):
     assert course(track_of([0.0, step_s], [0.0, step_m])).good.tolist() == [good]
-
-
-def test_segments_have_8_to_30_steps_without_a_trend():
-    """The 47 good steps before a bad step give segments of 30 and 17. The 7 good steps after it are too few."""
-    number = np.arange(55.0)
-    parts = segments(Course(number, number + 1.0, np.full(55, 2.0), 9.0 + number, number != 47, np.full(55, 3.0)))
-    assert parts.begin_s.shape == (2, 30) and parts.begin_s[1, :17].tolist() == list(range(30, 47))
-    assert parts.middle_s[0, :2].tolist() == [0.5, 1.5]
-    assert parts.course_weight[1].tolist() == [0.25] * 17 + [0.0] * 13
-    assert parts.turned_deg == pytest.approx(np.zeros((2, 30)), abs=1e-6)  # a constant bend
-    assert parts.speed_mps[0] == pytest.approx(np.zeros(30), abs=1e-6)
-    values, at_s = np.array([[0.0, 0.0, 3.0]]), np.array([[0.0, 1.0, 2.0]])
-    assert without_trend(values, np.ones((1, 3)), at_s) == pytest.approx(np.array([[0.5, -1.0, 0.5]]))
-    assert without_trend(values, np.array([[1.0, 1.0, 0.0]]), at_s) == pytest.approx(values)
 
 
 def test_speeds_without_their_own_are_means_over_four_steps():

@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, strategies as st
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs.even_times import even_times
-from kickstand_tools.logs.reader import read_blocks
 
 ROUND = {"down": lambda x: np.floor(x + 1e-9), "to nearest": np.rint}
 
@@ -59,32 +58,3 @@ def test_times_increase_and_stay_near(steps, tick_s):
 def test_an_invalid_time_is_refused(times, words):
     with pytest.raises(InputError, match=words):
         even_times(times, "log")
-
-
-def rows_at(times):
-    return [f"{time:.6f},0.{k % 9}1,-0.02,1.01,0.5,-0.5,0.1{k % 7}" for k, time in enumerate(times)]
-
-
-LOGS = {  # recorded times, true times, the largest error
-    "104 per s, rounded to hundredths": (np.round(np.arange(12_000) / 104, 2), np.arange(12_000) / 104, 0.004),
-    "two samples per time": (np.repeat(np.arange(4500) / 100.0, 2), np.arange(9000) / 200.0, 0.006),
-}
-
-
-@pytest.mark.parametrize("name", LOGS)
-@pytest.mark.parametrize("size", [300, 50_000, 1 << 22])
-def test_times_are_spread_equally_for_any_block_size(text_log, small_blocks, name, size):
-    """Rows that wait for the next block are neither lost nor doubled."""
-    recorded, true, error = LOGS[name]
-    small_blocks(size)
-    notices = []
-    blocks = list(read_blocks(text_log(*rows_at(recorded)), notices=notices))
-    times = np.concatenate([block.start_s + block.t_s for block in blocks])
-    assert [line for block in blocks for line in block.lines] == rows_at(recorded)
-    assert np.diff(times)[100:-100] / np.diff(true)[0] == pytest.approx(1.0, abs=0.02)
-    assert np.abs(times - true).max() < error and blocks[0].time_us[0] == 0
-    assert not blocks[-1].own_times
-    assert len(blocks) > 2 or size == 1 << 22
-    (notice,) = (notice for notice in notices if notice.code == "times-spread")
-    repeated = np.count_nonzero(np.diff(recorded) == 0.0)
-    assert f"({repeated} of {len(true)} repeat the previous one): they are spread evenly" in notice.line()

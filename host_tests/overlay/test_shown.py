@@ -1,28 +1,13 @@
 """The values of a ride that the gauge shows at each moment: interpolation, gaps, maxima, trust."""
 
 import math
-from dataclasses import fields
 
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.analysis.channels import Channels
-from kickstand_tools.analysis.ride import Ride
 from kickstand_tools.overlay.shown import Shown, shown
 
 NAN = math.nan
-
-
-class KnownRide(Ride):
-    """A ride whose channels are known: 100 samples per second. Other channels are 0."""
-
-    def __init__(self, **columns):
-        count = len(next(iter(columns.values())))
-        named = {field.name: columns.get(field.name, np.zeros(count)) for field in fields(Channels)}
-        self.known = Channels(**(named | {"t_s": np.arange(count) / 100.0}))
-
-    def blocks(self, progress=None, notices=None):
-        yield self.known
 
 
 def values_at(times_s, at_s, **columns) -> Shown:
@@ -57,18 +42,6 @@ def test_a_speed_is_shown_between_speeds_up_to_3_s_apart():
     )
     speed[3:] = NAN
     assert np.isnan(values_at(times_s, times_s, speed_mps=speed).speed_mps).all()  # one speed has no neighbour
-
-
-def test_a_maximum_must_last_and_be_trusted():
-    """At 100 samples per second a maximum needs sixteen samples in a row, which last 0.15 s."""
-    lean = np.full(200, 5.0)
-    lean[20:35], lean[50:66], lean[80:120], lean[150:166] = 40.0, 30.0, 60.0, -20.0
-    sure = np.ones(200)
-    sure[80:120] = 0.0
-    values = shown(KnownRide(lean_deg=lean, sure=sure))
-    assert values.right_deg[[14, 15, 34, 64, 65, 199]].tolist() == [0.0, 5.0, 5.0, 5.0, 30.0, 30.0]
-    assert values.left_deg[[164, 165]].tolist() == [0.0, 20.0]
-    assert np.isnan(values.lean_deg[80:120]).all() and values.lean_deg[120] == 5.0
 
 
 def test_shown_values_are_those_of_the_display(ride):

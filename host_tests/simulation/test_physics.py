@@ -106,20 +106,6 @@ def test_a_steady_turn_balances_gravity_and_centripetal_force(lean_deg):
     assert np.sign(rolled.yaw_rate[3000:3500][np.argmax(np.abs(rolled.yaw_rate[3000:3300]))]) == np.sign(lean_deg)
 
 
-def test_the_moments_about_the_contact_point_balance():
-    """The road is banked, the rider hangs off and the tyres are wide. The line from the contact point to the centre of
-    mass must have the lean of balance."""
-    bike, bank, hang, b = Bike(), np.radians(7.0), 0.03, np.radians(31.0)
-    lean, arm = physics.chassis_lean(b, bike, bank, hang), bike.mass_height - bike.tyre_radius
-    right = bike.tyre_radius * np.sin(bank) + arm * np.sin(lean) + hang * np.cos(lean)
-    up = bike.tyre_radius * np.cos(bank) + arm * np.cos(lean) - hang * np.sin(lean)
-    assert np.arctan2(right, up) == pytest.approx(b)
-    hung, k = held_turn(30.0, bike, hang_m=0.04)
-    plain, _ = held_turn(30.0, bike)
-    assert 3.0 < np.degrees(plain.lean[k] - hung.lean[k]) < 5.0
-    assert hung.yaw_rate[k] == pytest.approx(plain.yaw_rate[k], rel=1e-6)
-
-
 def test_wind_from_the_left_leans_a_straight_ride_to_the_left():
     command = commands([Leg("straight", 6.0, 20.0, 0.0, crosswind_mps2=0.5)], RATE)
     rolled = physics.roll(command, Bike(), np.zeros_like(command.time))
@@ -132,20 +118,6 @@ def test_braking_lowers_the_nose_and_acceleration_raises_it(dive, g, nose_deg):
     bike = Bike(dive_deg_per_g=dive, squat_deg_per_g=1.5)
     push = np.where(np.arange(8000) > 1000, g * G, 0.0)
     assert np.degrees(bike.dive(push, RATE)[4000]) == pytest.approx(nose_deg, abs=0.01)
-
-
-def test_the_road_has_the_standards_density():
-    """In ISO 8608, the power density of the height of a class B road is 64e-6 m^3 at 0.1 cycles/m. The power density
-    falls with the square of the spatial frequency."""
-    slope = road.profile_slope(np.random.default_rng(1), 40000.0, road.CLASS_B)
-    n = 2**14
-    rows = slope[: len(slope) // n * n].reshape(-1, n) * np.hanning(n)
-    density = 2.0 * 0.02 * np.mean(np.abs(np.fft.rfft(rows)) ** 2, axis=0) / np.sum(np.hanning(n) ** 2)
-    waves = np.fft.rfftfreq(n, 0.02)
-    for wave in (0.1, 0.5, 1.0):
-        near = np.abs(waves - wave) < 0.05
-        displacement = density[near] / (2.0 * np.pi * waves[near]) ** 2
-        assert np.mean(displacement * (waves[near] / 0.1) ** 2) == pytest.approx(64e-6, rel=0.25)
 
 
 def heave_g(speed: float, roughness: float, seconds: float = 40.0):

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from support.mpy import run_mpy
 from support.web import page_repeated
-from support.web.rider import LAPTOP, PHONE, Rider
+from support.web.rider import LAPTOP, Rider
 
 WINDOW = {"width": 1000, "height": 700}
 LEAN_DEG = 30
@@ -152,29 +152,6 @@ def test_by_the_keyboard_alone(visit):
     rider.guide_says("Press the button.")
     rider.keys("Space", 1)
     rider.reads("Stand: hold")
-    assert rider.moved() == []
-
-
-@pytest.mark.long
-def test_a_phones_first_screen_has_all_for_the_first_minute(visit):
-    rider = visit(**PHONE)
-    page = rider.page
-    tops = page.eval_on_selector_all("main > section", "all => all.map((one) => one.getBoundingClientRect().top)")
-    assert tops == sorted(tops), "what arrives first is seen first, or the page moves while it loads"
-    rider.reads("Raw")
-    assert rider.text("nav [aria-current]") == "Try" and rider.fits() and rider.axe() == []
-    for selector in ("#display", "#press", "#todo", "#scene", "#shown-lean", "#pose"):
-        box = page.locator(selector).bounding_box()
-        assert box["y"] + box["height"] <= PHONE["viewport"]["height"], selector
-    page.tap("#press")
-    rider.reads("Stand: hold")
-    page.tap("#wire")
-    rider.guide_says("wire is out")
-    rider.reads("No sensor")
-    device, guide = (page.locator(one).bounding_box() for one in (".device", ".guide"))
-    assert device["y"] >= 0 and guide["y"] >= device["y"] + device["height"]
-    page.tap("#power")
-    rider.guide_says("display is dark")
     assert rider.moved() == []
 
 

@@ -6,7 +6,9 @@ import re
 from pathlib import Path
 
 import pytest
-from kickstand_tools.web.device import STATE, PageDevice
+from kickstand_tools.simulated_board.clock import Clock
+from kickstand_tools.simulated_board.lcd import Lcd
+from kickstand_tools.web.device import STATE, PageDevice, display
 from page_drive import ALIGN, RIDE, SHORT, Drive
 from support.mpy import run_mpy
 from support.web import page_repeated
@@ -189,3 +191,15 @@ def test_no_display_is_shown_half_written(tmp_path, monkeypatch):
     pages = [(t_s, re.sub(r"[-+\d.°]+|left|right|Brake|Accel", "", line).strip()) for t_s, line in shown if t_s > 1.0]
     changes = [pages[0], *(other for one, other in itertools.pairwise(pages) if one[1] != other[1])]
     assert all(other[0] - one[0] > LASTING_S for one, other in itertools.pairwise(changes))
+
+
+@pytest.mark.parametrize(("on", "two_lines", "letter"), [(True, True, 0x41), (False, True, 0x20), (True, False, 0x20)])
+def test_characters_are_sent_only_of_a_display_that_is_on(on, two_lines, letter):
+    lcd = Lcd(Clock())
+    lcd.ddram[0] = ord("A")
+    lcd.on, lcd.two_lines = on, two_lines
+    assert display(lcd)["codes"] == [[letter] + [0x20] * 15, [0x20] * 16]
+    lcd.ddram[:16] = b"Lean 12\xdf left   "
+    assert display(lcd)["cgram"] == [0] * 64
+    if two_lines:
+        assert display(lcd)["shown_deg"] == -12.0

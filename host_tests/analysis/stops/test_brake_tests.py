@@ -12,7 +12,7 @@ from kickstand_tools.analysis.stops.brake_test import (
     find_stops,
     mfdd_mps2,
 )
-from roads import RATE_HZ, REST_S, Road, braking
+from roads import REST_S, Road, braking
 
 REST = (REST_S, 0.0)
 USUAL = braking(20.0, 5.0)  # brakes from 14 to 18 s
@@ -119,19 +119,6 @@ def test_the_start_of_braking_is_found(engine_mps2, hard, earlier_s):
     """The engine alone slows the bike for 4 s before the rider brakes."""
     stop = one_stop(Road(REST, (6.0, 3.0), (3.0, 0.0), (4.0, -engine_mps2), *hard, REST).channels())
     assert REST_S + 6.0 + 3.0 + 4.0 - stop.start_s == pytest.approx(earlier_s, abs=0.025)
-
-
-def test_jerk_is_the_steepest_change_of_the_force():
-    """The deceleration rises to 6 m/s2 at 10 m/s3, stays constant, and falls at 20 m/s3, which is the larger jerk."""
-    t = np.arange(0.0, 30.0, 1.0 / RATE_HZ)
-    braked = np.interp(t, [15.0, 15.6, 17.6, 17.9, 19.0], [0.0, 6.0, 6.0, 0.0, 0.0])
-    lost = float(np.sum(braked[1:] + braked[:-1]) / 2.0 / RATE_HZ)
-    road = Road(REST, (lost / 2.0, 2.0), (30.0 - REST_S - lost / 2.0, 0.0))
-    road.mps2 = road.mps2 - braked[: len(road.t_s)]
-    road.rests = (road.t_s < REST_S) | (road.t_s > 17.9)
-    stop = one_stop(road.channels())
-    assert stop.jerk_mps3 == pytest.approx(20.0, rel=0.15)  # the force is smoothed twice over 0.2 s
-    assert (stop.peak_mps2, stop.initial_speed_mps) == pytest.approx((6.0, lost), rel=0.01)
 
 
 def pitched(pitch_deg):
