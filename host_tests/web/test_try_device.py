@@ -201,5 +201,5 @@ def test_characters_are_sent_only_of_a_display_that_is_on(on, two_lines, letter)
     assert display(lcd)["codes"] == [[letter] + [0x20] * 15, [0x20] * 16]
     lcd.ddram[:16] = b"Lean 12\xdf left   "
     assert display(lcd)["cgram"] == [0] * 64
-    if two_lines:
+    if on and two_lines:
         assert display(lcd)["shown_deg"] == -12.0
