@@ -6,10 +6,12 @@ nanoseconds, and the flash takes no time. The times of a real ESP32 also depend 
 """
 
 import contextlib
+import shutil
 import socket
 import subprocess
 import sys
 import tempfile
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -74,8 +76,9 @@ class Sink:
         self._folder = esp32_library.find()
         self.clock = Clock()
         super().__init__(Board(world or (lambda t_s: LEVEL), port="esp32", clock=self.clock, **fitted))
-        self._directory = tempfile.TemporaryDirectory(dir=_MEMORY if _MEMORY.is_dir() else None)
-        self._flash = Path(self._directory.name, "flash")
+        directory = tempfile.mkdtemp(dir=_MEMORY if _MEMORY.is_dir() else None)
+        weakref.finalize(self, shutil.rmtree, directory, ignore_errors=True)
+        self._flash = Path(directory, "flash")
         self._process: subprocess.Popen | None = None
         self._link = socket.socket()
         self._begun_us = 0  # time of power-on
@@ -127,6 +130,7 @@ class Sink:
         self._begun_us, self.powered = self.clock.now_us, True
         self._raw = self._booted = self._reads = False
         self._waiting.clear()
+        self._link.close()
         self._link, its = socket.socketpair()
         wires = [f"{bus.sda},{bus.scl}" for bus in self.board.buses]
         arguments = [str(its.fileno()), str(self._folder), str(self._flash), *wires]

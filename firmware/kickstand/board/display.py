@@ -188,7 +188,7 @@ class Display:
                 Driver = other_lcds.OwnI2c if address == _OWN_I2C else other_lcds.Mcp23008
         if type(self._driver) is not Driver:
             self._driver = None  # frees its memory
-            self._driver = Driver(*arguments)
+            self._driver = Driver(*arguments)  # type: ignore[arg-type]
             self._driver.show(*self._wanted)
             self.draws = self._driver.draws
         hz = self._bus_hz or (OLED_HZ if oled else LCD_HZ)
