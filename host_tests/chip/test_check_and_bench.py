@@ -10,7 +10,6 @@ from support.emulated import CHIPS, modules, pico
 
 pytestmark = [pytest.mark.chip, pytest.mark.long]
 REST = part(4, share=0.3)
-ESP32 = pytest.param("esp32", marks=pytest.mark.esp32)
 
 
 def checked(chip, world=REST, plant=None, press=True, files=None, **fitted):
@@ -33,7 +32,7 @@ def checked(chip, world=REST, plant=None, press=True, files=None, **fitted):
     return {finding.what: check.line(finding) for finding in findings if finding.verdict != check.GOOD}
 
 
-@pytest.mark.parametrize("chip", ["pico", ESP32])
+@pytest.mark.parametrize("chip", ["pico"])
 def test_a_good_board_is_good(chip):
     assert checked(chip) == {}
 
@@ -54,7 +53,7 @@ def many(board):
     board.remove_lcd()
 
 
-@pytest.mark.parametrize("chip", ["pico", ESP32])
+@pytest.mark.parametrize("chip", ["pico"])
 def test_defects_of_many_parts_are_found_at_once(chip):
     bad = checked(chip, spoilt, many, press=False)
     wanted = {"noise, accelerometer x", "noise, accelerometer y", "noise, gyro y", "noise, gyro z", "bias, gyro x"}
