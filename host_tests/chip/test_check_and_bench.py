@@ -3,8 +3,6 @@ and the heap stay within their limits."""
 
 import pytest
 from kickstand_tools.deploy import check
-from kickstand_tools.simulated_board.mpu6050 import Fifo
-from kickstand_tools.simulated_board.other_devices import Ds3231
 from support.checked_board import part
 from support.emulated import CHIPS, modules, pico
 
@@ -61,67 +59,6 @@ def test_defects_of_many_parts_are_found_at_once(chip):
     assert wanted <= set(bad), bad
     beside = {"self-test, accelerometer x", "self-test, gyro z", "sensor while running", "bias, accelerometer"}
     assert set(bad) - wanted <= beside | {"noise, gyro x"}, bad
-
-
-def always_full(board):
-    sensor, read = board.sensor, board.sensor.read_byte
-
-    def read_byte():
-        register, value = sensor._pointer, read()
-        return {0x72: 4, 0x73: 0}.get(register, value)
-
-    sensor.read_byte = read_byte
-    sensor.read_into = lambda buf: [buf.__setitem__(i, read_byte()) for i in range(len(buf))]
-
-
-def some_nacks(board):
-    count, start = [0], board.sensor.start
-
-    def started(address, read):
-        count[0] += 1
-        return count[0] % 150 != 0 and start(address, read)
-
-    board.sensor.start = started
-
-
-def a_clock(board):
-    board.remove_sensor()
-    board.sensor_bus.attach(Ds3231(board.clock))
-
-
-def wrong_answers(board):
-    sensor, read, count = board.sensor, board.sensor.read_byte, [0]
-
-    def read_byte():
-        register, value = sensor._pointer, read()
-        count[0] += register == 0x75
-        return value ^ 0x10 if register == 0x75 and count[0] % 300 == 299 else value
-
-    sensor.read_byte = read_byte
-    sensor.read_into = lambda buf: [buf.__setitem__(i, read_byte()) for i in range(len(buf))]
-
-
-SLOW_USER = b"from time import sleep_ms\ndef on_lean(lean_deg, trusted, meter):\n    sleep_ms(190)\n"
-PLANTED = {
-    "FIFO stays empty": ("FIFO", {"plant": lambda board: setattr(board.sensor, "_queue", lambda: None)}),
-    "FIFO stays full": ("FIFO", {"plant": always_full}),
-    "FIFO of half the size": ("FIFO under load", {"plant": lambda board: setattr(board.sensor, "fifo", Fifo(512))}),
-    "transfers fail": ("I2C errors", {"plant": some_nacks}),
-    "wrong answers": ("I2C errors", {"plant": wrong_answers}),
-    "no sensor": ("sensor", {"plant": lambda board: board.remove_sensor()}),
-    "a clock instead": ("sensor", {"plant": a_clock}),
-    "button stuck": ("button", {"plant": lambda board: setattr(board.button, "closed", True), "press": False}),
-    "slow user.py": ("longest turn", {"files": {"/user.py": SLOW_USER}}),
-}
-
-
-@pytest.mark.parametrize("name", PLANTED)
-def test_a_defect_that_hides_others_is_found_by_its_name(name):
-    """Each board has one defect. The line of the defect comes first, before the lines of its consequences. Together
-    with the eleven defects above, the tests plant twenty defects."""
-    what, planted = PLANTED[name]
-    bad = checked("pico", **planted)
-    assert next(iter(bad), None) == what, bad
 
 
 def test_the_loop_and_the_start_stay_within_their_limits():

@@ -42,6 +42,8 @@ def test_one_client_at_a_time_talks_to_the_console():
     server.say(b"to nobody")
     for word in (b"first", b"second"):
         with socket.create_connection(("127.0.0.1", server.port)) as client:
+            server.poll()
+            server.poll()  # the client stays, because nothing was sent yet
             client.sendall(word)
             while word not in received:
                 server.poll()

@@ -192,3 +192,15 @@ def test_the_quality_of_a_drive_by_numpy():
     assert quality.halves_deg == pytest.approx(abs(np.mean(angles[3:]) - np.mean(angles[:3])), rel=1e-3)
     assert quality.good and quality.agree and quality.parts.count == 6
     assert quality.mount_problem is None and quality.speed_problem is None
+
+
+@pytest.mark.parametrize(
+    ("first", "angles", "good"),
+    [
+        ([0.0] * 3, [3.9] * 3, True),  # the halves differ by up to 4 degrees
+        ([0.0] * 3, [4.1] * 3, False),
+        ([5.0, -5.0] * 2, [5.0, -5.0], False),  # a standard error of 2 degrees is too large
+    ],
+)
+def test_a_drive_becomes_ready_within_its_limits(first, angles, good):
+    assert Drive().judge([*first, *angles]).good is good

@@ -4,6 +4,7 @@ import errno
 import sys
 import types
 
+import framebuf  # pyright: ignore[reportMissingImports] the simulated board has it
 import pytest
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.contacts import Button as Contact
@@ -137,3 +138,35 @@ def test_any_fault_of_the_cards_driver_is_a_card_error(kind, pins, reason):
         assert raised.value.args[: len(reason)] == reason
 
     on_card(program, **kind)
+
+
+def on_canvas(draw):
+    """Call draw(oled, canvas), where oled is the driver's module. Return the canvas and its pixels."""
+    pixels, result = bytearray(1024), []
+
+    def program(board):
+        from kickstand.board import oled
+
+        result.append(oled.Canvas(pixels))
+        draw(oled, result[0])
+
+    assert on_board(program)[0] == "returned"
+    return result[0], pixels
+
+
+def test_letters_of_an_oled():
+    """The bars' patterns fill a letter from either side. Letters of double height have each row twice."""
+    for code, columns in enumerate(
+        ("##......", "####....", "######..", "########", "......##", "....####", "..######")
+    ):
+        _, pixels = on_canvas(lambda oled, canvas, code=code: oled.character(canvas, code, 0, 0))
+        assert pixels == bytes([0xFF if column == "#" else 0 for column in columns]) + bytes(1016)
+    canvas, pixels = on_canvas(lambda oled, canvas: canvas.tall("L\xffe", 2))
+    plain = framebuf.FrameBuffer(bytearray(1024), 128, 64, framebuf.MONO_VLSB)
+    plain.text("L", 0, 0, 1)
+    for x in range(8):
+        assert [canvas.pixel(x, 16 + y) for y in range(16)] == [plain.pixel(x, y // 2) for y in range(16)]
+    assert all(canvas.pixel(x, y) for x in range(8, 16) for y in range(16, 32))
+    assert not any(pixels[:256]) and not any(pixels[512:])
+    canvas, _ = on_canvas(lambda oled, canvas: canvas.tall("\xff", 2, True))
+    assert [canvas.pixel(x, 31) for x in (7, 8, 127)] == [0, 1, 1]
