@@ -168,8 +168,10 @@ class App:
         if wait_us < self._least_wait_us:
             self._least_wait_us = wait_us
         if wait_us > 0:
-            sleep_ms(wait_us // 1000)  # on an ESP32 only sleep_ms() gives time to the radio and the idle task
-            sleep_us(max(0, ticks_diff(self._due_us, ticks_us())))
+            if port.IS_ESP32:  # there only sleep_ms() gives time to the radio and the idle task
+                sleep_ms(wait_us // 1000)
+                wait_us = max(0, ticks_diff(self._due_us, ticks_us()))
+            sleep_us(wait_us)
         else:  # the pass took too long, for example because of a write to flash: do not try to catch up
             self._due_us = ticks_us()
 

@@ -62,7 +62,7 @@ def test_defects_of_many_parts_are_found_at_once(chip):
 
 
 def test_the_loop_and_the_start_stay_within_their_limits():
-    """No sample is lost, the heap does not shrink, and the first lean appears within 1.12 s."""
+    """No sample is lost, the heap does not shrink, and the first lean appears within 1.2 s."""
     pico()  # skips the test without the emulator
     from kickstand_workshop.bench import bench
 
@@ -76,6 +76,6 @@ def test_the_loop_and_the_start_stay_within_their_limits():
     assert result["free_heap_at_end_bytes"] > result["free_heap_bytes"] - 4000
     start = bench.start("rp2040")
     assert 0 < start.micropython_s < 0.1
-    assert 0.2 < start.starting_s < start.sampling_s < start.lean_s < 1.12
+    assert 0.2 < start.starting_s < start.sampling_s < start.lean_s < 1.2
     assert 0.4 < sum(start.import_s.values()) < start.sampling_s
     assert "kickstand.lean.lean_filter" in start.import_s

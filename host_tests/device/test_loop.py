@@ -32,4 +32,4 @@ def test_an_esp32_runs_at_240_mhz_and_yields(chip, processor_hz, monkeypatch):
     device = device_runs.Device(lambda t_s: (0.0, 1.0, 0.0, 0.0, 0.0, 0.0), machine=chip)
     device.run({}, [3.0])
     assert device.board.processor_hz == processor_hz
-    assert sum(ms >= 5 for ms in waits_ms) > 100
+    assert (sum(ms >= 5 for ms in waits_ms) > 100) is (chip == "esp32")

@@ -181,14 +181,16 @@ def run(detail, seconds, out, chosen):
         app.sensor.reopen = lambda: stages_guest.TimedBus(reopen(), spent)
     assert app_module.gc is gc
     app_module.gc = TimedGc(app)
-    real_sleep_us = app_module.sleep_us
 
-    def sleep_us(us):
-        start = ticks_us()
-        real_sleep_us(us)
-        app.slept_us += ticks_diff(ticks_us(), start)
+    def timed(sleep):
+        def sleeping(duration):
+            start = ticks_us()
+            sleep(duration)
+            app.slept_us += ticks_diff(ticks_us(), start)
 
-    app_module.sleep_us = sleep_us
+        return sleeping
+
+    app_module.sleep_us, app_module.sleep_ms = timed(app_module.sleep_us), timed(app_module.sleep_ms)
     try:
         app.run()
     except Done:
