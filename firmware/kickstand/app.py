@@ -168,7 +168,7 @@ class App:
         if wait_us < self._least_wait_us:
             self._least_wait_us = wait_us
         if wait_us > 0:
-            if port.IS_ESP32:  # there only sleep_ms() gives time to the radio and the idle task
+            if port.ONLY_MS_YIELD:
                 sleep_ms(wait_us // 1000)
                 wait_us = max(0, ticks_diff(self._due_us, ticks_us()))
             sleep_us(wait_us)

@@ -22,6 +22,7 @@ if IS_ESP32:
     # Extra arguments of Pin.irq(). An ESP32 has only soft interrupts, and transfers by SoftI2C delay them
     PIN_IRQ = {}
     I2C_NUMBERED = False  # see open_i2c()
+    ONLY_MS_YIELD = True  # sleep_us() gives no time to the radio and the idle task, only sleep_ms() does
     SD_SPI = (2, 3)  # slots of machine.SDCard that use SPI
     # Pins that the chip itself needs. An output on a pin of the chip's USB disconnects the board from the computer
     # until BOOT is held. An output on a pin of a classic chip's flash (6 to 11) crashes the board at each start. Pins 1
@@ -42,6 +43,7 @@ else:  # Raspberry Pi Pico and Pico 2, and boards of other makers with the same 
     GPS_UART, GPS_PINS, WHEEL_PIN = 1, (8, 9), 14
     PIN_IRQ = {"hard": True}  # soft interrupts would be lost during a transfer to the display
     I2C_NUMBERED = True  # two I2C buses must have two different controller numbers
+    ONLY_MS_YIELD = False
     SD_SPI = (0, 1)  # the numbers of machine.SPI
     TAKEN_PINS = INPUT_PINS = ()
 if not _KNOWN:  # an unknown board may lack these pins or use them for something else
