@@ -102,6 +102,7 @@ def test_a_motion_in_any_table_comes_back(tmp_path_factory, clock, accel, rates,
     separator, number, cell, encoding, end = DRESSES[dress]
     digits = {"g": 5, "m/s2": 4, "mg": 1, "rad/s": 5, "deg/s": 3}
     assume("thousands" not in dress or {accel, rates} <= set(digits))  # 1.234 alone may be 1234
+    assume(clock != "day first, points" or number is plain)  # 30.250 among decimal commas may be 30250
     cells = [[text_of(t) for t in t_s.tolist()]]
     for values, sign, factor, unit in (
         (force_g, signs[0], ACCEL[accel], accel),
