@@ -22,7 +22,7 @@ def plug_in(monkeypatch: pytest.MonkeyPatch, board: Any) -> Any:
     """Make this board the only connected one and let it restart at once. Returns the board."""
     monkeypatch.setattr(list_ports, "comports", lambda: [PICO_PORT])
     monkeypatch.setattr(connection, "ConnectedBoard", lambda name, timeout: board)
-    monkeypatch.setattr(connection, "_RESTART_S", 0)
+    monkeypatch.setattr(connection, "RESTART_S", 0)
     return board
 
 

@@ -30,7 +30,7 @@ _EMULATED = "socket:"  # the name of an emulated board's port starts with this
 _SLOWER = 12  # factor on time limits for an emulated board, which is slow on a busy computer
 RETURN_S = 6  # longest wait for a port that is missing or in use, because a board restarts or has just been plugged in
 _RETURN_POLL_S = 0.25
-_RESTART_S = 2  # time to wait until the board's USB port is back, because the next command may follow at once
+RESTART_S = 2  # time to wait until the board's USB port is back, because the next command may follow at once
 
 # USB vendors of the boards themselves and of the serial chips on ESP32 boards
 VENDORS = {
@@ -265,7 +265,7 @@ def why_closed(port: str) -> InputError:
 def restart(transport: ConnectedBoard) -> None:
     """Reset the board, which then starts as after power-on. Its USB port disappears for a moment."""
     transport.exec_raw_no_follow("import time, machine\ntime.sleep_ms(100)\nmachine.reset()")
-    transport.wait(_RESTART_S)
+    transport.wait(RESTART_S)
 
 
 def ask(transport: SerialTransport, expression: str, *shapes: Any) -> Any:
