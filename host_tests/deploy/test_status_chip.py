@@ -10,7 +10,6 @@ from support import command, emulated, emulated_port
 def test_status_after_a_ride_has_its_worst_values(chip, monkeypatch):
     files = emulated.firmware(chip) | emulated.calibrated()
     with emulated.CHIPS[chip](emulated.leaning(20), files) as device:
-        device.power_on()
         device.run(10.0)
         emulated_port.plug_in(monkeypatch, device)
         lines = command.works("status", "--port", emulated_port.NAME).out.splitlines()
