@@ -266,6 +266,9 @@ def test_whole_frames_are_read_while_the_chip_writes_one():
     wires.frame = bytes(range(101, 115))
     wires.waiting = 28
     assert (chip.fetch(), chip.overflows) == (2, 0), "a heated chip, with whole frames"
+    for temperature in (b"\x00\x05", b"\xff\xfa"):  # the sign changes at 36.5 degrees C
+        wires.frame, wires.waiting = bytes(6) + temperature + bytes(range(6)), 28 + 5 * (temperature[0] > 0)
+        assert (chip.fetch(), chip.overflows) == (2, 0)
     wires.frame, wires.waiting = bytes(range(1, 15)), 28 + 5
     assert (chip.fetch(), chip.overflows, chip.frames_left) == (0, 1, 0)
 

@@ -52,6 +52,7 @@ if not _KNOWN:  # an unknown board may lack these pins or use them for something
     GPS_UART = 1
 
 
+_ESP32_HZ = 240_000_000
 # Largest clock of SoftI2C, with half a period of 2 us. At 400 kHz, half a period is 1 us, but the MPU6050 needs 1.3 us
 _SOFT_I2C_HZ = 250_000
 _TURN_BYTES = 2000  # bytes of heap that one pass of the app's loop uses; 3000 while aligning by driving
@@ -69,9 +70,9 @@ def begin():
     # garbage, far along the heap. Then every later collection would scan the heap up to those objects. App resets the
     # threshold before its loop begins.
     gc.threshold(80_000)
-    if IS_ESP32:
+    if IS_ESP32 and machine.freq() < _ESP32_HZ:  # MicroPython starts a classic ESP32 with 160 MHz
         try:
-            machine.freq(240_000_000)  # MicroPython starts a classic ESP32 with 160 MHz
+            machine.freq(_ESP32_HZ)
         except ValueError:  # the C series and the H2 run at their highest frequency from the start
             pass
 

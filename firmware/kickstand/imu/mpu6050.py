@@ -270,11 +270,10 @@ class Mpu6050:
             before = self._temperature(0)
             self._i2c.readfrom_mem_into(self.address, _FIFO_R_W, self._some_frames[taken])
             if waiting % FRAME and self._in_step:
-                if not (
-                    -_STEP < self._temperature(0) - before < _STEP
-                    and -_STEP < self._temperature(taken - 1) - before < _STEP
-                ):
-                    return self._overflowed()
+                for k in (0, taken - 1):
+                    # The mask makes the difference right where the temperature changes its sign, at 36.5 degrees C
+                    if (self._temperature(k) - before + _STEP) & 0xFFFF > 2 * _STEP:
+                        return self._overflowed()
             self._in_step = True
         return taken
 

@@ -110,7 +110,8 @@ class Live:
             if packets.take_filter(data[:length], self._intervals):
                 self.asked = "RaceChrono"
             data = data[length:]
-        if packets.take_rate(radio.take_writes(radio.rate)[-2:], self._intervals):
+        data = radio.take_writes(radio.rate)
+        if len(data) % 2 == 0 and packets.take_rate(data[-2:], self._intervals):  # the last of several commands
             self.asked = "browser"
         self._ask()
 
