@@ -81,10 +81,7 @@ def test_the_row_of_a_stop():
     assert (other[1], other[-1]) == ("72.0*", "0.2 right")
 
 
-SLOW, FAST, BLIND = samples(1000, speed_mps=5.0), samples(1000, speed_mps=20.0), samples(1000)
-
-
-RIDE, DRIVE = "; calibrate ride takes it out", "; calibrate ride or drive takes it out"
+SLOW = samples(1000, speed_mps=5.0)
 
 
 def test_contradictions_hide_figures():

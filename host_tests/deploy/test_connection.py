@@ -203,5 +203,3 @@ def test_other_python_and_failing_programs_are_refused(port, tmp_path):
 
 
 # The lines of a running program
-
-SILENT, ENDLESS = "the board says nothing any more", "the program on the board does not end"

@@ -23,7 +23,7 @@ class Missing:
 
 @pytest.fixture
 def without():
-    """Return without(name, error, times): the firmware is imported anew, and its module of this name raises the
+    """Return without(name, error, times): the firmware is imported again, and its module of this name raises the
     error."""
     hooks = list(sys.meta_path)
     with FreshFirmware():

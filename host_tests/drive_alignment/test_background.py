@@ -16,7 +16,6 @@ from support import driving_runs
 from support.driving_runs import around, mounted
 
 MOUNT = random_mounting(5)
-LEFT, RIGHT = 1.0, -1.0
 TO_A_STOP = [[10.0, -1.5, 0.0], [6.0, 0.0, 0.0]]
 
 

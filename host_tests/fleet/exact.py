@@ -39,9 +39,3 @@ def block_group(turn_deg=0.0, axis=UP, count=8, varied=1.0, sway=NO_SWAY, log=0)
         np.tile(sums, (count, 1, 1)) for sums in (terms.T @ terms, terms.T @ force, mount.T @ sway @ mount)
     )
     return Blocks(square, product, swayed, np.full(count, log), begin_s, begin_s + 7.0)
-
-
-def horizontal_sway(direction_deg):
-    """Return the sway in a horizontal direction, from forward towards left."""
-    along = np.cos(np.radians(direction_deg)) * FORWARD + np.sin(np.radians(direction_deg)) * LEFT
-    return np.outer(along, along) / 8.0

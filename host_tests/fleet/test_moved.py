@@ -11,8 +11,6 @@ from kickstand_fleet.moved import LEAST_DEG, Move, compare, find_moves
 from kickstand_tools.calibration.drive import fit_logs, usable
 from kickstand_tools.logs.reader import read_log
 
-BRAKING, SWAY_ROAD = 2.0 * 0.16 + 2.0 * 0.25**2, 2.0 * 0.7**2  # variances of both ways to measure yaw, in deg^2
-
 
 def compared(before, after):
     result = compare(before, after)

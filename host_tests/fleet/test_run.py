@@ -1,4 +1,4 @@
-"""A run resumes from its finished results, writes them while it goes on, and loses none if it ends early."""
+"""A run resumes from its finished results, writes them while it continues, and loses none if it ends early."""
 
 import errno
 import os

@@ -1,12 +1,10 @@
 """A simulated fleet has the documented faults, and its sensors measure what the equations of its roads say."""
 
 from collections import Counter
-from math import atan, radians
 
 import numpy as np
 import pytest
 from fleet_drives import TROUBLES
-from kickstand.units import STANDARD_GRAVITY as G
 from kickstand_fleet import files
 from kickstand_fleet.simulation.fleet import make_fleet
 from kickstand_tools.common.errors import InputError
@@ -56,9 +54,3 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "drives").write_text("")
     with pytest.raises(InputError, match="drives"):
         make_fleet(tmp_path, 1)
-
-
-COUNT_G, COUNT_DPS = 1.0 / 16384.0, 1.0 / 131.0
-
-
-ROLL, LEAN = radians(4.0 * 3.0 / G), atan(5.0 / G)

@@ -4,7 +4,6 @@ from kickstand_tools.simulated_board.simulator import Board
 from support.board_access import level
 
 STEP_US = 10_000
-DAYS = 6.3, 9.0, 12.4, 12.5, 19.0
 
 
 def later(days):

@@ -4,7 +4,7 @@ import pytest
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.lcd import Lcd
 
-RS, RW, E, LIGHT = 0x01, 0x02, 0x04, 0x08
+RS, E, LIGHT = 0x01, 0x04, 0x08
 
 
 def nibble(lcd, value, rs=0):

@@ -1,7 +1,5 @@
 """The model of the OLEDs by the data sheets, and the text that is read from their pixels."""
 
-from collections import namedtuple
-
 import pytest
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.oled import Oled
@@ -86,9 +84,6 @@ def text_of(memory, height=64):
     commands(oled, 0xA8, height - 1, *SUPPLY["ssd1306"], 0xAF)
     oled.ram[: len(memory)] = memory
     return oled.text()
-
-
-Meter = namedtuple("Meter", "lean_deg max_left_deg max_right_deg smooth_force max_accel_g max_brake_g")
 
 
 def test_a_dark_or_unknown_picture_has_no_text():

@@ -5,7 +5,7 @@ from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.mpu6050 import START_UP_US, WAKE_US, Mpu6050
 from support.board_access import counts, level, read, write
 
-DIVIDER, CONFIG, GYRO, ACCEL, FIFO_EN, USER, POWER = 0x19, 0x1A, 0x1B, 0x1C, 0x23, 0x6A, 0x6B
+DIVIDER, GYRO, ACCEL, POWER = 0x19, 0x1B, 0x1C, 0x6B
 
 
 def tilted(t_s):

@@ -232,7 +232,7 @@ def _stream():
 
 
 class FreshFirmware:
-    """A context manager in which the firmware is imported anew. At its end the earlier modules are back."""
+    """A context manager in which the firmware is imported again. At its end the earlier modules are back."""
 
     def __enter__(self):
         self._modules = take_firmware()

@@ -7,7 +7,6 @@ from support.page_turner import PageTurner
 
 SHORT, LONG = ("press", 0.15), ("press", 1.2)
 STAND, UPRIGHT, RIDE = ("pose", "kickstand"), ("pose", "upright"), ("pose", 15.0)
-PULL, PLUG = ("sensor", False), ("sensor", True)
 ALIGN = [("wait", 1.5), SHORT, ("wait", 4), UPRIGHT, ("wait", 3), SHORT, ("wait", 4)]
 RIDING = [*ALIGN, RIDE, ("wait", 12), ("lean", 30), ("wait", 6)]
 

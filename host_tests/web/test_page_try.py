@@ -15,9 +15,7 @@ from support.web.rider import LAPTOP, Rider
 
 WINDOW = {"width": 1000, "height": 700}
 LEAN_DEG = 30
-LOOK, ROOM, COLOURS, FOREIGN = (
-    Path(__file__).with_name(f"{name}.js").read_text() for name in ("look", "room", "colours", "foreign")
-)
+LOOK, FOREIGN = (Path(__file__).with_name(f"{name}.js").read_text() for name in ("look", "foreign"))
 
 
 @pytest.fixture

@@ -14,10 +14,6 @@ READ_S = 120  # longest wait for the page to show something, long enough for a b
 # the page draw less often.
 KEEP = Path(__file__).with_name("keep.js").read_text()
 
-# This script replaces the page's fetch(). Files whose address has the passed ending get the passed status, until the
-# test calls window.given(). The service worker is bypassed.
-MISSING = Path(__file__).with_name("missing.js").read_text()
-
 
 class Rider:
     """A rider with a page of the site.
