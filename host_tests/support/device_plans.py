@@ -99,6 +99,7 @@ def on_flash(flash):
 
     The app collects garbage often. Objects of earlier tests are excluded, because scanning them takes minutes.
     """
+    _forget_the_riders_modules()  # a test of another folder may have left its own
     sys.path.insert(0, str(flash))
     importlib.invalidate_caches()
     writes_none, sys.dont_write_bytecode = sys.dont_write_bytecode, True
@@ -112,8 +113,12 @@ def on_flash(flash):
         gc.unfreeze()
         sys.dont_write_bytecode = writes_none
         sys.path.remove(str(flash))
-        for name in ("user", "config"):
-            sys.modules.pop(name, None)
+        _forget_the_riders_modules()
+
+
+def _forget_the_riders_modules():
+    for name in ("user", "config"):
+        sys.modules.pop(name, None)
 
 
 def run(engine, flash, plan, capsys=None, fit=None):
