@@ -4,7 +4,7 @@ import ast
 from pathlib import Path
 
 TESTS = Path(__file__).resolve().parent
-PRIVATE_USES, REPLACED_PARTS = 20, 110
+PRIVATE_USES, REPLACED_PARTS = 14, 89
 REPLACE = ("setattr", "setitem", "delattr", "delitem", "patch")
 
 
