@@ -267,15 +267,17 @@ class Mpu6050:
         taken = _MAX_FRAMES if n >= _MAX_FRAMES else _FEW_FRAMES if n > _FEW_FRAMES else n
         self.frames_left = n - taken
         if taken:
-            before = self._temperature(0)
+            before = self._temperature(0) if waiting % FRAME and self._in_step else None
             self._i2c.readfrom_mem_into(self.address, _FIFO_R_W, self._some_frames[taken])
-            if waiting % FRAME and self._in_step:
-                for k in (0, taken - 1):
-                    # The mask makes the difference right where the temperature changes its sign, at 36.5 degrees C
-                    if (self._temperature(k) - before + _STEP) & 0xFFFF > 2 * _STEP:
-                        return self._overflowed()
+            if before is not None and (self._jumped(before, 0) or self._jumped(before, taken - 1)):
+                return self._overflowed()
             self._in_step = True
         return taken
+
+    def _jumped(self, before, k):
+        """Return True if the temperature of sample k differs too much from a temperature before it."""
+        # The mask makes the difference right where the temperature changes its sign, at 36.5 degrees C
+        return (self._temperature(k) - before + _STEP) & 0xFFFF > 2 * _STEP
 
     def _overflowed(self):
         self.overflows += 1
