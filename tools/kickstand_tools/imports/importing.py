@@ -79,6 +79,14 @@ class ImportSign(Message):
     )
 
 
+class ImportTurned(Message):
+    """The sign of the accelerations of a table is changed, because the track shows that it is -1 g up."""
+
+    code = "import-turned"
+    text = "by the turns of the track, up reads -1 g, so the sign of the accelerations is changed"
+    todo = Remedy("if latitude and longitude are exchanged or without their sign, the lean is mirrored: leave them out")
+
+
 @dataclass(eq=False)
 class Imported:
     """An imported recording.
@@ -249,6 +257,8 @@ def _check_sign(recording: AppRecording, log: Log) -> None:
     else:
         log.accel_g = -log.accel_g
         _note_sign(recording, "-1 g up, by the turns of the track: sign turned")
+        if recording.app == mapped.NAME:
+            recording.notices.append(ImportTurned())
 
 
 def _note_sign(recording: AppRecording, sign: str) -> None:

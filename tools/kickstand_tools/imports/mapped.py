@@ -30,6 +30,7 @@ from .units import (
     counts_per,
     factor,
     since_first_s,
+    tick_ns,
     time_unit,
     unit,
 )
@@ -65,7 +66,7 @@ class MappedTable:
         if "t" not in found:
             return {}
         columns = self.sheet.columns
-        since = since_first_s(self.sheet.times(columns.index(found["t"].columns[0]), found["t"].unit))
+        since = since_first_s(self.sheet.times(columns.index(found["t"].columns[0]), found["t"].unit.strip("?")))
         shown = np.flatnonzero(since <= seconds)
         shown = shown[:: max(1, len(shown) // points)]
         picture: dict[str, list[float] | list[list[float]]] = {"t": since[shown].round(3).tolist()}
@@ -98,10 +99,10 @@ def read_mapped(
     places = {key: _place(sheet, key, wanted) for key, wanted in columns.items()}
     _check_apart(places, columns)
     _check_units(sheet, places, units)
-    said = unit(_unit(units, ("t",), sheet.columns[places["t"]]))
-    t_unit = time_unit(sheet.cells[places["t"]], said if said in TIMES else "")
+    stated = unit(_unit(units, ("t",), sheet.columns[places["t"]]))
+    t_unit = time_unit(sheet.cells[places["t"]], stated if tick_ns(stated) else "")
     time_ns = sheet.times(places["t"], t_unit)
-    if said not in TIMES and why is None and rate_hz(time_ns) > findings.DOUBTED_HZ:
+    if not tick_ns(stated) and why is None and rate_hz(time_ns) > findings.DOUBTED_HZ:
         raise InputError(
             f"{sheet.name}: {rate_hz(time_ns):.0f} samples per second: add the unit of t, as in --units t=min"
         )
@@ -120,7 +121,8 @@ def read_mapped(
     speed, speed_unit, notices = _speed(sheet, time_ns, places, units, (lat, lon))
     if why is not None and "lat" in places and "lon" in places:
         north, east = sheet.numbers(places["lat"]) * lat, sheet.numbers(places["lon"]) * lon
-        doubt = doubt_of_positions(time_ns, sheet.numbers(places.get("speed")), north, east)
+        speed_mps = sheet.numbers(speed) * SPEEDS[speed_unit]
+        doubt = doubt_of_positions(time_ns, speed_mps, north, east)
         if doubt:
             notices.append(ImportPositions(sheet.named([places.pop("lat"), places.pop("lon")]), doubt))
     track = track_of(sheet, time_ns, speed, places.get("lat"), places.get("lon"), speed_unit, (lat, lon))

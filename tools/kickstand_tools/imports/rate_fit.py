@@ -71,7 +71,7 @@ def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
         return RateFit()
     u, w = cells
     length = np.linalg.norm(u, axis=1)
-    good = np.abs(length / np.median(length) - 1.0) < STRAIGHT
+    good = np.abs(length - np.median(length)) < STRAIGHT * np.median(length)
     u = u / np.maximum(length, 1e-9)[:, None]
     span = round(WINDOW_S / CELL_S)
     begins = np.arange(0, len(u) - span, span // 2)
