@@ -179,10 +179,3 @@ def test_a_pipe_is_not_waited_for(tmp_path, name):
     }
     result = command.run(*uses[pipe.suffix])
     assert result.status == 2 and result.err.count("\n") == 1 and "unexpected" not in result.err
-
-
-def test_an_oversized_calibration_is_refused(tmp_path):
-    (tmp_path / "CAL.json").write_bytes(b"[" + b"1," * MB + b"1]")
-    log = command.still(tmp_path / "log.csv", (0, 1, 0))
-    arguments = "replay", log, "--calibration", tmp_path / "CAL.json", "--out", tmp_path / "x"
-    command.refused(tmp_path, *arguments, words="too large for a calibration")

@@ -215,6 +215,7 @@ def test_a_doubtful_table_is_refused_with_a_line_that_works(tmp_path, monkeypatc
     [
         (lambda north, east: east, lambda north, east: north, "latitude and longitude are exchanged"),
         (lambda north, east: 100.0 * north, lambda north, east: 100.0 * east, "they are no degrees"),
+        (lambda north, east: north / 57.0, lambda north, east: east / 57.0, "do not move as fast as the speed says"),
         (lambda north, east: north, lambda north, east: east, ""),
     ],
 )
@@ -231,6 +232,18 @@ def test_wrong_positions_are_left_out(tmp_path, lat, lon, words):
     assert bool(np.isfinite(imported.log.lat_deg).any()) is not bool(words)
     notices = [notice.line() for notice in imported.notices if notice.code == "import-positions"]
     assert len(notices) == bool(words) and words in "".join(notices)
+
+
+def test_south_and_west_have_their_letters(tmp_path):
+    """Without them the track would be a mirror image, and the sign of the accelerations would be turned."""
+    ride = riding().every(4)
+    columns = np.column_stack((ride.t_s, ride.phone_g, np.degrees(ride.phone_rad), ride.lat_deg, 20.0 - ride.lon_deg))
+    rows = [f"{','.join(map(str, row))},W" for row in columns.tolist()]
+    head = "t,ax (g),ay (g),az (g),gx (deg/s),gy (deg/s),gz (deg/s),lat,lon,E/W"
+    (tmp_path / "log.csv").write_text("\n".join([head, *rows]))
+    imported = api.import_recording(tmp_path / "log.csv")
+    assert imported.log.accel_g == pytest.approx(ride.phone_g, abs=1e-4)
+    assert np.nanmax(imported.log.lon_deg) < 0.0 and not imported.notices
 
 
 @pytest.mark.parametrize("unit", ["g", "m/s^2"])

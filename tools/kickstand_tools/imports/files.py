@@ -99,19 +99,19 @@ def _contents(path: Path) -> Iterator[tuple[str, bytes]]:
             zipped = file.read(4) == b"PK\x03\x04" or path.suffix.lower() == ".zip"
         yield from _unzipped(path) if zipped else [(path.name, _unpacked_file(path))]
         return
-    whole = path.resolve()
+    resolved = path.resolve()
     # skip links that lead out of the folder
-    names = (file for file in path.rglob("*") if file.is_file() and file.resolve().is_relative_to(whole))
+    names = (file for file in path.rglob("*") if file.is_file() and file.resolve().is_relative_to(resolved))
     names = sorted(itertools.islice(names, MOST_FILES + 1))
     if len(names) > MOST_FILES:
         raise InputError(f"{path} holds over {MOST_FILES} files: give the folder of one recording")
-    inside = _tables(names, lambda file: file.relative_to(path).as_posix())
-    packed = [file for file in names if file.suffix.lower() == ".zip"]
-    if not inside and len(packed) > 1:
-        raise InputError(f"{path} holds {len(packed)} zip files: give one of them, such as {packed[0]}")
-    if not inside and packed:
-        yield from _unzipped(packed[0])
-    for file in inside:
+    tables = _tables(names, lambda file: file.relative_to(path).as_posix())
+    zips = [file for file in names if file.suffix.lower() == ".zip"]
+    if not tables and len(zips) > 1:
+        raise InputError(f"{path} holds {len(zips)} zip files: give one of them, such as {zips[0]}")
+    if not tables and zips:
+        yield from _unzipped(zips[0])
+    for file in tables:
         yield file.relative_to(path).as_posix(), _unpacked_file(file)
 
 

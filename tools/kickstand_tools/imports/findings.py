@@ -426,10 +426,10 @@ def _split_axis(name: str) -> Iterator[tuple[str, str]]:
         part = next((part for part in _AXES if word.startswith(part) or word.endswith(part)), word)
         words[k : k + 1] = [word] if part == word else [part, word.replace(part, "", 1)]
     for k, word in enumerate(words):
-        rest = " ".join(words[:k] + words[k + 1 :])
+        others = " ".join(words[:k] + words[k + 1 :])
         axis = word if word in ("x", "y", "z") else _AXES.get(word, "")
-        if axis and (rest or word == axis):
-            yield sensor + rest, axis
+        if axis and (others or word == axis):
+            yield sensor + others, axis
             return
     joined = "".join(words)
     for k, word in reversed(list(enumerate(words))):  # accx, or ax before the name of a sensor
@@ -460,8 +460,8 @@ def _is_of(units: dict[str, float], name: str) -> bool:
 
 def _is_unit(text: str) -> bool:
     name = unit(text)
-    known = name in (*SPEEDS, "counts") or _is_of(ACCELERATIONS, name) or _is_of(RATES, name)
-    return known or tick_ns(name) > 0 or bool(counts_per(text)) or "/" in text
+    in_tables = name in (*SPEEDS, "counts") or _is_of(ACCELERATIONS, name) or _is_of(RATES, name)
+    return in_tables or tick_ns(name) > 0 or bool(counts_per(text)) or "/" in text
 
 
 def stated_unit(name: str) -> str:
@@ -474,9 +474,9 @@ def stated_unit(name: str) -> str:
         return last
     if "gyroadc" in bare:  # Betaflight
         return "deg/s"
-    for word, known in (("milli", "ms"), ("micro", "us"), ("nano", "ns"), ("minutes", "min"), ("hours", "h")):
+    for word, unit_name in (("milli", "ms"), ("micro", "us"), ("nano", "ns"), ("minutes", "min"), ("hours", "h")):
         if word in bare:
-            return known
+            return unit_name
     if bare.endswith("ms"):
         return "ms"
     return unit(bare) if unit(bare) in TIMES else ""
@@ -529,9 +529,11 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
     names = _names(sheet, rates)
     findings.found["g"] = ColumnFinding(names, stated_unit(names[0]), "by name", False)
     if accel is not None:
-        found = gyro(accel.values, rates.values, findings.found["a"], seconds, scales.get("g") or stated_unit(names[0]))
-        found.columns = names
-        findings.found["g"] = found
+        of_gyro = gyro(
+            accel.values, rates.values, findings.found["a"], seconds, scales.get("g") or stated_unit(names[0])
+        )
+        of_gyro.columns = names
+        findings.found["g"] = of_gyro
 
 
 def _partner(accel: _Triple | None, gyros: Sequence[_Triple]) -> _Triple | None:
@@ -615,13 +617,13 @@ def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> Col
     values: the accelerations, shape (n, 3). stated: the unit in the names of their columns.
     """
     length = calm_length(values, seconds)
-    whole = _are_whole(values)
-    gravities = {name: size for name, size in _gravities().items() if whole or not name.startswith("counts")}
+    counts = _are_whole(values)
+    gravities = {name: size for name, size in _gravities().items() if counts or not name.startswith("counts")}
     near = min(gravities, key=lambda name: abs(np.log(length / gravities[name])))
     why = f"gravity at rest is {length:.4g} long"
     if counts_per(stated) or stated in RARE_ACCELERATIONS:
         gravities[stated] = 1.0 / factor(stated, ACCELERATIONS, "a")
-    most = NEAR if whole else LEANT
+    most = NEAR if counts else LEANT
     if stated in gravities and 1.0 / NEAR < length / gravities[stated] < most:
         return ColumnFinding([], stated, f"{why}, as its name says")
     if near.startswith("counts"):
@@ -678,9 +680,9 @@ def _by_size(rates: Array, force: Array) -> tuple[str, str]:
     good = rates[np.all(np.isfinite(rates), axis=1)]
     length = np.linalg.norm(good - np.median(good, axis=0), axis=1)
     most, noise = float(np.percentile(length, 90.0)), float(np.median(np.std(good, axis=0)))
-    whole = float(np.median(np.linalg.norm(force[np.all(np.isfinite(force), axis=1)], axis=1)))
-    moved = float(np.max(np.std(force[np.all(np.isfinite(force), axis=1)], axis=0))) / max(whole, 1e-9)
-    if moved < 0.02:  # the sensor is at rest
+    length_force = float(np.median(np.linalg.norm(force[np.all(np.isfinite(force), axis=1)], axis=1)))
+    unrest = float(np.max(np.std(force[np.all(np.isfinite(force), axis=1)], axis=0))) / max(length_force, 1e-9)
+    if unrest < 0.02:  # the sensor is at rest
         near = min(RATES, key=lambda name: abs(np.log(max(noise, 1e-9) * RATES[name] / NOISE_DPS)))
         return near, f"its noise at rest is {noise:.2g}"
     if most > 1000.0:

@@ -189,16 +189,16 @@ def _has_names(line: str, width: int) -> bool:
 
 def _is_names(cells: list[str], width: int) -> bool:
     """True if the cells can be the names of `width` columns: most differ, and hardly any is a number or a unit."""
-    there = [cell for cell in cells if cell]
-    numbers = sum(bool(_NUMBER.fullmatch(cell)) or bool(re.search(r"[{}=]|:$", cell)) for cell in there)
-    if len(set(there)) <= len(there) / 2 or (_all_units(cells) and len(there) > FEWEST_CELLS):
+    filled_cells = [cell for cell in cells if cell]
+    numbers = sum(bool(_NUMBER.fullmatch(cell)) or bool(re.search(r"[{}=]|:$", cell)) for cell in filled_cells)
+    if len(set(filled_cells)) <= len(filled_cells) / 2 or (_all_units(cells) and len(filled_cells) > FEWEST_CELLS):
         return False
-    return max(2, width - 3) <= len(there) <= width + 1 and numbers <= len(there) / 4
+    return max(2, width - 3) <= len(filled_cells) <= width + 1 and numbers <= len(filled_cells) / 4
 
 
 def _all_units(cells: list[str]) -> bool:
-    there = [cell.strip("[]()") for cell in cells if cell]
-    return len(there) > 2 and sum(unit(cell) in _UNITS for cell in there) > len(there) / 2
+    filled_cells = [cell.strip("[]()") for cell in cells if cell]
+    return len(filled_cells) > 2 and sum(unit(cell) in _UNITS for cell in filled_cells) > len(filled_cells) / 2
 
 
 def _grid_below(lines: Sequence[str], wanted: Collection[str]) -> Grid | None:
@@ -243,8 +243,10 @@ def _names(lines: Sequence[str], grid: Grid) -> list[str]:
         last = next(line for line in reversed(lines[: grid.first]) if line.strip())
         units = split_row(last.lstrip("#%/ "), grid.separator)
         if _all_units(units) and len(units) <= len(names):
-            rest = names[len(units) :]
-            names = [f"{name} ({mark.strip('[]()')})" if mark else name for name, mark in zip(names, units)] + rest
+            without_unit = names[len(units) :]
+            names = [
+                f"{name} ({mark.strip('[]()')})" if mark else name for name, mark in zip(names, units)
+            ] + without_unit
     return [*names, *[""] * (grid.width - len(names))]
 
 
@@ -355,14 +357,14 @@ def _labelled_values(line: str) -> Iterator[tuple[str, str]]:
         values = re.split(r"[\s,;]+", several[2])
         for axis, value in zip("xyz" if len(values) == 3 else map(str, range(1, 10)), values):
             yield f"{several[1]} {axis}", value
-    before, found = "", list(_PAIR.finditer(_SEVERAL.sub("", line)))
-    stated = next((pair["unit"] for pair in reversed(found) if pair["unit"] and unit(pair["unit"]) in _UNITS), "")
-    for pair in found:
+    prefix, pairs = "", list(_PAIR.finditer(_SEVERAL.sub("", line)))
+    stated = next((pair["unit"] for pair in reversed(pairs) if pair["unit"] and unit(pair["unit"]) in _UNITS), "")
+    for pair in pairs:
         label = re.sub(r"\s+", " ", pair["label"].strip(" ,;|-"))
         words = label.split()
         if len(words) > 1 and len(words[-1]) == 1:
-            before = " ".join(words[:-1])
-        elif len(label) == 1 and before:
-            label = f"{before} {label}"
-        own = pair["unit"] if pair["unit"] and unit(pair["unit"]) in _UNITS else stated
-        yield (f"{label} ({own})" if own and label[-1:].lower() in "xyz" else label), pair["value"]
+            prefix = " ".join(words[:-1])
+        elif len(label) == 1 and prefix:
+            label = f"{prefix} {label}"
+        label_unit = pair["unit"] if pair["unit"] and unit(pair["unit"]) in _UNITS else stated
+        yield (f"{label} ({label_unit})" if label_unit and label[-1:].lower() in "xyz" else label), pair["value"]

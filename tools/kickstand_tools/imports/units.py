@@ -76,7 +76,7 @@ MOMENT = re.compile(
     rf"(?:{_HALF}\s*)?(?:(\d{{1,3}})([:.]))?(\d{{1,2}})(?(6)\6|:)(\d{{1,2}})(?:[.,:](\d+))?\s*(?:{_HALF})?"
     r"\s*(Z|UTC|GMT|[+-]\d\d:?\d\d)?\s*"
 )
-_HALVES = dict.fromkeys(("上午", "午前", "오전"), "AM ") | dict.fromkeys(("下午", "午後", "오후"), "PM ")
+_MORNING, _AFTERNOON = "上午|午前|오전", "下午|午後|오후"
 TIME_NAME = re.compile(
     r"time|milli|micro|^(t|ts|ms|us|ns|s|sec|secs|seconds|elapsed\w*)$|epoch|utc|clock|stamp|^monitors$"
 )
@@ -170,12 +170,12 @@ def _moment(text: str) -> tuple[int, bool] | None:
 
     Returns ns since 1970 and True, or ns since midnight and False. None for another text."""
     if not text.isascii():
-        text = re.sub("|".join(_HALVES), lambda half: _HALVES[half[0]], text)
+        text = re.sub(_AFTERNOON, "PM ", re.sub(_MORNING, "AM ", text))
     match = MOMENT.fullmatch(_COMPACT.sub(r"\1-\2-\3T\4:\5:\6.\g<7>0", text))
     if match is None:
         return None
-    first, month, last, before, hours, _, minutes, seconds, fraction, after, zone = match.groups()
-    half = before or after
+    first, month, last, half_before, hours, _, minutes, seconds, fraction, half_after, zone = match.groups()
+    half = half_before or half_after
     hours = int(hours or 0) % 12 + 12 * (half in "Pp") if half else int(hours or 0)
     ns = (3600 * hours + 60 * int(minutes) + int(seconds)) * 10**9 + int((fraction or "0").ljust(9, "0")[:9])
     if first is None:
@@ -235,7 +235,7 @@ def _is_of_day(values: Array) -> bool:
     """True for numbers of the form HHMMSS.SS: no minute and no second is over 59, and a minute ends."""
     valid = values[np.isfinite(values)]
     fields = bool(np.all((valid >= 0.0) & (valid < 240_000.0) & (valid % 100 < 60.0) & (valid // 100 % 100 < 60.0)))
-    return fields and bool(np.any(np.diff(valid) >= 40.0)) and np.median(np.diff(valid)) < 2.0
+    return fields and bool(np.any(np.diff(valid) >= 40.0) and np.median(np.diff(valid)) < 2.0)
 
 
 def _after_midnight(ns: Nanoseconds) -> Nanoseconds:
