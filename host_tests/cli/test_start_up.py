@@ -91,5 +91,5 @@ def test_an_invalid_entry_point_does_not_hide_a_crash(tmp_path, monkeypatch):
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: lap-timer\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text("[kickstand.commands]\nlaps = not an object!\n")
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setitem(main.COMMANDS, "report", (".no_such_module", ""))
+    monkeypatch.setitem(main.COMMANDS, "report", EntryPoint("report", "no_such_module", GROUP))
     assert ": a fault in kickstand, please report it" in command.run("report").err

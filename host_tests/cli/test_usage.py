@@ -114,9 +114,9 @@ def test_times_are_read_as_seconds_minutes_and_hours(text, seconds):
 
 
 def test_every_command_has_help_and_the_convention_of_logs():
-    for name, (_, words) in main.COMMANDS.items():
+    for name in main.COMMANDS:
         text = " ".join(command.works(name, "--help").out.split())
-        assert text.startswith(f"Usage: kickstand {name} ") and words.endswith(".")
+        assert text.startswith(f"Usage: kickstand {name} ")
         if name in ("import", "smooth", "report", "compare"):
             convention = "At rest, the axis that points up reads +1 g. Rates are right-handed about their axes."
             assert convention in text

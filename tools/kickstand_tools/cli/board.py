@@ -26,7 +26,7 @@ _NAMED_ONE_BY_ONE = 5
 @click.option("--config", is_flag=True, help="Also replace the board's config.py, which is otherwise kept.")
 @click.option("--yes", is_flag=True, help="Rename files of another project on the board without asking.")
 def flash_command(port: str | None, config: bool, yes: bool) -> None:
-    """Copy the firmware to a board that runs MicroPython, check it, and start it."""
+    """Copy the firmware to a board, and start it. The board must run MicroPython."""
     with Bar("") as bar:
         result = flash(port, config, bar.reach_in, agree=None if yes else _agree)
     echo(f"{result.board} on {result.port}")
@@ -79,9 +79,9 @@ def status_command(port: str | None, wirings: bool) -> None:
 @click.command()
 @PORT
 def check_command(port: str | None) -> None:
-    """Measure a board and everything wired to it in two minutes, and print each figure with its limit.
+    """Measure a board and everything wired to it, in two minutes.
 
-    Keep the sensor still. The exit status is 1 if a figure exceeds its limit."""
+    Each figure is printed with its limit. Keep the sensor still. The exit status is 1 if a figure exceeds its limit."""
     checked = check(port, echo)
     echo(verdict(checked.findings))
     if checked.faults:
@@ -93,7 +93,7 @@ def check_command(port: str | None) -> None:
 @click.option("--out", type=PATH, default=Path(), help="The directory to write to. Default: the current one.")
 @click.option("--delete", is_flag=True, help="Delete completely fetched rides from the board.")
 def pull_command(port: str | None, out: Path, delete: bool) -> None:
-    """Fetch the rides that a board has recorded, as logs with their calibration."""
+    """Fetch the rides that a board has recorded. Each ride is a log with its calibration."""
 
     def say(ride: PulledRide) -> None:
         for problem in ride.problems:

@@ -30,15 +30,15 @@ def calibrate_command() -> None:
     """Compute a calibration from recorded poses or drives."""
 
 
-@calibrate_command.command(short_help="Measure the sensor's errors, from six poses.")
+@calibrate_command.command()
 @file_argument("poses", "LOG.csv | POSE.csv...", nargs=-1, required=True)
 @OUT
 def six(poses: tuple[Path, ...], out: Path) -> None:
-    """Measure the sensor's errors from six still poses, each side up once, in any order.
+    """Measure the sensor's errors, from six still poses.
 
-    One log of the whole procedure calibrates accelerometer and gyro. Lay the sensor still for three seconds on each
-    side, and once at a slant. The turns between the poses calibrate the gyro. Six logs of one pose each give only
-    offset and slope of the accelerometer. A seventh log, of a slanted pose, checks them.
+    Each side is up once, in any order. One log of the whole procedure calibrates accelerometer and gyro. Lay the sensor
+    still for three seconds on each side, and once at a slant. The turns between the poses calibrate the gyro. Six logs
+    of one pose each give only offset and slope of the accelerometer. A seventh log, of a slanted pose, checks them.
     """
     check_output(out, list(poses))
     found = fit_procedure(poses[0]) if len(poses) == 1 else fit_six_positions(poses)
@@ -46,7 +46,7 @@ def six(poses: tuple[Path, ...], out: Path) -> None:
     _write(out, found.calibration)
 
 
-@calibrate_command.command(short_help="Align to the bike, from a pose on the kickstand and an upright pose.")
+@calibrate_command.command()
 @file_argument("kickstand", "KICKSTAND.csv")
 @file_argument("upright", "UPRIGHT.csv")
 @click.option("--calibration", type=PATH, help="The result of `kickstand calibrate six`, which is extended.")
@@ -54,7 +54,10 @@ def six(poses: tuple[Path, ...], out: Path) -> None:
 @OUT
 @RIGHT_HANDED
 def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out: Path) -> None:
-    """Find how the sensor is mounted on the bike, from a pose on the kickstand and an upright pose."""
+    """Align to the bike, from poses on the kickstand and upright.
+
+    The result says how the sensor is mounted.
+    """
     check_output(out, [kickstand, upright])
     before = read_calibration(calibration) if calibration else None
     found = fit_two_positions(kickstand, upright, before, side)
@@ -63,7 +66,7 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
     _write(out, found.calibration)
 
 
-@calibrate_command.command(short_help="Align to any vehicle, from driving with braking.")
+@calibrate_command.command()
 @file_argument("logs", "LOG.csv...", nargs=-1, required=True)
 @click.option("--calibration", type=PATH, help="An earlier calibration, by six positions or two poses.")
 @click.option("--vehicle", type=VEHICLES, help="Default: motorcycle if calibrated by two poses, otherwise car.")
@@ -71,7 +74,9 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
 @OUT
 @RIGHT_HANDED
 def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None, method: str, out: Path) -> None:
-    """Find how the sensor is mounted on a vehicle. The logs must have a speed, stops, and straight-line braking."""
+    """Align to any vehicle, from driving with braking.
+
+    The logs must have a speed, stops, and straight-line braking."""
     check_output(out, list(logs))
     before = read_calibration(calibration) if calibration else None
     several = len(logs) > 1
@@ -89,7 +94,7 @@ def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None,
     _write(out, found.calibration)
 
 
-@calibrate_command.command(short_help="Align to a motorcycle, from riding with bends.")
+@calibrate_command.command()
 @file_argument("log", "LOG.csv")
 @click.option(
     "--phone",
@@ -99,7 +104,7 @@ def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None,
 @OUT
 @RIGHT_HANDED
 def ride(log: Path, phone: str | None, out: Path) -> None:
-    """Find how the sensor is mounted on a motorcycle, from a ride with bends. No poses and no speed are needed."""
+    """Align to a motorcycle, from riding with bends. No poses and no speed are needed."""
     check_output(out, [log])
     with Bar("aligning") as bar:
         found = fit_ride(log, phone, bar.reach)

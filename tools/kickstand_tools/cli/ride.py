@@ -122,9 +122,10 @@ def join_command(ride: Path, track: Path, out: Path) -> None:
 def compare_command(
     a: Path, b: Path, calibration_a: Path | None, calibration_b: Path | None, picture: Path | None, as_json: bool
 ) -> None:
-    """Compare the leans of two devices on one bike, from two recordings of the same ride.
+    """Compare the leans of two devices on one bike.
 
-    The devices can be two phones, or a phone and the board. The clocks are aligned by matching the rates of rotation.
+    Give two recordings of the same ride. The devices can be two phones, or a phone and the board. The clocks are
+    aligned by matching the rates of rotation.
     """
     paths = [given or calibration_beside(log) for log, given in ((a, calibration_a), (b, calibration_b))]
     if picture is not None:
@@ -188,7 +189,10 @@ def smooth_command(ride: Path, calibration: Path | None, out: Path, **stretch: f
 @common.OUT
 @common.RIGHT_HANDED
 def export_command(ride: Path, form: str, calibration: Path | None, live: bool, out: Path) -> None:
-    """Export a ride for maps (gpx), Circuit Tools (vbo), RaceChrono, or data frames (parquet, csv)."""
+    """Export a ride for another program.
+
+    The programs are maps (gpx), Circuit Tools (vbo), RaceChrono, and data frames (parquet, csv).
+    """
     check_output(out, [*_inputs(ride), calibration or calibration_path(ride)])
     opened, notices = _opened(ride, calibration, live)
     with Bar("exporting") as bar:
@@ -205,7 +209,7 @@ def export_command(ride: Path, form: str, calibration: Path | None, live: bool, 
 @common.JSON
 @common.RIGHT_HANDED
 def report_command(ride: Path, calibration: Path | None, live: bool, as_json: bool, **stretch: float | None) -> None:
-    """Summarise a ride: maxima, time at large leans, and each stop measured as a brake test."""
+    """Summarise a ride: maxima, time at large leans, and stops as brake tests."""
     seen = _overview(ride, calibration, live, **stretch)
     if as_json:
         common.echo(json.dumps(as_data(seen)))
@@ -237,7 +241,10 @@ def plot_command(
 @common.STRETCH
 @common.OUT
 def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) -> None:
-    """Cut a stretch out of a log, such as a still pose for calibrate two or six, or one of several rides."""
+    """Cut a stretch out of a log.
+
+    Use it for a still pose for calibrate two or six, or for one of several rides.
+    """
     if from_s is None and to_s is None:
         raise click.UsageError("Give --from, --to or both: seconds from the beginning of the log.")
     check_output(out, [log])
@@ -273,9 +280,10 @@ def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) 
 def overlay_command(
     ride: Path, calibration: Path | None, video: Path | None, fps: str | None, out: Path, **options: Any
 ) -> None:
-    """Draw lean, forces, speed and maxima over a video, or write them as a transparent clip.
+    """Draw the lean over a video, or write it as a transparent clip.
 
-    .mov is ProRes 4444, .webm is VP9, both with alpha. The gauge shows -- while the lean is unknown.
+    The gauge also shows forces, speed and maxima. .mov is ProRes 4444, .webm is VP9, both with alpha. The lean is --
+    while the lean is unknown.
     """
     calibration = _given_or_beside(ride, calibration, out, *([video] if video else []))
     rate = float(fps) if fps else None
