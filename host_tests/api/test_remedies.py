@@ -22,10 +22,10 @@ WHOLE = {RatesMisfit: RatesMisfit((0, 1, 0), (1, 0, 0), (0, 0, 1)), MountMoved: 
 
 
 def classes(base=Message):
-    for one in base.__subclasses__():
-        yield from classes(one)
-        if one.code:
-            yield one
+    for subclass in base.__subclasses__():
+        yield from classes(subclass)
+        if subclass.code:
+            yield subclass
 
 
 CLASSES = sorted(classes(), key=lambda one: one.code)
@@ -49,7 +49,7 @@ def test_a_page_names_no_command(one):
 
 
 def test_each_code_is_one_class():
-    codes = [one.code for one in CLASSES]
+    codes = [message_class.code for message_class in CLASSES]
     assert len(codes) == len(set(codes)) > 60
 
 
@@ -67,10 +67,10 @@ def test_each_code_is_one_class():
     ],
 )
 def test_an_error_has_the_words_of_terminal_and_page(error, terminal, page):
-    for one in (error, pickle.loads(pickle.dumps(error))):
-        assert str(one).endswith(terminal)
-        assert one.line(page=True).endswith(page)
-        assert getattr(one, "code", "") in ("", "not-leaning")
+    for copy in (error, pickle.loads(pickle.dumps(error))):
+        assert str(copy).endswith(terminal)
+        assert copy.line(page=True).endswith(page)
+        assert getattr(copy, "code", "") in ("", "not-leaning")
 
 
 def test_a_notice_has_the_words_of_terminal_and_page():
@@ -88,8 +88,8 @@ def test_the_data_of_a_notice_are_its_fields_in_order():
 
 
 def test_the_same_line_is_kept_once():
-    first, same, other = UpOff(20.04, False), UpOff(20.0, False), UpOff(20.0, True)
-    assert distinct([first, same, other]) == [first, other]
+    first, equal, other = UpOff(20.04, False), UpOff(20.0, False), UpOff(20.0, True)
+    assert distinct([first, equal, other]) == [first, other]
 
 
 def test_a_file_that_is_not_a_calibration_is_refused(tmp_path):

@@ -126,9 +126,9 @@ def test_every_command_has_help_and_the_convention_of_logs():
 
 def test_shell_sees_one_line_on_standard_error_and_status_2(tmp_path):
     arguments = "-m kickstand_tools.cli replay none.csv --calibration x --out y".split()
-    done = subprocess.run([sys.executable, *arguments], cwd=tmp_path, capture_output=True, text=True)
-    assert (done.returncode, done.stdout) == (2, "") and not list(tmp_path.iterdir())
-    assert done.stderr == "kickstand: x: there is no such file: make it with kickstand calibrate\n"
+    process = subprocess.run([sys.executable, *arguments], cwd=tmp_path, capture_output=True, text=True)
+    assert (process.returncode, process.stdout) == (2, "") and not list(tmp_path.iterdir())
+    assert process.stderr == "kickstand: x: there is no such file: make it with kickstand calibrate\n"
 
 
 def test_slow_commands_show_progress_on_a_terminal(tmp_path, monkeypatch):

@@ -19,9 +19,9 @@ def checked_in():
 
 @pytest.mark.long  # device and demo run to draw their displays
 def test_no_drawing_is_stale():
-    drawings, kept = drawn.drawn(), checked_in()
-    stale = [name for name, svg in drawings.items() if kept.get(name) != svg]
-    assert not stale and drawings.keys() == kept.keys(), f"{', '.join(stale)}: {STALE}"
+    drawings, committed = drawn.drawn(), checked_in()
+    stale = [name for name, svg in drawings.items() if committed.get(name) != svg]
+    assert not stale and drawings.keys() == committed.keys(), f"{', '.join(stale)}: {STALE}"
 
 
 @pytest.mark.long  # each case draws a ride; host_tests/analysis tests the content of plots
@@ -30,12 +30,12 @@ def test_no_plot_of_a_ride_is_stale(name, draw):
     """The pixels of the pictures are compared. The files themselves differ between versions of matplotlib."""
     from PIL import Image
 
-    fresh, kept = (
+    fresh, committed = (
         np.asarray(Image.open(io.BytesIO(data)).convert("L"), dtype=float)
         for data in (draw(), (PICTURES / name).read_bytes())
     )
-    assert fresh.shape == kept.shape, STALE
-    difference = float(np.mean(np.abs(fresh - kept)))
+    assert fresh.shape == committed.shape, STALE
+    difference = float(np.mean(np.abs(fresh - committed)))
     assert difference < 1.0, STALE  # `difference` is the mean difference of the pixels, which are 0 to 255
 
 

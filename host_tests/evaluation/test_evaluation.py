@@ -38,8 +38,8 @@ def test_every_estimator_is_scored_and_none_beats_the_oracle():
     """In a long turn, the lean of filters that trust the force decays. Riders complain about this decay. The oracle
     knows the speed, the alignment and the sensor's errors."""
     scores = swept().scores
-    others = {"kickstand", "smoothed", "formula", "formula 0.3 s", "possible", "GPS 1 Hz", "GPS 10 Hz"}
-    assert swept().refusal is None and set(scores) == {*others, *FILTERS}
+    names = {"kickstand", "smoothed", "formula", "formula 0.3 s", "possible", "GPS 1 Hz", "GPS 10 Hz"}
+    assert swept().refusal is None and set(scores) == {*names, *FILTERS}
     assert all(
         np.all(np.isfinite(lean)) and len(lean) == len(swept().traces["time"]) for lean in swept().traces.values()
     )

@@ -57,13 +57,13 @@ def test_lag_is_found_between_samples(late_ms):
 
 
 def test_pooling_keeps_the_worst_of_the_rides_that_have_a_figure():
-    nothing = float("nan")
-    scores = [LeanScore(1.0, 2.0, 3.0, 0.9, 5.0, 0.1), LeanScore(3.0, 4.0, 9.0, 1.1, nothing, -0.6)]
+    unknown = float("nan")
+    scores = [LeanScore(1.0, 2.0, 3.0, 0.9, 5.0, 0.1), LeanScore(3.0, 4.0, 9.0, 1.1, unknown, -0.6)]
     assert pooled(scores) == pytest.approx({
         "rms": math.sqrt(5.0), "worst_ride_rms": 3.0, "p95": 3.0, "worst": 9.0, "slope": 1.0, "slope_low": 0.9,
         "slope_high": 1.1, "lag_ms": 5.0, "straight_bias": -0.6,
     })  # fmt: skip
-    lone = pooled([LeanScore(1.0, 2.0, 3.0, nothing, nothing, nothing), scores[0]])
+    lone = pooled([LeanScore(1.0, 2.0, 3.0, unknown, unknown, unknown), scores[0]])
     assert [lone[name] for name in ("slope", "slope_low", "slope_high", "lag_ms")] == [0.9, 0.9, 0.9, 5.0]
 
 
