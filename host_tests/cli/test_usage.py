@@ -54,7 +54,7 @@ REFUSALS = {
     "simulate --fleet 2 --out .": "holds a ride, whose truth would be lost",
     "simulate --profile street --out fleet": "holds a fleet, whose truth would be lost",
     **{f"{line} --out ride.csv": "ride.csv is a file: give --out the name of a directory"
-       for line in ("simulate --profile parked", "evaluate --profiles parked", "pull", "web")},
+       for line in ("simulate --profile parked", "pull", "web")},
     "import ride.csv --columns t --out o.csv": "--columns: 't' is not NAME=VALUE; separate the pairs with commas",
     "import ride.csv --units a=g,a=g --out o.csv": "--units: 'a' is given twice",
 }  # fmt: skip
