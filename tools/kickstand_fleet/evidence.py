@@ -158,8 +158,8 @@ def blocks(logs: list[Intervals]) -> Blocks:
         begin_s.append(log.t_s[starts])
         end_s.append(log.t_s[np.append(starts[1:], len(log.t_s)) - 1])
     if not square:
-        none = np.zeros(0)
-        return Blocks(np.zeros((0, 4, 4)), np.zeros((0, 4, 3)), np.zeros((0, 3, 3)), np.zeros(0, int), none, none)
+        empty = np.zeros(0)
+        return Blocks(np.zeros((0, 4, 4)), np.zeros((0, 4, 3)), np.zeros((0, 3, 3)), np.zeros(0, int), empty, empty)
     return Blocks(*(np.concatenate(parts) for parts in (square, product, sway, log_index, begin_s, end_s)))
 
 
@@ -282,10 +282,10 @@ def _integrals(columns: Iterable[Array], t_s: Array, step: Array, time: Array) -
 def _thinned(time: Array, speed: Array) -> tuple[Array, Array]:
     """Keep at most one speed per INTERVAL_S. Returns the times and the speeds that are kept."""
     selected, last = [], -np.inf
-    for k, now in enumerate(time.tolist()):
-        if now - last >= INTERVAL_S:
+    for k, time_s in enumerate(time.tolist()):
+        if time_s - last >= INTERVAL_S:
             selected.append(k)
-            last = now
+            last = time_s
     return time[selected], speed[selected]
 
 

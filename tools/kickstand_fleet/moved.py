@@ -226,12 +226,12 @@ def _moment_of_jump(log: Intervals, move: Move) -> float | None:
     # Unit vector of the direction in which the vertical moves
     tips = (left * move.turn_deg[2] - forward * move.turn_deg[0]) / tilt
     best, moment = 0.0, move.at_s
-    for now in time[np.abs(time - move.at_s) < 2.5 * STEP_S]:
-        early = (time > now - STEP_GAP_S - STEP_S) & (time < now - STEP_GAP_S)
-        late = (time > now + STEP_GAP_S) & (time < now + STEP_GAP_S + STEP_S)
+    for time_s in time[np.abs(time - move.at_s) < 2.5 * STEP_S]:
+        early = (time > time_s - STEP_GAP_S - STEP_S) & (time < time_s - STEP_GAP_S)
+        late = (time > time_s + STEP_GAP_S) & (time < time_s + STEP_GAP_S + STEP_S)
         if np.count_nonzero(early) < 3 or np.count_nonzero(late) < 3:
             continue
         step = np.degrees((np.median(level[late], axis=0) - np.median(level[early], axis=0)) @ tips)
         if step > best:
-            best, moment = float(step), float(now)
+            best, moment = float(step), float(time_s)
     return moment if best > STEP_SHARE * tilt or tilt > SURELY_DEG else None

@@ -250,13 +250,13 @@ def _mirrored(driven: list[evidence.Intervals]) -> bool:
 def _moved_words(moves: list[Move], logs: list[Log]) -> str:
     first = moves[0]
     name = logs[first.log].name
-    more = f", and {len(moves) - 1} times more" if len(moves) > 1 else ""
+    repeats = f", and {len(moves) - 1} times more" if len(moves) > 1 else ""
     turned = f"the mount was turned by {first.angle_deg:.0f} degrees"
     if first.at_s is None:
-        return f"{turned} before {name}{more}: give {name} and the logs after it another mount in the manifest"
+        return f"{turned} before {name}{repeats}: give {name} and the logs after it another mount in the manifest"
     return (
-        f"{turned} in {name} at {first.at_s:.0f} s{more}: cut it there (kickstand cut), and give the second part and "
-        "the logs after it another mount in the manifest"
+        f"{turned} in {name} at {first.at_s:.0f} s{repeats}: cut it there (kickstand cut), and give the second part "
+        "and the logs after it another mount in the manifest"
     )
 
 

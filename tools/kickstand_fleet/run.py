@@ -143,8 +143,8 @@ def _note_changed(period: Period, marks: dict[str, str], result: PeriodResult) -
     Returns True if there is such a log, because the result may then come from the old or the new version. Logs in a
     store are not checked: a file read from a store is always one complete version.
     """
-    now = files.identities(path for path in period.paths if not files.is_remote(path))
-    changed = [path for path, mark in now.items() if mark != marks[path]]
+    current = files.identities(path for path in period.paths if not files.is_remote(path))
+    changed = [path for path, mark in current.items() if mark != marks[path]]
     for path in map(files.printable, changed):
         whose = {"vehicle": period.vehicle, "mount": period.mount, "log": path, "reason": CHANGED}
         result.errors.append(whose | {"message": f"{path} has changed during the run: run the command again"})

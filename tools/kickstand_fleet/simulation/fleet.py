@@ -134,8 +134,8 @@ def _vehicle(
 ) -> MadeVehicle:
     kind = ("car", "bus", "motorcycle")[k % 3]
     name = f"{kind}-{k:04d}"
-    several = trouble in ("moved-between", "dies") or (trouble in ("", "garbage", "empty", "missing"))
-    drives = int(chance.integers(2, 4)) if several and (trouble or chance.random() < 0.5) else 1
+    has_several_drives = trouble in ("moved-between", "dies") or (trouble in ("", "garbage", "empty", "missing"))
+    drives = int(chance.integers(2, 4)) if has_several_drives and (trouble or chance.random() < 0.5) else 1
     sensor = random_sensor(chance)
     receiver = Receiver(float(chance.choice([0.2, 0.5, 1.0])), float(chance.uniform(0.0, 1.2)))
     if trouble == "late":

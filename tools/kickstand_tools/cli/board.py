@@ -40,17 +40,17 @@ def flash_command(port: str | None, config: bool, yes: bool) -> None:
         echo(f"note: {setting} is not used, because a '#' is in front of it: remove it, and flash --config")
     if result.why_sources:
         echo(f"note: {result.why_sources}: the board gets the sources and starts more slowly")
-    done = result.installed
-    if done.config_differs:
+    installed = result.installed
+    if installed.config_differs:
         echo("kept: config.py on the board is not this version's; --config would replace it")
-    if len(done.removed) > _NAMED_ONE_BY_ONE:
-        echo(f"removed: {len(done.removed)} files that are no longer part of the firmware")
+    if len(installed.removed) > _NAMED_ONE_BY_ONE:
+        echo(f"removed: {len(installed.removed)} files that are no longer part of the firmware")
     else:
-        for path in done.removed:
+        for path in installed.removed:
             echo(f"removed: {path[1:]} is no longer part of the firmware")
     echo(
-        f"copied {len(done.copied)} files, {done.copied_bytes / 1000:.1f} kB, and verified them; "
-        f"{len(done.kept)} left as they were"
+        f"copied {len(installed.copied)} files, {installed.copied_bytes / 1000:.1f} kB, and verified them; "
+        f"{len(installed.kept)} left as they were"
     )
     echo("restarted: the display shows the rest")
 

@@ -122,15 +122,15 @@ def _ended_by_signals() -> Iterator[None]:
     def end(number: int, _frame: object) -> None:
         raise _Ended(number)
 
-    before = {}
+    handlers = {}
     if threading.current_thread() is threading.main_thread():
         names = ("SIGTERM", "SIGHUP")  # Windows has no SIGHUP, and nohup ignores it
         numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
-        before = {n: signal.signal(n, end) for n in numbers if signal.getsignal(n) == signal.SIG_DFL}
+        handlers = {n: signal.signal(n, end) for n in numbers if signal.getsignal(n) == signal.SIG_DFL}
     try:
         yield
     finally:
-        for number, handler in before.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)
 
 

@@ -60,9 +60,9 @@ class Score:
         phase = state["phase"]
         self._turns += phase == "held turn" != self._phase
         self._phase = phase
-        shown = shown_lean(state["lcd"])
-        if shown is not None:
-            self._pairs.setdefault(self._part(phase), []).append((state["lean_deg"], shown))
+        lean = shown_lean(state["lcd"])
+        if lean is not None:
+            self._pairs.setdefault(self._part(phase), []).append((state["lean_deg"], lean))
 
     def _part(self, phase: str) -> str:
         if phase == "held turn":
@@ -106,12 +106,12 @@ def table(figures: dict[str, Figures]) -> Table | str:
 
 
 def _figures(pairs: list[tuple[float, float]]) -> Figures:
-    errors = [shown - true for true, shown in pairs]
+    errors = [lean - true for true, lean in pairs]
     count = len(pairs)
     return Figures(
         count,
         sum(true for true, _ in pairs) / count,
-        sum(shown for _, shown in pairs) / count,
+        sum(lean for _, lean in pairs) / count,
         sqrt(sum(error * error for error in errors) / count),
         max(errors, key=abs),
     )

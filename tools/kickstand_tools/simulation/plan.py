@@ -74,7 +74,7 @@ class Plan:
 
         No leg gets shorter than _SHORTEST_S, so the ride may stay longer than `seconds`.
         """
-        steady = [leg for before, leg in pairwise(self.legs) if leg.speed_mps in (None, before.speed_mps)]
+        steady = [leg for previous, leg in pairwise(self.legs) if leg.speed_mps in (None, previous.speed_mps)]
         while steady and (over := sum(leg.seconds for leg in self.legs) - seconds):
             longest = max(steady, key=lambda leg: leg.seconds)
             cut = min(over, longest.seconds - _SHORTEST_S)

@@ -28,8 +28,8 @@ _WHEN_READ = (*LATER, documents.FOLDER)  # the service worker stores these when 
 def python_files() -> dict[str, str]:
     """Return {path for import: source} of the firmware's package and of the tools' modules that the page Try runs."""
     package = firmware_path.PACKAGE
-    found = {path.relative_to(package.parent).as_posix(): path for path in sorted(package.rglob("*.py"))}
-    return {name: path.read_text(encoding="utf-8") for name, path in (found | archives.tools("web/device.py")).items()}
+    files = {path.relative_to(package.parent).as_posix(): path for path in sorted(package.rglob("*.py"))}
+    return {name: path.read_text(encoding="utf-8") for name, path in (files | archives.tools("web/device.py")).items()}
 
 
 def site_files() -> dict[str, bytes]:
@@ -60,8 +60,8 @@ def site_files() -> dict[str, bytes]:
     sizes = {name: len(data) for name, data in files.items() if name.startswith(LATER)}
     files["sizes.json"] = json.dumps(sizes).encode()
     version = hashlib.sha256(b"".join(name.encode() + data for name, data in sorted(files.items()))).hexdigest()[:12]
-    kept = sorted(["./", *(name for name in files if name not in _NOT_KEPT and not name.startswith(_WHEN_READ))])
-    files["service_worker.js"] = _filled("service_worker.js", files=kept, version=version)
+    stored = sorted(["./", *(name for name in files if name not in _NOT_KEPT and not name.startswith(_WHEN_READ))])
+    files["service_worker.js"] = _filled("service_worker.js", files=stored, version=version)
     return files
 
 
@@ -71,7 +71,7 @@ def home() -> str:
         named = metadata.metadata(DISTRIBUTION).get_all("Project-URL") or []
     except metadata.PackageNotFoundError:
         named = []
-    return dict(one.split(", ", 1) for one in named).get("Homepage", "")
+    return dict(entry.split(", ", 1) for entry in named).get("Homepage", "")
 
 
 def shop_boards() -> dict[str, dict[str, str]]:
@@ -83,10 +83,10 @@ def shop_boards() -> dict[str, dict[str, str]]:
     text = (firmware_path.documents() / "firmware" / "docs" / "settings.md").read_text(encoding="utf-8")
     boards = {}
     for line in re.findall(r"(?m)^\| board \| `SENSOR_SDA`.*\n\|.*\n((?:\|.*\n)+)", text)[0].splitlines():
-        name, sensor, display, button, more, _ = (cell.strip() for cell in line.strip("|").split("|"))
+        name, sensor, display, button, options, _ = (cell.strip() for cell in line.strip("|").split("|"))
         pins = re.findall(r"\d+", re.sub(r"\(.*?\)", "", f"{sensor} {display} {button}"))
         names = "SENSOR_SDA", "SENSOR_SCL", "LCD_SDA", "LCD_SCL", "BUTTON_PIN"
-        boards[name] = dict(zip(names, pins, strict=True)) | dict(re.findall(r"`(\w+) = (\w+)`", more))
+        boards[name] = dict(zip(names, pins, strict=True)) | dict(re.findall(r"`(\w+) = (\w+)`", options))
     return boards
 
 

@@ -49,13 +49,13 @@ class Holder:
             force: force of the sensor, shape (n, 3), in g.
             rates: rates of the sensor, shape (n, 3), in deg/s.
         """
-        held = np.column_stack([self._by_spring(column, k, rate_hz) for k, column in enumerate(force.T)])
-        turned = np.zeros_like(held)
-        turned[:, 0] = (self.sag[0] * held[:, 2]).clip(-_SAG_LIMIT, _SAG_LIMIT)
-        turned[:, 2] = (-self.sag[2] * held[:, 0]).clip(-_SAG_LIMIT, _SAG_LIMIT)
+        sprung = np.column_stack([self._by_spring(column, k, rate_hz) for k, column in enumerate(force.T)])
+        turned = np.zeros_like(sprung)
+        turned[:, 0] = (self.sag[0] * sprung[:, 2]).clip(-_SAG_LIMIT, _SAG_LIMIT)
+        turned[:, 2] = (-self.sag[2] * sprung[:, 0]).clip(-_SAG_LIMIT, _SAG_LIMIT)
         turning = np.column_stack([derivative(column, rate_hz) for column in turned.T])
         held_rates = np.column_stack([self._by_spring(column, k, rate_hz) for k, column in enumerate(rates.T)])
-        return held - np.cross(turned, held), held_rates + np.degrees(turning)
+        return sprung - np.cross(turned, sprung), held_rates + np.degrees(turning)
 
     def _by_spring(self, x: Signal, axis: int, rate_hz: float) -> Signal:
         """Return the motion of a mass on a spring whose base moves by x."""

@@ -101,8 +101,8 @@ def _imports(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes
     names = list(dict.fromkeys(names))
     files = {path: content for path, content in files.items() if path.lstrip("/") != "main.py"}
     with kind(world, files) as device:
-        said = device.exec(_GUEST.format(names=names), _LIMIT_S)
-    took_us = ast.literal_eval(said.split("took ")[1])
+        output = device.exec(_GUEST.format(names=names), _LIMIT_S)
+    took_us = ast.literal_eval(output.split("took ")[1])
     return {name: us / 1e6 for name, us in zip(names, took_us, strict=True)}
 
 

@@ -48,17 +48,17 @@ def measure(browser: Any, address: str, files: dict[str, bytes], name: str) -> P
     name: The page, a key of READY.
     """
     context = browser.new_context(service_workers="block", **PHONE)
-    asked: set[str] = set()
-    context.on("request", lambda request: asked.add(request.url.removeprefix(address)))
+    requests: set[str] = set()
+    context.on("request", lambda request: requests.add(request.url.removeprefix(address)))
     page = context.new_page()
     context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": SLOWER})
     page.goto(address + name)
     page.wait_for_selector(READY[name])
     ready_ms = page.evaluate("performance.now()")
-    size = sum(len(gzip.compress(files[path or "index.html"])) for path in asked if (path or "index.html") in files)
-    found = PageFigures(page.evaluate(_PAINT), ready_ms, size)
+    size = sum(len(gzip.compress(files[path or "index.html"])) for path in requests if (path or "index.html") in files)
+    figures = PageFigures(page.evaluate(_PAINT), ready_ms, size)
     context.close()
-    return found
+    return figures
 
 
 def main() -> None:

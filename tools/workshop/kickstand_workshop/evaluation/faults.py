@@ -100,8 +100,8 @@ def _gyro_axis_scaled(part: Part, scale: float) -> None:
 
 
 def _gyro_axes_swapped(part: Part) -> None:
-    others = [k for k in range(3) if k != part.axis]
-    part.rate[:, others] = part.rate[:, others[::-1]].copy()
+    axes = [k for k in range(3) if k != part.axis]
+    part.rate[:, axes] = part.rate[:, axes[::-1]].copy()
 
 
 def _gyro_bias_steps(part: Part, dps: float) -> None:
@@ -167,8 +167,8 @@ def _readings_lost(part: Part) -> None:
 
 def _readings_lost_now_and_then(part: Part) -> None:
     """Lose the readings of 0.3 s every ten seconds."""
-    every, n = round(10.0 * part.rate_hz), round(0.3 * part.rate_hz)
-    part.lost[np.arange(len(part.lost)) % every < n] = True
+    period, n = round(10.0 * part.rate_hz), round(0.3 * part.rate_hz)
+    part.lost[np.arange(len(part.lost)) % period < n] = True
 
 
 def _all(name: str, kind: str, change: Callable[[Part], None]) -> Iterator[Fault]:
@@ -253,17 +253,17 @@ def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: i
     vehicle_from_sensor: Rotation from sensor to bike axes, shape (3, 3).
     """
     chance = np.random.default_rng([seed, *fault.title.encode()])
-    made = readings.copy()
-    lost = np.zeros(len(made), dtype=bool)
+    faulty = readings.copy()
+    lost = np.zeros(len(faulty), dtype=bool)
     first = 0 if fault.from_start else round(begin_s * rate_hz)
-    end = len(made) if fault.seconds is None else min(len(made), first + round(fault.seconds * rate_hz))
+    end = len(faulty) if fault.seconds is None else min(len(faulty), first + round(fault.seconds * rate_hz))
     span = slice(first, end)
     # Apply a fault of the kind SEEN along the chip's own axes. A rotated fault would not show in the counts
     square = seed // 3 % 2 == 0 and fault.kind != SEEN
     turned = vehicle_from_sensor if square else np.eye(3)
     part = Part(
-        made[span, :3] @ turned.T,
-        made[span, 4:] @ turned.T,
+        faulty[span, :3] @ turned.T,
+        faulty[span, 4:] @ turned.T,
         lost[span],
         rate_hz,
         seed % 3,
@@ -271,6 +271,6 @@ def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: i
         chance,
     )
     fault.change(part)
-    made[span, :3] = (part.force @ turned).clip(-ACCEL_RANGE_G, ACCEL_RANGE_G)
-    made[span, 4:] = (part.rate @ turned).clip(-GYRO_RANGE_DPS, GYRO_RANGE_DPS)
-    return Ill(made, lost, first, end)
+    faulty[span, :3] = (part.force @ turned).clip(-ACCEL_RANGE_G, ACCEL_RANGE_G)
+    faulty[span, 4:] = (part.rate @ turned).clip(-GYRO_RANGE_DPS, GYRO_RANGE_DPS)
+    return Ill(faulty, lost, first, end)

@@ -72,12 +72,12 @@ def lag_ms(shown: NDArray, true: NDArray, rate_hz: float) -> float:
 
 def straights(truth: dict[str, NDArray], rate_hz: float) -> NDArray[np.bool_]:
     """Return True where the bike has ridden straight ahead for at least a second at over 5 m/s, shape (n)."""
-    now = (
+    is_straight = (
         (np.abs(truth["yaw_rate_dps"]) < _STRAIGHT_DPS)
         & (np.abs(truth["lean_deg"]) < _STRAIGHT_DEG)
         & (truth["speed_mps"] > _STRAIGHT_MPS)
     )
-    since = np.arange(len(now)) - np.maximum.accumulate(np.where(now, -1, np.arange(len(now))))
+    since = np.arange(len(is_straight)) - np.maximum.accumulate(np.where(is_straight, -1, np.arange(len(is_straight))))
     return since > _STRAIGHT_S * rate_hz
 
 

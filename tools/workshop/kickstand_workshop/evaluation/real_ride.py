@@ -65,13 +65,13 @@ def compare(path: Path) -> RecordingScores:
     reference = reference_lean(log, calibration)
     time = log.t_s
     riding = speed > _RIDING_MPS
-    shown = estimate(log, calibration)
+    leans = estimate(log, calibration)
     scores = {
         name: RealScore(rms((lean - reference)[riding]), slope(lean[riding], reference[riding], _LEANED_DEG))
-        for name, lean in shown.items()
+        for name, lean in leans.items()
     }
     notices = [*log.notices, *remarks(log, calibration, axes=False)]
-    return RecordingScores(path.name, scores, {"time": time, "reference": reference, **shown}, notices)
+    return RecordingScores(path.name, scores, {"time": time, "reference": reference, **leans}, notices)
 
 
 def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64]:
@@ -84,7 +84,7 @@ def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64
 
 def _speed(log: Log) -> NDArray[np.float64]:
     """Return the speed at each sample in m/s, interpolated between the logged values."""
-    there = ~np.isnan(log.speed_mps)
-    if np.count_nonzero(there) < 2:
+    has_speed = ~np.isnan(log.speed_mps)
+    if np.count_nonzero(has_speed) < 2:
         raise InputError(f"{log.name} has no speed: without it there is no reference")
-    return np.interp(log.t_s, log.t_s[there], log.speed_mps[there])
+    return np.interp(log.t_s, log.t_s[has_speed], log.speed_mps[has_speed])

@@ -109,16 +109,16 @@ def run(job: Job) -> Result:
     The calibration uses one log of the six positions, and the two poses.
     """
     upright_sign, pitch_sign = (1, -1)[job.seed % 2], (1, -1)[job.seed // 2 % 2]
-    made = ride(
+    simulated = ride(
         job.profile, job.seed, job.seconds, upright_sign * job.upright_error_deg, pitch_sign * job.pitch_change_deg
     )
     try:
-        calibration = calibrated_by_log(made)
+        calibration = calibrated_by_log(simulated)
     except InputError as error:
         return Result(job, refusal=str(error))
-    shown = estimators.estimate(as_log(made), calibration) | possible.leans(made)
-    scores = {name: score(lean, made.truth, made.rate_hz) for name, lean in shown.items()}
-    traces = {"time": made.time, "true": made.truth["lean_deg"], **shown} if job.traces else {}
+    leans = estimators.estimate(as_log(simulated), calibration) | possible.leans(simulated)
+    scores = {name: score(lean, simulated.truth, simulated.rate_hz) for name, lean in leans.items()}
+    traces = {"time": simulated.time, "true": simulated.truth["lean_deg"], **leans} if job.traces else {}
     return Result(job, scores, traces)
 
 

@@ -115,7 +115,7 @@ def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: 
     begun, said_h = time.monotonic(), 0.0
     chance = random.Random(seed)
     bike: SoakBoard | None = None
-    before = os.getcwd()
+    directory = os.getcwd()
     with tempfile.TemporaryDirectory() as folder:
         try:
             while figures.hours < hours:
@@ -133,7 +133,7 @@ def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: 
                     said_h = figures.hours
                     say(f"{said_h:.1f} h in {figures.host_s:.0f} s, {len(figures.found)} findings")
         finally:
-            os.chdir(before)
+            os.chdir(directory)
     return figures
 
 
