@@ -128,18 +128,13 @@ def _result(period: Period, signals_to: str | None) -> PeriodResult:
 
 @dataclass
 class _Drive:
-    """The alignment from the logs of a period.
+    """The alignment from the logs of a period."""
 
-    fit: Alignment by the firmware's method.
-    intervals: Intervals of each log. Empty if the firmware refused the logs and no other method can help.
-    moves: Moves of the mount.
-    forward: Alignment from all logs, or None if they do not determine it.
-    """
-
-    fit: DriveFit
+    fit: DriveFit  # alignment by the firmware's method
+    # Intervals of each log. Empty if the firmware refused the logs and no other method can help.
     intervals: list[evidence.Intervals] = field(default_factory=list)
-    moves: list[Move] = field(default_factory=list)
-    forward: Forward | None = None
+    moves: list[Move] = field(default_factory=list)  # moves of the mount
+    forward: Forward | None = None  # alignment from all logs, or None if they do not determine it
 
 
 def _drive(period: Period, logs: list[Log]) -> _Drive:

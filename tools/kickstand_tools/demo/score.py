@@ -12,25 +12,16 @@ _STANDING = ("kickstand", "upright", "moving", "wait")
 
 
 class State(TypedDict):
-    """One tick of the device.
+    """One tick of the device."""
 
-    t_s: Simulated time.
-    of_s: Duration of the run. None if the bike is steered by hand.
-    lcd: Both lines of the display.
-    lean_deg: True lean, positive to the right.
-    speed_mps: True speed.
-    phase: Name of the bike's present manoeuvre.
-    pressed: True while the button is pressed.
-    pixels: Pixels of an OLED as hex, 64 rows of 128 pixels. A byte has 8 pixels, the leftmost in bit 7.
-    """
-
-    t_s: float
-    of_s: float | None
-    lcd: list[str]
-    lean_deg: float
-    speed_mps: float
-    phase: str
-    pressed: bool
+    t_s: float  # simulated time
+    of_s: float | None  # duration of the run. None if the bike is steered by hand.
+    lcd: list[str]  # both lines of the display
+    lean_deg: float  # True lean, positive to the right
+    speed_mps: float  # True speed
+    phase: str  # name of the bike's present manoeuvre
+    pressed: bool  # True while the button is pressed
+    # Pixels of an OLED as hex, 64 rows of 128 pixels. A byte has 8 pixels, the leftmost in bit 7.
     pixels: NotRequired[str]
 
 

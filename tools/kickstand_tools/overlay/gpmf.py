@@ -21,14 +21,10 @@ _NESTED = b"\0"
 
 @dataclass
 class Telemetry:
-    """Readings of the camera's gyro.
+    """Readings of the camera's gyro."""
 
-    t_s: time since the video's first picture, in s, shape (n).
-    rate_dps: rates about the camera's axes, in deg/s, shape (n, 3).
-    """
-
-    t_s: Array
-    rate_dps: Array
+    t_s: Array  # time since the video's first picture, in s, shape (n)
+    rate_dps: Array  # rates about the camera's axes, in deg/s, shape (n, 3)
 
 
 def telemetry(video: Video) -> Telemetry | None:

@@ -17,34 +17,23 @@ from ..logs.reader import is_log
 
 @dataclass
 class GivenRide:
-    """A ride among the given files.
+    """A ride among the given files."""
 
-    log: a file, or a folder with the files of one recording.
-    files: names of all its files.
-    calibration: name of its calibration file, or "".
-    track: name of a .gpx or .fit file to join with the ride, or "".
-    table: the table whose columns the user must choose; None if the columns are known.
-    """
-
-    log: str
-    files: list[str]
-    calibration: str = ""
-    track: str = ""
+    log: str  # a file, or a folder with the files of one recording
+    files: list[str]  # names of all its files
+    calibration: str = ""  # name of its calibration file, or ""
+    track: str = ""  # name of a .gpx or .fit file to join with the ride, or ""
+    # The table whose columns the user must choose; None if the columns are known
     table: mapped.MappedTable | None = None
 
 
 @dataclass
 class Given:
-    """The result of sorted_out().
+    """The result of sorted_out()."""
 
-    rides: sorted by name.
-    kinds: {name of a file: its kind}.
-    refused: {name of a file: the reason why it cannot be used}.
-    """
-
-    rides: list[GivenRide] = field(default_factory=list)
-    kinds: dict[str, str] = field(default_factory=dict)
-    refused: dict[str, InputError] = field(default_factory=dict)
+    rides: list[GivenRide] = field(default_factory=list)  # sorted by name
+    kinds: dict[str, str] = field(default_factory=dict)  # {name of a file: its kind}
+    refused: dict[str, InputError] = field(default_factory=dict)  # {name of a file: the reason why it cannot be used}
 
 
 def sorted_out(names: list[str]) -> Given:

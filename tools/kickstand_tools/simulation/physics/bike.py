@@ -75,16 +75,11 @@ class Bike:
 
 @dataclass
 class Roll:
-    """Motion in roll and yaw.
+    """Motion in roll and yaw."""
 
-    lean: Lean of the chassis, in rad.
-    balance: Lean of the centre of mass, in rad.
-    yaw_rate: Rate about the vertical, in rad/s.
-    """
-
-    lean: Signal
-    balance: Signal
-    yaw_rate: Signal
+    lean: Signal  # lean of the chassis, in rad
+    balance: Signal  # lean of the centre of mass, in rad
+    yaw_rate: Signal  # rate about the vertical, in rad/s
 
 
 def chassis_lean(balance: Signal, bike: Bike, bank: Signal | float = 0.0, hang: Signal | float = 0.0) -> Signal:

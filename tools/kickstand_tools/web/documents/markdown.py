@@ -16,32 +16,21 @@ Link = Callable[[str], str | None]
 
 @dataclass
 class Heading:
-    """A heading of a document.
+    """A heading of a document."""
 
-    level: 1 for the title.
-    name: its anchor.
-    text: its text without markup.
-    """
-
-    level: int
-    name: str
-    text: str
+    level: int  # 1 for the title
+    name: str  # its anchor
+    text: str  # its text without markup
 
 
 @dataclass
 class Document:
-    """A converted document.
+    """A converted document."""
 
-    title: text of the first heading.
-    about: text of the first paragraph.
-    headings: all headings except the title.
-    html: the whole document.
-    """
-
-    title: str
-    about: str
-    headings: list[Heading]
-    html: str
+    title: str  # text of the first heading
+    about: str  # text of the first paragraph
+    headings: list[Heading]  # all headings except the title
+    html: str  # the whole document
 
 
 def anchor(text: str) -> str:

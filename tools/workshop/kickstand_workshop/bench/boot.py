@@ -32,20 +32,13 @@ print("took", took)
 
 @dataclass(frozen=True)
 class Boot:
-    """The parts of a start. All times but the last count from power-on.
+    """The parts of a start. All times but the last count from power-on."""
 
-    micropython_s: Time at which main.py begins.
-    starting_s: Time at which the display says that Kickstand starts.
-    sampling_s: Time at which the sensor is set up and samples.
-    lean_s: Time at which the display shows the first lean.
-    import_s: Time for importing each module, by its name.
-    """
-
-    micropython_s: float
-    starting_s: float
-    sampling_s: float
-    lean_s: float
-    import_s: dict[str, float]
+    micropython_s: float  # time at which main.py begins
+    starting_s: float  # time at which the display says that Kickstand starts
+    sampling_s: float  # time at which the sensor is set up and samples
+    lean_s: float  # time at which the display shows the first lean
+    import_s: dict[str, float]  # time for importing each module, by its name
 
 
 def boot(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes], compiled: bool = True) -> Boot:

@@ -27,16 +27,11 @@ _PAINT = "performance.getEntriesByName('first-contentful-paint')[0].startTime"
 
 
 class PageFigures(NamedTuple):
-    """The figures of a page that is opened for the first time.
+    """The figures of a page that is opened for the first time."""
 
-    paint_ms: Time until the first paint.
-    ready_ms: Time until the page can be used.
-    size: Bytes of the compressed files that the page loads until it is ready.
-    """
-
-    paint_ms: float
-    ready_ms: float
-    size: int
+    paint_ms: float  # time until the first paint
+    ready_ms: float  # time until the page can be used
+    size: int  # bytes of the compressed files that the page loads until it is ready
 
 
 def measure(browser: Any, address: str, files: dict[str, bytes], name: str) -> PageFigures:

@@ -44,24 +44,15 @@ WAVES_PER_M = 0.03, 4.0
 
 @dataclass
 class DrawnRide:
-    """A ride with the logs of its devices and its true motion.
+    """A ride with the logs of its devices and its true motion."""
 
-    logs: one log per device on the bike. Each has its own clock.
-    calibrations: one calibration per device.
-    time_s: time of each true value, in s.
-    lean_deg: true lean at time_s.
-    speed_mps: true speed at time_s.
-    kind: the kind of ride, a key of DRAWN.
-    mounts: one mount per device, a key of MOUNTS.
-    """
-
-    logs: list
-    calibrations: list
-    time_s: np.ndarray
-    lean_deg: np.ndarray
-    speed_mps: np.ndarray
-    kind: str
-    mounts: list
+    logs: list  # one log per device on the bike. Each has its own clock.
+    calibrations: list  # one calibration per device
+    time_s: np.ndarray  # time of each true value, in s
+    lean_deg: np.ndarray  # true lean at time_s
+    speed_mps: np.ndarray  # true speed at time_s
+    kind: str  # the kind of ride, a key of DRAWN
+    mounts: list  # one mount per device, a key of MOUNTS
 
     def true_lean(self, k):
         """Return the true lean at the samples of device k."""

@@ -32,16 +32,11 @@ PACKAGES |= {f"{name} best": package for name, package in PACKAGES.items()}
 
 @dataclass
 class Samples:
-    """N calibrated samples of a log.
+    """N calibrated samples of a log."""
 
-    time: Evenly spaced times, shape (N), in s.
-    force: Force along left, up, forward, shape (N, 3), in g.
-    rate: Rate about the same axes, shape (N, 3), in deg/s.
-    """
-
-    time: NDArray[np.float64]
-    force: NDArray[np.float64]
-    rate: NDArray[np.float64]
+    time: NDArray[np.float64]  # evenly spaced times, shape (N), in s
+    force: NDArray[np.float64]  # force along left, up, forward, shape (N, 3), in g
+    rate: NDArray[np.float64]  # rate about the same axes, shape (N, 3), in deg/s
 
     @property
     def rate_hz(self) -> float:

@@ -22,42 +22,26 @@ ACCEL_RANGE_G, GYRO_RANGE_DPS = 16.0, 500.0  # ranges of the sensor, the default
 
 @dataclass
 class Part:
-    """The n readings during a fault. The fault changes force, rate and lost in place.
+    """The n readings during a fault. The fault changes force, rate and lost in place."""
 
-    force: Force in the chip's axes, shape (n, 3), in g.
-    rate: Rate in the chip's axes, shape (n, 3), in deg/s.
-    lost: True for readings that never arrive, shape (n).
-    rate_hz: Number of readings per second.
-    axis: Index of the faulty axis, for a fault of one axis.
-    sign: Direction of the fault, 1 or -1.
-    chance: Source of random numbers.
-    """
-
-    force: Array
-    rate: Array
-    lost: NDArray[np.bool_]
-    rate_hz: float
-    axis: int
-    sign: float
-    chance: np.random.Generator
+    force: Array  # force in the chip's axes, shape (n, 3), in g
+    rate: Array  # rate in the chip's axes, shape (n, 3), in deg/s
+    lost: NDArray[np.bool_]  # True for readings that never arrive, shape (n)
+    rate_hz: float  # number of readings per second
+    axis: int  # index of the faulty axis, for a fault of one axis
+    sign: float  # direction of the fault, 1 or -1
+    chance: np.random.Generator  # source of random numbers
 
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault of the sensor.
+    """A fault of the sensor."""
 
-    name: Description of the fault.
-    kind: SEEN, ILL or HARMLESS.
-    change: Function that applies the fault to a Part.
-    seconds: Duration of the fault. None if it lasts until the end of the ride.
-    from_start: True if the fault exists from power-on. False if it begins in mid-ride.
-    """
-
-    name: str
-    kind: str
-    change: Callable[[Part], None]
-    seconds: float | None = None
-    from_start: bool = False
+    name: str  # description of the fault
+    kind: str  # SEEN, ILL or HARMLESS
+    change: Callable[[Part], None]  # function that applies the fault to a Part
+    seconds: float | None = None  # duration of the fault. None if it lasts until the end of the ride.
+    from_start: bool = False  # True if the fault exists from power-on. False if it begins in mid-ride.
 
     @property
     def title(self) -> str:
@@ -218,18 +202,12 @@ FAULTS: tuple[Fault, ...] = (
 
 @dataclass
 class Ill:
-    """The readings of a ride with a fault.
+    """The readings of a ride with a fault."""
 
-    readings: Readings in the chip's order, shape (n, 7).
-    lost: True for readings that never arrive, shape (n).
-    first: Index of the first reading with the fault.
-    end: Index after the last reading with the fault.
-    """
-
-    readings: Array
-    lost: NDArray[np.bool_]
-    first: int
-    end: int
+    readings: Array  # readings in the chip's order, shape (n, 7)
+    lost: NDArray[np.bool_]  # True for readings that never arrive, shape (n)
+    first: int  # index of the first reading with the fault
+    end: int  # index after the last reading with the fault
 
     @property
     def saturated(self) -> NDArray[np.bool_]:

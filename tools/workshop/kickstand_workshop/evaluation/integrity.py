@@ -45,24 +45,15 @@ CAPTION = (
 
 @dataclass(frozen=True)
 class FaultJob:
-    """A ride to simulate, with or without a fault.
+    """A ride to simulate, with or without a fault."""
 
-    fault: The fault, or None.
-    seed: Seed of the ride and of the fault.
-    seconds: Riding time.
-    road: Class of the road, as for simulation.ride.ride().
-    mount: Fault of the mount, as for simulation.ride.ride().
-    profile: Profile of the ride. None lets the seed choose it from PROFILES.
-    device: True to run the whole device, False to run only the lean meter.
-    """
-
-    fault: Fault | None
-    seed: int
-    seconds: float = 120.0
-    road: str | None = None
-    mount: str | None = None
-    profile: str | None = None
-    device: bool = False
+    fault: Fault | None  # the fault, or None
+    seed: int  # seed of the ride and of the fault
+    seconds: float = 120.0  # riding time
+    road: str | None = None  # class of the road, as for simulation.ride.ride()
+    mount: str | None = None  # fault of the mount, as for simulation.ride.ride()
+    profile: str | None = None  # profile of the ride. None lets the seed choose it from PROFILES.
+    device: bool = False  # True to run the whole device, False to run only the lean meter
 
     @property
     def gps(self) -> bool:
@@ -78,47 +69,29 @@ class FaultJob:
 
 @dataclass
 class Trace:
-    """The display during a ride, and the truth. The arrays have one entry per pass of the loop, shape (n).
+    """The display during a ride, and the truth. The arrays have one entry per pass of the loop, shape (n)."""
 
-    time: Time in s.
-    lean: Lean of the meter, in degrees.
-    shown: True if the lean is shown.
-    true: True lean, in degrees.
-    speed: True speed, in m/s.
-    named_s: Time at which the display named a fault, or NaN.
-    first_s: Start of the fault.
-    end_s: End of the fault.
-    """
-
-    time: Array
-    lean: Array
-    shown: NDArray[np.bool_]
-    true: Array
-    speed: Array
-    named_s: float
-    first_s: float
-    end_s: float
+    time: Array  # time in s
+    lean: Array  # lean of the meter, in degrees
+    shown: NDArray[np.bool_]  # True if the lean is shown
+    true: Array  # True lean, in degrees
+    speed: Array  # True speed, in m/s
+    named_s: float  # time at which the display named a fault, or NaN
+    first_s: float  # start of the fault
+    end_s: float  # end of the fault
 
 
 @dataclass
 class Outcome:
-    """The result of a ride. Only the time after the bike set off counts.
+    """The result of a ride. Only the time after the bike set off counts."""
 
-    job: The ride.
-    misleading_s: Time with a misleading lean.
-    longest_s: Longest single stretch with a misleading lean.
-    available: Share of the riding time in which a lean is shown.
-    hidden_after_s: Time from the start of the fault until the lean is hidden. NaN if it is never hidden.
-    named_after_s: Time from the start of the fault until the display names the fault. NaN if it never does.
-    recovered: True if the lean is right RECOVERY_S after the fault ends. None for a fault that does not end.
-    """
-
-    job: FaultJob
-    misleading_s: float
-    longest_s: float
-    available: float
-    hidden_after_s: float
-    named_after_s: float
+    job: FaultJob  # the ride
+    misleading_s: float  # time with a misleading lean
+    longest_s: float  # longest single stretch with a misleading lean
+    available: float  # share of the riding time in which a lean is shown
+    hidden_after_s: float  # time from the start of the fault until the lean is hidden. NaN if it is never hidden.
+    named_after_s: float  # time from the start of the fault until the display names the fault. NaN if it never does.
+    # True if the lean is right RECOVERY_S after the fault ends. None for a fault that does not end.
     recovered: bool | None
 
 

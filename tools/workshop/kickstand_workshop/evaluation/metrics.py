@@ -17,22 +17,14 @@ _STRAIGHT_DPS, _STRAIGHT_DEG, _STRAIGHT_MPS, _STRAIGHT_S = 2.0, 6.0, 5.0, 1.0
 
 @dataclass
 class LeanScore:
-    """The errors of a shown lean. A figure is NaN if the ride does not determine it.
+    """The errors of a shown lean. A figure is NaN if the ride does not determine it."""
 
-    rms_deg: Root of the mean square of the error.
-    p95_deg: 95th percentile of the absolute error.
-    worst_deg: Largest absolute error.
-    slope: Shown lean divided by true lean.
-    lag_ms: Delay of the shown lean. Positive if the lean is late.
-    straight_bias_deg: Mean error on straights in the last tenth of the ride.
-    """
-
-    rms_deg: float
-    p95_deg: float
-    worst_deg: float
-    slope: float
-    lag_ms: float
-    straight_bias_deg: float
+    rms_deg: float  # root of the mean square of the error
+    p95_deg: float  # 95th percentile of the absolute error
+    worst_deg: float  # largest absolute error
+    slope: float  # shown lean divided by true lean
+    lag_ms: float  # delay of the shown lean. Positive if the lean is late.
+    straight_bias_deg: float  # mean error on straights in the last tenth of the ride
 
 
 def rms(error: NDArray) -> float:

@@ -31,30 +31,21 @@ _LEANED_DEG = 5.0  # smallest lean for the fit of the slope. The reference is ra
 
 @dataclass
 class RealScore:
-    """The errors of a lean against the rough reference.
+    """The errors of a lean against the rough reference."""
 
-    rms_deg: Root of the mean square of the error.
-    slope: Shown lean divided by reference lean, for reference leans over 5 degrees.
-    """
-
-    rms_deg: float
-    slope: float
+    rms_deg: float  # root of the mean square of the error
+    slope: float  # shown lean divided by reference lean, for reference leans over 5 degrees
 
 
 @dataclass
 class RecordingScores:
-    """The scores of all estimators on a recording.
+    """The scores of all estimators on a recording."""
 
-    name: Name of the recording's file.
-    scores: Score of each estimator, by its name.
-    traces: "time" in s, and the leans in degrees, positive to the right: "reference" and each estimator. Each has shape
-        (N).
-    notices: Remarks about the recording, and about readings that contradict its calibration.
-    """
-
-    name: str
-    scores: dict[str, RealScore]
+    name: str  # name of the recording's file
+    scores: dict[str, RealScore]  # score of each estimator, by its name
+    # "time" in s, and the leans in degrees, positive to the right: "reference" and each estimator. Each has shape (N).
     traces: dict[str, NDArray[np.float64]]
+    # Remarks about the recording, and about readings that contradict its calibration
     notices: list[Message] = field(default_factory=list)
 
 

@@ -17,18 +17,12 @@ from .runs import as_log, calibrated_by_poses
 
 @dataclass
 class Known:
-    """A ride with its true lean.
+    """A ride with its true lean."""
 
-    log: n samples.
-    calibration: of the sensor that recorded the log.
-    lean_deg: true lean, shape (n).
-    riding: True after the bike has set off, shape (n).
-    """
-
-    log: Log
-    calibration: CalibrationFile
-    lean_deg: np.ndarray
-    riding: np.ndarray
+    log: Log  # n samples
+    calibration: CalibrationFile  # of the sensor that recorded the log
+    lean_deg: np.ndarray  # true lean, shape (n)
+    riding: np.ndarray  # True after the bike has set off, shape (n)
 
     def live(self):
         """Return the lean that the firmware computes, shape (n), in degrees."""

@@ -45,26 +45,17 @@ GPS_FAULTS = ("unplugged", "garbled", "void", "stuck")
 
 @dataclass
 class Trip:
-    """A trip.
+    """A trip."""
 
-    kind: Kind of the ride, a key of RIDES.
-    ride: Motion of the bike.
-    until_s: Time of the power cut.
-    presses: Start and duration of each press.
-    faults: Name, start and end of each fault.
-    calls: Method of Faults and its arguments, for each fault.
-    gps_faults: Faults of the GPS receiver, as for Gps.
-    cut_save: Number of bytes of the next calibration that are written before the power is cut. None
-        if the power is not cut in a save.
-    """
-
-    kind: str
-    ride: script.Ride
-    until_s: float
-    presses: list[tuple[float, float]]
-    faults: list[tuple[str, float, float]]
-    calls: list[tuple[str, tuple[Any, ...]]]
-    gps_faults: list[list[Any]] = field(default_factory=list)
+    kind: str  # kind of the ride, a key of RIDES
+    ride: script.Ride  # motion of the bike
+    until_s: float  # time of the power cut
+    presses: list[tuple[float, float]]  # start and duration of each press
+    faults: list[tuple[str, float, float]]  # Name, start and end of each fault
+    calls: list[tuple[str, tuple[Any, ...]]]  # method of Faults and its arguments, for each fault
+    gps_faults: list[list[Any]] = field(default_factory=list)  # faults of the GPS receiver, as for Gps
+    # Number of bytes of the next calibration that are written before the power is cut. None if the power is not cut in
+    # a save.
     cut_save: int | None = None
 
 
