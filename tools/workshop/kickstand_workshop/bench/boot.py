@@ -19,7 +19,7 @@ _ROWS = 10  # number of modules in the table
 
 # Each module is imported after the modules that it imports. So the time of a module does not contain the times of the
 # modules that it imports.
-_GUEST = """
+_TIMED_IMPORTS = """
 from time import ticks_diff, ticks_us
 took = []
 for name in {names}:
@@ -94,7 +94,7 @@ def _imports(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes
     names = list(dict.fromkeys(names))
     files = {path: content for path, content in files.items() if path.lstrip("/") != "main.py"}
     with kind(world, files) as device:
-        output = device.exec(_GUEST.format(names=names), _LIMIT_S)
+        output = device.exec(_TIMED_IMPORTS.format(names=names), _LIMIT_S)
     took_us = ast.literal_eval(output.split("took ")[1])
     return {name: us / 1e6 for name, us in zip(names, took_us, strict=True)}
 
