@@ -53,6 +53,7 @@ def test_signal_leaves_no_temporary_file(number, tmp_path):
     code = (
         "import os, signal, sys, time; from pathlib import Path\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "signal.signal(signal.SIGHUP, signal.SIG_DFL)\n"  # nohup ignores it, and a process inherits that
         "from kickstand_tools.cli import main; from kickstand_tools.common.output import whole_file\n"
         "def cut(*_, **__):\n"
         "    with whole_file(Path('old.csv')) as temporary:\n"
