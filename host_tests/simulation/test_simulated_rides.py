@@ -91,6 +91,7 @@ def test_a_seed_gives_the_rides_of_earlier_versions():
     readings = [0.5444, 0.5244, 0.4558, 22.7288, 5.1693, 5.6495, 9.0380]
     assert np.abs(simulated.readings).mean(axis=0) == pytest.approx(readings, abs=1e-4)
     assert simulated.upright.mean(axis=0)[:3] == pytest.approx([-0.1136, -0.9301, -0.2875], abs=1e-4)
+    assert simulated.procedure.mean(axis=0)[:3] == pytest.approx([-0.0453, -0.0142, 0.0650], abs=1e-4)
 
 
 DEFAULT = "street", "city", "fall"
