@@ -15,7 +15,7 @@ from kickstand_tools.common.templates import filled, source_hash
 from markupsafe import Markup
 
 from ..period import MOVED, PeriodResult, Row
-from .panel import Panel, date_text
+from .plot import Panel, date_text
 
 _WORST, _MOST_MOVED, _MOST_ROWS, _MOST_DOTS, _NAMED_ERRORS = 25, 200, 2000, 3000, 3
 _WORDS = {

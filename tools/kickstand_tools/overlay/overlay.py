@@ -15,9 +15,8 @@ from ..joining.motion import motion
 from ..logs.reader import Source, read_twice
 from ..logs.source import File, Progress, name_of
 from .camera_match import camera_offset_s
-from .gpmf import telemetry
 from .shown import Shown, shown
-from .video import Video, ffmpeg, input_of, open_video, write_video
+from .video import Video, ffmpeg, input_of, open_video, telemetry, write_video
 
 MARGIN = 0.03  # distance from the video's edges to the gauge, as a share of the video's height
 _BEYOND_S = 1.0  # longest time by which a video may begin before the ride or end after the ride

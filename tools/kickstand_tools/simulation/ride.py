@@ -11,10 +11,9 @@ from . import hands, poses
 from .commands import RiderCommands, commands
 from .physics.bike import Bike, roll, weave
 from .physics.chip import DIVIDER, RATE_HZ, Chip
-from .physics.engine import vibration
 from .physics.kinematics import Motion, body_rates, specific_force
 from .physics.mount import MOUNTS, Mount
-from .physics.road import CLASSES, Shaking, add_bumps, profile_slope, shaking
+from .physics.road import CLASSES, Shaking, add_bumps, profile_slope, shaking, vibration
 from .physics.signals import band_noise, smoothed, smoothstep
 from .plan import Conditions, Plan
 from .profiles import PROFILES
