@@ -4,7 +4,7 @@ bench() measures, and tables() formats the result.
 """
 
 import ast
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -13,39 +13,23 @@ import numpy as np
 from kickstand.calibration.parameters import Calibration
 from kickstand_emulator import flash_image
 from kickstand_emulator.emulate import Kind, device_class
-from kickstand_tools.common import firmware_path
 from kickstand_tools.deploy.bytecode import architecture, cross_compiled
 from kickstand_tools.simulated_board.mpu6050 import ACCEL_XOUT_H, Mpu6050
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
-from rich.console import Group
 from rich.table import Table
 
 _LIMIT_S = 10.0
-_ROWS = 10  # number of modules in the table
-
-# Each module is imported after the modules that it imports. So the time of a module does not contain the times of the
-# modules that it imports.
-_TIMED_IMPORTS = """
-from time import ticks_diff, ticks_us
-took = []
-for name in {names}:
-    start = ticks_us()
-    __import__(name)
-    took.append(ticks_diff(ticks_us(), start))
-print("took", took)
-"""
 
 
 @dataclass(frozen=True)
 class Boot:
-    """The parts of a start. All times but the last count from power-on."""
+    """The parts of a start. All times count from power-on."""
 
     micropython_s: float  # time at which main.py begins
     starting_s: float  # time at which the display says that Kickstand starts
     sampling_s: float  # time at which the sensor is set up and samples
     lean_s: float  # time at which the display shows the first lean
-    import_s: dict[str, float]  # time for importing each module, by its name
 
 
 def boot(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes], compiled: bool = True) -> Boot:
@@ -66,25 +50,7 @@ def boot(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes], c
         sampling_s = device.time_s
         device.run_until(lambda: device.lcd()[0].startswith("Lean") and "°" in device.lcd()[0], _LIMIT_S, 0.001)
         lean_s = device.time_s
-    return Boot(_micropython_s(kind, board_files), starting_s, sampling_s, lean_s, _imports(kind, world, board_files))
-
-
-def table(result: dict[str, Any]) -> Table:
-    """Format the result for a terminal. result: the fields of a Boot, by name."""
-    rows = Table(title="From reset to the first lean, compiled: emulated ms")
-    rows.add_column("what")
-    rows.add_column("at", justify="right")
-    rows.add_column("takes", justify="right")
-    rows.add_row("main.py begins", f"{1000 * result['micropython_s']:.0f}", "")
-    by_cost = sorted(result["import_s"].items(), key=lambda item: -item[1])
-    rows.add_row(f"{len(by_cost)} imports, all", "", f"{1000 * sum(result['import_s'].values()):.0f}")
-    for name, seconds in by_cost[:_ROWS]:
-        rows.add_row("  " + name.removeprefix("kickstand."), "", f"{1000 * seconds:.0f}")
-    rows.add_row("display says starting", f"{1000 * result['starting_s']:.0f}", "")
-    rows.add_row("sensor samples", f"{1000 * result['sampling_s']:.0f}", "")
-    took_s = result["lean_s"] - result["sampling_s"]
-    rows.add_row("first lean on the display", f"{1000 * result['lean_s']:.0f}", f"{1000 * took_s:.0f}")
-    return rows
+    return Boot(_micropython_s(kind, board_files), starting_s, sampling_s, lean_s)
 
 
 def _micropython_s(kind: Kind, files: dict[str, bytes]) -> float:
@@ -94,43 +60,6 @@ def _micropython_s(kind: Kind, files: dict[str, bytes]) -> float:
         device.listen(begun.append)  # on a Pico, Sink does not use USB, which starts later than main.py
         device.run_until(lambda: begun, _LIMIT_S, 0.001)
         return device.time_s
-
-
-def _imports(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes]) -> dict[str, float]:
-    names = ["kickstand.board.port", *in_order("kickstand.start", []), *in_order("kickstand.app", [])]
-    names = list(dict.fromkeys(names))
-    files = {path: content for path, content in files.items() if path.lstrip("/") != "main.py"}
-    with kind(world, files) as device:
-        output = device.exec(_TIMED_IMPORTS.format(names=names), _LIMIT_S)
-    took_us = ast.literal_eval(output.split("took ")[1])
-    return {name: us / 1e6 for name, us in zip(names, took_us, strict=True)}
-
-
-def in_order(name: str, found: list[str]) -> list[str]:
-    """Append a module to found, after the modules that it imports. Returns found."""
-    for other in _imported(name):
-        if other not in found:
-            in_order(other, found)
-    if name not in found:
-        found.append(name)
-    return found
-
-
-def _imported(name: str) -> Iterator[str]:
-    """Yield the firmware's modules that this module imports at its top level."""
-    path = _path(name)
-    package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
-    for node in ast.parse(path.read_text(encoding="utf-8")).body:
-        for inner in node.body if isinstance(node, ast.Try) else [node]:
-            if isinstance(inner, ast.ImportFrom) and inner.level:
-                base = package[: len(package) - inner.level + 1] + (inner.module or "").split(".") * bool(inner.module)
-                modules = [".".join(base), *(".".join([*base, alias.name]) for alias in inner.names)]
-                yield from (module for module in modules if _path(module).is_file() and "." in module)
-
-
-def _path(name: str) -> Path:
-    path = firmware_path.PACKAGE.parent.joinpath(*name.split("."))
-    return path.with_suffix(".py") if path.with_suffix(".py").is_file() else path / "__init__.py"
 
 
 class SampleCount:
@@ -181,7 +110,7 @@ class SampleCount:
 
 
 SAMPLE_HZ = 200  # samples per second, as in bench_guest.py
-_GUEST = ("bench_guest", "stages_guest", "bluetooth_guest")  # modules of this folder that run on the board
+_GUEST = ("bench_guest", "bluetooth_guest")  # modules of this folder that run on the board
 _SENSOR = Sensor(seed=1, share=0.0)  # a sensor without errors, mounted at some angle
 _SPEED_MPS = 15.0
 _RIDE = [accelerate(_SPEED_MPS, 1.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 20
@@ -196,7 +125,7 @@ _MODES: dict[str, dict[str, Any]] = {
 def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
     """Measure all costs. This takes minutes.
 
-    seconds: emulated time of each run. A Pico needs six runs, and an ESP32 five, because its stages are not measured.
+    seconds: emulated time of each run. A board needs five runs.
     chip: "rp2040" or "esp32".
 
     Returns the figures by name. A name ends with the figure's unit. Raises GuestError if the program on the board
@@ -210,28 +139,20 @@ def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
         "sample_hz": SAMPLE_HZ,
         **plain,
         "chip": chip,
-        "stage_us": {name: _spread(us) for name, us in _stages(_run(chip, seconds, detail=True)).items()}
-        if chip == "rp2040"  # on an ESP32, recording the time of a stage takes longer than the stage
-        else {},
         "modes": modes,
         "boot": {form: asdict(start(chip, form == "mpy")) for form in ("py", "mpy")},
         "flash_bytes": {form: _size(form == "mpy", device_class(chip).MPY) for form in ("py", "mpy")},
     }
 
 
-def tables(result: dict[str, Any]) -> Group:
+def tables(result: dict[str, Any]) -> Table:
     """Format the result of bench() for a terminal."""
-    title = f"A turn of the loop at {result['sample_hz']} samples per second: emulated us, {result['chip']}"
-    times = Table(title=title)
-    times.add_column("stage")
-    for name in ("median", "p99", "max"):
-        times.add_column(name, justify="right")
-    for name, spread in (*result["stage_us"].items(), ("whole turn", result["turn_us"])):
-        times.add_row(name, *(f"{spread[key]:.0f}" for key in ("median", "p99", "max")))
-    figures = Table(show_header=False)
+    figures = Table(title=f"{result['sample_hz']} samples per second, {result['chip']}", show_header=False)
+    turn = result["turn_us"]
     pause = result["collection_pause_us"]
     starts, size = result["boot"], result["flash_bytes"]
     for name, text in (
+        ("a turn of the loop", ", ".join(f"{name} {turn[name]:.0f} us" for name in ("median", "p99", "max"))),
         ("CPU share", f"{100 * result['cpu_share']:.0f} %"),
         ("samples taken / lost", f"{result['samples_taken']} / {result['samples_lost']} in {result['seconds']:.1f} s"),
         ("heap taken by a sample", f"{result['heap_bytes_per_sample']} bytes"),
@@ -246,7 +167,7 @@ def tables(result: dict[str, Any]) -> Group:
         ("size on flash", f"{size['py'] / 1000:.1f} kB as .py, {size['mpy'] / 1000:.1f} kB as .mpy"),
     ):
         figures.add_row(name, text)
-    return Group(times, table(starts["mpy"]), figures)
+    return figures
 
 
 def _mode_text(mode: dict[str, Any]) -> str:
@@ -289,11 +210,10 @@ def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = Non
     }
 
 
-def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
+def _run(chip: str, seconds: int, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
     """Run the app's loop on the emulated board.
 
-    seconds: emulated time. detail: True to measure the stages of a pass of the loop too. chosen: values of settings, by
-        name.
+    seconds: emulated time. chosen: values of settings, by name.
 
     Returns the figures and arrays of bench_guest.py, and the numbers of samples that were taken and lost.
     """
@@ -304,7 +224,6 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
     folder = Path(__file__).parent
     files |= {f"{name}.mpy": cross_compiled(folder / f"{name}.py", architecture(mpy)) for name in _GUEST}
     arrays: list[np.ndarray] = []
-    stages: list[np.ndarray] = []
     result: dict[str, Any] = {}
     with device_class(chip)(_SENSOR.world(Ride(_RIDE).motion), files, display=chosen.get("DISPLAY", "lcd")) as device:
         samples = SampleCount(device.board.sensor)
@@ -316,15 +235,13 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
                 result["heap_samples"] = samples.delivered()
             elif data == b"end":
                 result.update(taken=samples.taken(), lost=samples.lost())
-            elif "taken" not in result:
-                stages.append(np.frombuffer(data, np.uint32))
             else:
                 arrays.append(np.frombuffer(data, np.uint16))
 
         device.listen(take)
         if chosen.get("SPEED") == "wheel":
             device.fit_wheel(lambda t_s: _SPEED_MPS)
-        code = f"{device.SINK}import bench_guest\nbench_guest.run({detail}, {seconds}, Sink(), {chosen})\n"
+        code = f"{device.SINK}import bench_guest\nbench_guest.run({seconds}, Sink(), {chosen})\n"
         output = device.exec(code, limit_s=2.0 * seconds + 30.0)
         # The figures follow the output of a Sink
         result["figures"] = ast.literal_eval(output.rpartition("\x02")[2].strip())
@@ -332,32 +249,7 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
     result["took"] = arrays[0][:turns]
     asked_for = arrays[1][: result["figures"]["collections_by_app"]]
     result["pauses"] = asked_for if len(asked_for) else np.array([result["figures"]["collect_us"]])
-    if detail:
-        result["stages"] = np.array(stages).astype(int)
     return result
-
-
-def _stages(run: dict[str, Any]) -> dict[str, np.ndarray]:
-    """Return the times of each stage in us, one for each pass of the loop in which the stage ran."""
-    columns = dict(zip(run["figures"]["stages"], run["stages"].T, strict=True))
-    sampled = columns["decode and sum"] > 0
-    watch = run["figures"]["stopwatch_us"]
-    # The stage of the sensor contains three timed calls: two transfers and add_up()
-    fetch = columns["fetch"] - 3 * watch
-    meter = columns["meter"] - 2 * watch
-    stages = {
-        "read": columns["read"],
-        "decode and sum": columns["decode and sum"],
-        "check": fetch - columns["read"] - columns["decode and sum"],
-        "calibrate and rotate": columns["calibrate and rotate"],
-        "filter": columns["filter"],
-        "rest of the meter": meter - columns["calibrate and rotate"] - columns["filter"],
-        "sample path": fetch + meter,
-    }
-    stages = {name: us[sampled] for name, us in stages.items()}
-    stages["page"] = columns["page"][columns["page"] > 0]
-    stages["display"] = columns["display"]
-    return stages
 
 
 def _spread(us: np.ndarray) -> dict[str, float]:
