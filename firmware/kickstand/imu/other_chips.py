@@ -116,9 +116,9 @@ def is_clock(i2c, address):
 def _is_time(time, at, date_at, day_at):
     limits = ((at, 0x7F, 0, 59), (at + 1, 0x7F, 0, 59), (at + 2, 0x3F, 0, 32), (date_at, 0x3F, 1, 31))
     limits += ((day_at, 0xFF, 0, 7), (at + 5, 0x1F, 1, 12), (at + 6, 0xFF, 0, 99))
-    for place, mask, least, most in limits:
-        value = time[place] & mask
-        if value & 15 > 9 or not least <= (value >> 4) * 10 + (value & 15) <= most:
+    for index, mask, least, highest in limits:
+        value = time[index] & mask
+        if value & 15 > 9 or not least <= (value >> 4) * 10 + (value & 15) <= highest:
             return False
     return True
 
