@@ -97,7 +97,7 @@ def _search(logs: list[Intervals], driving: Blocks, share: float) -> list[Move]:
     best: tuple[float, int, Move] | None = None
     for index in range(LEAST_BLOCKS, count - LEAST_BLOCKS + 1):
         between = driving.log[index] != driving.log[index - 1]
-        turned = compare(*_sides(driving, index, between))
+        turned = turn_between(*_sides(driving, index, between))
         if turned is None:
             continue
         turn, sigma = turned
@@ -137,7 +137,7 @@ def _sides(driving: Blocks, index: int, between: bool) -> tuple[Blocks, Blocks]:
     return driving.part(earlier), driving.part(slice(index + 1, min(last, index + 1 + REACH)))
 
 
-def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
+def turn_between(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
     """Measure by how much the mount rotated between two groups of blocks.
 
     Returns:

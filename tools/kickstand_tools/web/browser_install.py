@@ -13,7 +13,7 @@ from ..common import firmware_path
 from ..common.errors import InputError
 from ..deploy import bytecode, check as board_check, config_check, config_text, connection, flash, others
 from ..deploy.firmware_files import CONFIG
-from .serial_guest import BrowserBoard
+from .browser_serial import BrowserBoard
 
 ROOT = Path("/packages")  # where page/python.mjs unpacks archives.install_archive()
 COMMON = "armv6m"  # the first of archives.ARCHITECTURES
