@@ -56,7 +56,6 @@ class UserCode:
         self._functions = {}
         self._functions["import"] = _functions_of  # _call() also guards the import
         self._slow = {}  # number of slow calls in a row, per function
-        self._problems = []
         # Stored once, because each access to self._draw creates a new bound method. The display would then treat an
         # unchanged picture as a new picture.
         self._drawn = self._draw
@@ -66,18 +65,10 @@ class UserCode:
         self.pages = [lambda name=name: self._page(name) for name in pages]
         self._call("setup", app)
 
-    def take_problem(self):
-        """Return a Notice that was not shown yet, or None."""
-        return self._problems.pop(0) if self._problems else None
-
-    def lean(self, trusted):
-        """Call the owner's on_lean(). The app calls this method ten times per second.
-
-        Args:
-            trusted: True if the lean may be shown.
-        """
+    def lean(self):
+        """Call the owner's on_lean(). The app calls this method ten times per second."""
         meter = self._app.meter
-        self._call("on_lean", meter.lean_deg, trusted, meter)
+        self._call("on_lean", meter.lean_deg, self._app.trusted, meter)
 
     def press(self, event):
         """Call the owner's on_press() after a press."""
@@ -128,7 +119,7 @@ class UserCode:
 
     def _report(self, notice):
         report(notice)
-        self._problems.append(notice)
+        self._app.notices.append(notice)
 
     def _page(self, name):
         shown = self._call(name, self._app)

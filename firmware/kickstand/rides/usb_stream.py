@@ -16,7 +16,7 @@ _SLOW_APART_MS = const(60_000)  # time within which two slow prints end the ride
 
 
 class RideStream:
-    """Has the same methods as a RideRing, but writes to the console."""
+    """Has the same methods as a RideFiles, but writes to the console."""
 
     stops_interrupts = False
 
