@@ -227,7 +227,9 @@ class App:
             self.clock.emptied(now_us)
         event = self.button.poll(now_ms)
         if event:
-            self._press(event, now_ms)
+            self.screen.press(event, now_ms)
+            if self.user:
+                self.user.call("on_press", event)
         if self.calibration.changed:
             self._calibration_changed()
         if ticks_diff(now_ms, self._page_ms) >= 0:
@@ -237,11 +239,6 @@ class App:
             self.rides.recorder.tick()
         if self.live:
             self.live.poll(now_ms)
-
-    def _press(self, event, now_ms):
-        self.screen.press(event, now_ms)
-        if self.user:
-            self.user.press(event)
 
     @property
     def recording(self):
@@ -268,7 +265,7 @@ class App:
             self.rides.prepare()
         self._collect_notices()
         if self.user:
-            self.user.lean()
+            self.user.call("on_lean", self.meter.lean_deg, self.trusted, self.meter)
         screen.tick(now_ms)
         if screen.view != "fault" or self.sensor.fault.code != "starting":  # the display already says "starting"
             self.lcd.show(*screen.lines(now_ms))
@@ -282,8 +279,7 @@ class App:
             self.notices.append(notice)
         axes = self.sensor.chip.axes
         if axes.notice:
-            report(axes.notice)
-            self.notices.append(axes.notice)
+            report(axes.notice, self.notices)
             axes.notice = None
 
     def _pass_on(self, n, dt_us, now_ms):

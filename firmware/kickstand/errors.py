@@ -51,9 +51,16 @@ class Refusal(Exception):
     words = Notice.words
 
 
-def report(refusal):
+def report(refusal, notices=None):
     """Print a Refusal or Notice on the console, unless a recent print was slow. If the module with the sentences cannot
-    be loaded, print only the code."""
+    be loaded, print only the code.
+
+    Args:
+        refusal: the Refusal or Notice.
+        notices: App.notices, to show it on the display too, or None.
+    """
+    if notices is not None:
+        notices.append(refusal)
     try:
         from .console import tell
 

@@ -74,10 +74,7 @@ def main(loop=None, closed_ms=5000):
         from .ui.messages import lines
 
         print("Kickstand stopped. " + sentence(error))
-        try:
-            _show(lcd or open_lcd(error.settings), *lines(error))
-        except SettingsError:  # the pins of the display are wrong or not set
-            pass
+        _last_words(lcd, *lines(error), error.settings)
     except KeyboardInterrupt:
         port.rest_watchdog()
         if lcd:
@@ -107,19 +104,20 @@ def _safe_mode(lcd, button, pin, closed_ms):
         _show(lcd, "Button is closed", "check its wires")
 
 
-def _last_words(lcd, line1, line2):
+def _last_words(lcd, line1, line2, chosen=None):
     """Show two lines when the firmware ends.
 
     Args:
-        lcd: the Display, or None if it is not open yet. Without a Display one is opened on the default pins.
+        lcd: the Display, or None if it is not open yet.
+        chosen: the Settings for opening the display; None for the default pins.
     """
     try:
         if lcd is None:
             sys.modules.pop("config", None)  # config.py itself may have used up the memory
             gc.collect()
-            lcd = open_lcd(settings.Settings())
+            lcd = open_lcd(chosen or settings.Settings())
         _show(lcd, line1, line2)
-    except Exception:  # memory may be short or a file missing; the console already has the message
+    except Exception:  # wrong pins, short memory or a missing file; the console already has the message
         pass
 
 
@@ -144,8 +142,7 @@ def _live(notices, function, *arguments):
     if notice:
         if notice.code == "no-memory":
             notice = LiveError("live-memory", *notice.values)
-        report(notice)
-        notices.append(notice)
+        report(notice, notices)
     return result
 
 

@@ -150,7 +150,7 @@ def test_slow_calls_are_reported_once_and_too_many_disable(calls_ms, notices, wi
 
     def use(app):
         for ms in calls_ms:
-            app.user.press(ms)
+            app.user.call("on_press", ms)
         return problems(app)
 
     source = "import time\ntime.sleep_ms(900)\ndef setup(app):\n    time.sleep_ms(900)\n"

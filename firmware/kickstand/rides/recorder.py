@@ -57,10 +57,7 @@ class Recorder:
                 period_us = 1_000_000 // self._sample_hz
                 self._block, self._spare = RideBlock(period_us), RideBlock(period_us)
             self._ride = self._writer.begin()
-        except CardError as error:
-            self._end(error)
-            return
-        except (OSError, MemoryError) as error:
+        except (CardError, OSError, MemoryError) as error:
             self._fail(error)
             return
         finally:
@@ -207,8 +204,5 @@ class Recorder:
         """End the ride after an error, and report it. Unwritten blocks are lost."""
         self.active = False
         self._writer.abandon()
-        self._end(Notice(self._writer.fault_code(error), str(error)))
-
-    def _end(self, notice):
-        report(notice)
-        self._notices.append(notice)
+        is_card = isinstance(error, CardError)
+        report(error if is_card else Notice(self._writer.fault_code(error), str(error)), self._notices)

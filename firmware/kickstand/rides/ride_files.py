@@ -57,38 +57,18 @@ def part_path(directory, ride, part):
     return "%s/%05d%s" % (ride_path(directory, ride), part, _ENDING)
 
 
-def groups(directory):
-    """Yield the numbers of all groups, in any order. Raises OSError."""
-    for group, _ in _numbers(directory, _GROUP_DIGITS):
-        yield group
-
-
-def rides(directory, group):
-    """Yield the numbers of all rides in a group, in any order. Raises OSError."""
-    for ride, _ in _numbers(group_path(directory, group), _RIDE_DIGITS):
-        yield RIDES_IN_GROUP * group + ride
-
-
 def first_part(ride_directory):
     """Return the first part in a ride's directory as (part number, bytes), or None. Raises OSError."""
     return min(_numbers(ride_directory, _PART_DIGITS, _ENDING), default=None)
 
 
-def newest_ride(directory, below=RIDES_IN_ALL):
-    """Return the number of the newest ride below the number `below`, or 0 if there is no ride. Raises OSError.
+def rides(directory, newest_first=False):
+    """Yield the numbers of all rides, in their order. Raises OSError.
 
-    A directory without parts does not count as a ride, because the board's owner may have created it."""
-    while True:
-        group = max((n for n in groups(directory) if RIDES_IN_GROUP * n < below), default=None)
-        if group is None:
-            return 0
-        ride = max((n for n in rides(directory, group) if n < below), default=None)
-        if ride is None:
-            below = RIDES_IN_GROUP * group
-        elif first_part(ride_path(directory, ride)):
-            return ride
-        else:
-            below = ride
+    A ride may have no parts, because the board's owner may have created its directory."""
+    for group, _ in sorted(_numbers(directory, _GROUP_DIGITS), reverse=newest_first):
+        for ride, _ in sorted(_numbers(group_path(directory, group), _RIDE_DIGITS), reverse=newest_first):
+            yield RIDES_IN_GROUP * group + ride
 
 
 def next_ride(directory):
@@ -97,20 +77,22 @@ def next_ride(directory):
     No recording reaches the largest possible number, but a directory of the board's owner may have this number. In this
     case the new ride gets a smaller, free number."""
     below = RIDES_IN_ALL
-    while True:
-        newest = newest_ride(directory, below)
-        if newest + 1 < below:
-            return newest + 1
-        below = newest
+    for ride in rides(directory, True):
+        if first_part(ride_path(directory, ride)):
+            if ride + 1 < below:
+                break
+            below = ride
+    else:
+        ride = 0
+    return ride + 1
 
 
 def parts(directory):
     """Yield (ride, part, bytes) of every part, in any order. Listing takes 5 ms per ride in flash, and 20 ms on a card.
     Raises OSError."""
-    for group in groups(directory):
-        for ride in rides(directory, group):
-            for part, size in _numbers(ride_path(directory, ride), _PART_DIGITS, _ENDING):
-                yield ride, part, size
+    for ride in rides(directory):
+        for part, size in _numbers(ride_path(directory, ride), _PART_DIGITS, _ENDING):
+            yield ride, part, size
 
 
 def _numbers(path, digits, ending=""):
@@ -228,8 +210,7 @@ class RideFiles:
         # bytes of the earlier rides; this is an estimate, because adding up hundreds of files would take too long
         self._others = max(0, space[1] * space[2] - self._free - FIRMWARE)
         self._wrapped = False  # True once parts at the beginning of this ride were removed
-        self._oldest = None  # number of the ride whose parts are removed next; None if not found yet
-        self._passed = -1  # all rides up to this number have no parts left
+        self._removing = self._make_room()
         return self._ride
 
     def _use(self, ride):
@@ -262,7 +243,7 @@ class RideFiles:
         if self._file:
             return True
         if self._free < self.needed:
-            self._make_room()
+            next(self._removing)
         else:
             path = part_path(self._directory, self._ride, self._part)
             self._part += 1
@@ -273,41 +254,33 @@ class RideFiles:
         return False
 
     def _make_room(self):
-        """Do one step of making room: find the oldest ride, or remove its first part or its empty directory. Raises
-        OSError."""
-        ride = self._oldest
-        if ride is None:
-            self._oldest = self._find_oldest()
-            return
-        path = ride_path(self._directory, ride)
-        first = first_part(path)
-        if first:
-            part, size = first
-            os.remove(part_path(self._directory, ride, part))
-            self._free += size
+        """Remove the oldest rides, part by part. This generator does one step at a time: it finds a ride, or removes a
+        part or an empty directory. Raises OSError."""
+        group = 0
+        for ride in rides(self._directory):
+            while group < ride // RIDES_IN_GROUP:
+                _remove_emptied(group_path(self._directory, group))
+                group += 1
+            yield
+            path = ride_path(self._directory, ride)
+            while True:
+                first = first_part(path)
+                if not first:
+                    break
+                part, size = first
+                os.remove(part_path(self._directory, ride, part))
+                self._free += size
+                if ride == self._ride:
+                    self._wrapped = True
+                else:
+                    self._others -= size
+                yield
             if ride == self._ride:
-                self._wrapped = True
-            else:
-                self._others -= size
-        elif ride == self._ride:
-            raise OSError(_ENOSPC)
-        else:
+                break
             _remove_emptied(path)
             self._free = _free_bytes(self._directory)  # measured again, because in flash a directory takes two blocks
-            self._oldest, self._passed = None, ride
-
-    def _find_oldest(self):
-        """Return the number of the oldest ride that may have parts, or None if this step has not found it. Raises
-        OSError."""
-        passed, size = self._passed, RIDES_IN_GROUP
-        group = min((group for group in groups(self._directory) if size * (group + 1) - 1 > passed), default=None)
-        if group is None:
-            raise OSError(_ENOSPC)
-        oldest = min((ride for ride in rides(self._directory, group) if ride > passed), default=None)
-        if oldest is None:
-            _remove_emptied(group_path(self._directory, group))
-            self._passed = size * (group + 1) - 1
-        return oldest
+            yield
+        raise OSError(_ENOSPC)
 
     def write(self, data):
         """Write the next bytes of the block. Raises OSError."""

@@ -191,7 +191,7 @@ class Screen:
         elif self._info:
             self._info = False
         elif self.view == "not_aligned" and not self._at:
-            self._begin_align(True)  # the press means that the bike is on its kickstand
+            self._align(True)  # the press means that the bike is on its kickstand
         elif self.view != "fault":
             self._at += 1
 
@@ -200,22 +200,32 @@ class Screen:
             self._menu = self._menu[1:] + self._menu[:1]
             self._menu_ms = ticks_add(now_ms, _MENU_MS)
             return
-        function, self._menu = self._menu[0][1], None
-        if function:
+        _, function, needs_readings = self._menu[0]
+        self._menu = None
+        fault = self._app.sensor.fault
+        if needs_readings and fault is not None:
+            self._app.notices.append(fault)
+        elif function:
             function()
 
     def _entries(self):
-        """Return the entries of the menu as a tuple of (name, function). A name has at most 15 characters."""
+        """Return the entries of the menu as a tuple of (name, function, True if it needs readings). A name has at most
+        15 characters."""
         app = self._app
-        align = (("Align the bike", self._align),)
-        drive = (("Align by drive", self._align_by_drive),) if app.drive else ()
-        rest = (("Six positions", self._six), ("Reset maxima", self._reset), ("Sensor info", self._show_info))
-        entries = align + rest + drive if app.settings.leans else drive + rest
-        entries += (("Stop recording", self._stop) if app.rides.recorder.active else ("Record ride", self._record),)
+        entries = (("Align the bike", self._align, True),) if app.settings.leans else ()
+        drive = (("Align by drive", self._align_by_drive, True),) if app.drive else ()
+        rest = (
+            ("Six positions", self._six, True),
+            ("Reset maxima", self._reset, False),
+            ("Sensor info", self._show_info, False),
+        )
+        entries += rest + drive if app.settings.leans else drive + rest
+        active = app.rides.recorder.active
+        entries += (("Stop recording", self._stop, False) if active else ("Record ride", self._record, True),)
         if app.user and app.user.pages:
-            entries += (("Own pages", self._show_own),)
+            entries += (("Own pages", self._show_own, False),)
         if app.live:
-            entries += (("Stop Bluetooth", app.live.stop),)
+            entries += (("Stop Bluetooth", app.live.stop, False),)
         return entries + (_LEAVE,)
 
     def interrupt(self):
@@ -224,37 +234,25 @@ class Screen:
             self.wizard = None
             self._app.notices.append(Notice("stopped"))
 
-    def _ready(self):
-        """Return True if there are readings. If not, show the reason."""
-        fault = self._app.sensor.fault
-        if fault is not None:
-            self._app.notices.append(fault)
-        return fault is None
-
     # The wizards are imported only when needed, because with their own imports they take 12 KB of heap. Garbage is
     # collected before the import. Without this collection the new modules, which stay loaded, would be placed at the
     # far end of the heap and make each later collection longer.
 
-    def _align(self):
-        if self._ready():
-            self._begin_align(False)
-
-    def _begin_align(self, pressed):
+    def _align(self, pressed=False):
         gc.collect()
         from .wizard import AlignWizard
 
         self._at = 0
-        app = self._app
-        side = app.settings.SIDE
-        self.wizard = AlignWizard(app.sensor.chip, app.settings.SAMPLE_HZ, app.calibration, side, pressed)
+        settings, calibration = self._app.settings, self._app.calibration
+        chip, rate_hz = self._app.sensor.chip, settings.SAMPLE_HZ
+        self.wizard = AlignWizard(chip, rate_hz, calibration, settings.SIDE, pressed)
 
     def _six(self):
-        if self._ready():
-            gc.collect()
-            from .six_wizard import SixWizard
+        gc.collect()
+        from .six_wizard import SixWizard
 
-            app = self._app
-            self.wizard = SixWizard(app.sensor.chip, app.settings.SAMPLE_HZ, app.calibration)
+        app = self._app
+        self.wizard = SixWizard(app.sensor.chip, app.settings.SAMPLE_HZ, app.calibration)
 
     def _reset(self):
         self._app.meter.reset_maxima()
@@ -267,20 +265,18 @@ class Screen:
         self._at = self._ring().index(self._app.user.pages[0])
 
     def _align_by_drive(self):
-        if self._ready():
-            self._app.drive.ask()
-            self._at = self._ring().index(pages.drive)
+        self._app.drive.ask()
+        self._at = self._ring().index(pages.drive)
 
     def _record(self):
-        if self._ready():
-            rides = self._app.rides
-            rides.start()
-            if rides.recorder.active:
-                self._app.notices.append(Notice("recording", *pages.recording(rides.recorder)))
+        rides = self._app.rides
+        rides.start()
+        if rides.recorder.active:
+            self._app.notices.append(Notice("recording", *pages.recording(rides.recorder)))
 
     def _stop(self):
         self._app.rides.stop()
         self._app.notices.append(Notice("recording-ended"))
 
 
-_LEAVE = ("Leave menu", None)
+_LEAVE = ("Leave menu", None, False)
