@@ -74,7 +74,6 @@ TOOLS = {
     "demo": {"common", "simulated_board", "simulation.scripted"},
     "deploy": {"common", "simulated_board"},  # tries config.py on the simulated board
     "rides": {"common", "logs", "calibration.file", "deploy", "replay.replay_engine"},
-    "pictures": {"common", "simulated_board"},
     "web": {
         "common",
         "logs",
@@ -88,7 +87,6 @@ TOOLS = {
         "demo.hand_bike",
         "deploy",
         "rides",
-        "pictures",
     },
     "api": {
         "common",
@@ -154,7 +152,6 @@ TOOLS = {
         "simulation",
         "demo",
         "deploy",
-        "pictures",
         "web",
         "cli",
         "kickstand_emulator",

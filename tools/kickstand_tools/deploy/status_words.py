@@ -91,13 +91,13 @@ class _Report:
         yield _line("Axes", ", ".join(fault) or "all six measure")
 
     def display(self, address: int | None, draws: bool) -> Iterator[str]:
-        one_bus = self._settings["one_bus"]
         if address:
             yield _line("Display", f"{'OLED' if draws else 'LCD'} at {hex(address)}")
-            if one_bus:
-                return
-        sda, scl, devices, fault = self._facts["display_bus"]
-        yield _bus("Display bus", sda, scl, devices)
+
+    def display_bus(self, sda: int, scl: int, devices: Devices, fault: str) -> Iterator[str]:
+        one_bus, (address, _) = self._settings["one_bus"], self._facts["display"]
+        if not (address and one_bus):
+            yield _bus("Display bus", sda, scl, devices)
         if address:
             return
         words = fault or "none answers: check wiring and LCD_ADDRESSES"
