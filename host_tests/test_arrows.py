@@ -24,7 +24,7 @@ FIRMWARE = {
     "lean": {"calibration"},
     "drive_alignment": set(),  # the app passes the calibrations to it
     "speed": {"board"},
-    "rides": {"board", "calibration", "console"},  # each block of a ride contains the record of its calibration
+    "rides": {"board", "calibration"},  # each block of a ride contains the record of its calibration
     "live": {"calibration.transform"},
     "ui": {"board.button", "lean", "calibration", "drive_alignment"},
     "settings": {"setting_table"},
