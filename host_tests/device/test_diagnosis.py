@@ -209,7 +209,7 @@ def test_status_finds_the_wiring_of_a_backpack(wiring, status):
         board.lcd.wiring = wiring
         board.every(0.1, lambda: counts.update([(*board.lcd.text(), board.lcd.backlight)]))
 
-    lines = status(fit=fit, arguments=(True,))
+    lines = status(fit=fit, wirings=True)
     readable = [
         line2.strip()
         for (line1, line2, lit), count in counts.items()
