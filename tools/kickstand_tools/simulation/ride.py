@@ -7,7 +7,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from . import hands, poses
+from . import hands
 from .commands import RiderCommands, commands
 from .physics.bike import Bike, roll, weave
 from .physics.chip import DIVIDER, RATE_HZ, Chip
@@ -66,7 +66,7 @@ class SimulatedRide:
     def procedure(self) -> NDArray[np.float64]:
         """Readings of seven other poses in one recording, with the turns between them, shape (n, 7)."""
         chance = np.random.default_rng(self.seed)
-        return hands.procedure(chance, self.chip, np.array(list(poses.ups(chance))), self.home_c)
+        return hands.procedure(chance, self.chip, np.array(list(hands.ups(chance))), self.home_c)
 
 
 def ride(
@@ -147,13 +147,13 @@ def ride(
     nose = chance.uniform(-0.5, 0.5)  # slope of the ground in both poses, in degrees
     change = chance.uniform(-1.0, 1.0) if pitch_change_deg is None else pitch_change_deg
     lean = -chance.uniform(8.0, 15.0)
-    seven = poses.seven(chance, chip, home_c)
+    seven = hands.seven(chance, chip, home_c)
     start_c = conditions.start_c
     return SimulatedRide(
         RATE_HZ / DIVIDER,
         seven,
-        poses.standing(chance, chip, mounting, lean, nose + change, start_c, held=False),
-        poses.standing(chance, chip, mounting, upright_error_deg, nose, start_c, held=True),
+        hands.standing(chance, chip, mounting, lean, nose + change, start_c, held=False),
+        hands.standing(chance, chip, mounting, upright_error_deg, nose, start_c, held=True),
         time,
         readings,
         truth,
