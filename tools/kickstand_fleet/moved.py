@@ -137,7 +137,7 @@ def _sides(driving: Blocks, index: int, between: bool) -> tuple[Blocks, Blocks]:
     return driving.part(earlier), driving.part(slice(index + 1, min(last, index + 1 + REACH)))
 
 
-def turn_between(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
+def turn_between(first: Blocks, second: Blocks) -> tuple[Array, Array] | None:
     """Measure by how much the mount rotated between two groups of blocks.
 
     Returns:
@@ -146,13 +146,13 @@ def turn_between(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
 
     Returns None if one of the groups does not determine an alignment.
     """
-    if min(len(before.log), len(after.log)) < LEAST_BLOCKS:
+    if min(len(first.log), len(second.log)) < LEAST_BLOCKS:
         return None
-    earlier, later = _align_part(before), _align_part(after)
+    earlier, later = _align_part(first), _align_part(second)
     if earlier is None or later is None:
         return None
     turn = np.degrees(rotation_vector(later.frame @ earlier.frame.T))
-    road = ROAD_DEG if before.log[-1] == after.log[0] else OTHER_ROAD_DEG
+    road = ROAD_DEG if first.log[-1] == second.log[0] else OTHER_ROAD_DEG
     variance = earlier.variance + later.variance + 2.0 * road**2
     # The direction of the sway measures the yaw in another way than the frame. An error between the yaws of the two
     # frames makes the sway seem to turn by the same angle

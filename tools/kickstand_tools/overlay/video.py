@@ -109,7 +109,7 @@ def packets(video: Video, stream: int) -> list[tuple[float, float, bytes]]:
 
 
 def write_video(
-    out: Path, arguments: Iterable[str], pictures: Iterable[bytes], each: Callable[[], None] | None = None
+    out: Path, arguments: Iterable[str], pictures: Iterable[bytes], on_picture: Callable[[], None] | None = None
 ) -> None:
     """Run ffmpeg to write a video.
 
@@ -117,7 +117,7 @@ def write_video(
         out: path of the video, ffmpeg's last argument.
         arguments: ffmpeg's other arguments.
         pictures: written to ffmpeg's standard input.
-        each: called after every picture.
+        on_picture: called after every picture.
 
     Raises InputError with ffmpeg's last line of text if ffmpeg fails.
     """
@@ -129,8 +129,8 @@ def write_video(
             try:
                 for picture in pictures:
                     process.stdin.write(picture)
-                    if each:
-                        each()
+                    if on_picture:
+                        on_picture()
                 process.stdin.close()
             except BrokenPipeError:
                 pass  # ffmpeg has stopped, and prints the reason

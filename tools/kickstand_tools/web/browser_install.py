@@ -63,7 +63,7 @@ class Installation:
         described = {"board": board, "settings": settings, "usual": usual, "by_hand": self._by_hand}
         return json.dumps(described | {"others": plan.words()})
 
-    def check(self, wanted):
+    def check(self, settings):
         """Check the config.py with new settings by the firmware's own rules.
 
         wanted: JSON of {name: value, or null for the default}.
@@ -72,7 +72,7 @@ class Installation:
             fault: [name of the setting or null, reason], or null if there is no fault.
         """
         text = self._template if self._own is None else self._own
-        values = json.loads(wanted)
+        values = json.loads(settings)
         for name, value in values.items():  # separately, because the page shows a fault beside its field
             try:
                 text = config_text.with_values(text, {name: value})

@@ -54,10 +54,10 @@ def in_json(function: Callable[..., Any]) -> Callable[..., str]:
 
 
 @in_json
-def rides(given, names):
+def rides(folder, names):
     """Identify the given files.
 
-    given: the folder of the files.
+    folder: the folder of the files.
     names: their names as a JSON list, in the order in which the user chose them.
     Returns:
         rides: list of objects, sorted by name. Each has the fields of FilesOfRide, "table" as from asked_for(), and
@@ -70,7 +70,7 @@ def rides(given, names):
         shutil.rmtree(old) if old.is_dir() else old.unlink()
     names = json.loads(names)
     for name in names:
-        Path(name).symlink_to(Path(given, name))
+        Path(name).symlink_to(Path(folder, name))
     inputs = sorted_out(names)
     rides = [
         vars(ride) | {"isLog": inputs.kinds.get(ride.log) == "log", "table": ride.table and asked_for(ride.table)}

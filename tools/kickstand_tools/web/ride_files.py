@@ -109,15 +109,15 @@ def _recordings_among(files: list[RecordingFile]) -> Iterator[tuple[str, list[Re
         yield from ((file.name, [file]) for file in remaining)
 
 
-def _add(found: RideFiles, log: str, names: list[str], files: list[RecordingFile]) -> None:
+def _add(inputs: RideFiles, log: str, names: list[str], files: list[RecordingFile]) -> None:
     """Add a ride, or the reason why the files are not a ride."""
     parts = recordings(files)
     table = None if parts else mapped.table_in(files)
     if not parts and (table is None or len(table.sheet.columns) < len(mapped.REQUIRED)):
-        found.refused |= dict.fromkeys(names, mapped.unknown(files, log))
+        inputs.refused |= dict.fromkeys(names, mapped.unknown(files, log))
         return
-    found.rides.append(FilesOfRide(log, names, table=table))
-    found.kinds |= dict.fromkeys(names, f"of {parts[0][0].NAME}" if parts else "table")
+    inputs.rides.append(FilesOfRide(log, names, table=table))
+    inputs.kinds |= dict.fromkeys(names, f"of {parts[0][0].NAME}" if parts else "table")
 
 
 def _by_number(name: str) -> list[tuple[int, str]]:

@@ -340,12 +340,12 @@ def figures(seed):
 FORM = "%5d %-9s %-9s %5.2f %5.1f %4.0f%%  %5.2f %5.1f %4.0f%% %4.0f%% %5.2f"
 
 
-def main(which, count):
+def main(parity, count):
     """Print one line of figures per seed, then one line per mount.
 
-    which: "odd" or "even" seeds. count: number of seeds.
+    parity: "odd" or "even" seeds. count: number of seeds.
     """
-    seeds, rows = range(which == "odd", 2 * int(count), 2), []
+    seeds, rows = range(parity == "odd", 2 * int(count), 2), []
     print(" seed kind      mount      live worst shown  smooth worst  1 s  2 s sigma")
     for row in map(figures, seeds):
         shares = (100.0 * row[5], *row[6:8], *(100.0 * share for share in row[8:10]), row[10])

@@ -186,16 +186,16 @@ _ORACLE = {
 }
 
 
-def oracle(made: SimulatedRide) -> NDArray[np.float64]:
+def oracle(ride: SimulatedRide) -> NDArray[np.float64]:
     """The lean with the least error that a filter can reach with this sensor, shape (N), in degrees."""
-    readings, chip = made.readings, made.chip
+    readings, chip = ride.readings, ride.chip
     warm = (readings[:, 3] - CALIBRATED_C)[:, None]
     force = readings[:, :3] - chip.accel_offset - warm * chip.accel_per_c
     force = force @ np.linalg.inv(chip.accel_matrix).T
     rate = readings[:, 4:] - chip.gyro_bias - warm * chip.gyro_per_c - GYRO_DPS_PER_G * force
     rate = rate @ np.linalg.inv(chip.gyro_matrix).T
-    calibration = CalibrationFile(vehicle_from_sensor=made.vehicle_from_sensor, aligned=True, six_done=True)
-    log = Log(made.time, force, rate, made.truth["speed_mps"].copy(), name="RIDE.csv")
+    calibration = CalibrationFile(vehicle_from_sensor=ride.vehicle_from_sensor, aligned=True, six_done=True)
+    log = Log(ride.time, force, rate, ride.truth["speed_mps"].copy(), name="RIDE.csv")
     with _oracle_parameters():
         return replay(log, calibration).lean_deg
 
@@ -207,17 +207,17 @@ def _oracle_parameters() -> Iterator[None]:
         yield
 
 
-def gps_lean(made: SimulatedRide, rate_hz: float) -> NDArray[np.float64]:
+def gps_lean(ride: SimulatedRide, rate_hz: float) -> NDArray[np.float64]:
     """The lean as in phone apps, shape (N), in degrees.
 
     The lean is atan(speed x change of course / g) at each position, and stays the same until the next position.
 
     rate_hz: number of positions per second.
     """
-    time, truth = made.time, made.truth
+    time, truth = ride.time, ride.truth
     chance = np.random.default_rng(len(time))
     fix_s = np.arange(time[0], time[-1], 1.0 / rate_hz)
-    course = np.cumsum(np.radians(truth["yaw_rate_dps"])) / made.rate_hz
+    course = np.cumsum(np.radians(truth["yaw_rate_dps"])) / ride.rate_hz
     speed, course = (np.interp(fix_s, time, values) for values in (truth["speed_mps"], course))
     speed, course = (
         speed + GPS_MPS * chance.normal(size=len(fix_s)),
@@ -228,6 +228,6 @@ def gps_lean(made: SimulatedRide, rate_hz: float) -> NDArray[np.float64]:
     return lean[np.searchsorted(fix_s, time, side="right").clip(1) - 1]
 
 
-def leans(made: SimulatedRide) -> dict[str, NDArray[np.float64]]:
+def leans(ride: SimulatedRide) -> dict[str, NDArray[np.float64]]:
     """Return the lean of oracle(), and the lean of gps_lean() at each rate in GPS_HZ, by name."""
-    return {NAME: oracle(made), **{f"GPS {rate_hz:g} Hz": gps_lean(made, rate_hz) for rate_hz in GPS_HZ}}
+    return {NAME: oracle(ride), **{f"GPS {rate_hz:g} Hz": gps_lean(ride, rate_hz) for rate_hz in GPS_HZ}}

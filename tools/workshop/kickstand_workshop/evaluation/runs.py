@@ -117,24 +117,24 @@ def rms(error: NDArray) -> float:
     return float(np.sqrt(np.mean(error * error)))
 
 
-def slope(shown: NDArray, true: NDArray, beyond: float = LEANED_DEG) -> float:
+def slope(lean: NDArray, true: NDArray, beyond: float = LEANED_DEG) -> float:
     """Fit a line through the origin to the shown lean over the true lean. Returns its slope, or NaN without samples.
 
     beyond: only samples with a larger true lean are used, in degrees.
     """
     leaned = np.abs(true) > beyond
     square = float(np.sum(true[leaned] ** 2))
-    return float(np.sum(shown[leaned] * true[leaned]) / square) if square > 0.0 else float("nan")
+    return float(np.sum(lean[leaned] * true[leaned]) / square) if square > 0.0 else float("nan")
 
 
-def lag_ms(shown: NDArray, true: NDArray, rate_hz: float) -> float:
+def lag_ms(lean: NDArray, true: NDArray, rate_hz: float) -> float:
     """Find the delay of the shown roll rate at which it correlates best with the true roll rate.
 
     The delay is refined by a parabola. Returns the delay in ms, or NaN if no delay is found.
     """
     width = max(round(_LAG_SMOOTHING_S * rate_hz), 1)
     window = np.full(width, 1.0 / width)
-    a, b = (np.convolve(np.gradient(x) * rate_hz, window, mode="same") for x in (shown, true))
+    a, b = (np.convolve(np.gradient(x) * rate_hz, window, mode="same") for x in (lean, true))
     if float(np.std(b)) < _STILL_DPS:
         return float("nan")
     shifts = np.arange(round(_LAG_RANGE_S[0] * rate_hz), round(_LAG_RANGE_S[1] * rate_hz) + 1)
@@ -158,27 +158,27 @@ def straights(truth: dict[str, NDArray], rate_hz: float) -> NDArray[np.bool_]:
     return since > _STRAIGHT_S * rate_hz
 
 
-def score(shown: NDArray, truth: dict[str, NDArray], rate_hz: float) -> LeanScore:
+def score(lean: NDArray, truth: dict[str, NDArray], rate_hz: float) -> LeanScore:
     """Score a shown lean from the moment the bike sets off to the end of the ride.
 
     If the bike never sets off, only the first second of the ride is left out.
 
-    shown: lean in degrees, shape (N).
+    lean: lean in degrees, shape (N).
     truth: lean_deg, speed_mps and yaw_rate_dps, each of shape (N).
     """
     off = truth["speed_mps"] > 0.5
     first = int(np.argmax(off)) if off.any() else round(rate_hz)
     true = truth["lean_deg"]
-    error = (shown - true)[first:]
+    error = (lean - true)[first:]
     late = straights(truth, rate_hz)
     late[: round(0.9 * len(late))] = False
     return LeanScore(
         rms(error),
         float(np.percentile(np.abs(error), 95.0)),
         float(np.max(np.abs(error))),
-        slope(shown[first:], true[first:]),
-        lag_ms(shown[first:], true[first:], rate_hz),
-        float(np.mean((shown - true)[late])) if late.any() else float("nan"),
+        slope(lean[first:], true[first:]),
+        lag_ms(lean[first:], true[first:], rate_hz),
+        float(np.mean((lean - true)[late])) if late.any() else float("nan"),
     )
 
 
@@ -279,33 +279,35 @@ def on_all_processors(function: Callable, jobs: list, chunk: int = 1, ordered: b
         pool.join()
 
 
-def calibrated_by_poses(made: SimulatedRide) -> CalibrationFile:
+def calibrated_by_poses(simulated: SimulatedRide) -> CalibrationFile:
     """Calibrate a ride like `kickstand calibrate six` and `two`, with one log per pose.
 
     Raises InputError if the poses are refused.
     """
-    seven = [Log.from_readings(pose, made.rate_hz, f"POSE_{k}.csv") for k, pose in enumerate(made.poses, 1)]
-    return _aligned(made, fit_six_positions(seven).calibration)
+    seven = [Log.from_readings(pose, simulated.rate_hz, f"POSE_{k}.csv") for k, pose in enumerate(simulated.poses, 1)]
+    return _aligned(simulated, fit_six_positions(seven).calibration)
 
 
-def calibrated_by_log(made: SimulatedRide) -> CalibrationFile:
+def calibrated_by_log(simulated: SimulatedRide) -> CalibrationFile:
     """Calibrate a ride like `kickstand calibrate six` and `two`, with one log of all six positions as on the board.
 
     Raises InputError if the poses are refused.
     """
-    return _aligned(made, fit_procedure(Log.from_readings(made.procedure, made.rate_hz, "SIX.csv")).calibration)
+    return _aligned(
+        simulated, fit_procedure(Log.from_readings(simulated.procedure, simulated.rate_hz, "SIX.csv")).calibration
+    )
 
 
-def _aligned(made: SimulatedRide, six: CalibrationFile) -> CalibrationFile:
-    kickstand = Log.from_readings(made.kickstand, made.rate_hz, "KICKSTAND.csv")
-    upright = Log.from_readings(made.upright, made.rate_hz, "UPRIGHT.csv")
+def _aligned(simulated: SimulatedRide, six: CalibrationFile) -> CalibrationFile:
+    kickstand = Log.from_readings(simulated.kickstand, simulated.rate_hz, "KICKSTAND.csv")
+    upright = Log.from_readings(simulated.upright, simulated.rate_hz, "UPRIGHT.csv")
     return fit_two_positions(kickstand, upright, six).calibration
 
 
-def as_log(made: SimulatedRide) -> Log:
+def as_log(simulated: SimulatedRide) -> Log:
     """Return the ride as the log that a reader of its file would return."""
-    readings = made.readings
-    return Log(made.time, readings[:, :3], readings[:, 4:], temperature_c=readings[:, 3], name="RIDE.csv")
+    readings = simulated.readings
+    return Log(simulated.time, readings[:, :3], readings[:, 4:], temperature_c=readings[:, 3], name="RIDE.csv")
 
 
 def _begin_worker() -> None:

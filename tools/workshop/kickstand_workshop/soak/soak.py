@@ -58,9 +58,9 @@ class Watch:
         self._why_since: float | None = None
         board.every(LOOK_S, self._look)
 
-    def _report(self, what: str) -> None:
-        line = f"{what} at {self._board.clock.now_us / 1e6:.1f} s: {'|'.join(self._text)}"
-        if not self.found or self.found[-1].split(" at ")[0] != what:
+    def _report(self, fault: str) -> None:
+        line = f"{fault} at {self._board.clock.now_us / 1e6:.1f} s: {'|'.join(self._text)}"
+        if not self.found or self.found[-1].split(" at ")[0] != fault:
             self.found.append(line)
 
     def _look(self) -> None:
