@@ -233,12 +233,9 @@ def _without_road(log: Intervals) -> tuple[Array, Array]:
 
 
 def sway_deg(sway: Array, frame: Array) -> Array:
-    """Compute the horizontal direction of the largest sway, shape (k), in degrees.
+    """Compute the horizontal direction of the largest sway, shape (k), from forward towards left, -90 to 90 degrees.
 
-    The direction counts from forward towards left, from -90 to 90.
-
-    sway: Covariances in the sensor's axes, shape (k, 3, 3).
-    frame: Rotation from sensor to vehicle axes, shape (3, 3).
+    sway: covariances in the sensor's axes, shape (k, 3, 3). frame: rotation from sensor to vehicle axes.
     """
     level = frame[[0, 2]] @ sway @ frame[[0, 2]].T
     return np.degrees(0.5 * np.arctan2(2.0 * level[..., 0, 1], level[..., 1, 1] - level[..., 0, 0]))
@@ -252,18 +249,9 @@ def _sway(log: Log) -> Array:
 
 
 def _integrals(columns: Iterable[Array], t_s: Array, step: Array, time: Array) -> Array:
-    """Integrate each column of samples from the log's beginning until the times `time`.
+    """Integrate k columns of samples from the log's beginning until the times `time`, shape (len(time), k).
 
-    Works column by column, to limit memory.
-
-    Args:
-        columns: k columns with one value per sample, shape (n) each.
-        t_s: Time of each sample, shape (n), in s.
-        step: Time since the previous sample, shape (n), in s. 0 after a gap.
-        time: The end times, in s.
-
-    Returns:
-        integrals: one row per end time, shape (len(time), k).
+    step: time since the previous sample, 0 after a gap. Works column by column, to limit memory.
     """
     return np.array([np.interp(time, t_s, np.cumsum(column * step)) for column in columns]).T
 
@@ -354,17 +342,9 @@ def _alone(device: DriveFit) -> Forward:
 
 
 def _mean(frame: Array, variance: float, device: Array, quality_deg: float) -> tuple[Array, float]:
-    """Merge this module's alignment with the firmware's.
+    """Merge this module's alignment with the firmware's, which has the standard error quality_deg.
 
-    Args:
-        frame: This module's alignment, shape (3, 3).
-        variance: Variance of its forward, in deg^2.
-        device: The firmware's alignment, shape (3, 3).
-        quality_deg: Standard error of its forward, in degrees.
-
-    Returns:
-        merged: the alignment with the firmware's up and the weighted mean of both forwards, shape (3, 3).
-        variance: variance of the mean, in deg^2.
+    Returns the alignment with the firmware's up and the weighted mean of both forwards, and the variance in deg^2.
     """
     device_variance = quality_deg**2 + SENSOR_DEG**2
     share = variance / (variance + device_variance)

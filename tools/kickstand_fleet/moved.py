@@ -125,10 +125,7 @@ def _search(logs: list[Intervals], driving: Blocks, share: float) -> list[Move]:
 
 
 def _sides(driving: Blocks, index: int, between: bool) -> tuple[Blocks, Blocks]:
-    """Return the blocks before and after block number `at`.
-
-    between: True if the block is the first of a log. True uses blocks of all logs, False only blocks of the same log.
-    """
+    """Return the blocks before and after block number `index`: of all logs if `between` logs, else of one log."""
     if between:
         return driving.part(slice(max(0, index - REACH), index)), driving.part(slice(index, index + REACH))
     first, last = np.searchsorted(driving.log, [driving.log[index], driving.log[index] + 1])
@@ -175,10 +172,7 @@ class _PartAlignment:
 
 
 def _align_part(part: Blocks) -> _PartAlignment | None:
-    """Compute the alignment from some blocks, with its variance from the jackknife.
-
-    Returns None if the blocks do not determine an alignment.
-    """
+    """Compute the alignment from some blocks, with its variance from the jackknife. None if undetermined."""
     square, product = np.sum(part.square, axis=0), np.sum(part.product, axis=0)
     coefficients, varied = fits(square, product)
     if np.sum(varied) < LEAST_VARIED:

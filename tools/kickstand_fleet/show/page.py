@@ -143,10 +143,7 @@ def _quality(values: Sequence[float]) -> Markup:
 
 
 def _braking(utc_s: Sequence[float], values: Sequence[float]) -> list[Markup]:
-    """Draw a histogram of the decelerations. If the times are known, also draw the decelerations over time.
-
-    Returns the pictures. Without decelerations the list of drawings is empty.
-    """
+    """Draw a histogram of the decelerations, and the decelerations over time if the times are known."""
     if not values:
         return []
     hardest = min(12.0, max(values) * 1.05)

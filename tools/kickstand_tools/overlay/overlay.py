@@ -158,10 +158,7 @@ def _found_offset(log: Source, video: Video, progress: Progress | None) -> tuple
 def _part(
     values: Shown, video: Video | None, offset_s: float | None, from_s: float | None, to_s: float | None, name: str
 ) -> tuple[float, float]:
-    """Compute start and end of the part to draw, in s since the ride's first sample.
-
-    Raises InputError if the part is not in the ride.
-    """
+    """Compute start and end of the part to draw, in s since the ride's first sample. Raises InputError."""
     last_s = float(values.t_s[-1])
     begin_s, end_s = (s if s is None or s >= 0.0 else max(0.0, last_s + s) for s in (from_s, to_s))
     if video is not None and offset_s is not None:

@@ -87,11 +87,8 @@ def _maximum(t_s: Array, lean: Array) -> Array:
 
 
 def _along_lines(at_s: Array, values: Array, index: Ints, t_s: Array, gap_s: float) -> Array:
-    """Interpolate linearly. The result is NaN outside the values, and between values further apart than gap_s.
-
-    at_s: times of the values.
-    before: for each result, index of the last value before its time.
-    t_s: times of the results.
+    """Interpolate linearly. NaN outside the values, and between values further apart than gap_s. index: the value
+    before.
     """
     step_s = at_s[index + 1] - at_s[index]
     share = (t_s - at_s[index]) / step_s

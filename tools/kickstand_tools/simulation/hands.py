@@ -16,11 +16,7 @@ _MOVE_DEG = 0.05  # rms of the lean's changes while the rider holds the bike upr
 
 
 def still(chance: np.random.Generator, chip: Chip, up: NDArray, temp_c: float) -> NDArray[np.float64]:
-    """Simulate the readings of a sensor at rest.
-
-    up: The vertical as a unit vector in the sensor's axes, shape (3), or one per row, shape (n, 3).
-    temp_c: Temperature of the sensor.
-    """
+    """Simulate the readings of a sensor at rest. up: the vertical in its axes, shape (3) or (n, 3)."""
     n = int(POSE_S * RATE_HZ)
     force = np.broadcast_to(up, (n, 3))
     return chip.read(chance, force, np.zeros((n, 3)), np.full(n, temp_c))
@@ -49,10 +45,7 @@ def ups(chance: np.random.Generator) -> Iterator[NDArray[np.float64]]:
 
 
 def up_seen(lean_deg: float | NDArray, pitch_deg: float) -> NDArray[np.float64]:
-    """Return the vertical as a unit vector along the bike's left, up and forward.
-
-    lean_deg: positive to the right. pitch_deg: positive if the nose is up.
-    """
+    """Return the vertical as a unit vector along the bike's left, up and forward. pitch_deg: > 0 with the nose up."""
     lean, pitch = np.radians(lean_deg), np.radians(pitch_deg)
     left, up = np.sin(lean) * np.cos(pitch), np.cos(lean) * np.cos(pitch)
     return np.stack((left, up, np.full_like(np.asarray(left, dtype=float), np.sin(pitch))), axis=-1)
@@ -67,10 +60,7 @@ def standing(
     temp_c: float,
     held: bool,
 ) -> NDArray[np.float64]:
-    """Simulate the readings of a bike at rest.
-
-    held: True if a rider holds the bike. The lean then changes a little, because no rider stands quite still.
-    """
+    """Simulate the readings of a bike at rest. held: True if a rider holds the bike, who does not stand quite still."""
     n = int(POSE_S * RATE_HZ)
     lean = np.full(n, lean_deg)
     if held:
@@ -93,14 +83,9 @@ class Hand:
 def procedure(
     chance: np.random.Generator, chip: Chip, ups: NDArray[np.float64], temp_c: float, hand: Hand | None = None
 ) -> NDArray[np.float64]:
-    """Simulate one recording of still poses and the turns between them.
+    """Simulate one recording of still poses and the turns between them, in the form of Chip.read(), shape (n, 7).
 
-    chip: The sensor.
-    ups: The vertical in each pose, as unit vectors in the sensor's axes, shape (poses, 3).
-    temp_c: Temperature of the sensor.
-    hand: Movements of the hand. None uses the defaults of Hand.
-
-    Returns the readings in the form of Chip.read(), shape (n, 7).
+    ups: the vertical in each pose, as unit vectors in the sensor's axes, shape (poses, 3).
     """
     hand = hand or Hand()
     attitude = _turn_between(ups[0], np.array([0.0, 0.0, 1.0]))  # rotation from sensor to world axes, with z up
@@ -148,10 +133,7 @@ def _turn_between(a: NDArray, b: NDArray) -> NDArray:
 
 
 def _rotations(vectors: NDArray) -> NDArray:
-    """Convert rotation vectors to rotation matrices, shape (n, 3, 3), by the formula of O. Rodrigues.
-
-    vectors: rotation vectors, shape (n, 3), in rad.
-    """
+    """Convert rotation vectors in rad, shape (n, 3), to matrices, shape (n, 3, 3), by the formula of O. Rodrigues."""
     angle = np.linalg.norm(vectors, axis=1)[:, None, None]
     k = np.zeros((len(vectors), 3, 3))
     k[:, 2, 1], k[:, 0, 2], k[:, 1, 0] = vectors.T

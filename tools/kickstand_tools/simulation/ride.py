@@ -222,10 +222,7 @@ def _rough(chance: np.random.Generator, plan: Plan, conditions: Conditions, roug
 
 
 def _slip(chance: np.random.Generator, command: RiderCommands, conditions: Conditions) -> NDArray[np.float64]:
-    """Simulate the acceleration to the left that side slip causes, shape (n), in m/s2.
-
-    With side slip, a bike does not move exactly in the direction in which it points.
-    """
+    """Simulate the acceleration to the left that side slip causes, shape (n), in m/s2."""
     if not conditions.slip_deg:
         return np.zeros(len(command.time))
     angle = np.radians(conditions.slip_deg) * band_noise(chance, len(command.time), 0.05, 1.0, command.rate_hz)
@@ -258,10 +255,7 @@ def _impact(chance: np.random.Generator, command: RiderCommands) -> NDArray[np.f
 
 
 def _creep(chance: np.random.Generator, n: int, degrees: float) -> NDArray[np.float64]:
-    """Simulate the rotation of a yielding mount. Most of the rotation is slow, the rest is sudden.
-
-    degrees: rotation at the end. Returns rotation vectors, shape (n, 3), in rad.
-    """
+    """Simulate the rotation of a yielding mount, mostly slow, partly sudden: rotation vectors, shape (n, 3), in rad."""
     axis = chance.standard_normal(3)
     at_once = np.zeros(n)
     at_once[int(n * chance.uniform(0.3, 0.7)) :] = 1.0
@@ -270,11 +264,9 @@ def _creep(chance: np.random.Generator, n: int, degrees: float) -> NDArray[np.fl
 
 
 def _to_sensor(vectors: NDArray, mounting: NDArray, turned: NDArray) -> NDArray[np.float64]:
-    """Rotate vectors from the vehicle's axes to the sensor's axes.
+    """Rotate vectors from the vehicle's axes to the sensor's axes, shape (n, 3).
 
-    vectors: The vectors, shape (n, 3).
-    mounting: Rotation from sensor to vehicle axes, shape (3, 3).
-    turned: Small rotations of the mount, shape (n, 3), in rad. These rotations are applied to second order.
+    turned: small rotations of the mount, shape (n, 3), in rad, applied to second order.
     """
     if turned.any():
         first = np.cross(turned, vectors)

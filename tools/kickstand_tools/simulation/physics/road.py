@@ -69,15 +69,7 @@ def add_bumps(slope: Signal, places_m: list[float], height_m: float, length_m: f
 def shaking(
     chance: np.random.Generator, distance: Signal, speed: Signal, slope: Signal, bike: Bike, rate_hz: float
 ) -> Shaking:
-    """Simulate driving over a profile.
-
-    chance: Source of random numbers.
-    distance: Distance of the rear wheel at each sample, in m.
-    speed: Speed at each sample, in m/s.
-    slope: Slope of the profile, see profile_slope().
-    bike: The bike.
-    rate_hz: Number of samples per second.
-    """
+    """Simulate driving over a profile (see profile_slope()). distance: of the rear wheel at each sample, in m."""
     height = np.cumsum(slope) * _STEP_M
     at = np.arange(len(slope)) * _STEP_M
     front = distance + bike.wheelbase
@@ -125,19 +117,11 @@ def crank_rpm(speed: Signal, shift_rpm: float, rate_hz: float) -> Signal:
 def vibration(
     chance: np.random.Generator, speed: Signal, running: Signal, rms_g: float, shift_rpm: float, rate_hz: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Simulate the vibration along the bike's left, up and forward.
+    """Simulate the engine's vibration along left, up and forward: force in m/s2 and rates in rad/s, shape (n, 3) each.
 
-    Args:
-        chance: Source of random numbers.
-        speed: Speed of the bike, shape (n), in m/s.
-        running: 1 while the engine is running, otherwise 0, shape (n).
-        rms_g: Vibration along each axis at 6000/min, rms, before the chip's filter.
-        shift_rpm: Engine speed at which the rider changes up.
-        rate_hz: Number of samples per second.
-
-    Returns:
-        force: specific force, shape (n, 3), in m/s2.
-        rates: angular rates, shape (n, 3), in rad/s.
+    running: 1 while the engine runs, otherwise 0, shape (n). rms_g: along each axis at 6000/min, before the chip's
+        filter.
+    shift_rpm: engine speed at which the rider changes up.
     """
     rpm = crank_rpm(speed, shift_rpm, rate_hz)
     turns = integral(rpm / 60.0, rate_hz)
