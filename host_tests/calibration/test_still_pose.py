@@ -79,7 +79,7 @@ def test_a_noisy_gyro_spoils_the_pose_and_a_sway_does_not(axis):
 
 
 class Chip:
-    accel_lsb_per_g, gyro_lsb_per_dps, SATURATED = 8192, 65.5, 32700
+    accel_lsb_per_g, gyro_lsb_per_dps, saturated = 8192, 65.5, 32700
 
 
 def taker():

@@ -68,7 +68,7 @@ class PoseTaker:
 
     def _new(self, expected):
         chip = self._chip
-        return StillPose(chip.accel_lsb_per_g, chip.gyro_lsb_per_dps, chip.SATURATED, expected)
+        return StillPose(chip.accel_lsb_per_g, chip.gyro_lsb_per_dps, chip.saturated, expected)
 
     def _settle(self, counts):
         self._waited += 1

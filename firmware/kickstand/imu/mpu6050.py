@@ -125,7 +125,7 @@ class Mpu6050:
         axes: an AxisWatch, which judges each axis.
     """
 
-    SATURATED = SATURATED
+    saturated = SATURATED
 
     def __init__(self, i2c, address=0x68, accel_range_g=16, gyro_range_dps=500, dlpf=3, rate_hz=200, accept=None):
         self._i2c = i2c
