@@ -4,7 +4,6 @@ import importlib
 import sys
 
 import pytest
-from kickstand_tools.common import firmware_path
 from kickstand_tools.deploy import literals
 
 MODULES = {
@@ -20,10 +19,9 @@ MODULES = {
 
 
 @pytest.fixture
-def package(tmp_path, monkeypatch):
-    """Return the directory of a small package that takes the place of the firmware's."""
+def package(tmp_path):
+    """Return the directory of a small package."""
     directory = tmp_path / "kickstand"
-    monkeypatch.setattr(firmware_path, "PACKAGE", directory)
     for name, source in MODULES.items():
         (directory / name).parent.mkdir(parents=True, exist_ok=True)
         (directory / name).write_text(source)
@@ -31,7 +29,7 @@ def package(tmp_path, monkeypatch):
 
 
 def test_values_replace_the_names_of_constants(package, tmp_path, monkeypatch):
-    texts = {name: literals.text(package / name) for name in MODULES}
+    texts = {name: literals.text(package / name, package) for name in MODULES}
     for name in ("GRAVITY", "HALF", "MOST", "_ROWS", "_TURN"):
         assert not [module for module, text in texts.items() if name in text], name
     assert "SINGLE_GAPS = 300" in texts["app.py"]  # a program outside the package reads this name
@@ -55,7 +53,7 @@ def test_values_replace_the_names_of_constants(package, tmp_path, monkeypatch):
 
 def test_other_files_stay_as_they_are(package, tmp_path):
     (tmp_path / "user.py").write_text("LIMIT = 5  # deg\n")
-    assert literals.text(tmp_path / "user.py") == "LIMIT = 5  # deg\n"
+    assert literals.text(tmp_path / "user.py", package) == "LIMIT = 5  # deg\n"
     (package / "app.py").write_text("from .units import GRAVITY\nclass A:\n    GRAVITY = GRAVITY\n")
     with pytest.raises(ValueError, match="app binds names that it imports: GRAVITY"):
-        literals.text(package / "app.py")
+        literals.text(package / "app.py", package)

@@ -34,9 +34,8 @@ class _Variable(Exception):
     """The value of an expression is not known before the firmware runs."""
 
 
-def text(source: Path) -> str:
-    """Return the text of a module. In a module of the firmware's package, values replace the names of constants."""
-    package = firmware_path.PACKAGE
+def text(source: Path, package: Path = firmware_path.PACKAGE) -> str:
+    """Return the text of a module. In a module of the package, values replace the names of constants."""
     if package not in source.parents:
         return source.read_text(encoding="utf-8")
     files = sorted(package.rglob("*.py"))
