@@ -13,7 +13,7 @@ from machine import Pin, SoftI2C
 from micropython import const
 
 from .errors import Notice
-from .imu.fifo_frames import FRAME
+from .imu.axes import FRAME
 from .imu.mpu6050 import NotKept
 from .imu.other_chips import MOTION, OTHER, SUPPORTED, name_of, who_am_i
 

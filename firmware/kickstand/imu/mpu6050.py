@@ -22,7 +22,7 @@ from time import sleep_ms
 
 from micropython import const
 
-from .fifo_frames import FRAME, SATURATED, AxisWatch, add_up, decode
+from .axes import FRAME, SATURATED, AxisWatch, add_up, decode
 
 # The registers that setup() writes follow one another: SMPLRT_DIV (p. 11), CONFIG with DLPF_CFG (p. 13), GYRO_CONFIG
 # (p. 14), ACCEL_CONFIG (p. 15) and, if the chip has it, ACCEL_CONFIG2. ACCEL_CONFIG2 sets the low-pass of the

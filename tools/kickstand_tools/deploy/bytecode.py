@@ -44,6 +44,9 @@ def architecture(mpy: int) -> str:
 def compiled(files: dict[str, Path], mpy: int, compiler: Compiler | None = None) -> dict[str, bytes]:
     """Compile modules to .mpy files. Returns {path on the board: content}.
 
+    A module with machine code stays on the board as source too, under another name, for a board that cannot run the
+    machine code (see the firmware's quick.py).
+
     files: Source file of each module, by its path on the board.
     mpy: The board's sys.implementation._mpy.
     compiler: Function that compiles a module. None uses cross_compiled().
@@ -56,6 +59,8 @@ def compiled(files: dict[str, Path], mpy: int, compiler: Compiler | None = None)
         if data[1] != mpy & 0xFF or (data[2] and data[2] != mpy >> 8 & 0x3F):
             raise CannotCompile("mpy-cross writes another format than this MicroPython accepts")
         made[path.removesuffix(".py") + ".mpy"] = data
+        if data[2]:
+            made[path.removesuffix(".py") + "_plain.py"] = source.read_bytes()
     return made
 
 

@@ -57,13 +57,11 @@ def board(parts):
     """
     import sys
 
-    from kickstand.calibration.transform import products, products_python
-    from kickstand.imu.fifo_frames import add_up, add_up_python, decode, decode_python
-    from kickstand.rides.block import encode, encode_python
+    from kickstand.calibration import transform  # noqa: F401 loads a function
+    from kickstand.quick import plain
+    from kickstand.rides import block  # noqa: F401 loads a function
 
-    pairs = (decode, decode_python), (add_up, add_up_python), (products, products_python), (encode, encode_python)
-    has_it = sys.platform in ("rp2", "esp32")  # the firmware uses machine code only on these boards
-    slow = ", ".join([plain.__name__ for used, plain in pairs if has_it and used is plain])
+    slow = ", ".join(plain) if sys.platform in ("rp2", "esp32") else ""  # other ports have no machine code
     chosen = parts.settings
     words = f"{chosen.SAMPLE_HZ} Hz, {chosen.ACCEL_RANGE_G} g, {chosen.GYRO_RANGE_DPS} deg/s, low-pass {chosen.DLPF}"
     release = ".".join([str(n) for n in sys.implementation.version[:3]])
