@@ -55,6 +55,14 @@ def test_other_units_are_refused(scale, words, every_s, late_s):
         read_log(record(scale=scale, every_s=every_s, late_s=late_s))
 
 
+def test_one_impossible_reading_hides_nothing():
+    """A log made in Python may hold any number."""
+    log = record(scale=KMH)
+    log.accel_g[1000] = 1e4
+    with pytest.raises(InputError, match="it is in km/h"):
+        read_log(log)
+
+
 @pytest.mark.parametrize(("every_s", "late_s"), [(0.1, 0.0), (0.1, 3.0), (0.5, 1.0), (2.0, 0.0), (2.0, 3.0)])
 def test_a_speed_in_mps_is_read(every_s, late_s):
     read_log(record(every_s=every_s, late_s=late_s, step=1 / 3.6))

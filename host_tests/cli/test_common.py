@@ -141,18 +141,18 @@ def test_message_has_words_for_a_terminal_and_for_a_page():
     assert both.words() == both.words(True) == "wait 3 s or stop"
     assert Plain("it is {broken}", Remedy("stop")).line() == "it is {broken}: stop"
     assert messages.by_code(Late, Turned) == {"late": Late, "turned": Turned}
-    assert messages.distinct([late, Turned(), Late(2.04, "a.csv")]) == [late, Turned()]
+    assert messages.distinct([late, Turned(), Late(2.0, "a.csv")]) == [late, Turned()]
     assert messages.is_explained([late, Turned()]) and not messages.is_explained([late])
 
 
 def test_refusal_keeps_its_reason_in_another_process():
     refusal = pickle.loads(pickle.dumps(RefusedInput(Turned(), "a.csv", ", as it seems")))
-    assert str(refusal) == "a.csv: the axes are turned, as it seems"
+    assert str(refusal) == refusal.line(True) == "a.csv: the axes are turned, as it seems"
     assert (refusal.code, refusal.message) == ("turned", Turned())
     assert str(refusal.at("b.csv")) == "b.csv: the axes are turned, as it seems"
     assert str(RefusedInput(Turned())) == "the axes are turned"
-    error = InputError("no such file", Remedy("run x", "press x"))
-    assert (str(error), error.line(True)) == ("no such file: run x", "no such file: press x")
+    error = pickle.loads(pickle.dumps(InputError("{x} is no file", Remedy("run x", "press x"))))
+    assert (str(error), error.line(True)) == ("{x} is no file: run x", "{x} is no file: press x")
     assert str(InputError(Late(1.0, "b"))) == "b is 1.0 s late: run it with --shift 1"
     causes = [PermissionError(13, "Permission denied", "a.csv"), ValueError("odd"), TimeoutError()]
     assert [errors.cause(cause) for cause in causes] == ["Permission denied", "odd", "TimeoutError"]

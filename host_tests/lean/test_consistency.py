@@ -181,6 +181,17 @@ def test_a_bike_that_has_fallen_stays_so():
     assert shown.odd is None
 
 
+def test_a_wrong_gyro_on_a_bike_that_rides_is_no_fall():
+    shown, leans, fell = riding(), [], []
+
+    def look(lean_deg):
+        leans.append(abs(shown.lean_deg))
+        fell.append(shown.fallen)
+
+    weave(shown, 20.0, then=look, bias_dps=25.0)
+    assert max(leans) > 65.0 and not any(fell)
+
+
 def test_a_long_smooth_bend_at_power_on_shows_no_lean_of_a_stand():
     shown = meter()
     force, rate = force_and_rate(12.0, 25.0)

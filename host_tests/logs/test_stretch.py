@@ -53,12 +53,8 @@ def test_unsafe_outputs_and_bad_stretches_are_refused(log, tmp_path):
         command.refused(tmp_path, "cut", log, *arguments, words=words)
 
 
-def test_replay_and_report_accept_a_stretch(tmp_path):
-    """Times count from the start of the whole ride."""
-    ride, out = analysis_rides.short(tmp_path, speed_hz=1), tmp_path / "LEAN.csv"
-    command.works("replay", ride, "--from", "18", "--to", "26", "--out", out)
-    lean = analysis_rides.table(out)
-    assert (lean["t_s"][0], lean["t_s"][-1]) == (18.0, 26.0)
+def test_a_report_of_a_stretch_has_the_times_of_the_ride(tmp_path):
+    ride = analysis_rides.short(tmp_path, speed_hz=1)
     data = json.loads(command.works("report", ride, "--from", "18", "--to", "26", "--json").out)
     assert (data["duration_s"], data["stops"]) == (8.0, []) and 18.0 <= data["max_right_deg"]["time_s"] <= 26.0
 

@@ -139,6 +139,16 @@ def test_transfer_that_was_disturbed_once_is_repeated(board, tmp_path):
     assert board.paths() == [] and len(logs(tmp_path)) == 1
 
 
+@pytest.mark.parametrize("damage", [(b"'rides/000", b"'rider/000"), (b"(3, 0", b"(300000, 0")])
+def test_damaged_list_of_rides_is_refused(damage, board, tmp_path):
+    """Otherwise `--delete` would remove other files of the board."""
+    board.put("000/03/00000.rid", small(1))
+    board.put("../rider/000/03/00000.rid", small(1))
+    send = board.exec_raw
+    board.exec_raw = lambda *script, **options: (send(*script, **options)[0].replace(*damage), b"")
+    command.refused(board.root, "pull", "--out", tmp_path / "out", "--delete", words="lists invalid rides")
+
+
 # The files on this computer
 
 

@@ -115,6 +115,7 @@ def test_after_any_unplug_it_returns_and_shows_nothing_old(board, display):
         for begun in (0, 12) if isinstance(board.lcd, Lcd) else (0,):
             turns(board, display, begun)
             board.remove_lcd()
+            assert not board.lcd.backlight and not "".join(board.lcd.text()).strip()
             board.clock.advance(1000 * gone_ms)
             turns(board, display, gap_turns)
             board.fit_lcd()
