@@ -23,25 +23,25 @@ _LIMIT = const(2)  # number of repetitions that make a frame dead
 LOST = const(3)  # number of frames in the last call of add_up() with an axis at the end of its range
 _ROW = const(4)  # number of successive frames with an axis at the end of its range
 # The next four entries describe the frames since the last look
-ENDS = const(5)  # a bit for each column that was at the end of its range
-CLIPPED = const(6)  # number of frames with an axis at the end of its range
-GYRO_CLIPPED = const(7)  # number of frames with an axis of the gyro at the end of its range
-DIFFER = const(8)  # bits of pairs of axes that differed: x and y (bits 1 and 5), y and z (2 and 6), x and z (0 and 4)
+_ENDS = const(5)  # a bit for each column that was at the end of its range
+_CLIPPED = const(6)  # number of frames with an axis at the end of its range
+_GYRO_CLIPPED = const(7)  # number of frames with an axis of the gyro at the end of its range
+_DIFFER = const(8)  # bits of pairs of axes that differed: x and y (bits 1 and 5), y and z (2 and 6), x and z (0 and 4)
 DUE = const(9)  # number of samples until the next look
 _HARD = const(10)  # absolute counts of the accelerometer that show hard vibration
-SHAKEN = const(11)  # number of frames that reached _HARD since the last look
+_SHAKEN = const(11)  # number of frames that reached _HARD since the last look
 # The next three are indices of the first of seven entries, which have the order of a frame
 _LAST = const(12)  # counts of the last frame
-SEEN = const(19)  # bits 0 to 15; bit n is set if the lowest four bits of the counts have been n since the last look
+_SEEN = const(19)  # bits 0 to 15; bit n is set if the lowest four bits of the counts have been n since the last look
 _PEAK = const(26)  # largest absolute counts since power-on
-HIGH_BYTE = const(0x10000)  # bit in SEEN that is set when the high byte changes
-WRAPPED = const(0x20000)  # bit in SEEN that is set when the counts jump by 192 or more within one high byte
+_HIGH_BYTE = const(0x10000)  # bit in _SEEN that is set when the high byte changes
+_WRAPPED = const(0x20000)  # bit in _SEEN that is set when the counts jump by 192 or more within one high byte
 
 # Half of the range of 8 g or 16 g. The low-pass hides most of a vibration. If half of the range is left after the
 # low-pass, the vibration was clipped before the low-pass. After clipping the mean is wrong, because the readings are
 # clipped unevenly. A range below 8 g has no limit for vibration, because bends alone reach half of that range.
 _HARD_COUNTS = const(16384)
-COLUMNS = (0, 1, 2, 4, 5, 6)  # the axes' columns in a frame
+_COLUMNS = (0, 1, 2, 4, 5, 6)  # the axes' columns in a frame
 _ALL_DIFFER = const(0x77)
 _TRIAL = const(
     b"\x7f\x00\x80\xff\xff\xff\x80\x00\x80\xff\x01\x00\xab\xcd"
@@ -101,9 +101,9 @@ class AxisWatch:
         notes = self.notes
         for i in range(_ROW, DUE):
             notes[i] = 0
-        for i in range(SEEN, SEEN + 7):
+        for i in range(_SEEN, _SEEN + 7):
             notes[i] = 0
-        notes[_REPEATS] = notes[SHAKEN] = 0
+        notes[_REPEATS] = notes[_SHAKEN] = 0
         notes[DUE] = self._look
 
     def clips(self):
@@ -111,7 +111,7 @@ class AxisWatch:
         notes = self.notes
         if notes[_ROW] < notes[_LIMIT]:
             return None
-        return Notice("clips", "Gyro" if notes[ENDS] > 7 else "Accel")
+        return Notice("clips", "Gyro" if notes[_ENDS] > 7 else "Accel")
 
     def shaken(self):
         """Return how hard the sensor was shaken since power-on.
@@ -144,16 +144,16 @@ class AxisWatch:
     def _well(self):
         """Return True if all axes certainly work, and begin the next look."""
         notes = self.notes
-        if notes[DIFFER] & _ALL_DIFFER != _ALL_DIFFER or notes[CLIPPED] or notes[SHAKEN]:
+        if notes[_DIFFER] & _ALL_DIFFER != _ALL_DIFFER or notes[_CLIPPED] or notes[_SHAKEN]:
             return False
-        for i in COLUMNS:
-            seen = notes[SEEN + i]
+        for i in _COLUMNS:
+            seen = notes[_SEEN + i]
             more = seen & (seen - 1) & 0xFFFF  # clears the lowest bit; the result is 0 if the counts had only one value
-            if not (more & (more - 1) and seen & 0x5555 and seen & 0xAAAA and (seen & HIGH_BYTE or seen < WRAPPED)):
+            if not (more & (more - 1) and seen & 0x5555 and seen & 0xAAAA and (seen & _HIGH_BYTE or seen < _WRAPPED)):
                 return False
-        for i in COLUMNS:
-            notes[SEEN + i] = 0
-        notes[DIFFER] = 0
+        for i in _COLUMNS:
+            notes[_SEEN + i] = 0
+        notes[_DIFFER] = 0
         return True
 
     def _load(self):

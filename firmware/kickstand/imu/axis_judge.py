@@ -10,7 +10,17 @@ from micropython import const
 
 from ..errors import Notice
 from ..units import AXES
-from .axes import CLIPPED, COLUMNS, DIFFER, ENDS, GYRO_CLIPPED, HIGH_BYTE, SEEN, SHAKEN, WRAPPED
+
+# Indices and bits in the notes of add_up(), as in axes.py, which imports this module
+_ENDS = const(5)
+_CLIPPED = const(6)
+_GYRO_CLIPPED = const(7)
+_DIFFER = const(8)
+_SHAKEN = const(11)
+_SEEN = const(19)
+_HIGH_BYTE = const(0x10000)
+_WRAPPED = const(0x20000)
+_COLUMNS = (0, 1, 2, 4, 5, 6)  # the axes' columns in a frame
 
 # The number of successive quiet looks that make an axis faulty. A look is quiet if the counts had at most two values,
 # or if their lowest bit did not change. The columns are for dlpf 1 to 6. The gyro has one row per range, from 250 to
@@ -62,24 +72,24 @@ class AxisJudge:
             True if the chip should be set up.
         """
         notes = watch.notes
-        lost, gyro = notes[CLIPPED], notes[GYRO_CLIPPED]
+        lost, gyro = notes[_CLIPPED], notes[_GYRO_CLIPPED]
         watch.clipped += lost
         enough = 2 * lost < samples  # True if at least half of the samples were within the range
-        shaken = 10 * notes[SHAKEN] >= samples
+        shaken = 10 * notes[_SHAKEN] >= samples
         if shaken or not enough:
             self._clips += 1
         elif 4 * lost < samples:
             self._clips = 0
         fault = self._ill_axes(notes)
         if not enough:
-            fault = _ill(notes[ENDS]) if lost == samples and self._clips >= _RAIL_LOOKS else None
+            fault = _ill(notes[_ENDS]) if lost == samples and self._clips >= _RAIL_LOOKS else None
         self._ill = self._ill + 1 if fault else 0
         if not fault and (shaken or 10 * lost >= samples):
             clips = Notice("clips", "Gyro" if lost and 2 * gyro >= lost else "Accel")
             self._show(watch, clips)
             if self._clips >= _CLIP_LOOKS:
                 fault = clips
-        notes[ENDS] = notes[CLIPPED] = notes[GYRO_CLIPPED] = notes[DIFFER] = notes[SHAKEN] = 0
+        notes[_ENDS] = notes[_CLIPPED] = notes[_GYRO_CLIPPED] = notes[_DIFFER] = notes[_SHAKEN] = 0
         if fault:
             self._well = 0
             watch.fault = fault
@@ -94,11 +104,11 @@ class AxisJudge:
         """Return a Notice for the faulty axes, or None."""
         quiet, wrapped = self._quiet, self._wrapped
         dead = equal = 0
-        for i in COLUMNS:
+        for i in _COLUMNS:
             limit = self._limits[i > 3]
-            if limit == 1 and not notes[DIFFER] >> i & 1:
+            if limit == 1 and not notes[_DIFFER] >> i & 1:
                 equal |= 1 << i | 1 << (i - 1 if i & 3 else i + 2)
-            seen = notes[SEEN + i]
+            seen = notes[_SEEN + i]
             values = seen & 0xFFFF
             more = values & (values - 1)  # clears the lowest bit; the result is 0 if the counts had only one value
             if not (more & (more - 1) and values & 0x5555 and values & 0xAAAA):
@@ -109,13 +119,13 @@ class AxisJudge:
                 dead |= 1 << i
             else:
                 quiet[i] = 0
-                if seen & HIGH_BYTE:
+                if seen & _HIGH_BYTE:
                     wrapped[i] = 0
-                elif seen & WRAPPED and wrapped[i] < _WRAP_LOOKS:
+                elif seen & _WRAPPED and wrapped[i] < _WRAP_LOOKS:
                     wrapped[i] += 1
                 if wrapped[i] == _WRAP_LOOKS:
                     dead |= 1 << i
-            notes[SEEN + i] = 0
+            notes[_SEEN + i] = 0
         return _ill(dead) if dead else _ill(equal, "equal") if equal else None
 
     def _show(self, watch, notice):

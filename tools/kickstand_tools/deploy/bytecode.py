@@ -20,6 +20,7 @@ PICO, ESP32 = 0x1306, 0x2B06  # sys.implementation._mpy of MicroPython 1.23 to 1
 # mpy-cross's names of the kinds of machine code, from number 1 on
 _ARCHITECTURES = "x86 x64 armv6 armv6m armv7m armv7em armv7emsp armv7emdp xtensa xtensawin rv32imc rv64imc".split()
 
+_PLAIN = ("quick_viper.py", "block_viper.py")  # modules with machine code that quick.py loads
 
 # A function that compiles a module for an architecture, as named by architecture(), and returns the .mpy file. It
 # raises CannotCompile
@@ -44,8 +45,8 @@ def architecture(mpy: int) -> str:
 def compiled(files: dict[str, Path], mpy: int, compiler: Compiler | None = None) -> dict[str, bytes]:
     """Compile modules to .mpy files. Returns {path on the board: content}.
 
-    A module with machine code stays on the board as source too, under another name, for a board that cannot run the
-    machine code (see the firmware's quick.py).
+    The firmware's quick.py loads machine code, and its source on a board that cannot run the machine code. So the board
+    gets the source too, as _plain.py.
 
     files: Source file of each module, by its path on the board.
     mpy: The board's sys.implementation._mpy.
@@ -59,8 +60,8 @@ def compiled(files: dict[str, Path], mpy: int, compiler: Compiler | None = None)
         if data[1] != mpy & 0xFF or (data[2] and data[2] != mpy >> 8 & 0x3F):
             raise CannotCompile("mpy-cross writes another format than this MicroPython accepts")
         made[path.removesuffix(".py") + ".mpy"] = data
-        if data[2]:
-            made[path.removesuffix(".py") + "_plain.py"] = source.read_bytes()
+        if source.name in _PLAIN:
+            made[path.removesuffix(".py") + "_plain.py"] = literals.without_words(source).encode()
     return made
 
 

@@ -42,6 +42,15 @@ def text(source: Path, package: Path = firmware_path.PACKAGE) -> str:
     return _texts(package, tuple((path, path.stat().st_mtime_ns) for path in files))[source]
 
 
+def without_words(source: Path) -> str:
+    """Return the text of a module without comments and docstrings."""
+    tree = ast.parse(source.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.FunctionDef) and ast.get_docstring(node):
+            del node.body[0]
+    return ast.unparse(tree)
+
+
 @functools.lru_cache(maxsize=2)
 def _texts(package: Path, files: tuple[tuple[Path, int], ...]) -> dict[Path, str]:
     """Return the text of each module. files: The modules' paths, and the times when they were written."""
