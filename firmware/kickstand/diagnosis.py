@@ -107,19 +107,21 @@ def scan(sda, scl, reopen, addresses):
     return notice, devices
 
 
-def explain_sensor(sda, scl, reopen, chip, error):
-    """Explain a failed set-up.
+def explain(sda, scl, reopen, chip, error):
+    """Explain a failed set-up, or test the FIFO.
 
     Args:
-        error: the OSError or UnknownChip that the set-up raised.
+        error: the OSError or UnknownChip that the set-up raised, or None to test the FIFO.
 
     Returns:
-        notice: a Notice with the reason.
-        addresses: sorted list of the I2C addresses that answer on the bus.
+        notice: a Notice with the reason; None if the FIFO works.
+        addresses: sorted list of the I2C addresses that answer on the bus; empty after a test of the FIFO.
 
     Raises:
-        The errors of reopen(), except OSError.
+        The errors of reopen(), except OSError. The errors of fifo_fault().
     """
+    if error is None:
+        return fifo_fault(chip), []
     notice, devices = scan(sda, scl, reopen, MOTION_ADDRESSES)
     if not notice:
         kept = not isinstance(error, NotKept)
@@ -194,35 +196,3 @@ def _repeats(chip):
             chip.take(k)
             frames.add(tuple(chip.counts))
     return len(frames) == 1 and _reading(chip) != first
-
-
-def bus_line(name, sda, scl, devices):
-    """Return one line of text about the devices that scan() has found.
-
-    Args:
-        name: the name of the bus.
-        devices: the devices from scan().
-    """
-    words = ", ".join([("0x%02x %s" % (address, found)).strip() for address, found, _ in devices])
-    return "%-13sSDA %d, SCL %d: %s" % (name + " bus", sda, scl, words or "nothing answers")
-
-
-def show_wirings(open_lcd, count, show_ms):
-    """Show the number of each wiring on a character display.
-
-    Each number is sent with its own wiring. So the user can read only the number of the display's real wiring.
-
-    Args:
-        open_lcd: open_lcd(number) returns a Display for this wiring.
-        count: number of wirings.
-        show_ms: time to show each number.
-    """
-    for number in range(1, count + 1):
-        lcd = open_lcd(number)
-        lcd.show("This is readable", "LCD_WIRING = %d" % number)
-        lcd.flush()
-        print("%-13sLCD_WIRING = %d is shown for %d s" % ("", number, show_ms // 1000))
-        sleep_ms(show_ms)
-        lcd.show("", "")  # blank the display now, because it may not react to the next wiring
-        lcd.flush()
-    print("%-13sput the line that it has shown into config.py; if it has shown none: its contrast, or 5 V" % "")

@@ -1,7 +1,7 @@
 """Errors and notices. Each error and each notice has a code and the values for its sentence.
 
 A code is a name for programs and is never shown. Three modules have words for each code:
-* ui/words.py for the display, in two lines of 16 characters
+* ui/messages.py for the display, in two lines of 16 characters
 * console.py for the USB console, in one sentence
 * the tools on the computer for a terminal
 """
@@ -47,9 +47,16 @@ class Refusal(Exception):
     words = Notice.words
 
 
-def report(refusal):
+def report(refusal, notices=None):
     """Print a Refusal or Notice on the console, unless a recent print was slow. If the module with the sentences cannot
-    be loaded, print only the code."""
+    be loaded, print only the code.
+
+    Args:
+        refusal: the Refusal or Notice.
+        notices: App.notices, to show it on the display too, or None.
+    """
+    if notices is not None:
+        notices.append(refusal)
     try:
         from .console import tell
 
@@ -59,29 +66,31 @@ def report(refusal):
 
 
 def attempt(function, *arguments):
-    """Call a function as tried() does. If tried() returns a Notice, report it. Return the Notice or None."""
-    problem = tried(function, *arguments)
-    if problem:
-        report(problem)
-    return problem
+    """Call a function as tried() does. Report its Notice, and return the Notice or None."""
+    notice = tried(function, *arguments)[1]
+    if notice:
+        report(notice)
+    return notice
 
 
 def tried(function, *arguments):
-    """Call a function that may import modules. Return None, or a Notice if memory is short or the firmware is
-    incomplete.
+    """Call a function that may import modules.
+
+    Returns:
+        result: the function's result.
+        notice: None, or a Notice if memory is short or the firmware is incomplete.
 
     After a failure, remove the modules that the function began to import, because MicroPython would keep a
     half-imported module."""
     before = None
     try:
         before = tuple(sys.modules)
-        function(*arguments)
-        return None
+        return function(*arguments), None
     except (ImportError, MemoryError) as error:
         for name in [name for name in sys.modules if name not in before] if before else ():
             del sys.modules[name]
         gc.collect()
-        return Notice("incomplete" if isinstance(error, ImportError) else "no-memory", str(error))
+        return None, Notice("incomplete" if isinstance(error, ImportError) else "no-memory", str(error))
 
 
 class CaptureError(Refusal):

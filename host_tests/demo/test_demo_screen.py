@@ -83,8 +83,8 @@ def test_each_pixel_of_an_oled_has_its_dot():
 
 def scored(*states):
     score = Score()
-    for phase, lean_deg, shown in states:
-        score.add({**STATE, "phase": phase, "lean_deg": lean_deg, "lcd": [shown, ""]})
+    for phase, lean_deg, displayed in states:
+        score.add({**STATE, "phase": phase, "lean_deg": lean_deg, "lcd": [displayed, ""]})
     return score.figures()
 
 

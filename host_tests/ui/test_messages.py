@@ -6,7 +6,7 @@ import re
 
 from kickstand import console, errors
 from kickstand.errors import Notice, Refusal, SettingsError
-from kickstand.ui import messages, words
+from kickstand.ui import messages, pages
 from kickstand_tools.common import firmware_path
 
 CLASSES = {name for name in vars(errors) if name[0].isupper()}
@@ -23,7 +23,6 @@ OTHER_SETTINGS = {
     "uart-pins",
     "aliasing",
 }
-OTHER_WORDS = {"starting"}  # the display shows this code without words.py
 CONSOLE_ONLY = {"wrong-code"}  # codes that are reported during imports, before a display exists
 # Values for the words of each code. Some are long numbers and long names.
 VALUES = {"dead-axis": ("x", 0.1), "odd-axis": ("x", 0.1, 1.0), "side-tilted": ("+x", 25.0, 20.0)}
@@ -59,17 +58,17 @@ def worded(table):
 
 
 def test_each_code_has_words_for_the_display_and_settings_are_named():
-    assert worded(words.LINES) == set(codes()) - OTHER_SETTINGS - OTHER_WORDS - CONSOLE_ONLY | INDIRECT
+    assert worded(messages._LINES) == set(codes()) - OTHER_SETTINGS - CONSOLE_ONLY | INDIRECT
     for code in OTHER_SETTINGS:
         assert messages.lines(SettingsError(code, "LCD_SDA", 1, 2, 3, 4)) == ("config.py: wrong", "LCD_SDA")
     assert messages.lines(Notice("aligned", 1.26)) == ("Aligned by drive", "error about 1.3\xdf")
 
 
 def test_words_fit_into_sixteen_characters():
-    for code in worded(words.LINES):
+    for code in worded(messages._LINES):
         lines = messages.lines(Refusal(code, *VALUES.get(code, (99.94, 60.0, 1.0, 1.0))))
         assert len(lines) == 2 and max(map(len, lines)) <= 16, code
-    assert all(len(words) <= 16 for words in messages.NO_LEAN.values())
+    assert all(len(words) <= 16 for words in pages.NO_LEAN.values())
 
 
 def test_a_refusal_of_the_board_has_a_console_sentence():

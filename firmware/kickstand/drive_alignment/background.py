@@ -54,7 +54,7 @@ class BackgroundAlignment:
         speed: the Speed.
         drive: the current DriveAlignment, read-only.
         state: the state to show (see alignment.py).
-        shown: True if the progress has its own page (ui/drive_page.py).
+        shown: True if the progress has its own page (ui/pages.py).
         result: the Notice or AlignmentError at the end of the last drive, or None.
         message: an AlignmentError, StoreError or Notice to show before everything else, or None. The message is shown
             until answer() is called or the vehicle drives off.

@@ -136,7 +136,7 @@ class AxisWatch:
             if self._well():
                 self.fault = None
                 return False
-            self.fault = tried(self._load)
+            self.fault = tried(self._load)[1]
             if self.fault:  # the judge could not be imported: memory is short, or the firmware is incomplete
                 return False
         return self._judge.look(self, samples)

@@ -118,6 +118,17 @@ class LeanMeter:
             return False
         return 0.0 <= lean.variance <= (MAX_VARIANCE if doubts <= MILD else DOUBTED_VARIANCE)
 
+    def shown_deg(self, late=False, fault=None):
+        """Return the lean that may be shown in degrees, or None. For a car the lean is 0 while its readings may be
+        shown.
+
+        Args:
+            late: True if the readings are too old for the display.
+            fault: the sensor's fault, or None.
+        """
+        hidden = late or fault is not None or self.fallen or not (self.calibration.aligned and self.trusted)
+        return None if hidden or abs(self.lean_deg) > FALLEN_DEG else self.lean_deg
+
     def keep_trim(self):
         """Copy the trim to the calibration if the bike is at rest and the trim is certain and has changed. Return True
         if it was copied."""

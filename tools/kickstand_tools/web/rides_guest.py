@@ -71,13 +71,13 @@ def rides(given, names):
     names = json.loads(names)
     for name in names:
         Path(name).symlink_to(Path(given, name))
-    found = sorted_out(names)
+    inputs = sorted_out(names)
     rides = [
-        vars(one) | {"isLog": found.kinds.get(one.log) == "log", "table": one.table and asked_for(one.table)}
-        for one in found.rides
+        vars(ride) | {"isLog": inputs.kinds.get(ride.log) == "log", "table": ride.table and asked_for(ride.table)}
+        for ride in inputs.rides
     ]
-    refused = {name: _one_line(error.line(page=True)) for name, error in found.refused.items()}
-    return {"rides": rides, "kinds": found.kinds, "why": refused}
+    refused = {name: _one_line(error.line(page=True)) for name, error in inputs.refused.items()}
+    return {"rides": rides, "kinds": inputs.kinds, "why": refused}
 
 
 def asked_for(table: mapped.MappedTable) -> dict[str, Any]:
@@ -91,17 +91,17 @@ def asked_for(table: mapped.MappedTable) -> dict[str, Any]:
         certain: true if all required columns are certain.
         picture: result of MappedTable.first_seconds().
     """
-    found = table.findings
-    keys = [[key, words, key in mapped.REQUIRED, found.columns.get(key, "")] for key, words in mapped.WORDS.items()]
+    findings = table.findings
+    keys = [[key, words, key in mapped.REQUIRED, findings.columns.get(key, "")] for key, words in mapped.WORDS.items()]
     units = []
     for key, words in (("t", "time"), ("a", "acceleration"), ("g", "rates"), ("speed", "speed")):
-        likely, why = found.units.get(key, ""), found.found[key].why if key in found.found else ""
+        likely, reason = findings.units.get(key, ""), findings.found[key].why if key in findings.found else ""
         choices = [*mapped.UNIT_KEYS[key], *([mapped.COUNTS] if key in "ag" else [])]
         if likely and likely not in choices:
             choices.insert(0, likely)
-        units.append([key, f"unit of the {words}", [[unit, unit] for unit in choices], likely, why])
+        units.append([key, f"unit of the {words}", [[unit, unit] for unit in choices], likely, reason])
     units[1][2] += [[f"-{unit}", f"{unit}, all of the opposite sign"] for unit, _ in list(units[1][2])]
-    words = {"lacking": table.lacking, "certain": found.decided, "picture": table.first_seconds()}
+    words = {"lacking": table.lacking, "certain": findings.decided, "picture": table.first_seconds()}
     return {"columns": table.sheet.columns, "keys": keys, "units": units} | words
 
 
@@ -124,10 +124,10 @@ def take(log, is_log, columns, units, track, progress):
         return {"log": log}
     out, warnings, words = log, [], ""
     if not is_log:
-        found = import_recording(log, json.loads(columns) or None, json.loads(units))
+        imported = import_recording(log, json.loads(columns) or None, json.loads(units))
         out = str(_result_path(log, f"{log.partition('.')[0]}.csv"))
-        write_imported(out, found)
-        warnings = [notice.line(page=True) for notice in [*found.notices, *found.shortfalls]]
+        write_imported(out, imported)
+        warnings = [notice.line(page=True) for notice in [*imported.notices, *imported.shortfalls]]
     if track:
         try:
             joined = join_track(Path(out), Path(track), progress)
@@ -137,17 +137,17 @@ def take(log, is_log, columns, units, track, progress):
             words = f"{track} is joined: correlation {match.correlation:.2f}, known to {match.sigma_s:.2f} s."
         except InputError as error:
             warnings.append(f"{track} is not joined: {_one_line(error.line(page=True))}")
-    made = {"path": out} if out != log else {}
-    return {"log": out, "warnings": warnings, "words": words} | made
+    entry = {"path": out} if out != log else {}
+    return {"log": out, "warnings": warnings, "words": words} | entry
 
 
 class _Keeping(Ride):
     """A ride whose smoothed lean is kept for smooth(), because computing it takes long."""
 
     def _read(self, log, progress, notices):
-        for block, found in super()._read(log, progress, notices):
-            _smoothed.setdefault(self.name, []).append(found)
-            yield block, found
+        for block, smoothed in super()._read(log, progress, notices):
+            _smoothed.setdefault(self.name, []).append(smoothed)
+            yield block, smoothed
 
 
 @in_json
@@ -167,13 +167,13 @@ def look(log, calibration, progress):
     opened = open_ride(Path(log), Path(calibration), smoothed=True)
     _smoothed.clear()
     ride = _Keeping(opened.log, opened.calibration, opened.smoothed)
-    seen = overview(ride, progress)
+    ride_overview = overview(ride, progress)
     table = {"units": report.STOPS_UNITS, "title": report.STOPS_TITLE, "terms": report.STOPS_TERMS}
     return {
-        "words": asdict(report.words(seen, on_page=True)) | table,
-        "json": report.as_data(seen) | {"ride": Path(log).name},
-        "warnings": [notice.line(page=True) for notice in seen.notices],
-        "page": page(seen, f'<script src="{PLOTLY}"></script>', "'self'"),
+        "words": asdict(report.words(ride_overview, on_page=True)) | table,
+        "json": report.as_data(ride_overview) | {"ride": Path(log).name},
+        "warnings": [notice.line(page=True) for notice in ride_overview.notices],
+        "page": page(ride_overview, f'<script src="{PLOTLY}"></script>', "'self'"),
         "plotly": PLOTLY,
         "stem": ride.stem,
     }
@@ -187,11 +187,11 @@ def smooth(log, calibration, progress):
     """
     ride = open_ride(Path(log), Path(calibration))
     out = _result_path(log, f"{ride.stem}.lean.csv")
-    kept = _smoothed.get(ride.name, [None])
-    if any(found is None for found in kept):
+    parts = _smoothed.get(ride.name, [None])
+    if any(part is None for part in parts):
         smooth_to_csv(Path(log), ride.calibration, out, progress)
     else:
-        write_lean(out, COLUMNS, DIGITS, _blocks_with(np.concatenate(kept), ride, progress))
+        write_lean(out, COLUMNS, DIGITS, _blocks_with(np.concatenate(parts), ride, progress))
     return {"path": str(out)}
 
 
@@ -200,10 +200,10 @@ def _blocks_with(values, ride, progress):
 
     values: shape (number of samples, number of columns).
     """
-    at = 0
+    end = 0
     for block in read_blocks(ride.log, 2, progress, calibration=ride.calibration):
-        at, begin = at + len(block.time_us), at
-        yield block, values[begin:at]
+        end, begin = end + len(block.time_us), end
+        yield block, values[begin:end]
 
 
 @in_json
@@ -214,11 +214,11 @@ def align(log, progress):
         path: path of the calibration.
         roll_deg, pitch_deg, yaw_deg: its standard errors.
     """
-    found = fit_ride(Path(log), progress=progress)
+    fit = fit_ride(Path(log), progress=progress)
     out = _result_path(log, calibration_path(Path(log)).name)
-    write_calibration(out, found.calibration)
-    known = {name: round(getattr(found, name), 1) for name in ("roll_deg", "pitch_deg", "yaw_deg")}
-    return {"path": str(out), **known}
+    write_calibration(out, fit.calibration)
+    errors = {name: round(getattr(fit, name), 1) for name in ("roll_deg", "pitch_deg", "yaw_deg")}
+    return {"path": str(out), **errors}
 
 
 def _result_path(log, name):
@@ -242,10 +242,10 @@ def raising(function):
 
     @functools.wraps(function)
     def checked(*matrices):
-        found = function(*matrices)
-        if np.any(np.isnan(found)) and all(np.all(np.isfinite(matrix)) for matrix in matrices):
+        result = function(*matrices)
+        if np.any(np.isnan(result)) and all(np.all(np.isfinite(matrix)) for matrix in matrices):
             raise np.linalg.LinAlgError("Singular matrix")
-        return found
+        return result
 
     return checked
 

@@ -147,10 +147,10 @@ def _attach(app):
     The radio is simulated, because a Pico has no radio, and the radio of an emulated ESP32 does not start.
     """
     sys.modules["bluetooth"] = __import__("bluetooth_guest")
-    from kickstand.live.live import attach
+    from kickstand.live.live import Live
     from kickstand.live.radio import Radio
 
-    attach(Radio(), app)
+    app.live = Live(Radio(), app)
     app.live.radio._ble.connect()
 
 
