@@ -99,7 +99,7 @@ class _Module(ast.NodeTransformer):
                 for alias in node.names:
                     self._find_imported(node, alias, modules)
         bound = [node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name) and _binds(node)]
-        if twice := set(bound) & (self._imported.keys() | self._modules.keys()):
+        if twice := set(bound) & self._imported.keys():
             raise ValueError(f"{self.name} binds names that it imports: {', '.join(sorted(twice))}")
         for statement in self._tree.body:
             for name, value in _assigned(statement):
