@@ -91,7 +91,7 @@ class App:
         self.meter = LeanMeter(Calibration(), settings.leans, sensor.chip.gyro_delay_s)
         self.calibration = ActiveCalibration(self.meter)
         self.drive = self._open_drive() if settings.SPEED else None
-        self.rides = Rides(settings, sensor.chip, self.meter, self.calibration, self.notices, writer)
+        self.rides = Rides(self, writer)
         self.clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self.late = False
         self._restarts = 0

@@ -174,7 +174,7 @@ class RideFiles:
         self._file = None
         self._refused = None  # the CardError that begin() raises
 
-    def prepare(self):
+    def prepare(self, notices):
         """Make the first ride's directory in flash, because an ESP32 makes a directory so slowly that the first
         readings would be lost. Or test the SD card: mount it, count its free space, and write a file.
 
@@ -182,8 +182,8 @@ class RideFiles:
         must be read, which takes half a minute. If a card does not become ready, the driver waits 5 s. During a ride
         such a wait would freeze the lean, and the watchdog would restart the board again and again.
 
-        Returns:
-            A CardError if the card cannot be used, else None.
+        Args:
+            notices: list to which a CardError is appended if the card cannot be used.
         """
         try:
             if self.stops_interrupts:
@@ -193,8 +193,7 @@ class RideFiles:
         except Exception as error:  # any error of driver or file system, because the board must not restart
             if not self.stops_interrupts:  # begin() reports an error of the flash when the ride begins
                 self._refused = error if isinstance(error, CardError) else CardError("no-card", str(error))
-                report(self._refused)
-        return self._refused
+                report(self._refused, notices)
 
     def begin(self):
         """Begin a new ride; return its number. Raises OSError, CardError."""

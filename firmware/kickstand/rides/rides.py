@@ -16,11 +16,7 @@ class Rides:
     """Begins and ends the recording of rides.
 
     Args:
-        settings: a Settings.
-        chip: the Mpu6050.
-        meter: the LeanMeter.
-        calibration: the meter's ActiveCalibration.
-        notices: list to which the Notices for the rider are appended.
+        app: the App.
         writer: the writer of the blocks, as for Recorder, or None for flash or SD card. With a writer, recording begins
             with the first readings.
 
@@ -29,17 +25,13 @@ class Rides:
         on_card: True if rides are stored on an SD card.
     """
 
-    def __init__(self, settings, chip, meter, calibration, notices, writer=None):
-        self._settings = settings
-        self._chip = chip
-        self._meter = meter
-        self._calibration = calibration
-        self._notices = notices
+    def __init__(self, app, writer=None):
+        self._app = app
         self._writer = writer
         self._modules = ("block", "recorder") if writer else ("block", "ride_files", "recorder")  # not yet imported
         self.recorder = NoRecorder
-        self.on_card = settings.SD_SPI is not None and writer is None
-        self._due = settings.RECORD or writer is not None  # True if recording begins with the first readings
+        self.on_card = app.settings.SD_SPI is not None and writer is None
+        self._due = app.settings.RECORD or writer is not None  # True if recording begins with the first readings
         self._refused = None  # a Notice with the reason why no ride can be recorded on the card
 
     def begin(self):
@@ -52,9 +44,7 @@ class Rides:
             if self.on_card:  # not tried again later, because a card must be tested before the watchdog runs
                 self._refused = refused
             if not refused:
-                fault = self._writer.prepare()
-                if fault:
-                    self._notices.append(fault)
+                self._writer.prepare(self._app.notices)
 
     def prepare(self):
         """Import one module that recording needs. The open menu calls this method repeatedly, so that a recording
@@ -77,11 +67,12 @@ class Rides:
                 self._import()
             from .recorder import Recorder
 
+            settings = self._app.settings
             if not self._writer:
                 from .ride_files import RideFiles
 
-                self._writer = RideFiles(self._settings)
-            self.recorder = Recorder(self._writer, self._settings.SAMPLE_HZ, self._notices)
+                self._writer = RideFiles(settings)
+            self.recorder = Recorder(self._writer, settings.SAMPLE_HZ, self._app.notices)
 
     def start(self):
         """Begin to record a ride. A failure is reported to the rider.
@@ -89,13 +80,14 @@ class Rides:
         If the bike is at rest, the lean filter restarts too. With this restart a replay shows the same lean as the
         display, and the filter estimates the gyro's errors again in the first bends. If the bike is moving, the filter
         does not restart, so the replay's filter at first knows the gyro's errors less well than the board's filter."""
-        if self._meter.at_rest:
-            self._calibration.restart()
+        app = self._app
+        if app.meter.at_rest:
+            app.calibration.restart()
         refused = self._refused or attempt(self._create)
         if refused:
-            self._notices.append(refused)
+            app.notices.append(refused)
         else:
-            self.recorder.start(self._chip, self._calibration.value)
+            self.recorder.start(app.sensor.chip, app.calibration.value)
 
     def start_due(self):
         """Begin to record if the settings or the writer require it. Call this method at the first readings."""
@@ -107,8 +99,8 @@ class Rides:
         """End the ride and begin another, because the calibration has changed and a ride has only one calibration. The
         meter restarts too, because a replay of the new ride does not know the poses that were just taken."""
         if self.recorder.active:
-            self._calibration.restart()
-            self.recorder.start(self._chip, self._calibration.value)
+            self._app.calibration.restart()
+            self.recorder.start(self._app.sensor.chip, self._app.calibration.value)
 
     def stop(self):
         """End the ride, if there is one."""

@@ -8,7 +8,7 @@ from typing import Any
 _MEASURED = {"odd-left": "force to the left", "odd-up": "force up", "odd-pitch": "pitch"}
 _ROWS = "offset, g", "slope", "gyro bias, deg/s", "left", "up", "forward"  # of the calibration
 _FULL_SCALE = 32768  # counts at the end of the range
-_SUPPORTED = 2  # kind of a sensor that the firmware supports, see imu/other_chips.py
+_SUPPORTED = 2  # kind of a sensor that the firmware supports, see diagnosis.py of the firmware
 
 Devices = list[tuple[int, str, int]]  # address, name and kind of each device on a bus
 Noticed = tuple[Any, Any]  # what the app noticed: its `worst`, and the last misfit of its readings; each may be None
