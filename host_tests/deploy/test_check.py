@@ -6,9 +6,8 @@ from types import SimpleNamespace
 import pytest
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.deploy import check
-from kickstand_tools.simulated_board.i2c import OPEN
+from kickstand_tools.simulated_board.i2c import OPEN, Registers
 from kickstand_tools.simulated_board.mpu6050 import FIFO_COUNTH, FIFO_COUNTL, Fifo
-from kickstand_tools.simulated_board.other_devices import Registers
 from support import command
 from support.checked_board import CheckedBoard, part
 
@@ -135,12 +134,12 @@ OFTEN = ("gyro x dead", "gyro y noisy", "gyro z biased", "FIFO of half the size"
     "name", [name if name in OFTEN else pytest.param(name, marks=pytest.mark.long) for name in DEFECTS]
 )
 def test_each_planted_defect_is_found_by_its_name(name, short, tmp_path):
-    what, world, plant = DEFECTS[name]
+    finding, world, plant = DEFECTS[name]
     checked = CheckedBoard(world)
     if plant:
         plant(checked.board)
     findings = faults(checked, tmp_path)
-    assert what == next(iter(findings), None) or (what in findings and name == "drop-outs"), findings
+    assert finding == next(iter(findings), None) or (finding in findings and name == "drop-outs"), findings
 
 
 @pytest.mark.parametrize(

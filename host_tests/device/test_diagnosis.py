@@ -4,9 +4,8 @@ FIFO."""
 from collections import Counter
 
 import pytest
-from kickstand_tools.simulated_board.i2c import LOW, OPEN
+from kickstand_tools.simulated_board.i2c import LOW, OPEN, Ds3231, Registers
 from kickstand_tools.simulated_board.mpu6050 import Fifo
-from kickstand_tools.simulated_board.other_devices import Ds3231, Registers
 
 WHO_AM_I, PWR_MGMT_1 = 0x75, 0x6B
 BAROMETER, COMPASS, UNKNOWN = (0x77, {}), (0x1E, {}), (0x42, {})
@@ -60,8 +59,8 @@ CAUSES = {
 
 @pytest.mark.parametrize("name", CAUSES)
 def test_device_on_the_bus_is_named(name, run, status):
-    devices, shown, words = CAUSES[name]
-    assert display(run, connected(*devices)) == shown
+    devices, displayed, words = CAUSES[name]
+    assert display(run, connected(*devices)) == displayed
     lines = status(fit=connected(*devices))
     (sensor,) = [line for line in lines if line.startswith("Sensor  ")]
     assert words in sensor and ("ACCEPT" in sensor) is (name == "unknown")
@@ -204,16 +203,16 @@ def test_broken_fifo_is_named(fifo, how, run, status):
 def test_status_finds_the_wiring_of_a_backpack(wiring, status):
     """The board sends the number of each possible wiring with the wiring itself. Only the text of the right wiring is
     readable and lit."""
-    shown = Counter()
+    counts = Counter()
 
     def fit(board):
         board.lcd.wiring = wiring
-        board.every(0.1, lambda: shown.update([(*board.lcd.text(), board.lcd.backlight)]))
+        board.every(0.1, lambda: counts.update([(*board.lcd.text(), board.lcd.backlight)]))
 
-    lines = status(fit=fit, arguments=(True,))
+    lines = status(fit=fit, wirings=True)
     readable = [
         line2.strip()
-        for (line1, line2, lit), count in shown.items()
+        for (line1, line2, lit), count in counts.items()
         if lit and line1 == "This is readable" and count > 9
     ]
     assert readable == [f"LCD_WIRING = {wiring}"]

@@ -4,7 +4,7 @@ import functools
 
 import numpy as np
 import pytest
-from kickstand.drive_alignment import verdict
+from kickstand.drive_alignment import alignment
 from kickstand.drive_alignment.alignment import DriveAlignment
 from kickstand.rotation import matrix
 from kickstand_tools.calibration.drive import fit_drive, fit_logs
@@ -64,8 +64,8 @@ def test_bins_give_the_board_s_matrix(every, gap):
 
 
 def test_a_car_is_aligned_by_its_drive():
-    log, done, events = driven(), [], []
-    fit = fit_logs([log], None, None, "improved", lambda *step: done.append(step), events.append)
+    log, finished, events = driven(), [], []
+    fit = fit_logs([log], None, None, "improved", lambda *step: finished.append(step), events.append)
     aligned = fit.calibration
     assert angle_deg(aligned.vehicle_from_sensor, MOUNT) < 1.2
     assert aligned.gyro_bias_dps == pytest.approx(BIAS, abs=0.02)
@@ -76,7 +76,7 @@ def test_a_car_is_aligned_by_its_drive():
     assert fit.lag_s == pytest.approx(0.0, abs=0.3) and fit.halves_deg is not None and fit.halves_deg < 3.0
     (ready_s,) = [event.t_s for event in events if event.what == "ready"]
     assert fit.ready_s == ready_s and events == fit.events
-    assert done == sorted(done) and done[-1] == (2 * len(log.t_s),) * 2
+    assert finished == sorted(finished) and finished[-1] == (2 * len(log.t_s),) * 2
 
 
 def test_a_gyro_that_was_calibrated_has_its_bias_as_a_reading():
@@ -88,7 +88,7 @@ def test_a_gyro_that_was_calibrated_has_its_bias_as_a_reading():
 
 
 @pytest.mark.parametrize(
-    ("yaw_deg", "expected", "error_deg"), [(10.0, verdict.REFINED, -10.0), (180.0, verdict.REVERSED, 180.0)]
+    ("yaw_deg", "expected", "error_deg"), [(10.0, alignment.REFINED, -10.0), (180.0, alignment.REVERSED, 180.0)]
 )
 def test_two_poses_are_compared_with_the_drive(yaw_deg, expected, error_deg):
     """The alignment from the poses is turned to the left about the vertical by yaw_deg."""

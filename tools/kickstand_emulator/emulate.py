@@ -4,11 +4,13 @@ The board has a sensor, a display and a button, and is on a simulated bike.
 """
 
 import contextlib
+import socket
 import sys
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeAlias, cast
 
+from kickstand_tools.common.errors import InputError, cause
 from kickstand_tools.demo.device import (
     KICKSTAND_PRESS_S,
     LONG_PRESS_S,
@@ -27,12 +29,72 @@ from kickstand_tools.simulation.scripted.script import Ride
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from rich.live import Live
 
-from .console_server import ConsoleServer
 from .device import EmulatedDevice
 
 if TYPE_CHECKING:
     from .esp32 import Esp32
     from .pico import Pico
+
+
+class ConsoleServer:
+    """Serves one client at a time, as a serial port does. Call poll() often.
+
+    Args:
+        send: Function that is called with the client's data.
+        port: Number of the TCP port. 0 chooses a free port.
+
+    The attribute `port` holds the actual number. Raises InputError if the port cannot be opened.
+    """
+
+    def __init__(self, send: Callable[[bytes], None], port: int) -> None:
+        self._send = send
+        self._client: socket.socket | None = None
+        try:
+            self._server = socket.create_server(("127.0.0.1", port))
+        except (OSError, OverflowError) as error:
+            raise InputError(f"port {port} cannot be opened: {cause(error)}; choose another") from error
+        self._server.setblocking(False)
+        self.port: int = self._server.getsockname()[1]
+
+    def close(self) -> None:
+        """Disconnect the client and stop listening."""
+        self._disconnect()
+        self._server.close()
+
+    def poll(self) -> None:
+        """Accept a client, or pass the data of the connected client to send()."""
+        if self._client is None:
+            with contextlib.suppress(BlockingIOError):
+                self._client = self._server.accept()[0]
+                self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                self._client.setblocking(False)
+            return
+        try:
+            data = self._client.recv(4096)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if data:
+            self._send(data)
+        else:
+            self._disconnect()
+
+    def say(self, data: bytes) -> None:
+        """Send the board's output to the client. Without a client the output is lost."""
+        if self._client:
+            try:
+                self._client.setblocking(True)
+                self._client.sendall(data)
+                self._client.setblocking(False)
+            except OSError:
+                self._disconnect()
+
+    def _disconnect(self) -> None:
+        if self._client:
+            self._client.close()
+            self._client = None
+
 
 Kind: TypeAlias = "type[Pico] | type[Esp32]"
 
@@ -104,9 +166,9 @@ def emulate(port: int, say: Callable[[str], None], chip: str = "rp2040", display
 
 def _run(device: EmulatedDevice, server: ConsoleServer) -> None:
     """Advance the time by one step, but not faster than real time. The time-outs of mpremote use the host's clock."""
-    begun, before = time.monotonic(), device.time_s
+    begun, previous_s = time.monotonic(), device.time_s
     device.run(_STEP_S, server.poll)
-    time.sleep(max(0.0, device.time_s - before - (time.monotonic() - begun)))
+    time.sleep(max(0.0, device.time_s - previous_s - (time.monotonic() - begun)))
 
 
 def _watch(device: EmulatedDevice, server: ConsoleServer, bike: HandBike, address: str) -> None:
@@ -133,11 +195,11 @@ def below(on: bool, address: str) -> str:
 
 
 def _print(device: EmulatedDevice, server: ConsoleServer, bike: ScriptedBike, say: Callable[[str], None]) -> None:
-    shown: list[str] = device.lcd()
+    lines: list[str] = device.lcd()
     while True:
         _run(device, server)
         bike.follow(device)
-        if device.lcd() != shown:
-            shown = device.lcd()
+        if device.lcd() != lines:
+            lines = device.lcd()
             say(f"{device.time_s:8.2f} s")
-            say("\n".join(lcd_lines(shown)))
+            say("\n".join(lcd_lines(lines)))

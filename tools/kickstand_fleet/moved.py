@@ -56,18 +56,13 @@ STEP_SHARE = 0.7  # a tilt is sudden if more than this share of the tilt happens
 
 @dataclass
 class Move:
-    """A rotation of the mount.
+    """A rotation of the mount."""
 
-    log: Index of the log in which the mount rotated, or of the first log after the rotation.
-    at_s: Time of the rotation from the beginning of that log. None if the mount rotated before that log.
-    turn_deg: Rotation vector along the vehicle's left, up and forward, shape (3).
-    sigma_deg: Standard deviations of turn_deg, shape (3).
-    """
-
-    log: int
+    log: int  # index of the log in which the mount rotated, or of the first log after the rotation
+    # Time of the rotation from the beginning of that log. None if the mount rotated before that log.
     at_s: float | None
-    turn_deg: Array
-    sigma_deg: Array
+    turn_deg: Array  # rotation vector along the vehicle's left, up and forward, shape (3)
+    sigma_deg: Array  # standard deviations of turn_deg, shape (3)
 
     @property
     def angle_deg(self) -> float:
@@ -102,7 +97,7 @@ def _search(logs: list[Intervals], driving: Blocks, share: float) -> list[Move]:
     best: tuple[float, int, Move] | None = None
     for index in range(LEAST_BLOCKS, count - LEAST_BLOCKS + 1):
         between = driving.log[index] != driving.log[index - 1]
-        turned = compare(*_sides(driving, index, between))
+        turned = turn_between(*_sides(driving, index, between))
         if turned is None:
             continue
         turn, sigma = turned
@@ -130,10 +125,7 @@ def _search(logs: list[Intervals], driving: Blocks, share: float) -> list[Move]:
 
 
 def _sides(driving: Blocks, index: int, between: bool) -> tuple[Blocks, Blocks]:
-    """Return the blocks before and after block number `at`.
-
-    between: True if the block is the first of a log. True uses blocks of all logs, False only blocks of the same log.
-    """
+    """Return the blocks before and after block number `index`: of all logs if `between` logs, else of one log."""
     if between:
         return driving.part(slice(max(0, index - REACH), index)), driving.part(slice(index, index + REACH))
     first, last = np.searchsorted(driving.log, [driving.log[index], driving.log[index] + 1])
@@ -142,7 +134,7 @@ def _sides(driving: Blocks, index: int, between: bool) -> tuple[Blocks, Blocks]:
     return driving.part(earlier), driving.part(slice(index + 1, min(last, index + 1 + REACH)))
 
 
-def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
+def turn_between(first: Blocks, second: Blocks) -> tuple[Array, Array] | None:
     """Measure by how much the mount rotated between two groups of blocks.
 
     Returns:
@@ -151,13 +143,13 @@ def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
 
     Returns None if one of the groups does not determine an alignment.
     """
-    if min(len(before.log), len(after.log)) < LEAST_BLOCKS:
+    if min(len(first.log), len(second.log)) < LEAST_BLOCKS:
         return None
-    earlier, later = _align_part(before), _align_part(after)
+    earlier, later = _align_part(first), _align_part(second)
     if earlier is None or later is None:
         return None
     turn = np.degrees(rotation_vector(later.frame @ earlier.frame.T))
-    road = ROAD_DEG if before.log[-1] == after.log[0] else OTHER_ROAD_DEG
+    road = ROAD_DEG if first.log[-1] == second.log[0] else OTHER_ROAD_DEG
     variance = earlier.variance + later.variance + 2.0 * road**2
     # The direction of the sway measures the yaw in another way than the frame. An error between the yaws of the two
     # frames makes the sway seem to turn by the same angle
@@ -171,25 +163,16 @@ def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
 
 @dataclass
 class _PartAlignment:
-    """The alignment on one side of a comparison.
+    """The alignment on one side of a comparison."""
 
-    frame: Rotation from sensor to vehicle axes, shape (3, 3).
-    variance: Variances of pitch, yaw and roll, shape (3), in degrees^2.
-    sway_deg: Direction of the sway, in degrees from forward.
-    sway_variance: Variance of sway_deg, in degrees^2. Infinite without sway.
-    """
-
-    frame: Array
-    variance: Array
-    sway_deg: float
-    sway_variance: float
+    frame: Array  # rotation from sensor to vehicle axes, shape (3, 3)
+    variance: Array  # variances of pitch, yaw and roll, shape (3), in degrees^2
+    sway_deg: float  # direction of the sway, in degrees from forward
+    sway_variance: float  # variance of sway_deg, in degrees^2. Infinite without sway.
 
 
 def _align_part(part: Blocks) -> _PartAlignment | None:
-    """Compute the alignment from some blocks, with its variance from the jackknife.
-
-    Returns None if the blocks do not determine an alignment.
-    """
+    """Compute the alignment from some blocks, with its variance from the jackknife. None if undetermined."""
     square, product = np.sum(part.square, axis=0), np.sum(part.product, axis=0)
     coefficients, varied = fits(square, product)
     if np.sum(varied) < LEAST_VARIED:
@@ -226,12 +209,12 @@ def _moment_of_jump(log: Intervals, move: Move) -> float | None:
     # Unit vector of the direction in which the vertical moves
     tips = (left * move.turn_deg[2] - forward * move.turn_deg[0]) / tilt
     best, moment = 0.0, move.at_s
-    for now in time[np.abs(time - move.at_s) < 2.5 * STEP_S]:
-        early = (time > now - STEP_GAP_S - STEP_S) & (time < now - STEP_GAP_S)
-        late = (time > now + STEP_GAP_S) & (time < now + STEP_GAP_S + STEP_S)
+    for time_s in time[np.abs(time - move.at_s) < 2.5 * STEP_S]:
+        early = (time > time_s - STEP_GAP_S - STEP_S) & (time < time_s - STEP_GAP_S)
+        late = (time > time_s + STEP_GAP_S) & (time < time_s + STEP_GAP_S + STEP_S)
         if np.count_nonzero(early) < 3 or np.count_nonzero(late) < 3:
             continue
         step = np.degrees((np.median(level[late], axis=0) - np.median(level[early], axis=0)) @ tips)
         if step > best:
-            best, moment = float(step), float(now)
+            best, moment = float(step), float(time_s)
     return moment if best > STEP_SHARE * tilt or tilt > SURELY_DEG else None

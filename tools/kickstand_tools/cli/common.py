@@ -34,7 +34,7 @@ class Time(click.ParamType):
             numbers = [*(int(cell) for cell in cells[:-1]), float(cells[-1])]
         except ValueError:
             numbers = [-1.0]
-        seconds = sum(60**place * number for place, number in enumerate(reversed(numbers)))
+        seconds = sum(60**power * number for power, number in enumerate(reversed(numbers)))
         if len(cells) > 3 or min(numbers) < 0 or not seconds < float("inf"):
             self.fail(f"{text!r} is not a time: give seconds such as 60 or 12.5, or minutes and seconds such as 1:00")
         return sign * seconds
@@ -114,9 +114,9 @@ def live(command: Command) -> Command:
     return option(help_adds(words)(command))
 
 
-def known_to(found: "RideFit") -> str:
+def known_to(fit: "RideFit") -> str:
     """Return the standard errors of an alignment by a ride, in words."""
-    return f"known to: roll {found.roll_deg:.1f}, pitch {found.pitch_deg:.1f}, yaw {found.yaw_deg:.1f} degrees"
+    return f"known to: roll {fit.roll_deg:.1f}, pitch {fit.pitch_deg:.1f}, yaw {fit.yaw_deg:.1f} degrees"
 
 
 def warn(log: Path | str, notices: Iterable[Message]) -> None:

@@ -1,5 +1,6 @@
 """Reads recorded logs block by block: CSV with the columns of COLUMNS, plain or gzipped."""
 
+import contextlib
 import itertools
 from collections.abc import Iterator
 from dataclasses import replace
@@ -120,10 +121,11 @@ def read_blocks(
 
 def check_first_line(log: Path) -> None:
     """Raise InputError if the first line of a file is not the header of a log, or if no other line follows."""
-    pieces = (text for text, _ in chunks(log, BLOCK_BYTES, []))
-    _, rest = _header(str(log), next(pieces, b""))
-    if not rest.strip() and not any(text.strip() for text in pieces):
-        raise InputError(f"{log} is empty: there are no readings below the names of its columns")
+    with contextlib.closing(chunks(log, BLOCK_BYTES, [])) as pieces:
+        first, _ = next(pieces, (b"", 0))
+        _, rest = _header(str(log), first)
+        if not rest.strip() and not any(text.strip() for text, _ in pieces):
+            raise InputError(f"{log} is empty: there are no readings below the names of its columns")
 
 
 def is_log(path: Path) -> bool:
@@ -205,11 +207,12 @@ def _blocks_of(log: Log) -> Iterator[Block]:
 
 
 def _parsed(source: File, name: str, remarks: list[Message], lines: bool) -> Iterator[Block]:
-    pieces = chunks(source, BLOCK_BYTES, remarks)
-    first, packed = next(pieces, (b"", 0))
-    names, rest = _header(name, first)
-    rows = _rows(itertools.chain([(rest, packed)], pieces), name, names, remarks, lines)
-    return even_blocks(rows, name, remarks)
+    # An error holds the frames that it went through, so without closing() the file would stay open as long as the error
+    with contextlib.closing(chunks(source, BLOCK_BYTES, remarks)) as pieces:
+        first, packed = next(pieces, (b"", 0))
+        names, rest = _header(name, first)
+        rows = _rows(itertools.chain([(rest, packed)], pieces), name, names, remarks, lines)
+        yield from even_blocks(rows, name, remarks)
 
 
 def _header(name: str, first: bytes) -> tuple[list[str], bytes]:

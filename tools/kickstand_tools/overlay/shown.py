@@ -47,16 +47,16 @@ class Shown:
 
     def at(self, t_s: Array) -> "Shown":
         """Interpolate the values at other times. The values are NaN before the ride, after it and in gaps."""
-        before = np.clip(np.searchsorted(self.t_s, t_s, side="right") - 1, 0, len(self.t_s) - 2)
+        index = np.clip(np.searchsorted(self.t_s, t_s, side="right") - 1, 0, len(self.t_s) - 2)
         lean, forward, left = (
-            _along_lines(self.t_s, value, before, t_s, _GAP_S) for value in (self.lean_deg, self.forward_g, self.left_g)
+            _along_lines(self.t_s, value, index, t_s, _GAP_S) for value in (self.lean_deg, self.forward_g, self.left_g)
         )
-        known = np.flatnonzero(np.isfinite(self.speed_mps))
+        valid = np.flatnonzero(np.isfinite(self.speed_mps))
         speed = np.full(len(t_s), np.nan)
-        if len(known) > 1:
-            at_s = self.t_s[known]
-            place = np.clip(np.searchsorted(at_s, t_s, side="right") - 1, 0, len(known) - 2)
-            speed = _along_lines(at_s, self.speed_mps[known], place, t_s, _SPEED_S)
+        if len(valid) > 1:
+            at_s = self.t_s[valid]
+            speed_index = np.clip(np.searchsorted(at_s, t_s, side="right") - 1, 0, len(valid) - 2)
+            speed = _along_lines(at_s, self.speed_mps[valid], speed_index, t_s, _SPEED_S)
         last = np.searchsorted(self.t_s, t_s, side="right") - 1
         most_left, most_right = (np.where(last >= 0, value[last], 0.0) for value in (self.left_deg, self.right_deg))
         return Shown(t_s, lean, forward, left, speed, most_left, most_right)
@@ -86,16 +86,13 @@ def _maximum(t_s: Array, lean: Array) -> Array:
     return np.maximum(np.maximum.accumulate(lasted), 0.0)
 
 
-def _along_lines(at_s: Array, values: Array, before: Ints, t_s: Array, gap_s: float) -> Array:
-    """Interpolate linearly. The result is NaN outside the values, and between values further apart than gap_s.
-
-    at_s: times of the values.
-    before: for each result, index of the last value before its time.
-    t_s: times of the results.
+def _along_lines(at_s: Array, values: Array, index: Ints, t_s: Array, gap_s: float) -> Array:
+    """Interpolate linearly. NaN outside the values, and between values further apart than gap_s. index: the value
+    before.
     """
-    step_s = at_s[before + 1] - at_s[before]
-    share = (t_s - at_s[before]) / step_s
-    result = values[before] * (1.0 - share) + values[before + 1] * share
+    step_s = at_s[index + 1] - at_s[index]
+    share = (t_s - at_s[index]) / step_s
+    result = values[index] * (1.0 - share) + values[index + 1] * share
     margin = gap_s / step_s
     inside = (share >= -np.minimum(margin, 0.5)) & (share <= 1.0 + np.minimum(margin, 0.5)) & (step_s <= gap_s)
     return np.where(inside, result, np.nan)

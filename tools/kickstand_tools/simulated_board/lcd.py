@@ -6,7 +6,62 @@ are not connected, so the controller reads them as ones. Data sent while the con
 
 import re
 
-from .glyphs import drawn, rom
+# Codes of ROM A00 that differ from ASCII and have a counterpart in Unicode (HD44780U data sheet, table 4)
+_ROM_A00 = {
+    0x5C: "\u00a5",  # yen
+    0x7E: "\u2192",  # right arrow
+    0x7F: "\u2190",  # left arrow
+    0xA5: "\u00b7",  # middle dot
+    0xDF: "\u00b0",  # degree
+    0xE0: "\u03b1",  # alpha
+    0xE2: "\u03b2",  # beta
+    0xE4: "\u03bc",  # mu
+    0xF2: "\u03b8",  # theta
+    0xF4: "\u03a9",  # omega
+    0xF6: "\u03a3",  # sigma
+    0xF7: "\u03c0",  # pi
+    0xFD: "\u00f7",  # division
+    0xFF: "\u2588",  # full block
+}
+
+# The nearest Unicode block by number of filled columns or rows. Unicode has blocks in eighths, but a character has five
+# columns.
+_FROM_LEFT = " \u258e\u258d\u258b\u258a\u2588"
+_FROM_RIGHT = " \u2595\u2590\u2590\u2590\u2588"  # at the right edge Unicode has only an eighth and a half block
+_FROM_BELOW = " \u2581\u2582\u2583\u2584\u2585\u2586\u2587\u2588"
+
+
+def rom(code):
+    """Return the ROM's character for a code from 0x10 on, or '?' if Unicode has no similar character."""
+    if code in _ROM_A00:
+        return _ROM_A00[code]
+    if 0x20 <= code < 0x7E:
+        return chr(code)
+    return " " if code < 0x20 or 0x80 <= code <= 0xA0 else "?"
+
+
+def drawn(rows):
+    """Return the character that looks most like a 5x8 pattern, or '?'.
+
+    rows: eight values. Bit 4 is the left dot, and bit 0 the right dot.
+    """
+    rows = [row & 0x1F for row in rows]
+    inked = [row for row in rows if row]
+    if not inked:
+        return " "
+    if all(row == 0x1F for row in rows[8 - len(inked) :]):
+        return _FROM_BELOW[len(inked)]
+    row = inked[0]
+    if len(inked) < 5 or any(r != row for r in inked):
+        return "?"
+    # Vertical bars, perhaps with an empty row above or below
+    for columns in range(1, 6):
+        if row == 0x1F & ~(0x1F >> columns):
+            return _FROM_LEFT[columns]
+        if row == (1 << columns) - 1:
+            return _FROM_RIGHT[columns]
+    return "|" if row in (0x04, 0x08, 0x02) else "?"
+
 
 _RS, _RW, _E, _LIGHT = 0x01, 0x02, 0x04, 0x08
 
@@ -33,8 +88,8 @@ def shown_lean(lines):
 
     Returns None if the two lines are another page.
     """
-    found = _LEAN_PAGE.match(lines[0])
-    return found and float(found.group(1)) * (-1.0 if found.group(2) == "left" else 1.0)
+    match = _LEAN_PAGE.match(lines[0])
+    return match and float(match.group(1)) * (-1.0 if match.group(2) == "left" else 1.0)
 
 
 class Lcd:
@@ -98,7 +153,7 @@ class Lcd:
     def codes(self):
         """Return two lists of the 16 visible character codes."""
         places = [(self._shift + i) % _LINE for i in range(COLUMNS)]
-        return [[self.ddram[start + place] for place in places] for start in (0x00, 0x40)]
+        return [[self.ddram[start + column] for column in places] for start in (0x00, 0x40)]
 
     def text(self):
         """Return two strings of the 16 visible characters. The strings are blank while the display is off."""
@@ -125,14 +180,14 @@ class Lcd:
         """
         if self.wiring != 1:
             self._raw, value = value, self._as_usual(value)
-        before = self._port
+        previous = self._port
         self._port = value
-        if (before ^ value) & _LIGHT:
+        if (previous ^ value) & _LIGHT:
             self.changes += 1
-        if value & _E and not before & _E:
-            self._rs = before & _RS  # RS must be stable 40 ns before E rises (tAS), so a change with E comes too late
-        elif before & _E and not value & _E:
-            self._latch(before & ~_RS | self._rs)
+        if value & _E and not previous & _E:
+            self._rs = previous & _RS  # RS must be stable 40 ns before E rises (tAS), so a change with E comes too late
+        elif previous & _E and not value & _E:
+            self._latch(previous & ~_RS | self._rs)
         return True
 
     def read_byte(self):

@@ -205,15 +205,11 @@ def crosswind(plan: Plan) -> Conditions:
 
 
 def weight(plan: Plan) -> Conditions:
-    """A rider who hangs off in turns, and luggage on one side.
-
-    The rider moves the centre of mass by up to 5 cm, which is 5 degrees of lean. The luggage moves the centre of mass
-    by 1 to 2 cm.
-    """
+    """A rider who hangs off by up to 5 cm in turns (5 degrees of lean), and luggage that moves it by 1 to 2 cm."""
     conditions = street(plan)
-    beside = plan.side() * plan.uniform(0.01, 0.02)
+    offset_m = plan.side() * plan.uniform(0.01, 0.02)
     for leg in plan.legs:
-        leg.hang_m = beside
+        leg.hang_m = offset_m
         if leg.lean_deg is not None and abs(leg.lean_deg) > 12.0:
             leg.hang_m += plan.uniform(0.02, 0.05) * (1.0 if leg.lean_deg > 0 else -1.0)
     conditions.sway_m = 0.004

@@ -66,7 +66,8 @@ class Server(ThreadingHTTPServer):
     def _end_silent_connection(self) -> bool:
         """End the oldest connection that has sent no request, and take its place. Return False without one."""
         with contextlib.suppress(OSError, StopIteration, RuntimeError):
-            next(one for one in list(self._open) if one not in self.has_asked).shutdown(socket.SHUT_RDWR)
+            silent = (connection for connection in list(self._open) if connection not in self.has_asked)
+            next(silent).shutdown(socket.SHUT_RDWR)
             return self._free.acquire(timeout=FULL_S)
         return False
 
@@ -100,7 +101,7 @@ def server(files: dict[str, bytes], port: int = PORT) -> Server:
         def do_HEAD(self) -> None:
             self._answer(False)
 
-        def _answer(self, whole: bool) -> None:
+        def _answer(self, with_body: bool) -> None:
             self.server.has_asked.add(self.connection)  # pyright: ignore[reportAttributeAccessIssue]
             try:
                 name = unquote(urlsplit(self.path).path).lstrip("/") or "index.html"
@@ -114,7 +115,7 @@ def server(files: dict[str, bytes], port: int = PORT) -> Server:
             self.send_header("Cache-Control", "no-cache")
             self.send_header("X-Content-Type-Options", "nosniff")
             self.end_headers()
-            if whole and data:
+            if with_body and data:
                 self.wfile.write(data)
 
         def log_message(self, format: str, *args: object) -> None:
