@@ -12,9 +12,11 @@ import pytest
 from kickstand_workshop.reach import HARDWARE, import_graph
 
 # {part of the firmware: the other parts that it may import}. A part is a folder, or a module outside the folders.
-ANY = {"errors", "units", "rotation"}  # any part of the firmware may import these
+ANY = {"errors", "units", "rotation", "quick"}  # any part of the firmware may import these
 FIRMWARE = {
     "errors": {"console"},
+    "quick": set(),
+    "quick_viper": set(),
     "units": set(),
     "rotation": set(),
     "console": set(),

@@ -16,7 +16,7 @@ from machine import Pin, SoftI2C
 from micropython import const
 
 from .errors import Notice
-from .imu.fifo_frames import FRAME
+from .imu.axes import FRAME
 from .imu.mpu6050 import CHIPS, NotKept
 
 _SENSOR_ADDRESSES = const((0x68, 0x69))

@@ -9,10 +9,6 @@ A code is a name for programs and is never shown. Three modules have words for e
 import gc
 import sys
 
-# The exceptions that the import of machine code can raise. Machine code cannot run on CPython, on a port without viper,
-# on an ESP32 without enough free memory, or on a kind of chip that it was not compiled for.
-NO_MACHINE_CODE = (ImportError, NameError, SyntaxError, MemoryError, ValueError)
-
 
 class Notice:
     """Something to report.
@@ -95,28 +91,6 @@ def tried(function, *arguments):
             del sys.modules[name]
         gc.collect()
         return None, Notice("incomplete" if isinstance(error, ImportError) else "no-memory", str(error))
-
-
-def checked(machine_code, plain, *arguments):
-    """Check the machine code of a function. Some releases of MicroPython had bugs in the compiler for some boards.
-
-    Args:
-        machine_code: the function in machine code.
-        plain: the same function in Python.
-        arguments: the arguments for one call of each function. The second call gets copies.
-
-    Returns:
-        machine_code if both functions give the same results. If the results differ, plain, after a report on the
-        console.
-    """
-    copies = [a if isinstance(a, (int, bytes)) else a[:] for a in arguments]
-    same = machine_code(*arguments) == plain(*copies)
-    for a, b in zip(arguments, copies):
-        same = same and (isinstance(a, int) or bytes(a) == bytes(b))  # MicroPython cannot compare array("f")
-    if same:
-        return machine_code
-    report(Notice("wrong-code", plain.__name__))
-    return plain
 
 
 class CaptureError(Refusal):

@@ -10,8 +10,19 @@ from time import ticks_add, ticks_diff
 from ..errors import Notice, StoreError
 from ..rotation import matrix
 from ..units import const
-from .alignment import BRAKING, CAR, MOTORCYCLE, TURNING, DriveAlignment
-from .verdict import MOVED, REFINED, REVERSED, SAME, compare, turn_round
+from .alignment import (
+    BRAKING,
+    CAR,
+    MOTORCYCLE,
+    MOVED,
+    REFINED,
+    REVERSED,
+    SAME,
+    TURNING,
+    DriveAlignment,
+    compare,
+    turn_round,
+)
 
 # Number of passes of the loop whose counts are added up before they are converted to floats, to save time
 _FEED_TURNS = const(2)

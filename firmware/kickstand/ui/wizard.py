@@ -181,7 +181,7 @@ class Wizard:
 
     def _pose(self, expected):
         chip = self._chip
-        return StillPose(chip.accel_lsb_per_g, chip.gyro_lsb_per_dps, chip.SATURATED, expected)
+        return StillPose(chip.accel_lsb_per_g, chip.gyro_lsb_per_dps, chip.saturated, expected)
 
 
 def words(refusal):

@@ -7,7 +7,7 @@ rider add to the force only. These effects can make the change of speed seem too
 """
 
 import numpy as np
-from kickstand.drive_alignment.speed_check import speed_unit_problem
+from kickstand.drive_alignment.quality import speed_unit_problem
 from kickstand.units import STANDARD_GRAVITY
 
 from ..common.errors import InputError

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 from kickstand.calibration.six_position import SIDES
 from kickstand.calibration.two_position import WARN_TILT_DEG
-from kickstand.drive_alignment import verdict
+from kickstand.drive_alignment import alignment
 from kickstand.units import AXES
 
 from ..analysis import alignment_quality
@@ -174,12 +174,12 @@ def _drive_lines(found: DriveFit, several: bool) -> Iterable[str]:
         yield f"speed: {found.lag_s:.1f} s late; two halves of the drive differ by {found.halves_deg:.1f} degrees"
     if found.poses:
         yaw_deg = abs(found.poses.yaw_deg)
-        if found.poses.verdict == verdict.REVERSED:
+        if found.poses.verdict == alignment.REVERSED:
             yield (
                 "warning: the two poses had forward and backward exchanged: the kickstand is on the other side, "
                 f"or, if no board wrote this log, {OPPOSITE_SIGN}"
             )
-        elif found.poses.verdict == verdict.MOVED:
+        elif found.poses.verdict == alignment.MOVED:
             yield f"warning: the mount is {yaw_deg:.0f} degrees off its place in the two poses: was it moved since?"
         else:
             cost_deg = alignment_quality.yaw_cost_deg(yaw_deg)
