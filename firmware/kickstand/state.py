@@ -19,9 +19,10 @@ def state(app):
     screen, fault, lean_deg = app.screen, app.sensor.fault, app.lean_deg
     view = screen.view
     wizard = screen.wizard if view in ("align", "six") else None
+    notice = wizard.notice if wizard else screen.shown
     return {
         "view": view,
-        "code": screen.shown.code if screen.shown else None,
+        "code": notice.code if notice else None,
         "step": wizard.step if wizard else None,
         "pose": ("upright" if wizard.upright else "kickstand") if wizard and view == "align" else None,
         "entry": screen.entry if view == "menu" else None,

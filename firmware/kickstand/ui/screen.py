@@ -29,7 +29,7 @@ class Screen:
     Attributes:
         view: the name of the view in front: "notice", "align", "six", "menu", "info", "fault", "question", or the name
             of a page, which is "own" for a page of the board's owner.
-        shown: the Notice or Refusal that the view in front shows, or None.
+        shown: the Notice or Refusal in front, or None. A wizard has its own.
         notice: the Notice before all other views, or None. It disappears after two seconds, or with a press.
         wizard: the current AlignWizard or SixWizard, which takes every sample, or None.
         entry: the name of the menu's entry that is shown, or None.
@@ -76,7 +76,7 @@ class Screen:
         if self.notice:
             self.view, self.shown = "notice", self.notice
         elif self.wizard:
-            self.view, self.shown = self.wizard.name, self.wizard.notice
+            self.view = self.wizard.name
         elif self._menu:
             self.view = "menu"
         elif self._info:
@@ -105,10 +105,10 @@ class Screen:
     def lines(self, now_ms):
         """Return the content of the display: two lines and, for a display that draws, a picture."""
         app, view = self._app, self.view
-        if view in ("align", "six"):
-            return self.wizard.lines
         if self.shown:
             return pages.words(self.shown)
+        if self.wizard:
+            return self.wizard.lines
         if view == "menu":
             count = len(self._menu)
             return pages.ARROW + self.entry, "next %d/%d hold=ok" % (count - self._menu.index(_LEAVE), count)
