@@ -137,7 +137,7 @@ def prepare(
 
     wanted: The files that the board should have, see contents().
     replace_config: Also replace the user's config.py.
-    there: Files of other foreign on the board. None if such files were not searched.
+    there: Files of other projects on the board. None if such files were not searched.
 
     Raises InputError if a file is in the way, or if the board has too little room.
     """
