@@ -44,10 +44,10 @@ def open_sensor(settings):
 
     def explain(chip, error):
         try:
-            result = tried(look, chip, error)[0]
+            found = tried(look, chip, error)[0]
         except OSError:
-            result = None
-        return result or (error and Notice("no-sensor"), [])
+            found = None
+        return found or (error and Notice("no-sensor"), [])
 
     return Sensor(chip, reopen, explain)
 

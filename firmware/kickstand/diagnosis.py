@@ -120,14 +120,14 @@ def _level(pin, pull):
 def answering(i2c, addresses=range(_FIRST, _LAST + 1)):
     """List the addresses that answer on a machine.I2C."""
     status = bytearray(1)
-    answers = []
+    found = []
     for address in addresses:
         try:
             i2c.readfrom_into(address, status)
         except OSError:
             continue
-        answers.append(address)
-    return answers
+        found.append(address)
+    return found
 
 
 def exchanged(sda, scl, addresses):
@@ -222,20 +222,20 @@ def fifo_fault(chip):
     chip.restart_fifo()
     left = chip.waiting()  # not 0 if a sample has arrived since the restart of the FIFO
     chip.write_register(_INT_ENABLE, 1)
-    reading = _reading(chip)
+    before = _reading(chip)
     sleep_ms(_PERIODS * chip.period_ms)
     waiting = chip.waiting()
-    measures = chip.read_register(_INT_STATUS) & 1 or _reading(chip) != reading
+    measures = chip.read_register(_INT_STATUS) & 1 or _reading(chip) != before
     chip.write_register(_INT_ENABLE, 0)
-    fault = None
+    how = None
     if left > FRAME * _PERIODS:
-        fault = "stays full"
+        how = "stays full"
     elif measures and waiting <= left:
-        fault = "stays empty" if not left else "stands still"
+        how = "stays empty" if not left else "stands still"
     elif measures and _repeats(chip):
-        fault = "repeats"
+        how = "repeats"
     chip.restart_fifo()
-    return Notice("sensor-fifo", fault) if fault else None
+    return Notice("sensor-fifo", how) if how else None
 
 
 def _reading(chip):
@@ -308,9 +308,9 @@ def is_clock(i2c, address):
 def _is_time(time, at, date_at, day_at):
     limits = ((at, 0x7F, 0, 59), (at + 1, 0x7F, 0, 59), (at + 2, 0x3F, 0, 32), (date_at, 0x3F, 1, 31))
     limits += ((day_at, 0xFF, 0, 7), (at + 5, 0x1F, 1, 12), (at + 6, 0xFF, 0, 99))
-    for index, mask, least, highest in limits:
-        value = time[index] & mask
-        if value & 15 > 9 or not least <= (value >> 4) * 10 + (value & 15) <= highest:
+    for place, mask, least, most in limits:
+        value = time[place] & mask
+        if value & 15 > 9 or not least <= (value >> 4) * 10 + (value & 15) <= most:
             return False
     return True
 
