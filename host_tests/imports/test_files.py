@@ -124,11 +124,6 @@ def test_two_recordings_in_one_folder_are_refused(tmp_path):
     kinetics = app_exports.sensor_kinetics(ride)
     kinetics |= {name.replace("Ride", "Home"): text for name, text in kinetics.items()}
     refused(tmp_path, app_exports.into(tmp_path / "k", kinetics), "holds 2 recordings")
-    (tmp_path / "zips").mkdir()
-    app_exports.into(tmp_path / "zips" / "a.zip", app_exports.phyphox(ride))
-    assert api.import_recording(tmp_path / "zips").app == "phyphox"
-    app_exports.into(tmp_path / "zips" / "b.zip", app_exports.phyphox(ride))
-    refused(tmp_path, tmp_path / "zips", "holds 2 zip files: give one of them, such as")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited as on Linux")
@@ -179,10 +174,3 @@ def test_a_pipe_is_not_waited_for(tmp_path, name):
     }
     result = command.run(*uses[pipe.suffix])
     assert result.status == 2 and result.err.count("\n") == 1 and "unexpected" not in result.err
-
-
-def test_an_oversized_calibration_is_refused(tmp_path):
-    (tmp_path / "CAL.json").write_bytes(b"[" + b"1," * MB + b"1]")
-    log = command.still(tmp_path / "log.csv", (0, 1, 0))
-    arguments = "replay", log, "--calibration", tmp_path / "CAL.json", "--out", tmp_path / "x"
-    command.refused(tmp_path, *arguments, words="too large for a calibration")
