@@ -22,7 +22,12 @@ from ..signals import Array, Lag, best_lag, correlation, rotated, rotation_vecto
 from .cells import CELL_S, LogCells
 
 MEAN_S = 0.5  # means over this time are used to judge up and the bends
-UP_DEG, FORWARD_DEG = 15.0, 25.0  # if up or forward differs by more, the calibration belongs to another mount
+# In bends of less than two minutes, forward must differ by more than FEW_FORWARD_DEG
+UP_DEG, FORWARD_DEG, FEW_FORWARD_DEG = (
+    15.0,
+    25.0,
+    40.0,
+)  # if up or forward differs by more, the calibration belongs to another mount
 # If the two poses were swapped, "up" is the up axis of the bike on the kickstand. That axis leans by up to LEANED_DEG.
 LEANED_DEG = 25.0
 BACKWARD_DEG = 150.0  # if forward differs by more than this, forward and backward are exchanged
@@ -273,7 +278,9 @@ class _Ride:
         if np.count_nonzero(there) < BENDS or np.std(turned[there]) < BENDS_DPS:
             return None
         found = correlation(-turned[there], rolled[there], whole=True)
-        return _angle_deg(found.direction) if found.value > SURE_BENDS else None
+        angle_deg = _angle_deg(found.direction)
+        unsure = np.count_nonzero(there) < 2 * BENDS and FORWARD_DEG < abs(angle_deg) < FEW_FORWARD_DEG
+        return angle_deg if found.value > SURE_BENDS and not unsure else None
 
 
 def _angle_deg(direction: Array) -> float:
