@@ -7,7 +7,7 @@ deviation. Outliers of both kinds are down-weighted (Cauchy).
 
 import numpy as np
 
-from ..signals import Array, Bools, Ints, rotation_matrix, stretches
+from ..signals import Array, Bools, Ints, intervals, rotation_matrix
 from .equations import BALANCED, RESTING, RESTING_RATE, ROWS, SLIDING, jacobian, process_and_measurements
 from .first_guess import lean_and_speed, standing
 from .hypotheses import Hypotheses
@@ -117,7 +117,7 @@ class Estimate:
         """
         contradicted = np.max(np.abs(self._residuals() / self.noise.sigma())[:, CONTRADICTING], axis=1) > CONTRADICTED
         false = np.zeros_like(still)
-        for begin, end in stretches(still):
+        for begin, end in intervals(still):
             near = contradicted[max(0, begin - AROUND) : end + AROUND]
             false[begin:end] = end - begin < BRIEF and bool(np.any(near))
         return false

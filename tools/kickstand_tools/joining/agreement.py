@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 
 from ..calibration.file import CalibrationFile
+from ..calibration.mount import read_ride
 from ..common.errors import InputError, extra
-from ..common.messages import Message, as_data, distinct
+from ..common.messages import Message, as_data
 from ..common.times import clock, tick_s
-from ..estimation.smooth import SmoothedRide, smooth
-from ..logs.reader import Source, read_twice
+from ..estimation.smooth import SmoothedRide, smooth_checked
+from ..logs.log import Source
 from ..logs.source import Progress, name_of
-from ..replay.replay import replay
+from ..replay.replay import LeanTable, replay_checked
 from ..signals import Array, Bools
 from .clocks import Clocks, clocks
 from .motion import motion
@@ -83,7 +84,7 @@ class Agreement:
     def as_data(self) -> dict[str, Any]:
         """All fields except the leans, for JSON."""
         live = None if self.live is None else asdict(self.live)
-        remarks = {name: as_data(said) for name, said in self.notices.items()}
+        remarks = {name: as_data(notices) for name, notices in self.notices.items()}
         return {"clocks": asdict(self.clocks), "live": live, "smoothed": asdict(self.smoothed), "remarks": remarks}
 
 
@@ -96,7 +97,7 @@ def compare_rides(
 ) -> Agreement:
     """Compare two recordings of one ride by two devices. The clocks of the devices may differ by any time.
 
-    a, b: see read_log. progress: called with (done, total) of the first reading. Raises InputError, also if the
+    a, b: see read_log. progress: called with (done, total) of the samples, ride by ride. Raises InputError, also if the
     recordings are of different rides.
 
     >>> from kickstand_tools.api import Log, simulate_ride
@@ -106,30 +107,28 @@ def compare_rides(
     >>> compare_rides(log, log, calibration, calibration).smoothed.rms_deg
     0.0
     """
-    a, b = read_twice(a), read_twice(b)
-    notices: dict[str, list[Message]] = {"a": [], "b": []}
-    motion_a, motion_b = (motion(one, progress, said) for one, said in zip((a, b), notices.values()))
+    checked = [read_ride(source, calibration) for source, calibration in ((a, calibration_a), (b, calibration_b))]
     try:
-        found = clocks(motion_a, motion_b, calibration_a, calibration_b)
+        relation = clocks(motion(checked[0]), motion(checked[1]), calibration_a, calibration_b)
     except InputError as error:
         raise InputError(f"{name_of(a)}, {name_of(b)}: {error}") from error
-    rides = [smooth(one, calibration) for one, calibration in ((a, calibration_a), (b, calibration_b))]
-    shown = [replay(one, calibration) for one, calibration in ((a, calibration_a), (b, calibration_b))]
-    for said, ride in zip(notices.values(), rides):
-        said[:] = distinct([*said, *ride.notices])
+    pairs = list(zip(checked, (calibration_a, calibration_b)))
+    rides = [smooth_checked(*pair, progress) for pair in pairs]
+    displayed = [replay_checked(*pair) for pair in pairs]
     t_s = np.arange(0.0, rides[0].t_s[-1], STEP_S)
-    at = t_s, found.of_b(t_s)
+    times_s = t_s, relation.of_b(t_s)
     riding = np.ones(len(t_s), dtype=bool)
-    for ride, when in zip(rides, at):
-        riding &= _interpolated(ride.t_s, ride.speed_mps, when) > _RIDING_MPS  # False for NaN
-    smoothed = [_lean_while_riding(ride, when, riding) for ride, when in zip(rides, at)]
-    live = [_lean_while_riding(ride, when, riding) for ride, when in zip(shown, at)]
+    for ride, time_s in zip(rides, times_s):
+        riding &= _interpolated(ride.t_s, ride.speed_mps, time_s) > _RIDING_MPS  # False for NaN
+    smoothed = [_lean_while_riding(ride, time_s, riding) for ride, time_s in zip(rides, times_s)]
+    live = [_lean_while_riding(lean, time_s, riding) for lean, time_s in zip(displayed, times_s)]
     difference = _difference(*smoothed)
     if difference is None:
         raise InputError(f"{name_of(a)}, {name_of(b)}: under {_LEAST_S:.0f} s of riding in common")
     names = ("live A", "live B", "smoothed A", "smoothed B")
     leans: dict[str, Array] = dict(zip(names, (lean for lean, _ in (*live, *smoothed))))
-    return Agreement(found, _difference(*live), difference, t_s, leans, notices, (name_of(a), name_of(b)))
+    notices = {name: ride.notices for name, ride in zip("ab", rides)}
+    return Agreement(relation, _difference(*live), difference, t_s, leans, notices, (name_of(a), name_of(b)))
 
 
 def words(found: Agreement) -> Iterator[str]:
@@ -206,7 +205,7 @@ def _interpolated(t_s: Array, values: Array, at_s: Array) -> Array:
     return np.where(near, np.interp(at_s, t_s, values), np.nan)
 
 
-def _lean_while_riding(ride: SmoothedRide | Any, at_s: Array, riding: Bools) -> tuple[Array, Array]:
+def _lean_while_riding(ride: SmoothedRide | LeanTable, at_s: Array, riding: Bools) -> tuple[Array, Array]:
     """Return the lean and its standard deviation in degrees, both of shape (n). Both are NaN if the lean or the
     standard deviation is unknown, or the bike is not riding."""
     lean, sigma = (_interpolated(ride.t_s, values, at_s) for values in (ride.lean_deg, ride.lean_sigma_deg))

@@ -14,9 +14,9 @@ from ..common.errors import InputError
 from ..signals import Array, Bools, correlations, log_likelihood_ratio, moving_mean, peaks, rotation_angle
 from .fit import USUAL_DRIFT
 from .match import LEAST_EVIDENCE, LEAST_LEAD, LEAST_S, MOST_DRIFT
-from .motion import STEP_S, CellMotion
+from .motion import STEP_S, BinMotion
 
-_SMOOTH = 5  # rates are averaged over this many cells, to find their derivatives
+_SMOOTH = 5  # rates are averaged over this many bins, to find their derivatives
 _MOST_DPS = 60.0  # higher rates are due to jolts, and are limited to this
 _APART_S, _CANDIDATES = 3.0, 6
 _INDEPENDENT_S = 1.0  # rates that are further apart in time are treated as independent
@@ -47,17 +47,17 @@ class Clocks:
         return (a_s - self.later_s) * (1.0 - self.drift)
 
 
-def clocks(a: CellMotion, b: CellMotion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
+def clocks(a: BinMotion, b: BinMotion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
     """The Clocks of two recordings. Raises InputError if they are from different rides, or if the ride cannot be proved
     to be the same. Callers put both names in front of the error's text."""
     size = [_size(one) for one in (a, b)]
-    found, count = correlations(size[0], a.there, size[1], b.there)
+    found, count = correlations(size[0], a.valid, size[1], b.valid)
     found = np.where(count * STEP_S >= LEAST_S, found, 0.0)
     likely = log_likelihood_ratio(found, count, STEP_S / _INDEPENDENT_S)
     places = peaks(likely, round(_APART_S / STEP_S), _CANDIDATES)
     tried = []
     for place in places:
-        shift_s = (place - (len(b.there) - 1)) * STEP_S
+        shift_s = (place - (len(b.valid) - 1)) * STEP_S
         alike = _correlation_at(a, b, _along(a, np.eye(3)), _along(b, _rotation(a, b, shift_s)), shift_s)
         ratio = log_likelihood_ratio(np.array(alike), count[place], STEP_S / _INDEPENDENT_S)
         tried.append((float(ratio), alike, shift_s))
@@ -81,34 +81,34 @@ def clocks(a: CellMotion, b: CellMotion, axes_a: CalibrationFile, axes_b: Calibr
     return made
 
 
-def _size(motion: CellMotion) -> Array:
+def _size(motion: BinMotion) -> Array:
     """Return the magnitude of the rates minus its mean, in deg/s, shape (n)."""
     size = moving_mean(np.minimum(np.linalg.norm(motion.rate_dps, axis=1), _MOST_DPS), _SMOOTH)
-    return size - np.mean(size[motion.there])
+    return size - np.mean(size[motion.valid])
 
 
-def _along(motion: CellMotion, axes: Array) -> Array:
+def _along(motion: BinMotion, axes: Array) -> Array:
     """Return the smoothed rates about the rows of axes (3, 3), shape (n, 3)."""
     return moving_mean(np.clip(motion.rate_dps @ axes.T, -_MOST_DPS, _MOST_DPS), _SMOOTH)
 
 
-def _rotation(a: CellMotion, b: CellMotion, later_s: float) -> Array:
+def _rotation(a: BinMotion, b: BinMotion, later_s: float) -> Array:
     """Return the rotation from B's axes to A's, shape (3, 3), that brings B's rates nearest to A's (Kabsch's
     algorithm)."""
-    both = _valid_at(b, a.t_s - later_s) & a.there
+    both = _valid_at(b, a.t_s - later_s) & a.valid
     one, other = _along(a, np.eye(3))[both], _interpolated_at(b.t_s, _along(b, np.eye(3)), a.t_s[both] - later_s)
     left, _, right = np.linalg.svd((one - one.mean(axis=0)).T @ (other - other.mean(axis=0)))
     return left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
 
 
-def _fitted(a: CellMotion, b: CellMotion, of_a: Array, of_b: Array, later_s: float) -> Clocks:
+def _fitted(a: BinMotion, b: BinMotion, of_a: Array, of_b: Array, later_s: float) -> Clocks:
     """The Clocks, found by Gauss-Newton steps from a rough shift."""
     at_s, drift = a.t_s, 0.0
     derivative = np.gradient(of_b, STEP_S, axis=0)
     error = np.zeros(0)
     for k in range(_ROUNDS):
         on_b = (at_s - later_s) * (1.0 - drift)
-        both = _valid_at(b, on_b) & a.there
+        both = _valid_at(b, on_b) & a.valid
         if np.count_nonzero(both) * STEP_S < LEAST_S:
             raise InputError(f"they have less than {LEAST_S:.0f} s of riding in common")
         when = at_s[both] - at_s[both].mean()
@@ -128,25 +128,23 @@ def _fitted(a: CellMotion, b: CellMotion, of_a: Array, of_b: Array, later_s: flo
         later_s += step[0] - step[1] * (middle - later_s)
     if abs(drift) > MOST_DRIFT:
         raise InputError("they turn alike, but their clocks drift apart by more than clocks do: one has gaps")
-    common_s = float(np.count_nonzero(_valid_at(b, (at_s - later_s) * (1.0 - drift)) & a.there) * STEP_S)
+    common_s = float(np.count_nonzero(_valid_at(b, (at_s - later_s) * (1.0 - drift)) & a.valid) * STEP_S)
     return Clocks(float(later_s), float(drift), _correlation_at(a, b, of_a, of_b, later_s, drift), common_s)
 
 
-def _correlation_at(
-    a: CellMotion, b: CellMotion, of_a: Array, of_b: Array, later_s: float, drift: float = 0.0
-) -> float:
+def _correlation_at(a: BinMotion, b: BinMotion, of_a: Array, of_b: Array, later_s: float, drift: float = 0.0) -> float:
     """The correlation of the rates of both sensors about the same axes. of_a: shape (n, 3). of_b: shape (m, 3)."""
     on_b = (a.t_s - later_s) * (1.0 - drift)
-    both = _valid_at(b, on_b) & a.there
+    both = _valid_at(b, on_b) & a.valid
     one, other = of_a[both], _interpolated_at(b.t_s, of_b, on_b[both])
     one, other = one - one.mean(axis=0), other - other.mean(axis=0)
     return float(np.sum(one * other) / max(np.sqrt(np.sum(one**2) * np.sum(other**2)), 1e-9))
 
 
-def _valid_at(motion: CellMotion, at_s: Array) -> Bools:
+def _valid_at(motion: BinMotion, at_s: Array) -> Bools:
     place = np.rint(at_s / STEP_S - 0.5).astype(np.int64)
-    inside = (place >= 0) & (place < len(motion.there))
-    return inside & motion.there[np.clip(place, 0, len(motion.there) - 1)]
+    inside = (place >= 0) & (place < len(motion.valid))
+    return inside & motion.valid[np.clip(place, 0, len(motion.valid) - 1)]
 
 
 def _interpolated_at(t_s: Array, values: Array, at_s: Array) -> Array:

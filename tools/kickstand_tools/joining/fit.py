@@ -10,7 +10,7 @@ import numpy as np
 
 from ..signals import Array
 from .compare import Comparison
-from .motion import CellMotion
+from .motion import BinMotion
 from .track import Course, Segments
 
 AROUND_S = 6.0  # largest distance from the rough shift, including the drift at the ends of the ride
@@ -53,7 +53,7 @@ class TrackFit:
     segments: int
 
 
-def fitted(motion: CellMotion, course: Course, segments: Segments, rough_s: float) -> TrackFit | None:
+def fitted(motion: BinMotion, course: Course, segments: Segments, rough_s: float) -> TrackFit | None:
     """The best fit within AROUND_S of a rough shift. None if ride and track hardly overlap at these shifts."""
     compared = Comparison(motion, course, segments, rough_s, AROUND_S + 1.0)
     if len(compared.given.begin_s) < _FEWEST:
@@ -62,7 +62,7 @@ def fitted(motion: CellMotion, course: Course, segments: Segments, rough_s: floa
     return _refine(Comparison(motion, course, segments, shift_s, 2.0), shift_s, drift, evidence)
 
 
-def cost_of_one_shift(motion: CellMotion, course: Course, segments: Segments, fit: TrackFit) -> float:
+def cost_of_one_shift(motion: BinMotion, course: Course, segments: Segments, fit: TrackFit) -> float:
     """Return by how much the cost per segment falls if each segment gets its own shift. The unit is the mean cost of
     one error.
 

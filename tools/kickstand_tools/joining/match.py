@@ -9,7 +9,7 @@ from ..common.errors import InputError
 from ..common.messages import OPPOSITE_SIGN
 from ..signals import Array, Bools, correlations, log_likelihood_ratio, moving_mean, peaks
 from .fit import AROUND_S, TrackFit, cost_of_one_shift, fitted
-from .motion import STEP_S, CellMotion
+from .motion import STEP_S, BinMotion
 from .track import LONGEST_S, SLOWEST_MPS, STEPS, Course, Track, course, segments
 
 _GRID_S = 0.5
@@ -51,7 +51,7 @@ class Match:
         return (utc_s - self.start_utc_s) * (1.0 - self.drift)
 
 
-def match(motion: CellMotion, track: Track) -> Match:
+def match(motion: BinMotion, track: Track) -> Match:
     """The Match of a track with a ride. Raises InputError if the track does not belong to the ride, or if this is
     uncertain. Callers put both names in front of the error's text."""
     track = track.once_a_second()
@@ -97,7 +97,7 @@ _LONGER = "a longer ride with more bends is needed, or a track with a point ever
 _OTHER = "is it the track of another ride or another day?"
 
 
-def _check_turns(motion: CellMotion, steps: Course) -> None:
+def _check_turns(motion: BinMotion, steps: Course) -> None:
     if motion.seconds < LEAST_S:
         raise InputError(f"the ride lasts {motion.seconds:.0f} s: at least {LEAST_S:.0f} s with bends are needed")
     moving_s = float((steps.end_s - steps.begin_s)[steps.good].sum())
@@ -112,7 +112,7 @@ def _check_turns(motion: CellMotion, steps: Course) -> None:
         raise InputError(f"the ride turns by {turned_deg:.0f} degrees in all: too few bends to match a track")
 
 
-def _rough_shifts(motion: CellMotion, steps: Course) -> tuple[bool, list[float]]:
+def _rough_shifts(motion: BinMotion, steps: Course) -> tuple[bool, list[float]]:
     """Return True if the ride would fit better with the opposite sign of yaw, and the shifts that fit best."""
     of_track, track_good = _changes_of_track(steps)
     of_ride, ride_good = _changes_of_ride(motion)
@@ -140,13 +140,13 @@ def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
     return change * np.cos(np.arctan(speed * np.radians(change / _SPAN_S) / STANDARD_GRAVITY)), known
 
 
-def _changes_of_ride(motion: CellMotion) -> tuple[Array, Bools]:
+def _changes_of_ride(motion: BinMotion) -> tuple[Array, Bools]:
     """Return two arrays with a value every _GRID_S: the rotation of the ride about its up within _SPAN_S, in degrees,
     and True where it is known."""
     at_s, half = np.arange(0.0, motion.seconds, _GRID_S), _SPAN_S / 2.0
-    edges_s = np.arange(len(motion.there) + 1) * STEP_S
+    edges_s = np.arange(len(motion.valid) + 1) * STEP_S
     turned = np.append(0.0, np.cumsum(motion.rate_dps @ motion.up)) * STEP_S
     change = np.interp(at_s + half, edges_s, turned) - np.interp(at_s - half, edges_s, turned)
-    missing = np.append(0, np.cumsum(~motion.there)) * STEP_S
+    missing = np.append(0, np.cumsum(~motion.valid)) * STEP_S
     gap_s = np.interp(at_s + half, edges_s, missing) - np.interp(at_s - half, edges_s, missing)
     return change, (gap_s < 0.1 * _SPAN_S) & (at_s >= half) & (at_s <= motion.seconds - half)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..logs.log import Table
-from ..signals import Array, Bools, distance_m, stretches
+from ..signals import Array, Bools, distance_m, intervals
 
 LONGEST_S = 6.0  # longest time between two points of a course; watches write points this far apart on straights
 SLOWEST_MPS = 2.5  # in slower steps, the errors of the positions dominate
@@ -134,7 +134,7 @@ def segments(course: Course) -> Segments:
     """The segments of a course."""
     rows = [
         np.arange(start, min(start + STEPS, end))
-        for begin, end in stretches(course.good)
+        for begin, end in intervals(course.good)
         for start in range(begin, end, STEPS)
     ]
     rows = [row for row in rows if len(row) >= _FEWEST]

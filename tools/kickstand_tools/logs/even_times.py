@@ -6,16 +6,14 @@ and some are 0. This module replaces each time by the mean of the recorded times
 about half a tick of the recorder's clock.
 """
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..common.errors import InputError
-from ..common.messages import Message
+from ..common.messages import kind
 from ..signals import Array, Ints, window_means
-from .log import Block
 
 COARSE = 0.05  # share of the time between samples; times with a smaller tick are not changed
 # If more than this share of the times repeats the previous time, the recorder writes one time for several samples
@@ -34,27 +32,14 @@ CROWD = 50
 # the mean is less exact.
 ALLOWED = 0.6
 SHORTEST_S = 2e-6  # shortest step, in s, which stays over 0 if times are rounded to microseconds
-CONTEXT = 2000  # number of samples before and after a block that are used to compute its times
-REPORTED_S = 0.002  # smallest change of a time, in s, that is reported in a notice
 
 
-class TimesSpread(Message):
-    """The recorder rounded the times.
-
-    repeated: number of times that equal the previous time.
-    samples: number of all times.
-    shift_s: largest change of a time, in s.
-    """
-
-    repeated: int
-    samples: int
-    shift_s: float
-
-    code = "times-spread"
-    text = (
-        "the times are rounded ({repeated} of {samples} repeat the previous one): they are spread evenly, by up to "
-        "{shift_s:.3f} s"
-    )
+TimesSpread = kind(
+    "times-spread",
+    "repeated samples shift_s",  # number of times that equal the previous one, number of all times, largest change in s
+    "the times are rounded ({repeated} of {samples} repeat the previous one): they are spread evenly, by up to "
+    "{shift_s:.3f} s",
+)
 
 
 def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
@@ -92,8 +77,8 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
     counts = np.diff(np.append(starts, len(recorded)))
     between_us = np.diff(time_us[starts])
     usual_us = float(np.median(between_us))
-    whole = between_us <= 5.0 * usual_us
-    period_us = float(np.sum(between_us[whole])) / float(np.sum(counts[:-1][whole]))
+    near = between_us <= 5.0 * usual_us
+    period_us = float(np.sum(between_us[near])) / float(np.sum(counts[:-1][near]))
     repeated = len(recorded) - len(starts)
     tick_us = float(np.gcd.reduce(between_us))
     if repeated > OFTEN * len(recorded):
@@ -165,96 +150,3 @@ def _line(k: Array, values: Array) -> Callable[[Array], Array]:
     away = k - middle
     slope = float(away @ (values - mean)) / max(float(away @ away), 1e-12)
     return lambda at: mean + slope * (at - middle)
-
-
-def even_blocks(blocks: Iterator[Block], name: str, remarks: list[Message]) -> Iterator[Block]:
-    """Yield the blocks of a log with even, increasing times, as even_times() makes them.
-
-    name: the log's name in messages.
-    remarks: a notice about changed times is appended.
-
-    A block whose times need no change is returned as it is. The last samples of other blocks are moved to the next
-    block, because their times depend on it.
-    """
-    spread = _Spread(name)
-    held: Block | None = None
-    for block in blocks:
-        whole = block if held is None else _joined(held, block)
-        ready, held = spread.take(whole)
-        if ready is not None:
-            yield ready
-    if held is not None:
-        yield spread.rest(held)
-    remarks += spread.notices()
-
-
-def _joined(first: Block, second: Block) -> Block:
-    """Join two successive blocks."""
-    return replace(
-        second,
-        lines=first.lines + second.lines,
-        own_times=first.own_times and second.own_times,
-        **{name: np.concatenate((rows, getattr(second, name))) for name, rows in first.columns().items()},
-    )
-
-
-class _Spread:
-    """Makes the times of a log even, block by block. name: the log's name in messages."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-        self._before_s = np.zeros(0)  # recorded times of the last samples that were returned
-        self._from_us: int | None = None  # new time of the first sample
-        self._last_us = -1
-        self._samples = self._repeated = 0
-        self._shift_s = 0.0
-
-    def take(self, block: Block) -> tuple[Block | None, Block | None]:
-        """Process one block.
-
-        Returns:
-            ready: the part with final times, or None.
-            held: the part that must be joined with the next block, or None.
-        """
-        recorded = np.concatenate((self._before_s, block.t_s))
-        steady = not np.any(np.diff(block.time_us) == 0)
-        if not steady and len(block.time_us) < 2 * CONTEXT:
-            return None, block
-        times = even_times(recorded, self._name)
-        if np.array_equal(times, recorded):
-            return self._ready(block, block.t_s), None
-        if len(block.time_us) < 2 * CONTEXT:
-            return None, block
-        wait = len(block.time_us) - CONTEXT
-        held = block.part(slice(wait, None))
-        return self._ready(block.part(slice(0, wait)), times[len(self._before_s) :][:wait]), held
-
-    def rest(self, block: Block) -> Block:
-        """Return the last block of the log with even times."""
-        times = even_times(np.concatenate((self._before_s, block.t_s)), self._name)
-        return self._ready(block, times[len(self._before_s) :])
-
-    def notices(self) -> list[Message]:
-        """The notices about the times."""
-        if not self._repeated and self._shift_s < REPORTED_S:
-            return []
-        return [TimesSpread(self._repeated, self._samples, self._shift_s)]
-
-    def _ready(self, block: Block, times: np.ndarray) -> Block:
-        recorded = block.t_s
-        self._samples += len(times)
-        self._repeated += int(np.count_nonzero(np.diff(recorded, prepend=self._before_s[-1:]) == 0.0))
-        self._shift_s = max(self._shift_s, float(np.max(np.abs(times - recorded))))
-        self._before_s = np.concatenate((self._before_s, recorded))[-CONTEXT:]
-        own = bool(np.array_equal(times, recorded))
-        if own and not self._from_us:
-            self._from_us = 0
-            self._last_us = int(block.time_us[-1])
-            return block
-        time_us = np.rint(times * 1e6).astype(np.int64)
-        if self._from_us is None:
-            self._from_us = int(time_us[0])
-        order = np.arange(1, len(times) + 1)
-        time_us = np.maximum.accumulate(np.maximum(time_us - self._from_us, self._last_us + 1) - order) + order
-        self._last_us = int(time_us[-1])
-        return replace(block, time_us=time_us, start_s=block.start_s + self._from_us / 1e6, own_times=own)

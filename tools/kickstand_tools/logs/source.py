@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import IO, Any, cast
 
 from ..common.errors import InputError, cause
-from ..common.messages import Message, Remedy
+from ..common.messages import Message, Remedy, kind
 
 # Limit in bytes for one line, and for the NUL bytes that a file system may leave at the end of a file after a power cut
 LONGEST_LINE = 16_000_000
@@ -20,21 +20,12 @@ File = Path | str | IO[bytes] | IO[str]
 Progress = Callable[[int, int], None]  # called with (done, total) in the same unit; total is 0 if unknown
 
 
-class NulEnd(Message):
-    """The file ends in NUL bytes. count: number of NUL bytes."""
-
-    count: int
-
-    code = "nul-end"
-    text = "its end is {count} NUL bytes, as after a loss of power: they are left out"
-
-
-class CutGzip(Message):
-    """The end of a gzip file is missing."""
-
-    code = "cut-gzip"
-    text = "the file was cut: the readings at its end are lost"
-    todo = Remedy("copy it again if you can")
+NulEnd = kind("nul-end", "count", "its end is {count} NUL bytes, as after a loss of power: they are left out")
+CutGzip = kind(
+    "cut-gzip",
+    text="the file was cut: the readings at its end are lost",
+    todo=Remedy("copy it again if you can"),
+)
 
 
 def open_input(path: Path | str) -> IO[bytes]:

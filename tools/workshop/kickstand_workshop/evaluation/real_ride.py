@@ -13,11 +13,12 @@ from pathlib import Path
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.checks.log import remarks
+from kickstand_tools.calibration.mount import read_ride
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.common.messages import Message
 from kickstand_tools.estimation.alignment import fit_ride
-from kickstand_tools.logs.reader import Log, read_log
+from kickstand_tools.logs.log import Log
+from kickstand_tools.logs.reader import read_log
 from kickstand_tools.signals import moving_mean
 from numpy.typing import NDArray
 
@@ -70,7 +71,7 @@ def compare(path: Path) -> RecordingScores:
         name: RealScore(rms((lean - reference)[riding]), slope(lean[riding], reference[riding], _LEANED_DEG))
         for name, lean in shown.items()
     }
-    notices = [*log.notices, *remarks(log, calibration, axes=False)]
+    notices = read_ride(log, calibration).notices
     return RecordingScores(path.name, scores, {"time": time, "reference": reference, **shown}, notices)
 
 
