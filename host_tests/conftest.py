@@ -169,12 +169,12 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     Reasons have the form "no X" or "no X: how to get it".
     """
     reasons = [str(report.longrepr[-1]) for report in terminalreporter.stats.get("skipped", ())]
-    wanted = Counter(_why_skipped(reason.removeprefix("Skipped: ")) for reason in reasons)
+    skipped = Counter(_why_skipped(reason.removeprefix("Skipped: ")) for reason in reasons)
     if _seconds_of_tests.total() > 3:
         folders = [f"{folder} {seconds:.0f}" for folder, seconds in _seconds_of_tests.most_common()]
         terminalreporter.write_line("processor seconds: " + ", ".join(folders))
-    if wanted:
-        numbers = [f"{number} {why}" for why, number in wanted.most_common()]
+    if skipped:
+        numbers = [f"{number} {missing}" for missing, number in skipped.most_common()]
         terminalreporter.write_line("skipped: " + ", ".join(numbers))
 
 

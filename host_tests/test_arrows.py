@@ -75,7 +75,6 @@ TOOLS = {
     "demo": {"common", "simulated_board", "simulation.scripted"},
     "deploy": {"common", "simulated_board"},  # tries config.py on the simulated board
     "rides": {"common", "logs", "calibration.file", "deploy", "replay.replay_engine"},
-    "pictures": {"common", "simulated_board"},
     "web": {
         "common",
         "logs",
@@ -89,7 +88,6 @@ TOOLS = {
         "demo.hand_bike",
         "deploy",
         "rides",
-        "pictures",
     },
     "api": {
         "common",
@@ -155,7 +153,6 @@ TOOLS = {
         "simulation",
         "demo",
         "deploy",
-        "pictures",
         "web",
         "cli",
         "kickstand_emulator",

@@ -15,8 +15,8 @@ def is_private(name):
 def private_uses(node):
     """Count attributes `_x` of anything but self and cls, and imports of `_x`."""
     if isinstance(node, ast.Attribute):
-        own = isinstance(node.value, ast.Name) and node.value.id in ("self", "cls")
-        return int(is_private(node.attr) and not own)
+        is_own = isinstance(node.value, ast.Name) and node.value.id in ("self", "cls")
+        return int(is_private(node.attr) and not is_own)
     return sum(is_private(alias.name) for alias in node.names) if isinstance(node, ast.ImportFrom) else 0
 
 

@@ -20,13 +20,13 @@ class Road:
         self.t_s = np.arange(0.0, sum(seconds for seconds, _ in legs) - 1e-9, 1.0 / rate_hz)
         ends = np.cumsum([seconds for seconds, _ in legs])
         steps = np.array([mps2 for _, mps2 in legs] + [0.0])
-        before, after = (steps[np.searchsorted(ends, self.t_s + off)] for off in (-1e-9, 1e-9))
+        previous_step, next_step = (steps[np.searchsorted(ends, self.t_s + off)] for off in (-1e-9, 1e-9))
         # where the acceleration jumps, the mean of its values before and after makes the trapezoidal rule exact
-        self.mps2 = (before + after) / 2.0
+        self.mps2 = (previous_step + next_step) / 2.0
         corners = np.concatenate(([0.0], np.cumsum([seconds * mps2 for seconds, mps2 in legs])))
         self.mps = np.interp(self.t_s, np.concatenate(([0.0], ends)), corners)
         self.mps[np.abs(self.mps) < 1e-9] = 0.0
-        self.rests = (self.mps == 0.0) & (after == 0.0)
+        self.rests = (self.mps == 0.0) & (next_step == 0.0)
 
     def channels(self, **changed: np.ndarray) -> Channels:
         """Return the channels of the ride, without a speed in the log. changed: channels with other values."""

@@ -69,7 +69,8 @@ def test_calibrate_drive_corrects_yaw(ride):
     log, calibration, *_ = ride
     corrected = fit_drive([log], turned(calibration, "yaw", 9.0), "motorcycle").calibration
     wrong_deg, right_deg = (
-        overview(open_ride(log, each)).quality.yaw_deg for each in (turned(calibration, "yaw", 9.0), corrected)
+        overview(open_ride(log, alignment)).quality.yaw_deg
+        for alignment in (turned(calibration, "yaw", 9.0), corrected)
     )
     assert wrong_deg is not None and right_deg is not None
     assert abs(wrong_deg) == pytest.approx(9.0, abs=2.5) and abs(right_deg) < 2.0

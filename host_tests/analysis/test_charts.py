@@ -35,7 +35,7 @@ def chart(title, **columns) -> Any:
 def test_the_lean_has_its_maxima_with_right_above(lean, side, note):
     lean_chart = chart("Lean", lean_deg=lean)
     assert lean_chart.y_range == pytest.approx((-48.0, 48.0)) and lean_chart.x_range == pytest.approx((0.0, 59.99))
-    assert [(each.y, each.text, each.side) for each in lean_chart.notes] == [(*note, side)]
+    assert [(note_text.y, note_text.text, note_text.side) for note_text in lean_chart.notes] == [(*note, side)]
     assert lean_chart.ticks == {float(k): f"0:{k:02}" for k in range(0, 60, 5)}
     assert chart("Lean", lean_deg=0.1 * lean).y_range == (-20.0, 20.0)
 

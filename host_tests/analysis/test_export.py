@@ -44,15 +44,15 @@ def expected(name):
 
 
 def test_csv_to_the_letter(tmp_path):
-    none = block(0.5, 1.25, speed_mps=np.nan, temp_c=np.nan, lean_formula_deg=np.nan, **NOWHERE)
-    text = written(export_columns.write_csv, tmp_path / "x.csv", block(0.25), none, start_s=100.0)
+    empty_block = block(0.5, 1.25, speed_mps=np.nan, temp_c=np.nan, lean_formula_deg=np.nan, **NOWHERE)
+    text = written(export_columns.write_csv, tmp_path / "x.csv", block(0.25), empty_block, start_s=100.0)
     assert text == expected("ride.csv")
 
 
 def test_racechrono_to_the_letter(tmp_path):
     """The axis z points forward. Speed and position are written only in rows where they are new."""
-    none = block(0.5, speed_mps=np.nan, **NOWHERE)
-    assert written(export_racechrono.write, tmp_path / "x", block(0.25), none) == expected("ride.racechrono.csv")
+    empty_block = block(0.5, speed_mps=np.nan, **NOWHERE)
+    assert written(export_racechrono.write, tmp_path / "x", block(0.25), empty_block) == expected("ride.racechrono.csv")
 
 
 def test_vbo_to_the_letter(tmp_path):

@@ -64,8 +64,8 @@ def test_the_map_has_left_blue_right_orange_and_north_up():
     figure = track_map.figure(points_of(ride()), ride())
     dots, layout = figure["data"][1], figure["layout"]
     assert dots["marker"]["cmin"] == -dots["marker"]["cmax"] < 0.0
-    for place, colour in dots["marker"]["colorscale"]:
-        assert np.sign(int(colour[5:7], 16) - int(colour[1:3], 16)) == np.sign(0.5 - place)
+    for position, colour in dots["marker"]["colorscale"]:
+        assert np.sign(int(colour[5:7], 16) - int(colour[1:3], 16)) == np.sign(0.5 - position)
     lean = np.asarray(dots["marker"]["color"])
     assert lean.min() < -20.0 and lean.max() > 30.0
     assert layout["yaxis"]["scaleanchor"] == "x" and "autorange" not in layout["yaxis"]  # y grows upwards

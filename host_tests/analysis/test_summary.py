@@ -153,8 +153,8 @@ def test_channels_and_maxima_are_those_of_the_display(tmp_path):
 
 
 def test_a_smoothed_ride_differs_only_in_its_lean(short_ride):
-    live, smoothed = (joined(open_ride(short_ride, None, smoothed=which).blocks()) for which in (False, True))
+    live, smoothed = (joined(open_ride(short_ride, None, smoothed=smooth).blocks()) for smooth in (False, True))
     names = {field.name for field in fields(Channels)}
-    same = {name for name in names if np.array_equal(getattr(smoothed, name), getattr(live, name), equal_nan=True)}
-    assert names - same == {"lean_deg", "lean_sigma_deg", "lateral_g", "sure"}
+    equal = {name for name in names if np.array_equal(getattr(smoothed, name), getattr(live, name), equal_nan=True)}
+    assert names - equal == {"lean_deg", "lean_sigma_deg", "lateral_g", "sure"}
     assert np.array_equal(smoothed.sure > 0.0, smoothed.lean_sigma_deg <= 3.0) and np.any(smoothed.trusted)

@@ -40,33 +40,33 @@ def test_example_in_each_docstring_runs(name):
 
 def test_pydoc_lists_the_promised_functions():
     """Without __all__, pydoc would leave out the names that the module only imports."""
-    shown = pydoc.plain(pydoc.render_doc(api))
+    page = pydoc.plain(pydoc.render_doc(api))
     for name in ("import_recording", "fit_ride", "open_ride", "export", "simulate_ride"):
-        assert re.search(rf"^ +{name}(\(| = )", shown, re.M), name
+        assert re.search(rf"^ +{name}(\(| = )", page, re.M), name
     assert "_simulation" not in api.__all__
 
 
 @pytest.fixture(scope="module")
 def directory(tmp_path_factory):
     """Return the folder of a simulated ride and its poses. The functions under test make the ride's calibration."""
-    made = tmp_path_factory.mktemp("ride")
-    simulate("street", 1, made, seconds=60.0, speed=True)
-    six = api.fit_six_positions([made / f"POSE_{k}.csv" for k in range(1, 8)])
-    two = api.fit_two_positions(made / "KICKSTAND.csv", made / "UPRIGHT.csv", six.calibration)
-    api.write_calibration(made / "RIDE.cal.json", two.calibration)
-    return made
+    folder = tmp_path_factory.mktemp("ride")
+    simulate("street", 1, folder, seconds=60.0, speed=True)
+    six = api.fit_six_positions([folder / f"POSE_{k}.csv" for k in range(1, 8)])
+    two = api.fit_two_positions(folder / "KICKSTAND.csv", folder / "UPRIGHT.csv", six.calibration)
+    api.write_calibration(folder / "RIDE.cal.json", two.calibration)
+    return folder
 
 
 def test_nothing_is_printed(directory, capfd):
-    seen = []
+    calls = []
     log = directory / "RIDE.csv"
     calibration = api.read_calibration(directory / "RIDE.cal.json")
-    api.replay(log, calibration, progress=lambda done, total: seen.append((done, total)))
-    api.overview(api.open_ride(log), lambda done, total: seen.append((done, total)))
+    api.replay(log, calibration, progress=lambda done, total: calls.append((done, total)))
+    api.overview(api.open_ride(log), lambda done, total: calls.append((done, total)))
     with pytest.raises(api.RefusedInput, match="only 2 of 5 braking events"):
-        api.fit_drive([log], calibration, progress=lambda done, total: seen.append((done, total)))
+        api.fit_drive([log], calibration, progress=lambda done, total: calls.append((done, total)))
     assert tuple(capfd.readouterr()) == ("", "")
-    assert [done == total for done, total in seen].count(True) == 3  # each of the three calls reports its end once
+    assert [done == total for done, total in calls].count(True) == 3  # each of the three calls reports its end once
 
 
 def test_any_source_gives_the_same_log(directory):
@@ -83,8 +83,8 @@ def test_any_source_gives_the_same_log(directory):
             want,
         ]
         for source in sources:
-            got = api.read_log(source)
-            for name, values in got.columns().items():
+            log = api.read_log(source)
+            for name, values in log.columns().items():
                 assert np.array_equal(values, want.columns()[name], equal_nan=True), name
     assert want.accel_g.shape == want.gyro_dps.shape == (len(want.t_s), 3)
 
@@ -92,9 +92,9 @@ def test_any_source_gives_the_same_log(directory):
 def test_stops_and_summary_of_arrays_match_the_report(directory):
     """The functions for arrays find the same stops and the same summary as the report of the file."""
     channels = api.vehicle_channels(api.read_log(directory / "RIDE.csv"), directory / "RIDE.cal.json")
-    seen = api.overview(api.open_ride(directory / "RIDE.csv"))
-    assert seen.stops == api.find_stops(channels) != []
-    assert api.summary(channels).left_deg == seen.summary.left_deg
+    ride_overview = api.overview(api.open_ride(directory / "RIDE.csv"))
+    assert ride_overview.stops == api.find_stops(channels) != []
+    assert api.summary(channels).left_deg == ride_overview.summary.left_deg
 
 
 def test_tables_are_data_frames(directory):

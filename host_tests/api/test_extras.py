@@ -22,6 +22,6 @@ pandas PIL plotly pyarrow rp2040py s3fs vqf kickstand_fleet kickstand_emulator k
 
 
 def test_the_demo_needs_no_extra():
-    done = subprocess.run([sys.executable, "-c", _SCRIPT, *OPTIONAL], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert "simulated board" in done.stdout
+    process = subprocess.run([sys.executable, "-c", _SCRIPT, *OPTIONAL], capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
+    assert "simulated board" in process.stdout

@@ -2,7 +2,6 @@
 on a page may differ."""
 
 import json
-import pickle
 import re
 from dataclasses import fields
 
@@ -12,9 +11,8 @@ from kickstand_tools.calibration.drive_refusals import MountMoved
 from kickstand_tools.checks.handedness import RatesMisfit
 from kickstand_tools.checks.mount import ForwardExchanged, ForwardOff, UpOff
 from kickstand_tools.cli.main import kickstand
-from kickstand_tools.common.errors import InputError, RefusedInput
-from kickstand_tools.common.messages import Message, Remedy, as_data, distinct
-from kickstand_tools.estimation.first_guess import NotLeaning
+from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import Message, Remedy, as_data
 from kickstand_tools.imports.importing import ImportSign
 
 SAMPLES = {"str": "x", "int": 3, "float": 160.0, "bool": False, "float | None": None, "Remedy": Remedy()}
@@ -53,26 +51,6 @@ def test_each_code_is_one_class():
     assert len(codes) == len(set(codes)) > 60
 
 
-@pytest.mark.parametrize(
-    ("error", "terminal", "page"),
-    [
-        (InputError("no such thing: look"), "no such thing: look", "no such thing: look"),
-        (InputError("{x} is a zip", Remedy("import it")), "{x} is a zip: import it", "zip: import it"),
-        (InputError("units", Remedy("add --units a=g", "choose them")), "units: add --units a=g", "units: choose them"),
-        (
-            RefusedInput(NotLeaning(), "A.csv", "!"),
-            "as a car: with a speed in the log take kickstand calibrate drive --vehicle car!",
-            "as a car: this page aligns motorcycles only!",
-        ),
-    ],
-)
-def test_an_error_has_the_words_of_terminal_and_page(error, terminal, page):
-    for one in (error, pickle.loads(pickle.dumps(error))):
-        assert str(one).endswith(terminal)
-        assert one.line(page=True).endswith(page)
-        assert getattr(one, "code", "") in ("", "not-leaning")
-
-
 def test_a_notice_has_the_words_of_terminal_and_page():
     for notice in UpOff(20.0, False), ForwardOff(30.0, "speed", True), ImportSign("X"):
         assert api.sentence(notice) != api.sentence(notice, page=True)
@@ -85,11 +63,6 @@ def test_the_data_of_a_notice_are_its_fields_in_order():
     assert (data["code"], data["values"]) == ("forward-exchanged", [False, "left", None])
     (data,) = as_data([WHOLE[RatesMisfit]])
     assert json.loads(json.dumps(data["values"])) == [[0, 1, 0], [1, 0, 0], [0, 0, 1]]
-
-
-def test_the_same_line_is_kept_once():
-    first, same, other = UpOff(20.04, False), UpOff(20.0, False), UpOff(20.0, True)
-    assert distinct([first, same, other]) == [first, other]
 
 
 def test_a_file_that_is_not_a_calibration_is_refused(tmp_path):

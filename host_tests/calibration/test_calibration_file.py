@@ -122,11 +122,11 @@ def test_a_written_file_reads_back_the_same(tmp_path):
     write_calibration(tmp_path / "CAL.json", complete())
     (tmp_path / "BOM.json").write_bytes(b"\xef\xbb\xbf" + (tmp_path / "CAL.json").read_bytes())
     for name in "CAL.json", "BOM.json":
-        found = read_calibration(tmp_path / name)
-        assert found.as_json() | {"mine": [1]} == complete().as_json()
-        assert CalibrationFile(found.accel_offset_g) != CalibrationFile()
-        assert (found.vehicle, found.kickstand_side, found.gyro_delay_s) == ("motorcycle", "right", 0.0)
-        assert found.trim_deg == -1.25
+        cal = read_calibration(tmp_path / name)
+        assert cal.as_json() | {"mine": [1]} == complete().as_json()
+        assert CalibrationFile(cal.accel_offset_g) != CalibrationFile()
+        assert (cal.vehicle, cal.kickstand_side, cal.gyro_delay_s) == ("motorcycle", "right", 0.0)
+        assert cal.trim_deg == -1.25
     data = json.loads((tmp_path / "CAL.json").read_text())
     assert (data["version"], data["mine"]) == (1, [1])
     assert data["vehicle_from_sensor"] == complete().vehicle_from_sensor.tolist()
@@ -156,8 +156,8 @@ def test_a_calibration_is_applied_alike_by_numpy_and_by_the_firmware():
     of_vehicle, of_sensor = ([0.0] * 3, [0.0] * 3), ([0.0] * 3, [0.0] * 3)
     Transform(board).apply_sum(sums, 1, *of_vehicle)
     board.apply(sums, *of_sensor)
-    for found in (meter.force, meter.rate), of_vehicle:
-        assert list(found[0]) == pytest.approx(in_vehicle[0], abs=0.001)
-        assert np.degrees(found[1]) == pytest.approx(in_vehicle[1], abs=0.1)
+    for vectors in (meter.force, meter.rate), of_vehicle:
+        assert list(vectors[0]) == pytest.approx(in_vehicle[0], abs=0.001)
+        assert np.degrees(vectors[1]) == pytest.approx(in_vehicle[1], abs=0.1)
     assert of_sensor[0] == pytest.approx(force, abs=0.001)
     assert of_sensor[1] == pytest.approx(rate, abs=0.02)

@@ -65,8 +65,8 @@ def test_six_and_two_find_the_mounting_to_0_3_degrees(tmp_path, six_poses, free_
     stand, upright = (reads(mounting.T @ leaned(lean)) for lean in (-12.0 if side == "left" else 12.0, 0.0))
     poses = two_poses(tmp_path, stand, upright, BIAS)
     six, _ = calibrated(tmp_path / "CAL.json", "six", *six_poses, free_pose)
-    more = "--side", side, "--calibration", tmp_path / "CAL.json"  # written over by its successor
-    data, _ = calibrated(tmp_path / "CAL.json", "two", *poses, *more)
+    options = "--side", side, "--calibration", tmp_path / "CAL.json"  # written over by its successor
+    data, _ = calibrated(tmp_path / "CAL.json", "two", *poses, *options)
     assert (data["accel_offset_g"], data["accel_slope"]) == (six["accel_offset_g"], six["accel_slope"])
     assert data["gyro_bias_dps"] == pytest.approx(BIAS, abs=0.02)
     between = np.array(data["vehicle_from_sensor"]) @ mounting.T
@@ -85,8 +85,8 @@ def test_six_requires_six_or_seven_poses(tmp_path, six_poses, free_pose, count):
 
 
 def test_a_wrong_seventh_or_repeated_pose_is_named(tmp_path, six_poses):
-    again = shutil.copy(six_poses[2], tmp_path / "again.csv")
-    line = refused(tmp_path, "six", *six_poses[:5], again, words="side -z is missing")
+    repeated = shutil.copy(six_poses[2], tmp_path / "again.csv")
+    line = refused(tmp_path, "six", *six_poses[:5], repeated, words="side -z is missing")
     assert "side +y is there 2 times" in line
     assert "again.csv" in line
     flat = command.still(tmp_path / "flat.csv", reads(command.AXES["+y"]), BIAS, seed=5)

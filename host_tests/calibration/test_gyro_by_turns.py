@@ -29,9 +29,9 @@ def errors_left(seed, hand=None):
     """Return the remaining errors of the gyro in the axes of the calibrated accelerometer, and the standard errors that
     the calibration states, both of shape (3, 3)."""
     chip, readings = handled(seed, hand)
-    found = fit_procedure(Log.from_readings(readings, HZ)).calibration
-    u, _, v = np.linalg.svd(found.accel_matrix @ np.diag(found.accel_slope) @ chip.accel_matrix)
-    return found.gyro_matrix @ chip.gyro_matrix - u @ v, found.gyro_sigma
+    fit = fit_procedure(Log.from_readings(readings, HZ)).calibration
+    u, _, v = np.linalg.svd(fit.accel_matrix @ np.diag(fit.accel_slope) @ chip.accel_matrix)
+    return fit.gyro_matrix @ chip.gyro_matrix - u @ v, fit.gyro_sigma
 
 
 def rms(values):
@@ -39,18 +39,18 @@ def rms(values):
 
 
 def test_the_turns_calibrate_the_gyro_as_well_as_stated():
-    left, sigma = map(np.array, zip(*(errors_left(seed) for seed in range(4))))
-    assert rms(left[:, DIAGONAL]) < 0.004
-    assert rms(left[:, ~DIAGONAL]) < 0.005
-    assert 0.1 < rms(left / sigma) < 1.3
+    residuals, sigma = map(np.array, zip(*(errors_left(seed) for seed in range(4))))
+    assert rms(residuals[:, DIAGONAL]) < 0.004
+    assert rms(residuals[:, ~DIAGONAL]) < 0.005
+    assert 0.1 < rms(residuals / sigma) < 1.3
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("hand", [hands.Hand(), hands.Hand(heading_deg=0.0, detour_deg=0.0)])
 def test_the_turns_calibrate_fifty_gyros(hand):
-    left = np.array([errors_left(seed, hand)[0] for seed in range(100, 150)])
-    assert rms(left[:, DIAGONAL]) < 0.004
-    assert rms(left[:, ~DIAGONAL]) < 0.005
+    residuals = np.array([errors_left(seed, hand)[0] for seed in range(100, 150)])
+    assert rms(residuals[:, DIAGONAL]) < 0.004
+    assert rms(residuals[:, ~DIAGONAL]) < 0.005
 
 
 @pytest.mark.parametrize(
@@ -129,11 +129,11 @@ def test_a_faulty_gyro_axis_is_refused(axis, change, code):
 
 def test_turns_that_were_too_quick_are_left_out():
     try:
-        found = fit_procedure(Log.from_readings(handled(7, hands.Hand(turn_s=(0.35, 0.45)))[1], HZ))
+        fit = fit_procedure(Log.from_readings(handled(7, hands.Hand(turn_s=(0.35, 0.45)))[1], HZ))
     except RefusedInput as refusal:
         assert refusal.code == "unproved-gyro"
     else:
-        assert found.turns < found.all_turns == 6
+        assert fit.turns < fit.all_turns == 6
 
 
 def test_a_log_without_one_side_is_refused():

@@ -38,7 +38,7 @@ REFUSED = [
 
 
 def flat(answer):
-    return [number for each in answer for number in flat(each)] if isinstance(answer, list) else [answer]
+    return [number for item in answer for number in flat(item)] if isinstance(answer, list) else [answer]
 
 
 @pytest.fixture(scope="module", params=engines.ENGINES)

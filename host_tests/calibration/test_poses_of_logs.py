@@ -18,21 +18,21 @@ def sides(bias_dps=(0.0, 0.0, 0.0)):
 
 
 def test_six_poses_in_any_order_give_offset_slope_and_the_median_bias():
-    found = poses.fit_six_positions(sides((1, -1, 2))[::-1])
-    assert found.calibration.accel_offset_g == pytest.approx(OFFSET_G, abs=0.001)
-    assert found.calibration.accel_slope == pytest.approx(SLOPE, abs=0.001)
-    assert found.calibration.gyro_bias_dps == pytest.approx([2.5, -2.5, 5.0], abs=0.01)
-    assert found.calibration.six_done and not found.calibration.aligned
-    assert [side.name for side in found.sides] == list("abcdef")
-    assert np.array(found.tilt_deg) == pytest.approx([0.0] * 6, abs=2.5)
-    assert (found.free_pose, found.free_pose_error_g, found.beyond_sheet, found.turns) == (None, None, [], 0)
+    fit = poses.fit_six_positions(sides((1, -1, 2))[::-1])
+    assert fit.calibration.accel_offset_g == pytest.approx(OFFSET_G, abs=0.001)
+    assert fit.calibration.accel_slope == pytest.approx(SLOPE, abs=0.001)
+    assert fit.calibration.gyro_bias_dps == pytest.approx([2.5, -2.5, 5.0], abs=0.01)
+    assert fit.calibration.six_done and not fit.calibration.aligned
+    assert [side.name for side in fit.sides] == list("abcdef")
+    assert np.array(fit.tilt_deg) == pytest.approx([0.0] * 6, abs=2.5)
+    assert (fit.free_pose, fit.free_pose_error_g, fit.beyond_sheet, fit.turns) == (None, None, [], 0)
 
 
 def test_a_free_pose_proves_the_six():
-    found = poses.fit_six_positions([still_log(SLANTED, "free", bias_dps=(6, -6, 12)), *sides((1, -1, 2))])
-    assert found.calibration.gyro_bias_dps == pytest.approx([3.0, -3.0, 6.0], abs=0.01)
-    assert found.free_pose is not None and found.free_pose.name == "free"
-    assert found.free_pose_error_g == pytest.approx(0.0, abs=0.001)
+    fit = poses.fit_six_positions([still_log(SLANTED, "free", bias_dps=(6, -6, 12)), *sides((1, -1, 2))])
+    assert fit.calibration.gyro_bias_dps == pytest.approx([3.0, -3.0, 6.0], abs=0.01)
+    assert fit.free_pose is not None and fit.free_pose.name == "free"
+    assert fit.free_pose_error_g == pytest.approx(0.0, abs=0.001)
 
 
 def slanted(deg):
@@ -59,10 +59,10 @@ def test_captures_that_are_not_six_sides_are_refused(captures, words):
 def test_a_pose_is_the_mean_of_its_samples_also_without_a_temperature():
     readings = still(SLANTED, count=20, bias_dps=(1.0, 2.0, -3.0))
     readings[:, 3] = np.nan
-    found = poses.take_pose("n", readings, "again")
-    assert (found.name, found.samples) == ("n", 20)
-    assert found.accel_g == pytest.approx(readings[:, :3].mean(axis=0))
-    assert found.gyro_dps == pytest.approx(readings[:, 4:].mean(axis=0))
+    fit = poses.take_pose("n", readings, "again")
+    assert (fit.name, fit.samples) == ("n", 20)
+    assert fit.accel_g == pytest.approx(readings[:, :3].mean(axis=0))
+    assert fit.gyro_dps == pytest.approx(readings[:, 4:].mean(axis=0))
 
 
 def test_the_same_path_twice_is_refused(tmp_path):
@@ -74,21 +74,27 @@ def test_the_same_path_twice_is_refused(tmp_path):
 @pytest.mark.parametrize(("side", "left"), [("left", -1.0), ("right", 1.0)])
 def test_two_poses_show_which_way_is_left(side, left):
     """On a left kickstand the bike leans to its left. Seen from the leaning bike, up turns to the right."""
-    before = CalibrationFile(accel_offset_g=OFFSET_G, accel_slope=SLOPE, six_done=True, trim_deg=1.0, vehicle="car")
+    six = CalibrationFile(accel_offset_g=OFFSET_G, accel_slope=SLOPE, six_done=True, trim_deg=1.0, vehicle="car")
     stand, upright = still_log(leaned(10.0), bias_dps=(1.0, 2.0, 3.0)), still_log([0.0, 1.0, 0.0])
-    found = poses.fit_two_positions(stand, upright, before, side)
-    made = found.calibration
-    assert found.tilt_deg == pytest.approx(10.0, abs=0.1)
-    assert made.vehicle_from_sensor == pytest.approx(np.diag([left, 1.0, left]), abs=0.01)
-    assert made.gyro_bias_dps == pytest.approx([1.0, 2.0, 3.0], abs=0.001)
-    assert (made.kickstand_side, made.vehicle, made.trim_deg, made.aligned, made.six_done) == (
+    fit = poses.fit_two_positions(stand, upright, six, side)
+    calibration = fit.calibration
+    assert fit.tilt_deg == pytest.approx(10.0, abs=0.1)
+    assert calibration.vehicle_from_sensor == pytest.approx(np.diag([left, 1.0, left]), abs=0.01)
+    assert calibration.gyro_bias_dps == pytest.approx([1.0, 2.0, 3.0], abs=0.001)
+    assert (
+        calibration.kickstand_side,
+        calibration.vehicle,
+        calibration.trim_deg,
+        calibration.aligned,
+        calibration.six_done,
+    ) == (
         side,
         "",
         0.0,
         True,
         True,
     )
-    assert made.accel_offset_g.tolist() == OFFSET_G.tolist()
+    assert calibration.accel_offset_g.tolist() == OFFSET_G.tolist()
 
 
 def test_two_equal_poses_are_refused_by_name():
@@ -108,11 +114,11 @@ def procedure_of(readings):
 
 
 def test_one_recording_has_all_poses_and_turns(handled):
-    found = procedure_of(handled)
-    assert (found.turns, found.all_turns) == (6, 6)
-    assert found.calibration.accel_offset_g == pytest.approx([0.0] * 3, abs=0.002)
-    assert found.free_pose_error_g == pytest.approx(0.0, abs=0.002)
-    assert [float(np.round(side.accel_g[k // 2])) for k, side in enumerate(found.sides)] == [1, -1, 1, -1, 1, -1]
+    fit = procedure_of(handled)
+    assert (fit.turns, fit.all_turns) == (6, 6)
+    assert fit.calibration.accel_offset_g == pytest.approx([0.0] * 3, abs=0.002)
+    assert fit.free_pose_error_g == pytest.approx(0.0, abs=0.002)
+    assert [float(np.round(side.accel_g[k // 2])) for k, side in enumerate(fit.sides)] == [1, -1, 1, -1, 1, -1]
 
 
 def test_a_recording_without_movement_or_too_short_is_refused():
@@ -131,10 +137,10 @@ def test_a_pose_that_vibrates_is_refused(handled):
 
 def test_readings_are_turned_to_the_vehicle():
     """The sensor's y axis points to the left, and its x axis points down."""
-    made = CalibrationFile(
+    calibration = CalibrationFile(
         accel_offset_g=OFFSET_G, accel_slope=SLOPE, gyro_bias_dps=np.array([0.0, 0.0, 4.0]),
         vehicle_from_sensor=np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]]),
     )  # fmt: skip
-    force, rate = made.in_vehicle(np.array([[*read_at([-0.9, 0.2, 0.3]), 99.0, 10.0, 20.0, 34.0]]))
+    force, rate = calibration.in_vehicle(np.array([[*read_at([-0.9, 0.2, 0.3]), 99.0, 10.0, 20.0, 34.0]]))
     assert force == pytest.approx(np.array([[0.2, 0.9, 0.3]]))
     assert rate == pytest.approx(np.array([[20, -10, 30]]))

@@ -51,7 +51,7 @@ def test_a_knock_along_or_about_any_axis_spoils_the_pose(axis, sign):
     ],
 )
 def test_a_pose_that_is_not_still_is_refused(change, code):
-    rows = [[value + more for value, more in zip(row, change(k))] for k, row in enumerate(samples(300))]
+    rows = [[value + step for value, step in zip(row, change(k))] for k, row in enumerate(samples(300))]
     assert code in problem_of(rows)
 
 

@@ -137,12 +137,12 @@ def test_the_fault_of_a_record_is_reported(store, tmp_path, content, problem):
 def test_after_a_power_cut_at_any_byte_the_previous_record_counts(store, tmp_path, saved_before, matrices):
     for mark in range(1, saved_before + 1):
         store.save(calibration(mark))
-    before = {name: (tmp_path / name).read_bytes() for name in FILES if (tmp_path / name).exists()}
+    contents = {name: (tmp_path / name).read_bytes() for name in FILES if (tmp_path / name).exists()}
     store.save(calibration(9, matrices))
     written = newest_file(tmp_path)
     content = written.read_bytes()
     for cut in range(len(content)):
-        for name, old in before.items():
+        for name, old in contents.items():
             (tmp_path / name).write_bytes(old)
         written.write_bytes(content[:cut])
         assert mark_of(store.load()) == saved_before

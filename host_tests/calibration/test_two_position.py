@@ -75,16 +75,16 @@ def test_after_the_six_positions_a_pose_reads_1_g_more_closely(spoilt, size):
 def test_an_alignment_keeps_offset_and_slope_and_sets_the_bias():
     """The bias is from the kickstand pose, because a bike moves less on its stand than under a rider."""
     offset, slope = [0.05, -0.02, 0.0], [1.02, 0.98, 1.0]
-    before = Calibration()
-    before.set_accel(offset, slope)
-    before.six_done = True
-    before.gyro_bias[0], before.trim_deg = 9.0, 1.5
+    earlier = Calibration()
+    earlier.set_accel(offset, slope)
+    earlier.six_done = True
+    earlier.gyro_bias[0], earlier.trim_deg = 9.0, 1.5
     kickstand, upright = (
         Pose((force - offset) / slope, gyro)
         for force, gyro in ((leaned(-12), [1.0, -2.0, 0.5]), (leaned(0), [1.5, 0, 0]))
     )
-    aligned, tilt = align(before, kickstand, upright, "left")
+    aligned, tilt = align(earlier, kickstand, upright, "left")
     assert tilt == pytest.approx(12.0, abs=1e-4)
     assert aligned.parameters() == pytest.approx([*offset, *slope, 1.0, -2.0, 0.5, *np.eye(3).ravel(), 0.0], abs=1e-6)
     assert (aligned.aligned, aligned.six_done, aligned.by_drive) == (True, True, False)
-    assert not before.aligned
+    assert not earlier.aligned

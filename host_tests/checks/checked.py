@@ -42,10 +42,10 @@ def made_up(profile: str) -> SimulatedRide:
 @functools.cache
 def simulated(profile: str) -> Log:
     """Return the ride of made_up() as a log with 50 samples and one speed per second."""
-    made = made_up(profile)
-    readings, mps = made.readings[::4], np.full(len(made.time[::4]), np.nan)
-    mps[::50] = made.truth["speed_mps"][::200]
-    return Log(made.time[::4], readings[:, :3], readings[:, 4:], mps)
+    ride = made_up(profile)
+    readings, mps = ride.readings[::4], np.full(len(ride.time[::4]), np.nan)
+    mps[::50] = ride.truth["speed_mps"][::200]
+    return Log(ride.time[::4], readings[:, :3], readings[:, 4:], mps)
 
 
 def hand(seconds: float = 60.0, seed: int = 0, hz: int = 50) -> Log:

@@ -18,11 +18,11 @@ from kickstand_tools.simulation.files import positions
 def simulated(profile: str = "street", late_s: float = 0.6) -> Log:
     """Simulate the log of a board with a gyro bias. The log has 50 readings per second and one position per second. The
     positions are late by late_s seconds, as from a satellite receiver."""
-    made = made_up(profile)
-    here = slice(None, None, 4)
-    times, readings = made.time[here], made.readings[here]
-    known = np.arange(len(times)) % 50 == 10
-    track = [np.where(known, np.interp(times - late_s, made.time, column), np.nan) for column in positions(made)]
+    ride = made_up(profile)
+    thinned = slice(None, None, 4)
+    times, readings = ride.time[thinned], ride.readings[thinned]
+    has_position = np.arange(len(times)) % 50 == 10
+    track = [np.where(has_position, np.interp(times - late_s, ride.time, column), np.nan) for column in positions(ride)]
     assert np.max(np.abs(np.mean(readings[:50, 4:], axis=0))) > 3.0
     return Log(times, readings[:, :3], readings[:, 4:], **dict(zip(("lat_deg", "lon_deg", "utc_s"), track)))
 
@@ -64,9 +64,9 @@ def circling(both_sides: bool, bias_dps: float, wavering_dps: float = 0.0) -> bo
     yaw_dps = turning_dps + wave_dps
     way = np.cumsum(np.radians(yaw_dps)) * 0.02
     lat, lon = (np.cumsum(10.0 * wave(way)) * 0.02 * 9e-6 for wave in (np.sin, np.cos))
-    known = np.arange(len(t_s)) % 50 == 0
+    has_position = np.arange(len(t_s)) % 50 == 0
     rates = np.column_stack((0 * t_s, turning_dps - wave_dps + bias_dps, 0 * t_s))
-    places = [np.where(known, place, np.nan) for place in (lat, lon)]
+    places = [np.where(has_position, coordinate, np.nan) for coordinate in (lat, lon)]
     up = np.tile([0.0, 1.0, 0.0], (len(t_s), 1))
     return course_agrees(cells_of(Log(t_s, up, rates, lat_deg=places[0], lon_deg=places[1])))
 
@@ -87,10 +87,10 @@ def test_a_gyro_of_the_opposite_sign_is_reported_as_that_alone():
 def test_blocks_and_gaps_change_nothing(monkeypatch):
     monkeypatch.setattr(reader, "BLOCK_SAMPLES", 333)
     log = simulated()
-    kept = (log.t_s % 20.0) > 2.0
+    recorded = (log.t_s % 20.0) > 2.0
     assert codes(mirrored(log)) == ["mirrored"]
-    assert codes(log.part(kept)) == []
-    assert codes(mirrored(log.part(kept))) == ["mirrored"]
+    assert codes(log.part(recorded)) == []
+    assert codes(mirrored(log.part(recorded))) == ["mirrored"]
 
 
 def test_without_enough_positions_nothing_is_reported():
@@ -104,9 +104,9 @@ def test_without_enough_positions_nothing_is_reported():
 def test_errors_of_the_positions_are_no_turns(seed):
     """The bike goes nearly straight at 15 m/s. Errors of 0.5 m turn the course by some degrees per second."""
     chance, t_s = np.random.default_rng(seed), np.arange(0.0, 40.0, 0.02)
-    known = np.arange(len(t_s)) % 50 == 0
+    has_position = np.arange(len(t_s)) % 50 == 0
     east, north = chance.normal(0.0, 0.5, len(t_s)), 15.0 * t_s + chance.normal(0.0, 0.5, len(t_s))
-    lat, lon = (np.where(known, place * 9e-6, np.nan) for place in (north, east))
+    lat, lon = (np.where(has_position, coordinate * 9e-6, np.nan) for coordinate in (north, east))
     rates = np.column_stack((0 * t_s, 2.0 * np.sin(t_s + seed), 0 * t_s))
     up = np.tile([0.0, 1.0, 0.0], (len(t_s), 1))
     assert course_agrees(cells_of(Log(t_s, up, rates, lat_deg=lat, lon_deg=lon))) is None

@@ -124,9 +124,9 @@ def test_the_bias_is_found_in_a_ride_of_long_bends(bias):
     """Without a standstill and in bends of 60 s, the median rate is not the gyro's bias."""
     log = simulated("held")
     cells = cells_of(log.part((log.t_s > 20.0) & (log.t_s < 130.0)))
-    rest = np.mean(log.gyro_dps[log.t_s < 2.0], axis=0)
-    found = bias_dps(cells.force, cells.rate - rest + bias, cells.known, CELL_S)
-    assert found == pytest.approx(np.array(bias), abs=1.5)
+    resting_rate = np.mean(log.gyro_dps[log.t_s < 2.0], axis=0)
+    fitted = bias_dps(cells.force, cells.rate - resting_rate + bias, cells.known, CELL_S)
+    assert fitted == pytest.approx(np.array(bias), abs=1.5)
 
 
 def test_recordings(shared_data):

@@ -55,9 +55,9 @@ def said(log, calibration):
 @pytest.mark.parametrize("profile", PROFILES)
 def test_right_calibrations_are_never_reported(profile):
     log, calibration = made(profile)
-    for each in log, silent(log):
-        assert said(each, calibration) == ""
-        assert said(each, other(calibration, up=8.0)) == ""  # an alignment by two poses may have this error
+    for variant in log, silent(log):
+        assert said(variant, calibration) == ""
+        assert said(variant, other(calibration, up=8.0)) == ""  # an alignment by two poses may have this error
 
 
 @pytest.mark.parametrize(("profile", "speed"), [("street", True), ("city", False), ("track", False), ("hills", True)])
@@ -91,8 +91,8 @@ def test_another_seeds_calibration(rides=("street", "sweeper", "city")):
 def test_gaps():
     log, calibration = made("street")
     wrong = other(calibration, up=90.0)
-    kept = (log.t_s % 30.0) < 24.0
-    gaps = log.part(kept)
+    recorded = (log.t_s % 30.0) < 24.0
+    gaps = log.part(recorded)
     assert said(gaps, calibration) == ""
     assert "by the speed of this ride forward is " in said(gaps, wrong)
 
@@ -112,9 +112,9 @@ def test_the_commands_say_so_in_one_line(tmp_path):
     path = analysis_rides.write(tmp_path, legs, speed_hz=1)
     cal = tmp_path / "wrong.json"
     cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]}))
-    given = "replay", path, "--out", tmp_path / "out.csv"
-    assert command.works(*given).err == ""
-    line = command.works(*given, "--calibration", cal).err
+    arguments = "replay", path, "--out", tmp_path / "out.csv"
+    assert command.works(*arguments).err == ""
+    line = command.works(*arguments, "--calibration", cal).err
     assert line.startswith(f"warning: {path}: by the speed of this ride forward is 9")
     assert line.count("\n") == 1
 
@@ -125,8 +125,8 @@ def test_recordings(shared_data):
     calibration = fit_ride(log).calibration
     assert said(log, calibration) == ""
     found_by_bends = said(log, other(calibration, up=90.0))
-    found = re.search(r"by the bends of this ride forward is (\d+) degrees to the left", found_by_bends)
-    assert found and abs(int(found[1]) - 90) < 6
+    match = re.search(r"by the bends of this ride forward is (\d+) degrees to the left", found_by_bends)
+    assert match and abs(int(match[1]) - 90) < 6
     assert "forward and backward are exchanged" in said(log, other(calibration, up=180.0))
     name = "car-urban-medium-turn-loop-nominal-001.csv.gz"
     rows = [[0.0473, 0.9987, 0.0204], [-0.0003, -0.0204, 0.9998], [0.9989, -0.0473, -0.0006]]
@@ -176,12 +176,12 @@ def test_a_speed_up_to_two_seconds_late_shows_forward(late_s, shown):
 
 def test_only_the_last_hour_counts():
     """In the first of two hours the force along forward is reversed, as if the sensor had been turned round."""
-    before, after = jerky(sign=-1.0, seconds=3600, mps2=8.0), jerky(seconds=3600)
-    after.speed_mps += before.speed_mps[-10] - after.speed_mps[0]
-    force, speed = (np.concatenate((getattr(before, name), getattr(after, name))) for name in ("accel_g", "speed_mps"))
+    earlier, later = jerky(sign=-1.0, seconds=3600, mps2=8.0), jerky(seconds=3600)
+    later.speed_mps += earlier.speed_mps[-10] - later.speed_mps[0]
+    force, speed = (np.concatenate((getattr(earlier, name), getattr(later, name))) for name in ("accel_g", "speed_mps"))
     time = np.arange(0.0, 7200.0, 0.1)
     assert not exchanged(Log(time, force, np.zeros(force.shape), speed))
-    assert exchanged(before)
+    assert exchanged(earlier)
 
 
 def test_of_several_speeds_in_a_second_the_first_counts():

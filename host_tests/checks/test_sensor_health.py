@@ -31,13 +31,13 @@ def test_a_dead_axis_is_named_and_has_no_lean(street, axis):
         (force if axis < 3 else rate)[time > 50.0, axis % 3] = 0.25
 
     log = ill(street, die)
-    for found in (smooth(log, street.calibration), replay(log, street.calibration)):
-        (notice,) = (n for n in found.notices if isinstance(n, AxisDead))
+    for lean in (smooth(log, street.calibration), replay(log, street.calibration)):
+        (notice,) = (n for n in lean.notices if isinstance(n, AxisDead))
         assert notice.name == NAMES[axis]
         assert notice.begin_s == pytest.approx(50.0, abs=2.0)
         assert f"{NAMES[axis]} is dead" in sentence(notice)
         dead = (log.t_s > 52.0) & (log.t_s < 95.0)
-        assert np.mean(np.isnan(found.lean_deg[dead])) > 0.9
+        assert np.mean(np.isnan(lean.lean_deg[dead])) > 0.9
 
 
 @pytest.mark.parametrize(("sensor", "begin_s"), [("gyro", -1.0), ("gyro", 50.0), ("accelerometer", 50.0)])
@@ -45,10 +45,10 @@ def test_a_sensor_dead_in_all_axes_is_named_and_left_out(street, sensor, begin_s
     def die(time, force, rate):
         (force if sensor == "accelerometer" else rate)[time > begin_s] = (0.25, -0.5, 0.75)
 
-    found = replay(ill(street, die), street.calibration)
-    names = [notice.values[0] for notice in found.notices if notice.code == "axis-dead"]
+    lean = replay(ill(street, die), street.calibration)
+    names = [notice.values[0] for notice in lean.notices if notice.code == "axis-dead"]
     assert names == [name for name in NAMES if name.startswith(sensor)]
-    assert np.mean(np.isnan(found.lean_deg[(found.t_s > max(2.0, begin_s + 2.0)) & (found.t_s < 95.0)])) > 0.8
+    assert np.mean(np.isnan(lean.lean_deg[(lean.t_s > max(2.0, begin_s + 2.0)) & (lean.t_s < 95.0)])) > 0.8
 
 
 def test_an_accelerometer_that_clips_is_said(street):
@@ -66,8 +66,8 @@ def test_a_bias_that_steps_is_said_by_replay_and_report(street):
         rate += 0.4 * np.maximum(0.0, time - 30.0)[:, None] * street.calibration.vehicle_from_sensor[2]
 
     log = ill(street, drift)
-    seen = overview(Ride(log, street.calibration))
-    for notices in (replay(log, street.calibration).notices, seen.notices):
+    ride_overview = overview(Ride(log, street.calibration))
+    for notices in (replay(log, street.calibration).notices, ride_overview.notices):
         (notice,) = (n for n in notices if n.code == "readings-misfit")
         assert notice.values[0] > 2.0
         assert notice.values[1] > 30.0
@@ -79,23 +79,23 @@ def test_a_saturated_gyro_is_reported_and_the_rest_is_good(street):
         rate[(time > 60.0) & (time < 60.5), 1] = 500.0
 
     log = ill(street, saturate)
-    found = smooth(log, street.calibration)
-    (notice,) = (n for n in found.notices if isinstance(n, GyroSaturated))
+    lean = smooth(log, street.calibration)
+    (notice,) = (n for n in lean.notices if isinstance(n, GyroSaturated))
     assert (notice.axis, notice.times) == ("y", 1)
     assert notice.seconds == pytest.approx(0.5, abs=0.02)
-    there = street.riding & (np.abs(log.t_s - 60.0) > 2.0)
-    assert rms((found.lean_deg - street.lean_deg)[there]) < 0.4
-    assert np.all(np.isnan(found.lean_deg[(log.t_s > 60.01) & (log.t_s < 60.49)]))
+    is_judged = street.riding & (np.abs(log.t_s - 60.0) > 2.0)
+    assert rms((lean.lean_deg - street.lean_deg)[is_judged]) < 0.4
+    assert np.all(np.isnan(lean.lean_deg[(log.t_s > 60.01) & (log.t_s < 60.49)]))
 
 
 @pytest.mark.parametrize("scale", [(1.0, 1.0, 0.5), (1.0, 0.5, 1.0)])
 def test_a_gyro_of_half_the_scale_is_doubted(street, scale):
     about = street.calibration.vehicle_from_sensor
     log = replace(street.log, gyro_dps=street.log.gyro_dps @ about.T @ np.diag(scale) @ about)
-    found = smooth(log, street.calibration)
-    assert "sensor-odd" in [notice.code for notice in found.notices]
-    off = np.abs(found.lean_deg - street.lean_deg)[street.riding]
-    assert np.mean(off < 3.0 * found.lean_sigma_deg[street.riding]) > 0.8
+    lean = smooth(log, street.calibration)
+    assert "sensor-odd" in [notice.code for notice in lean.notices]
+    off = np.abs(lean.lean_deg - street.lean_deg)[street.riding]
+    assert np.mean(off < 3.0 * lean.lean_sigma_deg[street.riding]) > 0.8
 
 
 def test_sound_sensors_are_not_called_ill(street):

@@ -28,9 +28,9 @@ KMH, MPH, KNOTS = 3.6, 2.2369, 1.9438
 @functools.cache
 def driven(brakings):
     """Return the force, rate and speed of a simulated ride with this number of braking events."""
-    made = list(driving_runs.samples(driving_runs.around(brakings), "motorcycle"))
-    force, rate = (np.array([driving_runs.mounted(MOUNT, row[k]) for row in made]) for k in (0, 1))
-    return force, rate, [row[2] for row in made]
+    samples = list(driving_runs.samples(driving_runs.around(brakings), "motorcycle"))
+    force, rate = (np.array([driving_runs.mounted(MOUNT, row[k]) for row in samples]) for k in (0, 1))
+    return force, rate, [row[2] for row in samples]
 
 
 def record(brakings=7, **source):
@@ -55,6 +55,14 @@ def test_other_units_are_refused(scale, words, every_s, late_s):
         read_log(record(scale=scale, every_s=every_s, late_s=late_s))
 
 
+def test_one_impossible_reading_hides_nothing():
+    """A log made in Python may hold any number."""
+    log = record(scale=KMH)
+    log.accel_g[1000] = 1e4
+    with pytest.raises(InputError, match="it is in km/h"):
+        read_log(log)
+
+
 @pytest.mark.parametrize(("every_s", "late_s"), [(0.1, 0.0), (0.1, 3.0), (0.5, 1.0), (2.0, 0.0), (2.0, 3.0)])
 def test_a_speed_in_mps_is_read(every_s, late_s):
     read_log(record(every_s=every_s, late_s=late_s, step=1 / 3.6))
@@ -65,11 +73,11 @@ def test_a_wrong_unit_is_refused_before_the_end_of_the_log(monkeypatch, samples)
     """Evidence accumulates from block to block. The reader refuses the log as soon as the evidence is enough."""
     log = record(20, scale=KMH)
     monkeypatch.setattr(reader, "BLOCK_SAMPLES", samples)
-    before = 0
+    read_us = 0
     with pytest.raises(InputError, match="km/h"):
         for block in reader.read_blocks(log):
-            before = block.time_us[-1]
-    assert 20e6 < before < 90e6
+            read_us = block.time_us[-1]
+    assert 20e6 < read_us < 90e6
 
 
 @pytest.mark.parametrize("profile", PROFILES)
@@ -95,8 +103,8 @@ def test_a_speed_that_has_nothing_to_do_with_the_ride():
 
 def test_recordings(shared_data):
     for log in sorted(shared_data.glob("*.csv.gz")):
-        whole = read_log(log)
-        time, force, speed = whole.t_s, whole.accel_g, whole.speed_mps
+        recording = read_log(log)
+        time, force, speed = recording.t_s, recording.accel_g, recording.speed_mps
         if log.name.startswith("car-urban"):
             assert "it is in km/h" in said(time, force, speed * KMH)
             assert "it is in mph or knots" in said(time, force, speed * MPH)

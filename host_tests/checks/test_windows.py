@@ -25,12 +25,13 @@ WRONG = [matrix for matrix in EXCHANGES if not np.array_equal(matrix, np.eye(3))
 @functools.cache
 def long_ride(profile: str, seconds: float) -> Log:
     """Simulate a log with 50 samples per second, and one speed and one position per second."""
-    made = ride(profile, 8, seconds)
-    known = np.arange(len(made.time[::4])) % 50 == 0
+    ridden = ride(profile, 8, seconds)
+    has_position = np.arange(len(ridden.time[::4])) % 50 == 0
     speed, lat, lon = (
-        np.where(known, np.asarray(column)[::4], np.nan) for column in (made.truth["speed_mps"], *positions(made)[:2])
+        np.where(has_position, np.asarray(column)[::4], np.nan)
+        for column in (ridden.truth["speed_mps"], *positions(ridden)[:2])
     )
-    return Log(made.time[::4], made.readings[::4, :3], made.readings[::4, 4:], speed, lat_deg=lat, lon_deg=lon)
+    return Log(ridden.time[::4], ridden.readings[::4, :3], ridden.readings[::4, 4:], speed, lat_deg=lat, lon_deg=lon)
 
 
 def window(log: Log, chance: np.random.Generator) -> Log:
@@ -83,13 +84,13 @@ def test_no_window_of_a_recording_is_accused(shared_data):
 )
 def test_mistakes_are_found_in_most_windows_and_named_right(profile, count):
     chance = np.random.default_rng(4)
-    found = 0
+    named = 0
     for _ in range(count):
         log, wrong = window(long_ride(profile, 200.0), chance), WRONG[chance.integers(len(WRONG))]
         notices = read_log(Log(log.t_s, log.accel_g, log.gyro_dps @ wrong.T)).notices
         assert len(notices) <= 1
         for notice in notices:
-            found += 1
+            named += 1
             repair = -np.eye(3) if notice.code == "left-handed" else notice.values
             assert notice.code == "axes-misfit" or np.array_equal(repair, wrong.T), (notice, wrong)
-    assert found >= count / 2
+    assert named >= count / 2

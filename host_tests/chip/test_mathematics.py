@@ -40,9 +40,9 @@ def records():
 
 def assert_equal_leans(results):
     """Assert that all engines give the same lean within 0.01 degrees at every sample. results: one per engine."""
-    host, *others = (np.frombuffer(result).reshape(-1, len(replay_engine.COLUMNS)) for result in results)
+    host, *emulated = (np.frombuffer(result).reshape(-1, len(replay_engine.COLUMNS)) for result in results)
     assert abs(host[:, 0]).max() > 25.0
-    for other in others:
+    for other in emulated:
         assert host.shape == other.shape
         assert len(other) == 300
         assert np.abs(host - other)[:, :2].max() < 0.01

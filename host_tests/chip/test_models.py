@@ -40,9 +40,9 @@ def test_fast_division_gives_the_results_of_rp2040py():
     device = pico()  # skips the test without the emulator
     from rp2040py.rp2040 import RP2040
 
-    quick, own = device.chip.rp2040, RP2040()
+    quick, original = device.chip.rp2040, RP2040()
     results = []
-    for chip in (quick, own):
+    for chip in (quick, original):
         chip.sio.reset()
         begin = chip.core.cycles
         values = []

@@ -113,8 +113,8 @@ def test_users_own_script_is_not_run(tmp_path):
     """A user's script in the current folder is not run, even if its name begins with kickstand."""
     (tmp_path / "kickstand_my_rides.py").write_text("raise RuntimeError('it was run')\n")
     arguments = [sys.executable, "-m", "kickstand_tools.cli", "--help"]
-    done = subprocess.run(arguments, cwd=tmp_path, capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
+    process = subprocess.run(arguments, cwd=tmp_path, capture_output=True, text=True)
+    assert (process.returncode, process.stderr) == (0, "")
 
 
 def test_checkout_has_the_workshops_commands():

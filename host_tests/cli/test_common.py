@@ -53,6 +53,7 @@ def test_signal_leaves_no_temporary_file(number, tmp_path):
     code = (
         "import os, signal, sys, time; from pathlib import Path\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "signal.signal(signal.SIGHUP, signal.SIG_DFL)\n"  # nohup ignores it, and a process inherits that
         "from kickstand_tools.cli import main; from kickstand_tools.common.output import whole_file\n"
         "def cut(*_, **__):\n"
         "    with whole_file(Path('old.csv')) as temporary:\n"
@@ -60,9 +61,9 @@ def test_signal_leaves_no_temporary_file(number, tmp_path):
         "main.kickstand.invoke = cut; main.main(['report'])"
     )
     (tmp_path / "old.csv").write_text("before")
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == (130 if number == signal.SIGINT else 128 + number)
-    assert done.stderr.strip() == "kickstand: stopped"
+    process = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
+    assert process.returncode == (130 if number == signal.SIGINT else 128 + number)
+    assert process.stderr.strip() == "kickstand: stopped"
     assert [path.read_text() for path in tmp_path.iterdir()] == ["before"]
 
 
@@ -109,8 +110,10 @@ def test_file_that_the_shell_has_opened_is_not_replaced(name, tmp_path):
         f"check_output(Path({name!r}), [])"
     )
     with open(tmp_path / "log", "a") as log:
-        done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, stdout=log, stderr=subprocess.PIPE, text=True)
-    assert "this command's own input or output" in done.stderr and (tmp_path / "log").read_text() == "before\n"
+        process = subprocess.run(
+            [sys.executable, "-c", code], cwd=tmp_path, stdout=log, stderr=subprocess.PIPE, text=True
+        )
+    assert "this command's own input or output" in process.stderr and (tmp_path / "log").read_text() == "before\n"
 
 
 # Texts
@@ -135,24 +138,24 @@ def test_message_has_words_for_a_terminal_and_for_a_page():
     assert late.line() == messages.sentence(late) == "a.csv is 2.0 s late: run it with --shift 2"
     assert late.line(page=True) == messages.sentence(late, True) == "a.csv is 2.0 s late: shift it by 2 s"
     assert late.values == (2.04, "a.csv") and Turned().line() == "the axes are turned"
-    more = Remedy("run x", "press x").followed("; wait")
-    assert (more.words(), more.words(True)) == ("run x; wait", "press x; wait")
-    both = Remedy("wait {n} s").followed(" or stop").filled(n=3)
-    assert both.words() == both.words(True) == "wait 3 s or stop"
+    longer = Remedy("run x", "press x").followed("; wait")
+    assert (longer.words(), longer.words(True)) == ("run x; wait", "press x; wait")
+    filled = Remedy("wait {n} s").followed(" or stop").filled(n=3)
+    assert filled.words() == filled.words(True) == "wait 3 s or stop"
     assert Plain("it is {broken}", Remedy("stop")).line() == "it is {broken}: stop"
     assert messages.by_code(Late, Turned) == {"late": Late, "turned": Turned}
-    assert messages.distinct([late, Turned(), Late(2.04, "a.csv")]) == [late, Turned()]
+    assert messages.distinct([late, Turned(), Late(2.0, "a.csv")]) == [late, Turned()]
     assert messages.is_explained([late, Turned()]) and not messages.is_explained([late])
 
 
 def test_refusal_keeps_its_reason_in_another_process():
     refusal = pickle.loads(pickle.dumps(RefusedInput(Turned(), "a.csv", ", as it seems")))
-    assert str(refusal) == "a.csv: the axes are turned, as it seems"
+    assert str(refusal) == refusal.line(True) == "a.csv: the axes are turned, as it seems"
     assert (refusal.code, refusal.message) == ("turned", Turned())
     assert str(refusal.at("b.csv")) == "b.csv: the axes are turned, as it seems"
     assert str(RefusedInput(Turned())) == "the axes are turned"
-    error = InputError("no such file", Remedy("run x", "press x"))
-    assert (str(error), error.line(True)) == ("no such file: run x", "no such file: press x")
+    error = pickle.loads(pickle.dumps(InputError("{x} is no file", Remedy("run x", "press x"))))
+    assert (str(error), error.line(True)) == ("{x} is no file: run x", "{x} is no file: press x")
     assert str(InputError(Late(1.0, "b"))) == "b is 1.0 s late: run it with --shift 1"
     causes = [PermissionError(13, "Permission denied", "a.csv"), ValueError("odd"), TimeoutError()]
     assert [errors.cause(cause) for cause in causes] == ["Permission denied", "odd", "TimeoutError"]

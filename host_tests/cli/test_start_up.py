@@ -22,9 +22,9 @@ finally:
 
 
 def test_help_loads_no_command_and_no_numpy():
-    done = subprocess.run([sys.executable, "-c", LOADED], capture_output=True, text=True, check=True)
-    loaded = set(json.loads(done.stderr))
-    assert "  fleet      Align many vehicles, find moved mounts, test their brakes." in done.stdout
+    process = subprocess.run([sys.executable, "-c", LOADED], capture_output=True, text=True, check=True)
+    loaded = set(json.loads(process.stderr))
+    assert "  fleet      Align many vehicles, find moved mounts, test their brakes." in process.stdout
     heavy = {name for name in loaded if name.partition(".")[0] in ("numpy", "rich", "dask", "jinja2")}
     leaves = {
         name for name in loaded if name.startswith(("kickstand_fleet", "kickstand_emulator", "kickstand_workshop"))
@@ -37,10 +37,10 @@ def processor_s(*arguments):
     """Return the least processor time of four runs of Python, in s."""
     times = []
     for _ in range(4):
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        start = resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run([sys.executable, *arguments], stdout=subprocess.DEVNULL, check=True)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        times.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+        end = resource.getrusage(resource.RUSAGE_CHILDREN)
+        times.append(end.ru_utime + end.ru_stime - start.ru_utime - start.ru_stime)
     return min(times)
 
 
@@ -91,5 +91,5 @@ def test_an_invalid_entry_point_does_not_hide_a_crash(tmp_path, monkeypatch):
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: lap-timer\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text("[kickstand.commands]\nlaps = not an object!\n")
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setitem(main.COMMANDS, "report", (".no_such_module", ""))
+    monkeypatch.setitem(main.COMMANDS, "report", EntryPoint("report", "no_such_module", GROUP))
     assert ": a fault in kickstand, please report it" in command.run("report").err

@@ -54,7 +54,7 @@ REFUSALS = {
     "simulate --fleet 2 --out .": "holds a ride, whose truth would be lost",
     "simulate --profile street --out fleet": "holds a fleet, whose truth would be lost",
     **{f"{line} --out ride.csv": "ride.csv is a file: give --out the name of a directory"
-       for line in ("simulate --profile parked", "evaluate --profiles parked", "pull", "web")},
+       for line in ("simulate --profile parked", "pull", "web")},
     "import ride.csv --columns t --out o.csv": "--columns: 't' is not NAME=VALUE; separate the pairs with commas",
     "import ride.csv --units a=g,a=g --out o.csv": "--units: 'a' is given twice",
 }  # fmt: skip
@@ -114,9 +114,9 @@ def test_times_are_read_as_seconds_minutes_and_hours(text, seconds):
 
 
 def test_every_command_has_help_and_the_convention_of_logs():
-    for name, (_, words) in main.COMMANDS.items():
+    for name in main.COMMANDS:
         text = " ".join(command.works(name, "--help").out.split())
-        assert text.startswith(f"Usage: kickstand {name} ") and words.endswith(".")
+        assert text.startswith(f"Usage: kickstand {name} ")
         if name in ("import", "smooth", "report", "compare"):
             convention = "At rest, the axis that points up reads +1 g. Rates are right-handed about their axes."
             assert convention in text
@@ -126,9 +126,9 @@ def test_every_command_has_help_and_the_convention_of_logs():
 
 def test_shell_sees_one_line_on_standard_error_and_status_2(tmp_path):
     arguments = "-m kickstand_tools.cli replay none.csv --calibration x --out y".split()
-    done = subprocess.run([sys.executable, *arguments], cwd=tmp_path, capture_output=True, text=True)
-    assert (done.returncode, done.stdout) == (2, "") and not list(tmp_path.iterdir())
-    assert done.stderr == "kickstand: x: there is no such file: make it with kickstand calibrate\n"
+    process = subprocess.run([sys.executable, *arguments], cwd=tmp_path, capture_output=True, text=True)
+    assert (process.returncode, process.stdout) == (2, "") and not list(tmp_path.iterdir())
+    assert process.stderr == "kickstand: x: there is no such file: make it with kickstand calibrate\n"
 
 
 def test_slow_commands_show_progress_on_a_terminal(tmp_path, monkeypatch):

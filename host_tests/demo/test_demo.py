@@ -25,39 +25,39 @@ def frames(text):
     """Return a tuple for each printed frame: time, phase, true lean, and the two lines of the LCD."""
     head = r"^ *([\d.]+) s  ([\w ]+), true lean ([\d.]+)° ?(left|right|)"
     edge, line = r"\+-{16}\+", r"\|(.{16})\|"
-    found = re.findall("\n".join([head, edge, line, line, edge]), text, re.MULTILINE)
+    matches = re.findall("\n".join([head, edge, line, line, edge]), text, re.MULTILINE)
     signs = {"left": -1.0, "": 1.0, "right": 1.0}
-    return [(float(t), phase, signs[side] * float(lean), x, y) for t, phase, lean, side, x, y in found]
+    return [(float(t), phase, signs[side] * float(lean), x, y) for t, phase, lean, side, x, y in matches]
 
 
 def test_the_rider_aligns_the_board_in_two_poses(printed):
-    said = [(phase, f"{first} {second}") for _, phase, _, first, second in frames(printed)]
+    texts = [(phase, f"{first} {second}") for _, phase, _, first, second in frames(printed)]
     order = []
     for text, during in (
         ("On stand: press", "kickstand"),
         ("Now upright", "kickstand"),
         ("Aligned!", "upright"),
     ):
-        order.append(next(k for k, (_, lcd) in enumerate(said) if text in lcd))
-        assert said[order[-1]][0] == during
+        order.append(next(k for k, (_, lcd) in enumerate(texts) if text in lcd))
+        assert texts[order[-1]][0] == during
     assert order == sorted(order)
     tilt = re.search(r"Aligned! +([\d.]+)°", printed)
     assert tilt and float(tilt[1]) == pytest.approx(12.0, abs=1.0)
-    assert all(one[3:] != other[3:] for one, other in itertools.pairwise(frames(printed)))
+    assert all(frame[3:] != other[3:] for frame, other in itertools.pairwise(frames(printed)))
 
 
 def test_the_display_follows_the_true_lean(printed):
-    shown = [(true, shown_lean(lcd)) for _, phase, true, *lcd in frames(printed) if phase == "held turn"]
-    assert {true > 0 for true, _ in shown} == {True, False}
-    assert all(lean == pytest.approx(true, abs=4.0) for true, lean in shown)
+    displayed = [(true, shown_lean(lcd)) for _, phase, true, *lcd in frames(printed) if phase == "held turn"]
+    assert {true > 0 for true, _ in displayed} == {True, False}
+    assert all(lean == pytest.approx(true, abs=4.0) for true, lean in displayed)
 
 
 def test_the_end_compares_shown_and_true_lean(printed):
     table = printed.split("shown on the LCD, and true")[1]
     rows = re.findall(r"│ held turn \d +│ +(\d+) │ +(-?[\d.]+) │ +(-?[\d.]+) │ +([\d.]+) │ +([-+][\d.]+) │", table)
     assert [round(float(row[1])) for row in rows] == [-30, 38, -45]
-    for count, true, shown, rms, worst in rows:
-        assert int(count) > 50 and float(shown) == pytest.approx(float(true), abs=3.0)
+    for count, true, displayed, rms, worst in rows:
+        assert int(count) > 50 and float(displayed) == pytest.approx(float(true), abs=3.0)
         assert float(rms) <= abs(float(worst))
     assert re.search(r"│ all +│ +\d{3,} │", table)
 

@@ -8,7 +8,7 @@ from kickstand_tools.common import unix_port
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.demo import user_program
 from kickstand_tools.demo.score import Score, State, table
-from kickstand_tools.demo.screen import oled_lines, screen
+from kickstand_tools.demo.screen import bike, oled_lines, screen
 from rich.console import Console
 
 STATE: State = {
@@ -63,11 +63,12 @@ def test_the_picture_has_true_and_shown_lean(changed, values):
     ("paused", "of_s", "end"), [(False, 60.0, "23.4 of 60 s"), (False, None, "23.4 s"), (True, 60.0, "paused")]
 )
 def test_the_picture_fits_eighty_columns_with_title_and_time(paused, of_s, end):
-    """Without an end of the ride, there is no progress bar."""
+    """Without an end of the ride, there is no progress bar. The bike stands on the picture's last row, the ground."""
     for lean_deg in (-50.0, 0.0, 50.0):
         lines = drawn(paused, of_s=of_s, lean_deg=lean_deg)
         assert lines[0].startswith("a title") and lines[0].rstrip().endswith(end) and lines[-1].startswith("the keys")
         assert len(lines) == len(drawn()) - (of_s is None) and max(len(line.rstrip()) for line in lines) <= 80
+        assert " " not in bike(lean_deg, None).plain.split("\n")[-1]
 
 
 def test_each_pixel_of_an_oled_has_its_dot():
@@ -82,8 +83,8 @@ def test_each_pixel_of_an_oled_has_its_dot():
 
 def scored(*states):
     score = Score()
-    for phase, lean_deg, shown in states:
-        score.add({**STATE, "phase": phase, "lean_deg": lean_deg, "lcd": [shown, ""]})
+    for phase, lean_deg, displayed in states:
+        score.add({**STATE, "phase": phase, "lean_deg": lean_deg, "lcd": [displayed, ""]})
     return score.figures()
 
 

@@ -45,8 +45,8 @@ def config(tmp_path, monkeypatch):
 @pytest.fixture
 def port(monkeypatch):
     """Return the serial port that any name opens. Only waiting takes time."""
-    made = SerialPort()
-    monkeypatch.setattr(serial, "serial_for_url", made.open)
+    serial_port = SerialPort()
+    monkeypatch.setattr(serial, "serial_for_url", serial_port.open)
     for name in ("sleep", "monotonic", "time"):
-        monkeypatch.setattr(time, name, getattr(made, name))
-    return made
+        monkeypatch.setattr(time, name, getattr(serial_port, name))
+    return serial_port

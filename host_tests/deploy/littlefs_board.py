@@ -83,13 +83,13 @@ class LittlefsBoard(fake_board.FakeBoard):
 
     def files(self) -> dict[str, bytes]:
         """Return the path and content of every file on the board."""
-        found = {}
+        contents = {}
         for folder, _, names in self.system.walk("/"):
             for name in names:
                 path = f"{folder.rstrip('/')}/{name}"
                 with self.system.open(path, "rb") as file:
-                    found[path] = file.read()
-        return found
+                    contents[path] = file.read()
+        return contents
 
     def folders(self) -> set[str]:
         return {f"{folder.rstrip('/')}/{name}" for folder, names, _ in self.system.walk("/") for name in names}
@@ -110,8 +110,8 @@ class LittlefsBoard(fake_board.FakeBoard):
 
         def stat(path: str) -> tuple[int, ...]:
             with _as_os_errors():
-                found = system.stat(path)
-            return (0x4000 if found.type == 2 else 0x8000, 0, 0, 0, 0, 0, found.size, 0, 0, 0)
+                status = system.stat(path)
+            return (0x4000 if status.type == 2 else 0x8000, 0, 0, 0, 0, 0, status.size, 0, 0, 0)
 
         def change(name: str) -> Any:
             def act(*paths: str) -> None:

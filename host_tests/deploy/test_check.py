@@ -135,12 +135,12 @@ OFTEN = ("gyro x dead", "gyro y noisy", "gyro z biased", "FIFO of half the size"
     "name", [name if name in OFTEN else pytest.param(name, marks=pytest.mark.long) for name in DEFECTS]
 )
 def test_each_planted_defect_is_found_by_its_name(name, short, tmp_path):
-    what, world, plant = DEFECTS[name]
+    finding, world, plant = DEFECTS[name]
     checked = CheckedBoard(world)
     if plant:
         plant(checked.board)
     findings = faults(checked, tmp_path)
-    assert what == next(iter(findings), None) or (what in findings and name == "drop-outs"), findings
+    assert finding == next(iter(findings), None) or (finding in findings and name == "drop-outs"), findings
 
 
 @pytest.mark.parametrize(

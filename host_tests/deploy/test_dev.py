@@ -120,8 +120,8 @@ def test_failed_installation_gives_the_reason_and_the_log(project):
     [(["fly"], "dev.py: no task is named"), ([], "dev.py: no task is named")],
 )
 def test_dev_lists_its_commands(arguments, words):
-    done = subprocess.run([sys.executable, str(DEV), *arguments], capture_output=True, text=True)
-    assert done.returncode != 0 and done.stderr.startswith(words) and done.stderr.count("\n") == 1
+    process = subprocess.run([sys.executable, str(DEV), *arguments], capture_output=True, text=True)
+    assert process.returncode != 0 and process.stderr.startswith(words) and process.stderr.count("\n") == 1
 
 
 def test_old_python_is_refused_in_one_line(project, monkeypatch):

@@ -182,15 +182,15 @@ def test_edited_config_is_kept_unless_requested(board, config):
 def test_other_projects_files_are_renamed(files, renamed, board):
     put(board, {f"{name}.py": content for name, content in files.items()})
     result = command.works("flash", "--yes")
-    after = root_files(board)
+    new_files = root_files(board)
     for name in renamed:
-        assert after[f"{name}-before-kickstand.py"] == files[name]
+        assert new_files[f"{name}-before-kickstand.py"] == files[name]
         line = f"kept: {name}.py on the board is another project's: kept as {name}-before-kickstand.py\n"
         assert line in result.out
-    assert result.out.count("another project's") == len(renamed) and after["main.py"] == MAIN
+    assert result.out.count("another project's") == len(renamed) and new_files["main.py"] == MAIN
     for name in files.keys() - {"main", *renamed}:
-        assert after[f"{name}.py"] == files[name]
-    assert "another project's" not in command.works("flash").out and root_files(board) == after
+        assert new_files[f"{name}.py"] == files[name]
+    assert "another project's" not in command.works("flash").out and root_files(board) == new_files
 
 
 FAULTS = [

@@ -35,17 +35,17 @@ UNTYPED = '"None"', 'for class "NoRec', 'for class "Settings', 'of type "ptr', "
 @pytest.fixture(scope="module", params=["rp2", "esp32"])
 def stubs(request):
     """Return a port and the directory with the stubs of its MicroPython. The first use installs the stubs in .venv."""
-    wanted = tomllib.loads((ROOT / "pyproject.toml").read_text())["dependency-groups"][f"stubs-{request.param}"]
-    directory = Path(sys.prefix) / f"stubs-{request.param}-{hashlib.sha256(repr(wanted).encode()).hexdigest()[:8]}"
+    pins = tomllib.loads((ROOT / "pyproject.toml").read_text())["dependency-groups"][f"stubs-{request.param}"]
+    directory = Path(sys.prefix) / f"stubs-{request.param}-{hashlib.sha256(repr(pins).encode()).hexdigest()[:8]}"
     if not directory.is_dir():
         with tempfile.TemporaryDirectory(dir=sys.prefix) as scratch:
             pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-            done = subprocess.run(
-                [*pip, "--target", f"{scratch}/stubs", *wanted], capture_output=True, text=True, timeout=300
+            process = subprocess.run(
+                [*pip, "--target", f"{scratch}/stubs", *pins], capture_output=True, text=True, timeout=300
             )
-            if done.returncode != 0:
-                reason = done.stderr.strip() or "pip failed"
-                pytest.skip(f"no {wanted[0]}: it cannot be installed: {reason.splitlines()[-1]}")
+            if process.returncode != 0:
+                reason = process.stderr.strip() or "pip failed"
+                pytest.skip(f"no {pins[0]}: it cannot be installed: {reason.splitlines()[-1]}")
             with contextlib.suppress(OSError):  # OSError: another process has already installed the stubs
                 os.rename(f"{scratch}/stubs", directory)
     return request.param, directory

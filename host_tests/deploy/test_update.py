@@ -57,11 +57,11 @@ def board_with(files, port="rp2", ending=".mpy") -> Any:
 
 @pytest.mark.parametrize("ending", [".mpy", ".py"])
 def test_flat_modules_of_old_versions_are_removed(monkeypatch, ending):
-    own = NOTES | {"/kickstand/own/a.txt": b""}
-    board = board_with(earlier("flat " + ending) | own | {"/kickstand/lean/old/older.py": b"pass"})
+    user_files = NOTES | {"/kickstand/own/a.txt": b""}
+    board = board_with(earlier("flat " + ending) | user_files | {"/kickstand/lean/old/older.py": b"pass"})
     board.system.makedirs("/kickstand/errors")  # a folder of this name would hide errors.mpy from the import
     result = command.works("flash", "--yes") if fake_board.plug_in(monkeypatch, board) else None
-    expected = contents(".mpy") | own | CONFIG
+    expected = contents(".mpy") | user_files | CONFIG
     assert board.files() == expected
     assert board.folders() == {path.rpartition("/")[0] for path in expected} - {""}
     assert result and "files that are no longer part of the firmware" in result.out
@@ -179,5 +179,5 @@ def test_room_for_an_update_by_hand():
 def test_files_of_an_interrupted_update_are_removed():
     left_over = plan({"/main.py": b"/main.py"}, listed({"/main.py": b"/main.py", "/main.new": b"x"}), False)
     assert left_over.remove == ["/main.py", "/main.new"] and list(left_over.copy) == ["/main.py"]
-    same = plan({"/main.py": b"/main.py"}, listed({"/main.py": b"/main.py"}), False)
-    assert (same.copy, same.remove, same.keep) == ({}, [], ["/main.py"])
+    unchanged = plan({"/main.py": b"/main.py"}, listed({"/main.py": b"/main.py"}), False)
+    assert (unchanged.copy, unchanged.remove, unchanged.keep) == ({}, [], ["/main.py"])

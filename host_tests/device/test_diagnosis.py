@@ -60,8 +60,8 @@ CAUSES = {
 
 @pytest.mark.parametrize("name", CAUSES)
 def test_device_on_the_bus_is_named(name, run, status):
-    devices, shown, words = CAUSES[name]
-    assert display(run, connected(*devices)) == shown
+    devices, displayed, words = CAUSES[name]
+    assert display(run, connected(*devices)) == displayed
     lines = status(fit=connected(*devices))
     (sensor,) = [line for line in lines if line.startswith("Sensor  ")]
     assert words in sensor and ("ACCEPT" in sensor) is (name == "unknown")
@@ -204,16 +204,16 @@ def test_broken_fifo_is_named(fifo, how, run, status):
 def test_status_finds_the_wiring_of_a_backpack(wiring, status):
     """The board sends the number of each possible wiring with the wiring itself. Only the text of the right wiring is
     readable and lit."""
-    shown = Counter()
+    counts = Counter()
 
     def fit(board):
         board.lcd.wiring = wiring
-        board.every(0.1, lambda: shown.update([(*board.lcd.text(), board.lcd.backlight)]))
+        board.every(0.1, lambda: counts.update([(*board.lcd.text(), board.lcd.backlight)]))
 
     lines = status(fit=fit, arguments=(True,))
     readable = [
         line2.strip()
-        for (line1, line2, lit), count in shown.items()
+        for (line1, line2, lit), count in counts.items()
         if lit and line1 == "This is readable" and count > 9
     ]
     assert readable == [f"LCD_WIRING = {wiring}"]

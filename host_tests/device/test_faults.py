@@ -141,7 +141,7 @@ def test_sensor_lost_in_a_turn(lean, off_s, run):
     record = run({"ride": ride, "faults": [["unplug_sensor", [20.0, off_s]]], "until": 34})
     assert record.lean_at(19.5) == pytest.approx(lean, abs=2)
     assert record.first("No sensor|Sensor", 20) < 20.5
-    assert all(abs(shown - lean) <= 7 for shown in record.leans(20.6, 33.5))
+    assert all(abs(displayed - lean) <= 7 for displayed in record.leans(20.6, 33.5))
     assert record.lean_at(33) == pytest.approx(lean, abs=3)
 
 

@@ -32,7 +32,7 @@ def without():
 
 
 def frames_with(record, lines):
-    return [t_s for t_s, *shown in record.frames if shown == lines]
+    return [t_s for t_s, *displayed in record.frames if displayed == lines]
 
 
 @pytest.mark.parametrize("charge_us", [0, 7_000, 75_000])

@@ -44,9 +44,9 @@ def too_old(record, from_s=FROM_S - 5.0):
     old = []
     for k in range(int(10 * (UNTIL_S - from_s))):
         t_s = from_s + k / 10
-        shown = record.lean_at(t_s)
+        displayed = record.lean_at(t_s)
         recent = [TRUE.truth(t_s - OLDEST_S * i / 20)[0] for i in range(21)]
-        if shown is not None and not min(recent) - NEAR_DEG <= shown <= max(recent) + NEAR_DEG:
+        if displayed is not None and not min(recent) - NEAR_DEG <= displayed <= max(recent) + NEAR_DEG:
             old.append((t_s, record.at(t_s)[0], min(recent), max(recent)))
     return old
 

@@ -12,8 +12,8 @@ NOTEBOOK = Path(__file__).resolve().parents[2] / "tools" / "examples" / "first_r
 
 
 def cells(kind):
-    found = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
-    return ["".join(cell["source"]) for cell in found if cell["cell_type"] == kind]
+    contents = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
+    return ["".join(cell["source"]) for cell in contents if cell["cell_type"] == kind]
 
 
 @pytest.mark.long
@@ -24,10 +24,10 @@ def test_the_notebook_runs_and_finds_the_lean(monkeypatch, tmp_path, capsys):
     names: dict = {}
     for number, cell in enumerate(cells("code")):
         exec(compile(cell, f"cell {number}", "exec"), names)
-    said = capsys.readouterr().out
-    assert "samples per second" in said and "phyphox" in said
-    shown, smoothed = (float(found) for found in re.findall(r"^\w+: (.*?) degrees rms", said, re.M))
-    assert smoothed < 0.4 and shown < 0.8
+    output = capsys.readouterr().out
+    assert "samples per second" in output and "phyphox" in output
+    live, smoothed = (float(rms) for rms in re.findall(r"^\w+: (.*?) degrees rms", output, re.M))
+    assert smoothed < 0.4 and live < 0.8
     assert len(pyplot.figure(1).axes) == 2
     pyplot.close("all")
     total, true_deg = names["total"], names["true_deg"]
@@ -37,6 +37,6 @@ def test_the_notebook_runs_and_finds_the_lean(monkeypatch, tmp_path, capsys):
 
 def test_notebook_explains_each_step_and_keeps_no_output():
     """The notebook is stored without output, because readers run it themselves."""
-    whole = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
-    assert whole[0]["cell_type"] == "markdown" and len(cells("markdown")) >= len(cells("code")) - 1
-    assert not any(cell.get("outputs") or cell.get("execution_count") for cell in whole)
+    contents = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
+    assert contents[0]["cell_type"] == "markdown" and len(cells("markdown")) >= len(cells("code")) - 1
+    assert not any(cell.get("outputs") or cell.get("execution_count") for cell in contents)

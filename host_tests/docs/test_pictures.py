@@ -2,11 +2,15 @@
 
 import io
 import re
+import runpy
 from pathlib import Path
 
 import numpy as np
 import pytest
-from kickstand_workshop.pictures import drawn, explained, page, ride
+from kickstand_tools.common import firmware_path
+from kickstand_tools.simulated_board import simulator
+from kickstand_tools.web import site
+from kickstand_workshop.pictures import displays, page, rides, terminal
 
 ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "tools" / "pictures"
@@ -19,23 +23,23 @@ def checked_in():
 
 @pytest.mark.long  # device and demo run to draw their displays
 def test_no_drawing_is_stale():
-    drawings, kept = drawn.drawn(), checked_in()
-    stale = [name for name, svg in drawings.items() if kept.get(name) != svg]
-    assert not stale and drawings.keys() == kept.keys(), f"{', '.join(stale)}: {STALE}"
+    drawings, committed = displays.draw() | {"demo.svg": terminal.draw()}, checked_in()
+    stale = [name for name, svg in drawings.items() if committed.get(name) != svg]
+    assert not stale, f"{', '.join(stale)}: {STALE}"
 
 
 @pytest.mark.long  # each case draws a ride; host_tests/analysis tests the content of plots
-@pytest.mark.parametrize(("name", "draw"), [("ride.png", ride.draw), ("lean_compared.png", explained.lean_compared)])
+@pytest.mark.parametrize(("name", "draw"), [("ride.png", rides.ride_plot), ("lean_compared.png", rides.lean_compared)])
 def test_no_plot_of_a_ride_is_stale(name, draw):
     """The pixels of the pictures are compared. The files themselves differ between versions of matplotlib."""
     from PIL import Image
 
-    fresh, kept = (
+    fresh, committed = (
         np.asarray(Image.open(io.BytesIO(data)).convert("L"), dtype=float)
         for data in (draw(), (PICTURES / name).read_bytes())
     )
-    assert fresh.shape == kept.shape, STALE
-    difference = float(np.mean(np.abs(fresh - kept)))
+    assert fresh.shape == committed.shape, STALE
+    difference = float(np.mean(np.abs(fresh - committed)))
     assert difference < 1.0, STALE  # `difference` is the mean difference of the pixels, which are 0 to 255
 
 
@@ -57,8 +61,15 @@ def test_drawings_are_small_and_fetch_nothing():
         assert set(re.findall(r"https?://[^\"' ]+", svg)) == {"http://www.w3.org/2000/svg"}, name
 
 
-def test_the_wires_go_to_the_pins_of_the_settings():
-    """The default pins of both boards are bold. No other pin is bold."""
-    for name, pins in (("pico", {"GP4", "GP5", "GP6", "GP7", "GP15"}), ("esp32", {"21", "22", "18", "19", "4"})):
-        bold = re.findall(r'font-weight="bold"[^>]*>(?:\d+  )?(GP\d+|\d+)<', checked_in()[f"wiring_{name}.svg"])
-        assert set(bold) == pins
+@pytest.mark.parametrize(("machine", "prefix"), [("pico", "GP"), ("esp32", "")])
+def test_the_wires_go_to_the_pins_of_the_settings(machine, prefix):
+    """In the drawing the default pins are bold, and no other pin is. The page Install has the same pins as a table."""
+    with simulator.Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=machine):
+        port = runpy.run_path(str(firmware_path.PACKAGE / "board" / "port.py"))
+    pins = [prefix + str(pin) for pin in (*port["SENSOR_PINS"], *port["LCD_PINS"], port["BUTTON_PIN"])]
+    drawing = checked_in()[f"wiring_{machine}.svg"]
+    assert sorted(re.findall(r'font-weight="bold"[^>]*>(?:\d+  )?(GP\d+|\d+)<', drawing)) == sorted(pins)
+    (table,) = re.findall(
+        r"table\(\"" + ("Rasp" if prefix else "ESP32") + r".*", (site.PAGE / "install.html").read_text()
+    )
+    assert re.findall(r"\"(?:GPIO )?(\w+)(?:, pin \d+)?\"", table)[-5:] == pins

@@ -26,7 +26,7 @@ def text_of(path):
 
 
 def links(path):
-    return [one or other for one, other in LINK.findall(text_of(path))]
+    return [target or other for target, other in LINK.findall(text_of(path))]
 
 
 def anchors(path):
@@ -36,9 +36,9 @@ def anchors(path):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_every_link_leads_somewhere(page):
-    found = [link for link in links(page) if not (link.startswith("https://") or OF_THE_REPOSITORY.match(link))]
-    assert found or page.name == "CHANGELOG.md"
-    for link in found:
+    local = [link for link in links(page) if not (link.startswith("https://") or OF_THE_REPOSITORY.match(link))]
+    assert local or page.name == "CHANGELOG.md"
+    for link in local:
         name, _, anchor = link.partition("#")
         target = page.parent / name if name else page
         assert target.exists(), link
@@ -75,8 +75,8 @@ def test_no_line_of_prose_is_too_wide(page):
 
 
 def test_every_picture_is_shown():
-    shown = {(page.parent / link).resolve() for page in PAGES for link in links(page) if "pictures/" in link}
-    assert shown == {path.resolve() for path in (ROOT / "tools" / "pictures").iterdir()}
+    pictures = {(page.parent / link).resolve() for page in PAGES for link in links(page) if "pictures/" in link}
+    assert pictures == {path.resolve() for path in (ROOT / "tools" / "pictures").iterdir()}
 
 
 def test_the_first_page_is_short_and_begins_with_an_animation():
@@ -92,11 +92,13 @@ def test_how_right_it_is_stands_in_both_places_alike():
         [cell.strip() for cell in line.strip("|").split("|")]
         for line in text_of(HOW).partition("| profile | shown")[2].partition("\n\n")[0].splitlines()
     ]
-    whole = [[row[1], row[3], row[4], row[6]] for row in rows[1:]]
+    figures = [[row[1], row[3], row[4], row[6]] for row in rows[1:]]
     assert "complementary" in heads[5]
     section = text_of(FIRST).partition("## How right it is")[2]
-    shown = [line.strip("|").split("|")[1:] for line in section.splitlines() if line.startswith("|") and "**" in line]
-    assert [[cell.strip() for cell in row] for row in shown] == whole
+    pictures = [
+        line.strip("|").split("|")[1:] for line in section.splitlines() if line.startswith("|") and "**" in line
+    ]
+    assert [[cell.strip() for cell in row] for row in pictures] == figures
 
 
 PACKAGES = (

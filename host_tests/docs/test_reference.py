@@ -22,10 +22,10 @@ def command(workflow):
 @pytest.mark.long
 def test_the_reference_has_every_public_name(tmp_path):
     pytest.importorskip("pdoc", reason='pdoc is not installed: pip install -e ".[reference]"')
-    *what, out = command("site.yml")
+    *pdoc, out = command("site.yml")
     assert out == "_site/api"
-    done = subprocess.run([sys.executable, "-m", *what, str(tmp_path)], cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    process = subprocess.run([sys.executable, "-m", *pdoc, str(tmp_path)], cwd=tmp_path, capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
     for module, least in ((api, 40), (fleet_api, 4)):
         page = unescape((tmp_path / module.__name__.replace(".", "/")).with_suffix(".html").read_text(encoding="utf-8"))
         public = [name for name in module.__all__ if hasattr(getattr(module, name), "__qualname__")]

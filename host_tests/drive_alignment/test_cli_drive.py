@@ -182,9 +182,11 @@ def test_a_log_of_opposite_sign_looks_upside_down(tmp_path):
 def test_a_calibration_that_contradicts_the_drive_is_reported(tmp_path):
     log, cal = record(tmp_path / "drive.csv", around(6)), tmp_path / "CAL.json"
     command.works("calibrate", "drive", log, "--out", cal)
-    again = "calibrate", "drive", log, "--vehicle", "car", "--out", tmp_path / "AGAIN.json"
-    assert command.works(*again, "--calibration", cal).err == ""
+    arguments = "calibrate", "drive", log, "--vehicle", "car", "--out", tmp_path / "AGAIN.json"
+    assert command.works(*arguments, "--calibration", cal).err == ""
     data = json.loads(cal.read_text())
     left, up, forward = data["vehicle_from_sensor"]
     cal.write_text(json.dumps(data | {"vehicle_from_sensor": [forward, up, [-value for value in left]]}))
-    assert f"warning: {log}: by the speed of this ride forward is " in command.works(*again, "--calibration", cal).err
+    assert (
+        f"warning: {log}: by the speed of this ride forward is " in command.works(*arguments, "--calibration", cal).err
+    )

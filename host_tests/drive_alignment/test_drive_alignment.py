@@ -185,6 +185,12 @@ def straight_drive(brakings):
     return fed(alignment.DriveAlignment("motorcycle", PLAIN[3:6], [0.0] * 3), brakings)
 
 
+@pytest.mark.parametrize(("brakings", "state"), [(4, alignment.WAITING_FOR_BRAKING), (5, alignment.READY)])
+def test_a_drive_is_ready_after_five_brakings(brakings, state):
+    bike = straight_drive(brakings)
+    assert bike.ready == (state == alignment.READY) and bike.state == state
+
+
 @pytest.mark.parametrize(
     ("yaw_deg", "up_deg", "brakings", "expected"),
     [

@@ -186,8 +186,8 @@ def test_the_quality_of_a_drive_by_numpy():
     quality = Drive().judge(angles)
     a = np.radians(angles)
     mean = np.arctan2(np.sin(a).sum(), np.cos(a).sum())
-    rest = [np.arctan2(np.delete(np.sin(a), k).sum(), np.delete(np.cos(a), k).sum()) for k in range(6)]
-    variance, weight = np.sum(np.degrees(rest - mean) ** 2) * 5 / 6, 6 * 2 * 15.0 * 0.09
+    left_out_angles = [np.arctan2(np.delete(np.sin(a), k).sum(), np.delete(np.cos(a), k).sum()) for k in range(6)]
+    variance, weight = np.sum(np.degrees(left_out_angles - mean) ** 2) * 5 / 6, 6 * 2 * 15.0 * 0.09
     assert quality.quality_deg == pytest.approx(np.sqrt((5 * variance + 4.0 / weight) / 9), rel=1e-3)
     assert quality.halves_deg == pytest.approx(abs(np.mean(angles[3:]) - np.mean(angles[:3])), rel=1e-3)
     assert quality.good and quality.agree and quality.parts.count == 6

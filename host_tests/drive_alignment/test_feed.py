@@ -64,8 +64,8 @@ def test_bins_give_the_board_s_matrix(every, gap):
 
 
 def test_a_car_is_aligned_by_its_drive():
-    log, done, events = driven(), [], []
-    fit = fit_logs([log], None, None, "improved", lambda *step: done.append(step), events.append)
+    log, finished, events = driven(), [], []
+    fit = fit_logs([log], None, None, "improved", lambda *step: finished.append(step), events.append)
     aligned = fit.calibration
     assert angle_deg(aligned.vehicle_from_sensor, MOUNT) < 1.2
     assert aligned.gyro_bias_dps == pytest.approx(BIAS, abs=0.02)
@@ -76,7 +76,7 @@ def test_a_car_is_aligned_by_its_drive():
     assert fit.lag_s == pytest.approx(0.0, abs=0.3) and fit.halves_deg is not None and fit.halves_deg < 3.0
     (ready_s,) = [event.t_s for event in events if event.what == "ready"]
     assert fit.ready_s == ready_s and events == fit.events
-    assert done == sorted(done) and done[-1] == (2 * len(log.t_s),) * 2
+    assert finished == sorted(finished) and finished[-1] == (2 * len(log.t_s),) * 2
 
 
 def test_a_gyro_that_was_calibrated_has_its_bias_as_a_reading():

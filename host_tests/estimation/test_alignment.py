@@ -86,9 +86,9 @@ def test_a_ride_is_as_good_as_two_poses_and_serves_the_display():
     poses = errors_deg(api.fit_two_positions(kickstand, upright).calibration, ride.vehicle_from_sensor)
     assert np.all(errors_deg(calibration, ride.vehicle_from_sensor)[1:] < poses[1:])
     live = api.replay(log, calibration)
-    shown = ~np.isnan(live.lean_sigma_deg)
-    assert np.mean(shown) > 0.9
-    assert np.sqrt(np.mean((live.lean_deg - ride.truth["lean_deg"][::4])[shown] ** 2)) < 1.5
+    displayed = ~np.isnan(live.lean_sigma_deg)
+    assert np.mean(displayed) > 0.9
+    assert np.sqrt(np.mean((live.lean_deg - ride.truth["lean_deg"][::4])[displayed] ** 2)) < 1.5
 
 
 def phone_log(mounting, tilt_deg=(0.0, 0.0, 0.0)):

@@ -197,10 +197,10 @@ def test_time_in_the_hand_does_not_spoil_the_ride():
     force = np.concatenate((first[0], ride.log.accel_g, last[0]))
     rate = np.concatenate((first[1], ride.log.gyro_dps, last[1]))
     lean = smooth(Log(np.arange(len(force)) / 50.0, force, rate), ride.calibration)
-    own = slice(len(first[0]), len(first[0]) + n)
-    off = np.abs(lean.lean_deg[own] - ride.lean_deg)
+    riding = slice(len(first[0]), len(first[0]) + n)
+    off = np.abs(lean.lean_deg[riding] - ride.lean_deg)
     assert rms(off[500:-500]) < 0.8
-    assert np.mean(off < 2.0 * lean.lean_sigma_deg[own]) > 0.85
+    assert np.mean(off < 2.0 * lean.lean_sigma_deg[riding]) > 0.85
 
 
 @pytest.mark.parametrize("seconds", [0.05, 0.3, 2.0, 6.0])

@@ -97,11 +97,11 @@ def test_mean_of_hypotheses_includes_their_difference():
     variances = [0.01, 0.1], [1.0, 10.0]
     firm, loose = (Problem(3, 4, (variance,)) for variance in variances)
     mixed, weight = Problem(3, 4, variances), np.array([0.75, 0.25])
-    (first, _), (second, _) = (solve(each.blocks, each.walks, np.ones(1)) for each in (firm, loose))
+    (first, _), (second, _) = (solve(problem.blocks, problem.walks, np.ones(1)) for problem in (firm, loose))
     mean, parameters = solve(mixed.blocks, mixed.walks, weight)
     assert np.allclose(mean, 0.75 * first + 0.25 * second)
     assert np.allclose(back(mixed.blocks, mean[:, [0, -1]], parameters), mean)
-    within = [posterior_covariance(each.blocks, each.walks, np.ones(1)) for each in (firm, loose)]
+    within = [posterior_covariance(problem.blocks, problem.walks, np.ones(1)) for problem in (firm, loose)]
     apart = np.concatenate((second - first)[:, [0, -1]].transpose(1, 0, 2), axis=1)
     joint = posterior_covariance(mixed.blocks, mixed.walks, weight)[:, : 2 * S, : 2 * S]
     between = 0.75 * 0.25 * apart[:, :, None] * apart[:, None, :]

@@ -35,8 +35,8 @@ def numbers(line):
 
 def test_print_sensor(tmp_path):
     """The sensor is at rest and not calibrated. The set-up takes 0.2 s, and then a line is printed every 0.2 s."""
-    found, *lines = run(tmp_path, "print_sensor.py", 1.5)[0].strip().split("\n")
-    assert found == "Found an MPU6050" and len(lines) == 7
+    header, *lines = run(tmp_path, "print_sensor.py", 1.5)[0].strip().split("\n")
+    assert header == "Found an MPU6050" and len(lines) == 7
     ax, ay, az, *rates, temperature = numbers(lines[0])
     assert (ax * ax + ay * ay + az * az) ** 0.5 == pytest.approx(1.0, abs=0.1)
     assert max(map(abs, rates)) < 25.0 and temperature == pytest.approx(25.0, abs=0.1)
@@ -57,8 +57,8 @@ def test_print_lean(tmp_path):
 def test_user_page_is_the_last_page(tmp_path):
     """The load in the turn is 1 / cos(35 degrees)."""
     frames = run(tmp_path, "user_page.py", 12.0, turn_to=[(4, "own"), (10.5, "lean")])[1]["frames"]
-    own = re.fullmatch(r"Load     (\d\.\d\d) x *", frames[9][0])
-    assert own and float(own[1]) == pytest.approx(1.22, abs=0.05) and re.fullmatch(r"Lean  3\d deg *", frames[9][1])
+    page = re.fullmatch(r"Load     (\d\.\d\d) x *", frames[9][0])
+    assert page and float(page[1]) == pytest.approx(1.22, abs=0.05) and re.fullmatch(r"Lean  3\d deg *", frames[9][1])
     assert frames[-1][0].startswith("Lean")
 
 

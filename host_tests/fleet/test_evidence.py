@@ -71,8 +71,8 @@ def test_blocks_are_sums_over_eight_seconds_of_one_log():
     assert coefficients.shape == (8, 4, 3) and varied.shape == (8, 2)
     swaying, _ = drive(4, seconds=60.0)
     assert np.trace(evidence.blocks([intervals(swaying)]).sway, axis1=1, axis2=2).max() == pytest.approx(1.0)
-    nothing = evidence.blocks([])
-    assert (nothing.square.shape, nothing.product.shape, nothing.sway.shape) == ((0, 4, 4), (0, 4, 3), (0, 3, 3))
+    no_blocks = evidence.blocks([])
+    assert (no_blocks.square.shape, no_blocks.product.shape, no_blocks.sway.shape) == ((0, 4, 4), (0, 4, 3), (0, 3, 3))
     assert moved.find_moves([]) == []
 
 

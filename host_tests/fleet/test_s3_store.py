@@ -66,8 +66,8 @@ def test_logs_and_results_in_s3_give_the_same_as_files(s3, fleet, periods, worke
     assert run_fleet(remote, "s3://fleet/results", with_signals=True).new == 0
     s3.pipe_file("fleet/drives/" + Path(local[0].paths[0]).name, b"t_s,ax_g\n")
     workers.outcomes[local[1].vehicle] = KeyboardInterrupt()
-    again = run_fleet(remote, "s3://fleet/results", with_signals=True)
-    assert (again.new, again.seen.errors) == (1, usual.seen.errors + 1)
+    second_run = run_fleet(remote, "s3://fleet/results", with_signals=True)
+    assert (second_run.new, second_run.seen.errors) == (1, usual.seen.errors + 1)
 
 
 def test_store_that_refuses_is_reported_in_one_line(s3, periods):

@@ -39,10 +39,10 @@ def test_each_fault_has_its_share_of_the_fleet(tmp_path):
 
 def test_a_seed_gives_the_same_fleet_by_command_and_function(tmp_path):
     for name, seed in (("one", 1), ("same", 1), ("other", 2)):
-        done = command.works("simulate", "--fleet", 2, "--seed", seed, "--out", tmp_path / name)
-    assert "2 vehicles, " in done.out
-    one, same, other = ((tmp_path / name / "TRUTH.csv").read_text() for name in ("one", "same", "other"))
-    assert one == same != other
+        result = command.works("simulate", "--fleet", 2, "--seed", seed, "--out", tmp_path / name)
+    assert "2 vehicles, " in result.out
+    first, repeated, other = ((tmp_path / name / "TRUTH.csv").read_text() for name in ("one", "same", "other"))
+    assert first == repeated != other
     for path in (tmp_path / "one" / "drives").iterdir():
         assert path.read_bytes() == (tmp_path / "same" / "drives" / path.name).read_bytes()
     log = files.open_log(str(tmp_path / "one" / "drives" / "car-0000-1.csv"))  # about four minutes at 50 Hz

@@ -21,8 +21,8 @@ def test_a_fleet_runs_on_workers_of_this_computer(fleet, periods, results, tmp_p
         "vehicle,path,kind\n"
         + "".join(f"{period.vehicle},{path},{period.kind}\n" for period in periods[:2] for path in period.paths)
     )
-    done = command.works("fleet", fleet.directory / "TWO.csv", "--out", tmp_path, "--workers", 1)
-    assert "mounted sensors: 2\naligned: 2, refused: 0, errors: 0\n" in done.out
+    result = command.works("fleet", fleet.directory / "TWO.csv", "--out", tmp_path, "--workers", 1)
+    assert "mounted sensors: 2\naligned: 2, refused: 0, errors: 0\n" in result.out
     for row in parquet.read_table(tmp_path / "alignments.parquet").to_pylist():
         assert row["vehicle_from_sensor"] == results[row["vehicle"]].alignment["vehicle_from_sensor"]
 
@@ -82,7 +82,9 @@ def test_other_users_can_neither_read_nor_run_anything(tmp_path):
         assert process.stdout is not None and process.stdin is not None and process.stderr is not None
         assert process.stdout.readline() == b"running\n"
         family = [psutil.Process(process.pid), *psutil.Process(process.pid).children(recursive=True)]
-        addresses = [open.laddr for each in family for open in each.net_connections("inet") if open.status == "LISTEN"]
+        addresses = [
+            open.laddr for member in family for open in member.net_connections("inet") if open.status == "LISTEN"
+        ]
         assert len(addresses) >= 3 and {address.ip for address in addresses} == {"127.0.0.1"}
         for port in {address.port for address in addresses}:
             for secret in (False, True):

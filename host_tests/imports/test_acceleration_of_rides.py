@@ -26,7 +26,7 @@ def test_a_long_bend_is_not_an_acceleration_without_gravity(tmp_path, lean_deg):
 
 
 def test_gravity_and_the_acceleration_without_it_are_added(tmp_path):
-    names = ",".join(f"{what}.{axis}" for what in ("userAcceleration", "gravity") for axis in "xyz")
+    names = ",".join(f"{group}.{axis}" for group in ("userAcceleration", "gravity") for axis in "xyz")
     gravity = np.tile([0.0, -1.0, 0.0], (len(T_S), 1))
     log = imported(tmp_path, f"time_s,{names},{GX}", SHAKE, gravity, 30.0 * SHAKE).log
     assert log.accel_g == pytest.approx(SHAKE + gravity, abs=1e-4)

@@ -79,9 +79,9 @@ def test_each_app_has_a_test_and_a_description():
 
 @pytest.mark.parametrize("name", EXPORTS)
 def test_an_export_replays_as_the_ride_it_was_made_from(tmp_path, name):
-    write, every = EXPORTS[name]
+    write, period = EXPORTS[name]
     calibration = ON_BIKE if name.startswith(ON_THE_BIKE) else ON_PHONE
-    ride = riding().every(every)
+    ride = riding().every(period)
     imported = api.import_recording(write(tmp_path, ride))
     assert name.startswith(imported.app) and imported.vehicle_axes is name.startswith(ON_THE_BIKE)
     assert [notice.code for notice in imported.notices if notice.code != "import-sign"] == []
@@ -112,7 +112,7 @@ def test_a_pause_of_phyphox_is_a_gap(tmp_path):
     files = app_exports.phyphox(riding().every(2))
     rows = [("START", 0.0, 0.0), ("PAUSE", 12.0, 12.0), ("START", 12.0, 72.0), ("PAUSE", 28.0, 88.0)]
     files["meta/time.csv"] = '"event","experiment time","system time","system time text"\n' + "\n".join(
-        f'"{event}",{own:.9E},{START_UTC_S + utc:.15E},""' for event, own, utc in rows
+        f'"{event}",{clock:.9E},{START_UTC_S + utc:.15E},""' for event, clock, utc in rows
     )
     imported = api.import_recording(app_exports.into(tmp_path / "p.zip", files))
     assert imported.gaps_s == pytest.approx([60.0], abs=0.05)

@@ -68,8 +68,8 @@ def test_report_reads_an_export_directly(tmp_path, name):
 def test_report_refuses_what_is_no_log(tmp_path):
     """The export of RaceChrono is a single CSV file. A table is refused with the reason that import prints."""
     (tmp_path / "r.csv").write_text(app_exports.racechrono(riding().every(4)))
-    rest = app_exports.any_table(riding().every(4)).split("\n")[:120]
-    (tmp_path / "any.csv").write_text("\n".join(rest))
+    lines = app_exports.any_table(riding().every(4)).split("\n")[:120]
+    (tmp_path / "any.csv").write_text("\n".join(lines))
     (tmp_path / "names.csv").write_text("t_s,ax_g\n" + "0,1\n" * 9)
     (tmp_path / "t.gpx").write_text("<?xml version='1.0'?>\n")
     command.write_cal(tmp_path / "A.cal.json")
@@ -89,7 +89,7 @@ def test_an_export_in_vehicle_axes_needs_no_alignment(tmp_path):
     (tmp_path / "v.vbo").write_text(app_exports.vbo(riding().every(2)))
     result = command.works("import", tmp_path / "v.vbo", "--out", tmp_path / "RIDE.csv")
     assert "x is left, y up, z forward, as far as the logger was mounted so" in result.out
-    units = {taken.quantity: taken.unit for taken in api.import_recording(tmp_path / "v.vbo").taken}
+    units = {column.quantity: column.unit for column in api.import_recording(tmp_path / "v.vbo").taken}
     assert units["position"] == "minutes, west positive"
 
 
@@ -104,10 +104,15 @@ def test_a_damaged_export_gives_a_log_or_one_line(tmp_path):
     results = {"read": 0, "refused": 0}
     for k in range(36):
         content = exports[k % len(exports)].encode()
-        at = int(random.integers(500 if k % 3 else len(content)))
+        begin = int(random.integers(500 if k % 3 else len(content)))
         length = int(random.integers(300))
-        cut = [content[:at], content[at:], content[:at] + content[at + length :], content[: at + length] + content[at:]]
-        cut += [content[:at] + tokens[int(random.integers(len(tokens)))] + content[at + 2 :]] * 3
+        cut = [
+            content[:begin],
+            content[begin:],
+            content[:begin] + content[begin + length :],
+            content[: begin + length] + content[begin:],
+        ]
+        cut += [content[:begin] + tokens[int(random.integers(len(tokens)))] + content[begin + 2 :]] * 3
         files = {"Ride_gyrm.csv": gyro} if k % len(exports) == 5 else {}
         folder = app_exports.into(tmp_path / str(k), files)
         folder.mkdir(exist_ok=True)

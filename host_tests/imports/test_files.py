@@ -74,8 +74,8 @@ def damaged_zip(way):
 
 def locked(directory):
     content = bytearray(pack(directory / "p.zip", {"a.csv": TABLE}).read_bytes())
-    for mark, place in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
-        content[content.index(mark) + place] |= 1  # set the flag of an encrypted entry
+    for mark, offset in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+        content[content.index(mark) + offset] |= 1  # set the flag of an encrypted entry
     (directory / "p.zip").write_bytes(content)
 
 

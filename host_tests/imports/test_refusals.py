@@ -169,9 +169,9 @@ def test_a_contradiction_with_gravity_is_refused(tmp_path, head, row, units, wor
 def test_an_uncertain_table_gives_a_command_line_that_works(tmp_path, monkeypatch, name):
     """At rest nothing shows the unit of the rates for certain. The proposed line works without a change."""
     monkeypatch.chdir(tmp_path)
-    rest = app_exports.any_table(riding().every(4)).split("\n")[:120]
-    rest[0] = rest[0].replace("Acc_Y", '"Acc, Y"')
-    (tmp_path / name).write_text("\n".join(rest) + "\n")
+    lines = app_exports.any_table(riding().every(4)).split("\n")[:120]
+    lines[0] = lines[0].replace("Acc_Y", '"Acc, Y"')
+    (tmp_path / name).write_text("\n".join(lines) + "\n")
     line = command.refused(tmp_path, "import", name, "--out", "R.csv", words="not a file of an app that is known")
     assert "its columns are Millis, Acc_X" in line and "a: gravity at rest is 9.807 long; g: its noise at rest" in line
     words = shlex.split(line.partition("type: kickstand ")[2])

@@ -132,8 +132,8 @@ def test_repeated_and_shuffled_rows_of_an_export(tmp_path):
     lines = app_exports.any_table(ride).splitlines()
     lines[101], lines[103] = lines[103], lines[101]
     (tmp_path / "log.csv").write_text("\n".join(lines))
-    given = {"a": "m/s2", "g": "rad/s", "speed": "km/h"}
-    log = api.import_recording(tmp_path / "log.csv", app_exports.ANY_NAMES, given).log
+    units = {"a": "m/s2", "g": "rad/s", "speed": "km/h"}
+    log = api.import_recording(tmp_path / "log.csv", app_exports.ANY_NAMES, units).log
     assert log.accel_g == pytest.approx(ride.phone_g, abs=1e-5)
 
 

@@ -48,8 +48,8 @@ DATED = list(CLOCKS)[5:17]
 
 def grouped(value, group, mark):
     """Return a number with separators of thousands and a decimal mark."""
-    whole, _, part = value.lstrip("-").partition(".")
-    text = f"{int(whole):,}".replace(",", group) + (mark + part if part else "")
+    integer, _, part = value.lstrip("-").partition(".")
+    text = f"{int(integer):,}".replace(",", group) + (mark + part if part else "")
     return "-" + text if value.startswith("-") else text
 
 
@@ -126,7 +126,7 @@ def test_a_motion_in_any_table_comes_back(tmp_path_factory, clock, accel, rates,
     assert log.accel_g == pytest.approx(force_g, abs=0.6 * max(1e-3, 1.0 / 2048.0))
     assert log.gyro_dps == pytest.approx(rates_dps, abs=0.05)
     words = {"": "as it is", "-": "turned", "z": "turned in part"}
-    assert [taken.sign for taken in imported.taken] == ["", words[signs[0]], words[signs[1]]]
+    assert [origin.sign for origin in imported.taken] == ["", words[signs[0]], words[signs[1]]]
     assert bool(np.isfinite(log.utc_s).any()) is (clock in DATED)
     assert clock not in DATED or np.nanmin(log.utc_s) == pytest.approx(START_UTC_S, abs=0.01)
 

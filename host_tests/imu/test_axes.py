@@ -105,8 +105,8 @@ def test_the_quietest_chip_at_rest_is_not_faulty(gyro_range, dlpf, bandwidth_hz)
     counts then change as little as they can."""
     root = np.sqrt(np.pi / 2 * bandwidth_hz)
     noise = [100e-6 * root * 2048] * 3 + [3] + [0.004 * root * (131, 65.5, 32.8, 16.4)[gyro_range]] * 3
-    rest = (0.0, 0.5, 2048.5, -3920, 0.0, -500.5, 0.5)
-    assert Judged(gyro_range, dlpf).feed(at_rest(10, dlpf, noise, bandwidth_hz, rest)).changes() == []
+    resting = (0.0, 0.5, 2048.5, -3920, 0.0, -500.5, 0.5)
+    assert Judged(gyro_range, dlpf).feed(at_rest(10, dlpf, noise, bandwidth_hz, resting)).changes() == []
 
 
 def test_in_a_ride_the_judge_is_not_even_imported(monkeypatch):

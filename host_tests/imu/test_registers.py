@@ -59,8 +59,8 @@ class Wires:
             buffer[:] = self.frame * (len(buffer) // 14)
             return
         # each byte takes 25 us, so the driver must read only the bytes that it uses
-        most = {SMPLRT_DIV: 11, 0x3B: 14, FIFO_COUNT_H: 2, USER_CTRL: 3}.get(register, 1)
-        assert len(buffer) == most or (register == USER_CTRL and len(buffer) == 1)
+        limit = {SMPLRT_DIV: 11, 0x3B: 14, FIFO_COUNT_H: 2, USER_CTRL: 3}.get(register, 1)
+        assert len(buffer) == limit or (register == USER_CTRL and len(buffer) == 1)
         self.registers[FIFO_COUNT_H], self.registers[FIFO_COUNT_H + 1] = divmod(self.waiting, 256)
         buffer[:] = self.registers[register : register + len(buffer)]
 
@@ -236,12 +236,12 @@ def test_a_fifo_that_may_have_overflowed_is_emptied(who_am_i, size):
     wires = Wires(who_am_i)
     chip = started(wires)
     restart = [(FIFO_EN, 0), (USER_CTRL, 0x04), (USER_CTRL, 0x40), (FIFO_EN, 0xF8)]
-    most = (size - 14) // 14
-    for waiting, taken, left, overflows in (
-        (14 * most, 8, most - 8, 0),
-        (size - 14, 8, most - 8, 0),  # there is room for one frame, and a frame is being written
+    limit = (size - 14) // 14
+    for waiting, frames, remaining, overflows in (
+        (14 * limit, 8, limit - 8, 0),
+        (size - 14, 8, limit - 8, 0),  # there is room for one frame, and a frame is being written
         (14, 1, 0, 0),
-        (14 * (most + 1), 0, 0, 1),
+        (14 * (limit + 1), 0, 0, 1),
         (size, 0, 0, 2),
         (28, 2, 0, 2),
         (5, 0, 0, 2),
@@ -249,7 +249,7 @@ def test_a_fifo_that_may_have_overflowed_is_emptied(who_am_i, size):
         wires.writes.clear()
         emptied = chip.overflows < overflows
         wires.waiting = waiting
-        assert (chip.fetch(), chip.frames_left, chip.overflows) == (taken, left, overflows), waiting
+        assert (chip.fetch(), chip.frames_left, chip.overflows) == (frames, remaining, overflows), waiting
         assert wires.writes == (restart if emptied else [])
     assert chip.least_free_samples() == 0
 
@@ -260,9 +260,9 @@ def test_whole_frames_are_read_while_the_chip_writes_one():
     wires = Wires()
     chip = started(wires)
     wires.frame = bytes(range(1, 15))
-    for waiting, taken in ((28, 2), *[(28 + 5, 2)] * 20, (9, 0)):
+    for waiting, frames in ((28, 2), *[(28 + 5, 2)] * 20, (9, 0)):
         wires.waiting = waiting
-        assert (chip.fetch(), chip.overflows) == (taken, 0)
+        assert (chip.fetch(), chip.overflows) == (frames, 0)
     wires.frame = bytes(range(101, 115))
     wires.waiting = 28
     assert (chip.fetch(), chip.overflows) == (2, 0), "a heated chip, with whole frames"

@@ -22,14 +22,14 @@ def elapsed(clock, samples_us, looks_us):
     samples_us: times at which the chip takes samples.
     looks_us: times at which the FIFO is emptied.
     """
-    total = taken = 0
+    total = samples = 0
     for now_us in looks_us:
         ready = int(np.searchsorted(samples_us, now_us, side="right"))
-        if ready > taken:
-            total += clock.step(ready - taken, now_us)
-            taken = ready
+        if ready > samples:
+            total += clock.step(ready - samples, now_us)
+            samples = ready
         clock.emptied(now_us)
-    return total, samples_us[taken - 1] - samples_us[0]
+    return total, samples_us[samples - 1] - samples_us[0]
 
 
 def test_samples_are_a_period_apart(clock):

@@ -49,13 +49,13 @@ def test_a_difference_is_that_of_the_leans(comparison):
     for kind, difference in (("live", comparison.live), ("smoothed", comparison.smoothed)):
         change = comparison.leans[f"{kind} B"] - comparison.leans[f"{kind} A"]
         change = change[np.isfinite(change)]
-        rest = np.abs(change - change.mean())
+        off = np.abs(change - change.mean())
         assert difference is not None
         assert difference.seconds == pytest.approx(0.02 * len(change)) and difference.seconds > 40.0
         assert difference.constant_deg == pytest.approx(change.mean())
         assert difference.rms_deg == pytest.approx(np.hypot(change.mean(), change.std()))
         assert difference.moving_deg == pytest.approx(change.std())
-        assert (difference.p95_deg, difference.worst_deg) == pytest.approx((np.percentile(rest, 95.0), rest.max()))
+        assert (difference.p95_deg, difference.worst_deg) == pytest.approx((np.percentile(off, 95.0), off.max()))
         assert 0.1 < difference.expected_deg < 3.0 and 0.0 <= difference.within_1 <= difference.within_2 <= 1.0
 
 

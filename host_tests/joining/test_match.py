@@ -95,8 +95,8 @@ def test_frozen_readings_and_gaps_are_left_out():
     log = another_device(log)
     for readings in (log.accel_g, log.gyro_dps):
         readings[fastest : fastest + 1000] = readings[fastest]
-    rest = np.abs(np.arange(len(log.t_s)) - 12_000) > 400
-    joined = api.join_track(api.Log(log.t_s[rest], log.accel_g[rest], log.gyro_dps[rest]), track)
+    is_far = np.abs(np.arange(len(log.t_s)) - 12_000) > 400
+    joined = api.join_track(api.Log(log.t_s[is_far], log.accel_g[is_far], log.gyro_dps[is_far]), track)
     assert "frozen-readings" in [notice.code for notice in joined.notices]
     assert joined.match.correlation > 0.97
     assert joined.match.start_utc_s == pytest.approx(BEGIN_S, abs=0.1)

@@ -50,9 +50,9 @@ def test_speeds_without_their_own_are_means_over_four_steps():
 def test_a_track_of_ten_points_a_second_is_thinned_to_one():
     quick = track_of(np.arange(35) / 10.0 + 100.0, np.arange(35.0))
     assert quick.once_a_second().utc_s.tolist() == [100.0, 101.0, 102.0, 103.0]
-    for step_s, same in ((0.69, False), (0.71, True)):
+    for step_s, unchanged in ((0.69, False), (0.71, True)):
         track = track_of(np.arange(20) * step_s, 0.0)
-        assert (track.once_a_second() is track) is same
+        assert (track.once_a_second() is track) is unchanged
 
 
 def write_points(path, texts):

@@ -54,10 +54,10 @@ def numerical(x, force, rate):
     """Return the partial derivatives of equations(), shape (6, STATES)."""
     out = np.empty((6, STATES))
     for i in range(STATES):
-        more, less = x.copy(), x.copy()
-        more[i] += DISTANCE
+        higher, less = x.copy(), x.copy()
+        higher[i] += DISTANCE
         less[i] -= DISTANCE
-        out[:, i] = (equations(more, force, rate) - equations(less, force, rate)) / (2.0 * DISTANCE)
+        out[:, i] = (equations(higher, force, rate) - equations(less, force, rate)) / (2.0 * DISTANCE)
     return out
 
 

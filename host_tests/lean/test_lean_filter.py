@@ -52,12 +52,12 @@ def weaving(seconds):
 def leans(force, rate, speeds=None):
     """Return the filter's lean in degrees. speeds: {index of a sample: measured speed}."""
     estimator = lean_filter.LeanFilter()
-    shown = []
+    estimates = []
     for k, (f, w) in enumerate(zip(force, rate, strict=True)):
         if speeds and k in speeds:
             estimator.measure_speed(speeds[k])
-        shown.append(estimator.update(f, w, DT_US))
-    return np.array(shown, dtype=float)
+        estimates.append(estimator.update(f, w, DT_US))
+    return np.array(estimates, dtype=float)
 
 
 def shaken(force, rate, seed=5):
@@ -76,9 +76,9 @@ def test_vibration_does_not_make_held_turns_read_low():
     speed."""
     lean, speed = held_turns(240.0)
     force, rate = shaken(*balanced(240.0, lean, speed))
-    shown = leans(force.tolist(), rate.tolist())
-    assert slope(shown, np.degrees(lean)) == pytest.approx(1.0, abs=0.03)
-    assert np.sqrt(np.mean((shown - np.degrees(lean)) ** 2)) < 1.0
+    estimates = leans(force.tolist(), rate.tolist())
+    assert slope(estimates, np.degrees(lean)) == pytest.approx(1.0, abs=0.03)
+    assert np.sqrt(np.mean((estimates - np.degrees(lean)) ** 2)) < 1.0
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
@@ -89,10 +89,10 @@ def test_scale_and_cross_axis_errors_are_found(seed):
     lean, speed = weaving(420.0)
     force, rate = shaken(*balanced(420.0, lean, speed))
     errors = np.where(np.eye(3) > 0.0, 0.03, 0.02) * chance.choice([-1.0, 1.0], (3, 3))
-    shown = leans(force.tolist(), (rate @ (np.eye(3) + errors).T).tolist())
+    estimates = leans(force.tolist(), (rate @ (np.eye(3) + errors).T).tolist())
     late = slice(300 * HZ, None)
-    assert np.sqrt(np.mean((shown - np.degrees(lean))[late] ** 2)) < 1.0
-    assert np.abs(shown - np.degrees(lean))[late].max() < 2.5
+    assert np.sqrt(np.mean((estimates - np.degrees(lean))[late] ** 2)) < 1.0
+    assert np.abs(estimates - np.degrees(lean))[late].max() < 2.5
 
 
 def held_from_side_to_side(seconds):
@@ -160,8 +160,8 @@ def test_a_measured_speed_makes_no_long_bend_worse():
 def test_the_stated_sigma_fits_the_error_of_the_lean():
     """In a ride of the second simulator, about two thirds of the errors are within one standard deviation."""
     ride = drawn_ride(2, 100.0, ["firm"], "street")
-    shown = replay(ride.logs[0], ride.calibrations[0])
-    error = (shown.lean_deg - ride.true_lean(0)) / shown.lean_sigma_deg
+    estimates = replay(ride.logs[0], ride.calibrations[0])
+    error = (estimates.lean_deg - ride.true_lean(0)) / estimates.lean_sigma_deg
     error = np.abs(error[ride.riding(0) & ~np.isnan(error)])
     assert 0.5 < np.mean(error < 1.0) < 0.9
     assert np.mean(error < 2.0) > 0.85

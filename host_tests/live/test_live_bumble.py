@@ -58,9 +58,9 @@ async def ask_racechrono(central):
 def test_racechrono_finds_the_board_filters_and_decodes(on_air, on_the_road):
     plan, times = on_the_road
     (central,), record = on_air({**plan, "until": 30}, [(2.5, ask_racechrono, None)], "pico w", RECORD=True)
-    silent, two, ended, every = central.done.result()
+    silent, two, ended, all_ids = central.done.result()
     assert silent == {} and two.keys() == {1, 2} and sum(ended.values()) <= 2
-    assert 178 <= two[1] <= 182 and 446 <= two[2] <= 453 and 18 <= every[1] <= 21 and every[1] == every[2]
+    assert 178 <= two[1] <= 182 and 446 <= two[2] <= 453 and 18 <= all_ids[1] <= 21 and all_ids[1] == all_ids[2]
     values = {}
     for t_s in times[:2]:
         for sent_s, _, data in central.heard:

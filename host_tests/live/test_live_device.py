@@ -68,15 +68,15 @@ def test_second_phone_waits_for_the_first(run):
     second = [[6.0, "connect", 2], [9.5, "connect", 2], [12.0, "write", "rate", [100, 0]], [15.0, "leave"]]
     third = [[17.0, "connect", 3]]
     record = run({**STILL, "turn_to": [[1.5, "live"]], "until": 80}, first, second, third)
-    one, two, three = record.phones
-    assert 70 <= len(of(one, "chrono")) <= 80 and not of(one, "now")
+    first_phone, two, three = record.phones
+    assert 70 <= len(of(first_phone, "chrono")) <= 80 and not of(first_phone, "now")
     assert answers(two, "connect") == [False, True]
     assert not of(two, "chrono") and not of(two, "now", until_s=12) and 27 <= len(of(two, "now")) <= 31
     assert answers(three, "connect") == [True]
     dropped_s = [t_s for t_s, act, _ in three["said"] if act == "dropped"]
     assert len(dropped_s) == 1 and 77 < dropped_s[0] < 80
-    shown = [record.at(t_s)[0] for t_s in (3.9, 7.0, 11.0, 14.0)]
-    assert shown == ["BLE     no phone", "BLE   RaceChrono", "BLE      a phone", "BLE      browser"]
+    lines = [record.at(t_s)[0] for t_s in (3.9, 7.0, 11.0, 14.0)]
+    assert lines == ["BLE     no phone", "BLE   RaceChrono", "BLE      a phone", "BLE      browser"]
     assert record.at(7.0)[1].split() == ["20", "packets/s"]
 
 

@@ -68,14 +68,14 @@ def test_number_is_limited_and_never_unknown(ms, lean, sigma, force, rate, speed
     ],
 )
 def test_filter_sets_the_intervals(data, intervals):
-    asked = [50, 60, 70, 77]
-    assert packets.take_filter(bytes(data), asked)
-    assert asked == [*intervals, 77]
+    interval = [50, 60, 70, 77]
+    assert packets.take_filter(bytes(data), interval)
+    assert interval == [*intervals, 77]
 
 
 @pytest.mark.parametrize("data", [[], [0, 0], [1], [1, 0], [1, 0, 1, 0], [2, 0, 50, 0, 0, 1], [3], [255] * 20])
 def test_invalid_commands_change_nothing(data):
-    asked = [40, 50, 60, 70]
-    assert not packets.take_filter(bytes(data), asked)
-    assert packets.take_rate(bytes(data), asked) == (len(data) == 2)
-    assert asked[:3] == [40, 50, 60] and asked[3] in (70, 256 * (data == [1, 0]), 40)
+    interval = [40, 50, 60, 70]
+    assert not packets.take_filter(bytes(data), interval)
+    assert packets.take_rate(bytes(data), interval) == (len(data) == 2)
+    assert interval[:3] == [40, 50, 60] and interval[3] in (70, 256 * (data == [1, 0]), 40)

@@ -82,23 +82,23 @@ def test_a_damaged_log_gives_a_result_or_one_line(logs, tmp_path, numbers):
         log, out = tmp_path / name, tmp_path / "OUT"
         log.write_bytes(content)
         use = names[(number // len(broken_logs.WAYS) + number) % len(names)]
-        place = f"number {number} ({ways}) in {use}"
+        label = f"number {number} ({ways}) in {use}"
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
                 USES[use](log, out)
         except InputError as refusal:
             line = str(refusal)
-            assert "\n" not in line.replace(str(log), "") and "unexpected" not in line and not out.exists(), place
+            assert "\n" not in line.replace(str(log), "") and "unexpected" not in line and not out.exists(), label
             refusals.add(line.partition(":")[2][:12])
         except Exception as error:
-            pytest.fail(f"{place}: {type(error).__name__}: {error}")
+            pytest.fail(f"{label}: {type(error).__name__}: {error}")
         else:
             results += 1
             if out.exists():
-                assert out.read_bytes().endswith(b"\n"), place
+                assert out.read_bytes().endswith(b"\n"), label
                 out.unlink()
-        assert [path.name for path in tmp_path.iterdir()] == [name], place
+        assert [path.name for path in tmp_path.iterdir()] == [name], label
         log.unlink()
     assert 0.1 * len(numbers) < results < 0.9 * len(numbers)  # results and refusals are both frequent
     assert len(refusals) > 20

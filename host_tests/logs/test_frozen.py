@@ -73,14 +73,14 @@ def test_a_vehicle_at_rest_is_not_frozen(digits, noise):
 
 def test_a_log_without_frozen_readings_has_gaps():
     readings = riding(8)
-    whole = log_of(readings)
-    assert without_frozen(whole) is whole
+    complete = log_of(readings)
+    assert without_frozen(complete) is complete
     readings[300:500] = readings[300]
     log = log_of(readings)
-    rest = without_frozen(log)
-    assert len(rest.t_s) == 601 and np.max(np.diff(rest.t_s)) == pytest.approx(2.0)
+    shortened = without_frozen(log)
+    assert len(shortened.t_s) == 601 and np.max(np.diff(shortened.t_s)) == pytest.approx(2.0)
     (block,) = read_blocks(log)
-    assert block.measured.time_us.tolist() == rest.time_us.tolist()
+    assert block.measured.time_us.tolist() == shortened.time_us.tolist()
 
 
 def test_commands_report_frozen_readings(tmp_path):

@@ -14,7 +14,7 @@ def test_a_log_takes_at_most_250_bytes_per_sample(tmp_path):
     tracemalloc.start()
     try:
         log = read_log(path)
-        _, most = tracemalloc.get_traced_memory()
+        _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    assert len(log.t_s) == count and most / count < 250
+    assert len(log.t_s) == count and peak / count < 250

@@ -12,6 +12,7 @@ from kickstand_tools.checks import cells
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs.reader import is_log, read_blocks, read_log
 from kickstand_tools.logs.source import chunks, open_input
+from psutil import Process
 from support import command
 
 NAMES = command.HEADER
@@ -73,12 +74,13 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_a_bad_log_is_refused(tmp_path, name):
+def test_a_bad_log_is_refused_and_closed(tmp_path, name):
     content, words = BAD[name]
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError) as refusal:
         read_log(tmp_path / name)
     assert words in str(refusal.value) and name in str(refusal.value)
+    assert all(file.path != str(tmp_path / name) for file in Process().open_files())
 
 
 @pytest.mark.parametrize("name", ["nan.csv", "cut.csv.gz", "line\nbreak.csv"])

@@ -53,12 +53,8 @@ def test_unsafe_outputs_and_bad_stretches_are_refused(log, tmp_path):
         command.refused(tmp_path, "cut", log, *arguments, words=words)
 
 
-def test_replay_and_report_accept_a_stretch(tmp_path):
-    """Times count from the start of the whole ride."""
-    ride, out = analysis_rides.short(tmp_path, speed_hz=1), tmp_path / "LEAN.csv"
-    command.works("replay", ride, "--from", "18", "--to", "26", "--out", out)
-    lean = analysis_rides.table(out)
-    assert (lean["t_s"][0], lean["t_s"][-1]) == (18.0, 26.0)
+def test_a_report_of_a_stretch_has_the_times_of_the_ride(tmp_path):
+    ride = analysis_rides.short(tmp_path, speed_hz=1)
     data = json.loads(command.works("report", ride, "--from", "18", "--to", "26", "--json").out)
     assert (data["duration_s"], data["stops"]) == (8.0, []) and 18.0 <= data["max_right_deg"]["time_s"] <= 26.0
 
@@ -67,14 +63,14 @@ def test_replay_and_report_accept_a_stretch(tmp_path):
 def test_the_lean_of_a_stretch_is_that_of_the_whole_ride(tmp_path, name):
     """Readings before and after the stretch are used, too. Without them the lean would be wrong or unknown."""
     ride = analysis_rides.short(tmp_path, rate_hz=50)
-    whole, part = tmp_path / "whole.csv", tmp_path / "part.csv"
+    complete, part = tmp_path / "whole.csv", tmp_path / "part.csv"
     if name == "export":
-        command.works("export", ride, "--to", "csv", "--out", whole)
+        command.works("export", ride, "--to", "csv", "--out", complete)
         api.export(api.open_ride(Stretch(ride, 16.0, -4.0), smoothed=True), "csv", part)
     else:
-        command.works(name, ride, "--out", whole)
+        command.works(name, ride, "--out", complete)
         command.works(name, ride, "--from", "16", "--to", "-4", "--out", part)
-    _, *lines = whole.read_text().splitlines()
+    _, *lines = complete.read_text().splitlines()
     times = [float(line.partition(",")[0]) for line in lines]
     inside = [line for line, t_s in zip(lines, times) if 16.0 <= t_s <= times[-1] - 4.0 + 1e-9]
     assert part.read_text().splitlines()[1:] == inside

@@ -59,7 +59,10 @@ def test_a_camera_is_found_in_the_ride(begin_s, seconds, noise_dps, found):
     assert result == (found if isinstance(found, str) else pytest.approx(found, abs=0.03))
 
 
-def test_a_motion_that_occurs_twice_is_refused():
-    t_s = np.arange(1200) / 40.0
-    twice = bike(np.tile(rates(CELLS_S), (2, 1)))
-    assert outcome(twice, Telemetry(t_s, rates(t_s + 12.0))) == "the camera turns like the bike at several times"
+@pytest.mark.parametrize(("period_s", "end_s"), [(60.0, 120.0), (3.0, 15.0)])
+def test_a_motion_that_occurs_twice_is_refused(period_s, end_s):
+    """Until the time `end_s` the ride repeats itself: a loop that is ridden twice, or a slalom."""
+    t_s = np.arange(40.0 * (end_s - period_s)) / 40.0
+    ride_s = np.append(CELLS_S, RIDE_S + CELLS_S)
+    ride = bike(rates(np.where(ride_s < end_s, ride_s % period_s, ride_s)))
+    assert outcome(ride, Telemetry(t_s, rates(t_s % period_s))) == "the camera turns like the bike at several times"

@@ -45,10 +45,10 @@ def contains(picture, part) -> bool:
     opaque = opaque[:: max(1, len(opaque) // 80)]
     picture, colours = (values[..., :3] @ [1, 256, 65536] for values in (picture, part))
     height, width = (size - largest for size, largest in zip(picture.shape, opaque.max(axis=0)))
-    same = np.zeros((height, width), dtype=int)
+    equal = np.zeros((height, width), dtype=int)
     for row, column in opaque:
-        same += picture[row : row + height, column : column + width] == colours[row, column]
-    return bool(same.max() > 0.93 * len(opaque))
+        equal += picture[row : row + height, column : column + width] == colours[row, column]
+    return bool(equal.max() > 0.93 * len(opaque))
 
 
 def says(picture, words, colour=WHITE) -> bool:

@@ -105,15 +105,15 @@ def test_a_gopros_gyro_finds_the_offset(tmp_path):
 def test_the_drawn_part_of_a_ride(ffmpeg, tmp_path, parked, seconds, options, begin_s, end_s):
     log, calibration = parked
     video = ffmpeg.film(10 * seconds) if seconds else None
-    done: list[tuple[int, int]] = []
+    calls: list[tuple[int, int]] = []
     result = api.overlay(
         *(log, tmp_path / ("o.mp4" if video else "o.mov"), calibration, video),
-        **({"fps": 0.5, "live": True, "progress": lambda *of: done.append(of)} | options),
+        **({"fps": 0.5, "live": True, "progress": lambda *of: calls.append(of)} | options),
     )
     assert (result.begin_s, result.end_s) == pytest.approx((begin_s, end_s))
     assert (result.pictures, result.fps) == (round((end_s - begin_s) / 2.0), 0.5)
     assert result.offset_s == options.get("offset_s") and result.correlation is None
-    assert done[-result.pictures] == (1, result.pictures) and done[-1] == (result.pictures, result.pictures)
+    assert calls[-result.pictures] == (1, result.pictures) and calls[-1] == (result.pictures, result.pictures)
 
 
 @pytest.mark.parametrize(

@@ -14,8 +14,8 @@ def values_at(times_s, at_s, **columns) -> Shown:
     """Return the values at at_s of a ride with these times and columns. Missing columns are unknown."""
     unknown = np.full(len(times_s), NAN)
     names = ("lean_deg", "forward_g", "left_g", "speed_mps", "left_deg", "right_deg")
-    given = {name: np.array(columns.get(name, unknown), dtype=float) for name in names}
-    return Shown(np.array(times_s, dtype=float), **given).at(np.array(at_s, dtype=float))
+    columns_at = {name: np.array(columns.get(name, unknown), dtype=float) for name in names}
+    return Shown(np.array(times_s, dtype=float), **columns_at).at(np.array(at_s, dtype=float))
 
 
 def test_a_lean_is_shown_up_to_a_gap_of_200_ms():

@@ -24,9 +24,9 @@ def described(ffmpeg, rate="30 fps", size="1920x1080", more="", **counted):
     ],
 )
 def test_a_video_is_described_by_ffmpegs_words(ffmpeg, text, width, height, fps, telemetry):
-    found = described(ffmpeg, **text)
-    assert (found.width, found.height, found.fps, found.telemetry) == (width, height, fps, telemetry)
-    assert found.seconds == pytest.approx(300 / fps)
+    video = described(ffmpeg, **text)
+    assert (video.width, video.height, video.fps, video.telemetry) == (width, height, fps, telemetry)
+    assert video.seconds == pytest.approx(300 / fps)
 
 
 @pytest.mark.parametrize(

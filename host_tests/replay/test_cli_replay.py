@@ -129,25 +129,25 @@ def test_lean_of_a_real_recording_matches_gravity(tmp_path, shared_data):
     two_position(matrix, first.tolist(), upright.tolist(), "left")
     rows = np.array(matrix).reshape(3, 3)
     cal = analysis_rides.calibration(tmp_path / "CAL.json", vehicle_from_sensor=rows.tolist())
-    got, _ = replayed(shared_data / "hand-leaning.csv.gz", cal)
-    for held, (begin_s, end_s) in ((first, (5.0, 6.0)), (second, (7.4, 7.9))):
-        left, up, _ = rows @ held
+    lean, _ = replayed(shared_data / "hand-leaning.csv.gz", cal)
+    for pose, (begin_s, end_s) in ((first, (5.0, 6.0)), (second, (7.4, 7.9))):
+        left, up, _ = rows @ pose
         true_lean = np.degrees(np.arctan2(left, up))
-        shown = got["lean_deg"][(got["t_s"] >= begin_s) & (got["t_s"] <= end_s)]
+        displayed = lean["lean_deg"][(lean["t_s"] >= begin_s) & (lean["t_s"] <= end_s)]
         assert abs(true_lean) > 40
-        assert abs(np.mean(shown) - true_lean) < 2.0
-        assert abs(shown[-1] - true_lean) < 2.0
+        assert abs(np.mean(displayed) - true_lean) < 2.0
+        assert abs(displayed[-1] - true_lean) < 2.0
 
 
 def test_calibration_beside_the_log_is_used(tmp_path):
     """The commands report, plot and export use the same calibration as replay. The three commands refuse the output of
     replay as a log."""
     log = analysis_rides.short(tmp_path)
-    beside = log.with_name(log.name.split(".")[0] + ".cal.json")
-    beside.unlink(missing_ok=True)
+    calibration_file = log.with_name(log.name.split(".")[0] + ".cal.json")
+    calibration_file.unlink(missing_ok=True)
     lean = tmp_path / "LEAN.csv"
-    command.refused(tmp_path, "replay", log, "--out", lean, words=f"no calibration {beside.name} beside it")
-    analysis_rides.calibration(beside)
+    command.refused(tmp_path, "replay", log, "--out", lean, words=f"no calibration {calibration_file.name} beside it")
+    analysis_rides.calibration(calibration_file)
     command.works("replay", log, "--out", lean)
     words = f"LEAN.csv contains a lean but no readings: give the log that it was made from, {log}\n"
     exported = tmp_path / "EXPORTED.csv"
@@ -156,19 +156,19 @@ def test_calibration_beside_the_log_is_used(tmp_path):
     for arguments in (
         ("replay", lean, "--out", out),
         ("report", lean),
-        ("report", lean, "--calibration", beside),
+        ("report", lean, "--calibration", calibration_file),
         ("export", lean, "--to", "csv", "--out", out),
         ("cut", lean, "--to", "5", "--out", out),
     ):
         command.refused(tmp_path, *arguments, words=words)
     command.refused(tmp_path, "report", exported, words=words.replace("LEAN", "EXPORTED"))
     (tmp_path / "OTHER.csv").write_bytes(log.read_bytes())  # with two logs, the calibration may belong to either one
-    (tmp_path / "OTHER.cal.json").write_bytes(beside.read_bytes())
+    (tmp_path / "OTHER.cal.json").write_bytes(calibration_file.read_bytes())
     command.refused(tmp_path, "report", lean, words="give the log that it was made from\n")
 
 
 def test_calibration_beside_the_log_is_never_overwritten(tmp_path):
     log = analysis_rides.short(tmp_path)
-    beside = log.with_name("RIDE.cal.json")
-    command.refused(tmp_path, "replay", log, "--out", beside, words="is also an input")
-    command.refused(tmp_path, "export", log, "--to", "csv", "--out", beside, words="is also an input")
+    calibration_file = log.with_name("RIDE.cal.json")
+    command.refused(tmp_path, "replay", log, "--out", calibration_file, words="is also an input")
+    command.refused(tmp_path, "export", log, "--to", "csv", "--out", calibration_file, words="is also an input")

@@ -52,8 +52,8 @@ def test_fast_loop_equals_the_meter_for_each_sample(ride_and_calibration):
     cuts = [0, 1, 1, 700, 5000, len(measured.time_us)]  # limits of the blocks, one of which is empty
     parts = [along.columns(measured.part(slice(a, b))) for a, b in pairwise(cuts)]
     fast, slow = np.concatenate(parts), by_steps(log, calibration)[~block.frozen]
-    shown = fast[:, -1] != replay_engine.NOT_SHOWN
-    assert 0.2 < np.mean(shown) < 0.999
+    is_shown = fast[:, -1] != replay_engine.NOT_SHOWN
+    assert 0.2 < np.mean(is_shown) < 0.999
     for name, mine, meters in zip(replay_engine.COLUMNS, fast.T, slow.T, strict=True):
         if name in BY_NUMPY:
             assert np.max(np.abs(mine - meters)) < 1e-9, name

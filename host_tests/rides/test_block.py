@@ -17,7 +17,7 @@ def passes(blocks):
     """Return (six sums, number of samples, duration) of each pass of the loop in these blocks."""
     times = [blocks[0].time_us, *(turn.time_us for block in blocks for turn in block.turns)]
     turns = [turn for block in blocks for turn in block.turns]
-    return [(turn.sums, turn.n, turn.time_us - before) for turn, before in zip(turns, times)]
+    return [(turn.sums, turn.n, turn.time_us - previous) for turn, previous in zip(turns, times)]
 
 
 def places(blocks):
@@ -62,8 +62,8 @@ def test_full_blocks_keep_speeds_places_and_calibration(length, every):
     expected = [(k * every, ((-203_212_345 + 7 * k) / DEGREE, (-1_079_999_999 + 11 * k) / DEGREE,
                              MIDNIGHT_S - 17.9 + k / 10)) for k in range(-(-len(written) // every))]  # fmt: skip
     assert [k for k, _ in places(blocks)] == [k for k, _ in expected]
-    for (_, place), (_, given_place) in zip(places(blocks), expected):
-        assert place == pytest.approx(given_place, rel=0.0, abs=1e-6)
+    for (_, position), (_, given_place) in zip(places(blocks), expected):
+        assert position == pytest.approx(given_place, rel=0.0, abs=1e-6)
     turns = [turn for block in blocks for turn in block.turns]
     speeds = [(i, turn.speed_mps) for i, turn in enumerate(turns) if turn.speed_mps is not None]
     assert speeds == [(i, i / 100) for i in range(0, len(turns), 100)]

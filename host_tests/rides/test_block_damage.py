@@ -25,13 +25,13 @@ def test_file_cut_anywhere_in_its_last_block_keeps_the_others(data):
 
 
 def test_any_damaged_byte_loses_only_its_block_and_is_reported(data):
-    for at in [*range(0, 160, 3), *range(160, 1024, 97), *range(1014, 1024)]:
+    for offset in [*range(0, 160, 3), *range(160, 1024, 97), *range(1014, 1024)]:
         damaged = bytearray(data[1])
-        damaged[at] ^= 0x41
+        damaged[offset] ^= 0x41
         blocks, problems = block_reader.read(data[0] + bytes(damaged) + data[2])
-        assert [block.sequence for block in blocks] == [0, 2], at
-        assert len(problems) == 1, at
-        assert at in (6, 7) or problems[0].endswith(" at byte 512")
+        assert [block.sequence for block in blocks] == [0, 2], offset
+        assert len(problems) == 1, offset
+        assert offset in (6, 7) or problems[0].endswith(" at byte 512")
 
 
 @pytest.mark.parametrize(

@@ -50,11 +50,11 @@ def lean_matches(record, blocks, leans, slack_s=0.4):
     times = [turn.time_us / 1e6 for block in blocks for turn in block.turns]
     compared = 0
     for t_s, *_ in record.frames:
-        shown = record.lean_at(t_s)
-        if shown is None or not begin_s + slack_s < t_s < times[-1]:
+        displayed = record.lean_at(t_s)
+        if displayed is None or not begin_s + slack_s < t_s < times[-1]:
             continue
         recent = [lean for t, lean in zip(times, leans, strict=True) if t_s - slack_s <= t <= t_s]
-        assert min(recent) - 0.55 <= shown <= max(recent) + 0.55, (t_s, shown, recent)
+        assert min(recent) - 0.55 <= displayed <= max(recent) + 0.55, (t_s, displayed, recent)
         compared += 1
     return compared
 
@@ -104,10 +104,10 @@ def test_menu_starts_and_ends_a_ride(tmp_path):
 def test_recorded_ride_has_positions(engine, tmp_path):
     """Ten positions per second get from the receiver's wire to the log, even before a motorcycle's speed is
     confirmed."""
-    place = [-33.5, -70.5, -1e-4, 2e-4]
+    position = [-33.5, -70.5, -1e-4, 2e-4]
     plan = {
         "ride": [["upright", 4.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 5.0]],
-        "gps": {"hz": 10, "baud": 38400, "latency_s": 0.1, "place": place},
+        "gps": {"hz": 10, "baud": 38400, "latency_s": 0.1, "place": position},
         "config": {"RECORD": True, "SPEED": "gps", "GPS_BAUD": 38400},
         "until": 14,
     }
@@ -121,8 +121,8 @@ def test_recorded_ride_has_positions(engine, tmp_path):
     fix_s = log.utc_s[placed] - (noon_s - 20.0)
     delay_s = log.t_s[placed] + blocks[0].time_us * 1e-6 - fix_s
     assert np.all((delay_s > 0.09) & (delay_s < 0.2))
-    assert np.max(np.abs(log.lat_deg[placed] - (place[0] + place[2] * fix_s))) < 2e-6
-    assert np.max(np.abs(log.lon_deg[placed] - (place[1] + place[3] * fix_s))) < 3e-6
+    assert np.max(np.abs(log.lat_deg[placed] - (position[0] + position[2] * fix_s))) < 2e-6
+    assert np.max(np.abs(log.lon_deg[placed] - (position[1] + position[3] * fix_s))) < 3e-6
 
 
 # The stream over USB

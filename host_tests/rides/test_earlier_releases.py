@@ -91,10 +91,10 @@ def test_recorded_ride_stays_readable(release, tmp_path):
     check_calibration(block.calibration(), matrices="matrices" in release)
     cal = read_calibration(ride_log.write(tmp_path / "ride.csv", [block]))
     assert cal.gyro_delay_s == (None if release == "0.1.0" else 0.0134)
-    place = block.turns[2].place
-    assert (place is not None) is release.startswith("with")
-    if place:
-        assert (place.lat_deg, place.lon_deg, place.utc_s) == (48.0, -5.5, 1_778_976_001.5)
+    position = block.turns[2].place
+    assert (position is not None) is release.startswith("with")
+    if position:
+        assert (position.lat_deg, position.lon_deg, position.utc_s) == (48.0, -5.5, 1_778_976_001.5)
 
 
 def test_todays_firmware_writes_the_same_bytes(monkeypatch):

@@ -139,11 +139,11 @@ class Smooth(Scene):
 @pytest.fixture(scope="module")
 def source(tmp_path_factory):
     """Return the folder of a simulated ride with its calibration."""
-    place = tmp_path_factory.mktemp("source")
-    command.works("simulate", "--profile", "street", "--seconds", 20, "--out", place)
-    command.works("calibrate", "two", place / "KICKSTAND.csv", place / "UPRIGHT.csv", "--out", place / "RIDE.cal.json")
-    command.works(*Smooth(place / "smooth", place).arguments)  # each fork finds the modules already imported
-    return place
+    path = tmp_path_factory.mktemp("source")
+    command.works("simulate", "--profile", "street", "--seconds", 20, "--out", path)
+    command.works("calibrate", "two", path / "KICKSTAND.csv", path / "UPRIGHT.csv", "--out", path / "RIDE.cal.json")
+    command.works(*Smooth(path / "smooth", path).arguments)  # each fork finds the modules already imported
+    return path
 
 
 def in_a_fork(scene, fault, share=0.0, usual_s=1.0):

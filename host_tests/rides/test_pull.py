@@ -71,20 +71,20 @@ def test_only_completely_pulled_rides_are_deleted(board, tmp_path):
     board.put("000/05/00001.rid", data[5][2:])
     board.put("000/notes.txt", [b"the rider's own"])
     result = command.works("pull", "--out", tmp_path / "out", "--delete")
-    left = [path for path in board.paths() if path.endswith((".rid", ".txt"))]
-    assert left == ["000/02/00000.rid", "000/04/00000.rid", "000/05/00000.rid", "000/05/00001.rid", "000/notes.txt"]
-    kept = "not deleted from the board, because it was not fetched completely"
+    paths = [path for path in board.paths() if path.endswith((".rid", ".txt"))]
+    assert paths == ["000/02/00000.rid", "000/04/00000.rid", "000/05/00000.rid", "000/05/00001.rid", "000/notes.txt"]
+    warning = "not deleted from the board, because it was not fetched completely"
     assert result.err.splitlines() == [
         "warning: ride 2, part 0: damaged at byte 1024: left out",
         "warning: ride 2: 1 blocks are missing: the log has a gap there",
-        f"warning: ride 2: {kept}",
+        f"warning: ride 2: {warning}",
         "warning: ride 3, part 0: the last block is cut short, as by a power cut: left out",
         "warning: ride 4, part 0: not of a ride at byte 0: left out",
         "warning: ride 4: nothing in it can be read",
-        f"warning: ride 4: {kept}",
+        f"warning: ride 4: {warning}",
         "warning: ride 5, part 0: cut short: left out",
         "warning: ride 5: 1 blocks are missing: the log has a gap there",
-        f"warning: ride 5: {kept}",
+        f"warning: ride 5: {warning}",
     ]
     assert [path.name[:10] for path in logs(tmp_path)] == [f"ride-0000{ride}" for ride in (1, 2, 3, 5)]
     assert max(np.diff(read_log(logs(tmp_path)[1]).time_us)) > 500_000
@@ -102,10 +102,10 @@ def on_the_cable(change, times=99):
         def sends(script):
             board.serial.data = b""
             send(script)
-            content, end, rest = board.serial.data.partition(b"\x04")
+            content, end, tail = board.serial.data.partition(b"\x04")
             if len(content) > 4000 and next(transfers, None) is not None:
                 content = b"".join(change(content.splitlines(keepends=True)))
-            board.serial.data = content + end + rest
+            board.serial.data = content + end + tail
 
         board.exec_raw_no_follow = sends
 
@@ -137,6 +137,16 @@ def test_transfer_that_was_disturbed_once_is_repeated(board, tmp_path):
     on_the_cable(lambda lines: [lines[0], lines[1][1:], *lines[2:]], times=1)(board)
     assert command.works("pull", "--out", tmp_path / "out", "--delete").err == ""
     assert board.paths() == [] and len(logs(tmp_path)) == 1
+
+
+@pytest.mark.parametrize("damage", [(b"'rides/000", b"'rider/000"), (b"(3, 0", b"(300000, 0")])
+def test_damaged_list_of_rides_is_refused(damage, board, tmp_path):
+    """Otherwise `--delete` would remove other files of the board."""
+    board.put("000/03/00000.rid", small(1))
+    board.put("../rider/000/03/00000.rid", small(1))
+    send = board.exec_raw
+    board.exec_raw = lambda *script, **options: (send(*script, **options)[0].replace(*damage), b"")
+    command.refused(board.root, "pull", "--out", tmp_path / "out", "--delete", words="lists invalid rides")
 
 
 # The files on this computer

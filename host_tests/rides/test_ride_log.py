@@ -70,8 +70,8 @@ def test_replay_subtracts_the_delay_of_the_ride(tmp_path):
     ahead = early.lean_deg - late.lean_deg
     assert np.abs(ahead - (0.0134 - 0.0048) * early.roll_rate_dps)[200:].max() < 0.02
     assert np.abs(ahead).max() > 0.02
-    again = replay(tmp_path / "ride.csv", cal, engine="micropython")
-    assert np.abs(again.lean_deg - early.lean_deg).max() < 0.01
+    replayed = replay(tmp_path / "ride.csv", cal, engine="micropython")
+    assert np.abs(replayed.lean_deg - early.lean_deg).max() < 0.01
 
 
 # The log of a stream, which grows with each block

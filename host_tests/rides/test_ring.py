@@ -42,18 +42,18 @@ def test_oldest_rides_are_removed_first(root):
     def paths():
         return sorted(path.relative_to("rides").as_posix() for path in Path("rides").rglob("*"))
 
-    steps, left = [], paths()
+    steps, remaining = [], paths()
     with pytest.raises(OSError) as error:
         for _ in range(50):
             assert not ring.ready()
-            steps.append([path for path in left if path not in paths()])
-            left = paths()
+            steps.append([path for path in remaining if path not in paths()])
+            remaining = paths()
     assert error.value.args[0] == errno.ENOSPC and all(len(removed) <= 1 for removed in steps)
     assert [path for removed in steps for path in removed] == [
         "000/00", "000/98/00000.rid", "000/99/00000.rid", "000/99", "001/00/00000.rid", "001/00", "002",
         "003/00/00000.rid", "003/00",
     ]  # fmt: skip
-    assert left == ["000", "000/98", "000/98/notes.txt", "001", "001/notes.txt", "003", "003/01"]
+    assert remaining == ["000", "000/98", "000/98/notes.txt", "001", "001/notes.txt", "003", "003/01"]
     # Two steps find and remove ride 0. Three steps find each other ride, remove its part and remove its directory. Two
     # steps find the groups 1 and 2 empty. The last step finds the current ride itself.
     assert len(steps) == 2 + 4 * 3 + 2 + 1

@@ -37,13 +37,13 @@ def test_readings_are_calibrated_like_in_the_firmware():
     offset, slope, bias = np.array([[0.01, -0.02, 0.03], [1.02, 0.99, 1.01], [1.0, -2.0, 3.0]])
     calibration = CalibrationFile(offset, slope, bias, matrix)
     readings = CHANCE.normal(size=(5, 7))
-    found = calibration.in_vehicle(readings)
+    vectors = calibration.in_vehicle(readings)
     firmware = calibration.to_firmware()
     for k, reading in enumerate(readings):
         force, rate = np.zeros(3), np.zeros(3)
         firmware.apply(reading, force, rate)
-        assert np.allclose(found[0][k], matrix @ force, atol=1e-6)
-        assert np.allclose(found[1][k], matrix @ rate, atol=1e-6)
+        assert np.allclose(vectors[0][k], matrix @ force, atol=1e-6)
+        assert np.allclose(vectors[1][k], matrix @ rate, atol=1e-6)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 8])
@@ -101,8 +101,8 @@ def test_cells_hold_the_means_of_their_samples(block):
 def test_number_of_cells_is_limited():
     cells = Cells(1.0, most=3)
     assert cells.evenly(100) is None
-    for at in (0.0, 1.0, 2.0, 5.0):
-        cells.add(np.array([at]), np.ones((1, 1)), np.ones((1, 1)))
+    for start in (0.0, 1.0, 2.0, 5.0):
+        cells.add(np.array([start]), np.ones((1, 1)), np.ones((1, 1)))
     even = cells.evenly(100)
     assert even and even.first == 1
     assert even.count.tolist() == [1, 1, 0, 0, 1]
@@ -124,11 +124,11 @@ def test_lag_between_two_signals_is_found(late_s):
     def signal(at):
         return np.sin(at) + np.sin(2.7 * at)
 
-    found = best_lag(lags, lambda by: (signal(time - late_s), np.outer(signal(time - by), direction)))
-    assert found and found.inside
-    assert found.lag_s == pytest.approx(late_s, abs=0.01)
-    assert found.value > 0.99
-    assert np.allclose(found.direction, direction)
+    lag = best_lag(lags, lambda by: (signal(time - late_s), np.outer(signal(time - by), direction)))
+    assert lag and lag.inside
+    assert lag.lag_s == pytest.approx(late_s, abs=0.01)
+    assert lag.value > 0.99
+    assert np.allclose(lag.direction, direction)
     assert best_lag(lags, lambda by: None) is None
 
 
@@ -145,16 +145,16 @@ def test_correlations_at_all_shifts_are_right():
     first, second = CHANCE.normal(size=300), np.zeros(100)
     second[:] = first[120:220]
     good, other = CHANCE.random(300) > 0.1, CHANCE.random(100) > 0.2
-    found, count = correlations(first, good, second, other)
-    assert int(np.argmax(np.where(count > 50, found, 0.0))) == 120 + 99
-    assert found[219] == pytest.approx(1.0)
+    correlation, count = correlations(first, good, second, other)
+    assert int(np.argmax(np.where(count > 50, correlation, 0.0))) == 120 + 99
+    assert correlation[219] == pytest.approx(1.0)
     assert count[219] == np.count_nonzero(good[120:220] & other)
-    there, here = (good[50:150] & other), slice(50, 150)
-    whole = np.sum(first[here][there] ** 2) * np.sum(second[there] ** 2)
-    assert found[149] == pytest.approx(np.sum((first[here] * second)[there]) / np.sqrt(whole), abs=1e-6)
-    ratio = log_likelihood_ratio(found, count, 1.0)
+    is_valid, overlap = (good[50:150] & other), slice(50, 150)
+    energy = np.sum(first[overlap][is_valid] ** 2) * np.sum(second[is_valid] ** 2)
+    assert correlation[149] == pytest.approx(np.sum((first[overlap] * second)[is_valid]) / np.sqrt(energy), abs=1e-6)
+    ratio = log_likelihood_ratio(correlation, count, 1.0)
     assert ratio[219] > 100.0
-    assert np.all(ratio[found < 0.0] == 0.0)
+    assert np.all(ratio[correlation < 0.0] == 0.0)
     assert peaks(np.array([1.0, 5.0, 4.0, 0.0, 3.0, -1.0]), 1, 9) == [1, 4]
 
 
@@ -190,8 +190,8 @@ def test_the_angle_of_a_rotation_is_known_up_to_half_a_turn(angle_deg, axis):
 def test_standstill_is_where_nothing_changes(shaking, speed, expected):
     rate = CHANCE.normal(size=(100, 3)) * shaking
     force = np.tile([0.0, 1.0, 0.0], (100, 1))
-    known = None if speed is None else np.full(100, speed)
-    still = motionless(rate, force, 9, 1.8, 0.01, known)
+    speeds = None if speed is None else np.full(100, speed)
+    still = motionless(rate, force, 9, 1.8, 0.01, speeds)
     assert np.mean(still) == pytest.approx(float(expected), abs=0.1)
     assert not motionless(0.0 * rate, force + CHANCE.normal(size=(100, 3)), 9, 1.8, 0.01).any()
 
@@ -205,9 +205,9 @@ def test_leaning_shows_forward_speed_handedness_and_unit():
     force = np.column_stack((0.0 * lean, 1.0 / np.cos(lean), 0.0 * lean))
     turn = rotation_matrix(np.array([0.5, 1.0, -2.0]))
     riding = np.ones(len(time), dtype=bool)
-    found = leaning_of(rate @ turn, force @ turn, riding)
-    assert np.allclose(found.matrix, turn, atol=0.05)
-    assert found.speed == pytest.approx(15.0, rel=0.1)
-    assert found.share == pytest.approx(1.0, rel=0.1)
-    assert found.likeness > 0.9
+    leaning = leaning_of(rate @ turn, force @ turn, riding)
+    assert np.allclose(leaning.matrix, turn, atol=0.05)
+    assert leaning.speed == pytest.approx(15.0, rel=0.1)
+    assert leaning.share == pytest.approx(1.0, rel=0.1)
+    assert leaning.likeness > 0.9
     assert leaning_of(-rate @ turn, force @ turn, riding).share == pytest.approx(-1.0, rel=0.1)

@@ -38,9 +38,9 @@ def heard(seconds, **kind):
     def receive(data):
         text.append(data)
         if b"\n" in data:
-            *lines, rest = b"".join(text).decode("ascii", "replace").split("\r\n")
+            *lines, tail = b"".join(text).decode("ascii", "replace").split("\r\n")
             sentences.extend((clock.now_us / 1e6, line) for line in lines)
-            text[:] = [rest.encode()]
+            text[:] = [tail.encode()]
 
     Gps(clock, lambda t_s: 10.0 * t_s, **kind).connect(receive)
     clock.advance(round(seconds * 1e6))

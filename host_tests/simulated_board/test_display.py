@@ -79,8 +79,8 @@ def test_lines_appear_without_delaying_the_loop(board, display):
         display.show(*lines)
         turns(board, display, 40)
         cut = [line[:16].replace("\xff", "\x01").replace("\x7e", "\x02") for line in as_text(lines)]
-        shown = [line.replace("\u2588", "\x01").replace("\u2590", "\x01") for line in board.lcd.text()]
-        assert [line.replace("\u2192", "\x02") for line in shown] == cut, (shown, cut)
+        displayed = [line.replace("\u2588", "\x01").replace("\u2590", "\x01") for line in board.lcd.text()]
+        assert [line.replace("\u2192", "\x02") for line in displayed] == cut, (displayed, cut)
     transfers = board.lcd_bus.transfers[board.lcd.address]
     for _ in range(20):
         display.show(*OLD)
@@ -115,6 +115,7 @@ def test_after_any_unplug_it_returns_and_shows_nothing_old(board, display):
         for begun in (0, 12) if isinstance(board.lcd, Lcd) else (0,):
             turns(board, display, begun)
             board.remove_lcd()
+            assert not board.lcd.backlight and not "".join(board.lcd.text()).strip()
             board.clock.advance(1000 * gone_ms)
             turns(board, display, gap_turns)
             board.fit_lcd()

@@ -25,10 +25,10 @@ def fixes(text, piece=1000, step_ms=10, steps=60):
         gps = Gps(Wire(text if isinstance(text, bytes) else text.encode(), piece))
         result = []
         for now_ms in range(1000, 1000 + step_ms * steps, step_ms):
-            speed, place = gps.poll(now_ms), gps.place(now_ms)
-            assert speed is not None or place is None
+            speed, position = gps.poll(now_ms), gps.place(now_ms)
+            assert speed is not None or position is None
             if speed is not None:
-                result.append((round(1000 * speed), place and list(place)))
+                result.append((round(1000 * speed), position and list(position)))
     return result
 
 
@@ -85,8 +85,8 @@ def test_sentences_may_arrive_in_any_pieces():
 def test_all_four_quarters_of_the_earth_to_two_centimetres():
     for north, lat in (("N", 1), ("S", -1)):
         for east, lon in (("E", 1), ("W", -1)):
-            ((_, place),) = fixes(rmc("4807.03801," + north, "01131.00009," + east))
-            assert place == [DATE, NOON_MS, lat * 288703801, lon * 69100009]
+            ((_, position),) = fixes(rmc("4807.03801," + north, "01131.00009," + east))
+            assert position == [DATE, NOON_MS, lat * 288703801, lon * 69100009]
     for lat, lon, units in (
         ("0000.00000,S", "00000.00001,W", [0, -1]),
         ("8959.99999,S", "17959.99999,W", [-539999999, -1079999999]),
@@ -223,16 +223,16 @@ def test_a_fast_receiver_with_many_satellites_loses_no_speed():
             with Board(level):
                 from kickstand.speed.gps import Gps
 
-                wire, wanted, heard = Wire(), [], 0
+                wire, pending, fixes_read = Wire(), [], 0
                 gps = Gps(wire)
                 for turn in range(1000):
                     if turn % (100 // hz) == 0:
                         second, part = divmod(turn, 100)
                         bodies = (gsv + gsv)[:count]
                         bodies.insert(first, rmc(time=f"1200{second:02}.{part:02}"))
-                        wanted.append("".join(bodies).encode())
-                    line = b"".join(wanted)
-                    wire.data, wanted = (wire.data + line[:115])[:2304], [line[115:]]
+                        pending.append("".join(bodies).encode())
+                    line = b"".join(pending)
+                    wire.data, pending = (wire.data + line[:115])[:2304], [line[115:]]
                     if turn % 200 > 15:  # a stall of 0.15 s every 2 s
-                        heard += gps.poll(1000 + 10 * turn) is not None
-                assert heard >= 0.9 * 10 * hz, (hz, first, heard)
+                        fixes_read += gps.poll(1000 + 10 * turn) is not None
+                assert fixes_read >= 0.9 * 10 * hz, (hz, first, fixes_read)

@@ -34,7 +34,7 @@ def test_wrong_fields_give_no_place_off_the_earth_and_raise_nothing(fixes):
         now_ms += 1000
         while wire.any():
             gps.poll(now_ms)
-            place = gps.place(now_ms)
-            if place is not None:
-                assert abs(place[2]) < 90 * 6_000_000 and abs(place[3]) < 180 * 6_000_000
-                assert 0 <= place[1] <= 86_401_000
+            position = gps.place(now_ms)
+            if position is not None:
+                assert abs(position[2]) < 90 * 6_000_000 and abs(position[3]) < 180 * 6_000_000
+                assert 0 <= position[1] <= 86_401_000

@@ -46,9 +46,9 @@ def test_scripted_motion_matches_the_simulated_kinematics():
     assert np.abs(distance - np.cumsum(speed) * 0.001).max() < 0.1
     riding = [ride.truth(x) for x in t[10_000:-8_000:50]]
     assert all(abs(ride.motion(x)[0]) < 1e-9 for x in t[10_000:-8_000:50])  # in balance
-    held = np.array([state[:3] for state in riding if state[3] == "held turn"])
-    assert np.tan(np.radians(held[:, 0])) == pytest.approx(-held[:, 1] * np.radians(held[:, 2]) / G)
-    assert {*np.sign(held[:, 0])} == {1.0, -1.0}
+    held_turn = np.array([state[:3] for state in riding if state[3] == "held turn"])
+    assert np.tan(np.radians(held_turn[:, 0])) == pytest.approx(-held_turn[:, 1] * np.radians(held_turn[:, 2]) / G)
+    assert {*np.sign(held_turn[:, 0])} == {1.0, -1.0}
 
 
 @pytest.mark.parametrize(("mps", "share"), [(1.0, 0.0), (2.5, 0.5), (4.0, 1.0)])

@@ -20,8 +20,8 @@ from support.command import works
 def test_legs_become_signals():
     """The bike stands for 2 s, and reaches 10 m/s within 4 s. Then it reaches a lean of 30 degrees within 2 s. The
     rider's other values settle within 1 s, and the bank within 3 s."""
-    more = {"hang_m": 0.1, "lift_deg": 10.0, "engine": 1.0, "crosswind_mps2": 2.0, "bank_deg": 6.0}
-    legs = [Leg("a", 2.0, 0.0), Leg("b", 4.0, 10.0), Leg("a", 4.0, lean_deg=30.0, roll_s=2.0, **more)]
+    extras = {"hang_m": 0.1, "lift_deg": 10.0, "engine": 1.0, "crosswind_mps2": 2.0, "bank_deg": 6.0}
+    legs = [Leg("a", 2.0, 0.0), Leg("b", 4.0, 10.0), Leg("a", 4.0, lean_deg=30.0, roll_s=2.0, **extras)]
     signals = commands(legs, 100.0)
     assert len(signals.time) == 1000 and signals.time[100] == 1.0 and signals.phases == ["a", "b"]
     assert signals.speed[[100, 400, 800]] == pytest.approx([0.0, 5.0, 10.0], abs=0.01)
@@ -91,6 +91,7 @@ def test_a_seed_gives_the_rides_of_earlier_versions():
     readings = [0.5444, 0.5244, 0.4558, 22.7288, 5.1693, 5.6495, 9.0380]
     assert np.abs(simulated.readings).mean(axis=0) == pytest.approx(readings, abs=1e-4)
     assert simulated.upright.mean(axis=0)[:3] == pytest.approx([-0.1136, -0.9301, -0.2875], abs=1e-4)
+    assert simulated.procedure.mean(axis=0)[:3] == pytest.approx([-0.0453, -0.0142, 0.0650], abs=1e-4)
 
 
 DEFAULT = "street", "city", "fall"
@@ -137,8 +138,8 @@ def test_simulated_values_are_possible_for_a_motorcycle(name):
     standing = truth["speed_mps"] == 0.0
     assert np.abs(truth["yaw_rate_dps"][standing]).max(initial=0.0) < 0.5
     assert name not in CONDITIONS or CONDITIONS[name](simulated)
-    for column, (least, most) in zip(("lean_deg", "speed_mps", "yaw_rate_dps"), RANGES.get(name, ())):
-        assert least < np.abs(truth[column]).max() < most
+    for column, (least, highest) in zip(("lean_deg", "speed_mps", "yaw_rate_dps"), RANGES.get(name, ())):
+        assert least < np.abs(truth[column]).max() < highest
     stand = truth["lean_deg"][simulated.phase == "kickstand"]
     assert np.all(np.abs(stand - stand[:1]) < 0.02)  # a moving rider does not tilt a bike on its stand
 
@@ -192,10 +193,10 @@ def test_the_rates_of_a_hand_turn_gravity_to_each_pose():
     assert np.median(off) < 0.03 and np.percentile(off, 95) < 0.1
     assert 7 * 4.5 < seconds(simulated, still) < 7 * 6.5
     assert 7 * 4.5 + 6 * 0.9 < len(readings) / 200.0 < 7 * 6.0 + 6 * 3.2
-    for pose, held in ((simulated.kickstand, False), (simulated.upright, True)):
+    for pose, is_still in ((simulated.kickstand, False), (simulated.upright, True)):
         assert pose.shape == (800, 7)
         lean = np.degrees(np.arctan2(*(pose[:, :3] @ simulated.vehicle_from_sensor.T).T[:2]))
-        assert np.mean(lean) == pytest.approx(0.0 if held else simulated.stand_deg, abs=0.1)
+        assert np.mean(lean) == pytest.approx(0.0 if is_still else simulated.stand_deg, abs=0.1)
 
 
 def test_simulate_writes_logs_that_calibrate_and_replay(tmp_path):

@@ -17,8 +17,8 @@ PRESS_S = 0.5  # time from the check's request to the press
 
 def part(seed: int = 1, **more: float):
     """Return world(t_s) of an ordinary sensor at rest, in some orientation."""
-    made = Sensor(seed=seed, **more)
-    return resting(made, (0.3, -0.5, 0.8))
+    sensor = Sensor(seed=seed, **more)
+    return resting(sensor, (0.3, -0.5, 0.8))
 
 
 class CheckedBoard:
@@ -47,9 +47,9 @@ class CheckedBoard:
 
     def findings(self, folder: Path) -> list[Finding]:
         """Return all findings. folder: the board's flash."""
-        found: list[Finding] = []
-        self.run(folder, lambda ask: found.extend(check.measured(ask, self.say)))
-        return found
+        results: list[Finding] = []
+        self.run(folder, lambda ask: results.extend(check.measured(ask, self.say)))
+        return results
 
     def say(self, text: str) -> None:
         """Called by check(): presses the button when the check asks for it."""

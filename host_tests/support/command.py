@@ -43,7 +43,7 @@ def refused(directory: Path, *arguments: object, words: str = "") -> str:
 
     The command must not change `directory`.
     """
-    before = snapshot(directory)
+    contents = snapshot(directory)
     result = run(*arguments)
     assert result.status == 2, result.out + result.err
     assert result.err.startswith("kickstand: ")
@@ -52,7 +52,7 @@ def refused(directory: Path, *arguments: object, words: str = "") -> str:
     assert "Traceback" not in result.err
     assert "unexpected" not in result.err
     assert words in result.err
-    assert snapshot(directory) == before
+    assert snapshot(directory) == contents
     return result.err
 
 

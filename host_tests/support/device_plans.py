@@ -49,11 +49,11 @@ class Record:
 
     def at(self, t_s):
         """Return both lines of the display at t_s."""
-        shown = ["", ""]
+        displayed = ["", ""]
         for start, line1, line2 in self.frames:
             if start <= t_s + 1e-6:
-                shown = [line1, line2]
-        return shown
+                displayed = [line1, line2]
+        return displayed
 
     def first(self, pattern, after=0.0):
         """Return the first time from `after` on at which a line matches, or infinity without such a line."""
@@ -72,8 +72,8 @@ class Record:
 
     def leans(self, from_s, until_s):
         """Return every lean shown between two times."""
-        shown = [self.lean_at(from_s)] + [self.lean_at(f[0]) for f in self.frames if from_s < f[0] < until_s]
-        return [lean for lean in shown if lean is not None]
+        displayed = [self.lean_at(from_s)] + [self.lean_at(f[0]) for f in self.frames if from_s < f[0] < until_s]
+        return [lean for lean in displayed if lean is not None]
 
 
 WORLD_KEYS = ("lean", "ride", "poses", "seed", "remount")

@@ -42,13 +42,13 @@ def standing(plan):
     """
 
     def motion(t_s):
-        now = before = plan[0]
+        current = previous = plan[0]
         for entry in plan:
             if t_s >= entry[0]:
-                before, now = now, entry
-        share = min(1.0, (t_s - now[0]) / RAISE_S) if now is not before else 1.0
-        change = now[1] - before[1]
-        lean = math.radians(before[1] + change * share)
+                previous, current = current, entry
+        share = min(1.0, (t_s - current[0]) / RAISE_S) if current is not previous else 1.0
+        change = current[1] - previous[1]
+        lean = math.radians(previous[1] + change * share)
         return (math.sin(lean), math.cos(lean), 0.0, 0.0, 0.0, change / RAISE_S if share < 1.0 else 0.0)
 
     return motion
@@ -73,12 +73,12 @@ def poses_of(seed, steps):
     still = sensor_errors.resting(part, (1, 0, 0))
 
     def world(t_s):
-        now = still
+        motion_now = still
         for start, candidate in worlds:
             if t_s >= start:
-                now = candidate
-        if now:
-            return now(t_s)
+                motion_now = candidate
+        if motion_now:
+            return motion_now(t_s)
         return [value + 0.5 * math.sin(30 * t_s + k) for k, value in enumerate(still(t_s))]
 
     return world
@@ -183,13 +183,13 @@ class Device:
     def record(self):
         """Return the record as data for JSON."""
         board = self.board
-        seen = {"frames": self.frames, "ends": self.ends, "last": self.frames[-1][1:], "too_fast": board.too_fast}
-        seen["touched"] = sorted(board.touched)
+        recorded = {"frames": self.frames, "ends": self.ends, "last": self.frames[-1][1:], "too_fast": board.too_fast}
+        recorded["touched"] = sorted(board.touched)
         if self.phones:
-            seen["phones"] = [phone.record() for phone in self.phones]
+            recorded["phones"] = [phone.record() for phone in self.phones]
         if board.card:
-            seen["rides"], seen["card_hz"] = sd_cards.rides(board), board.card.most_hz
-        return seen
+            recorded["rides"], recorded["card_hz"] = sd_cards.rides(board), board.card.most_hz
+        return recorded
 
     def _run_until(self, until_s, config, main):
         end = "reset"
@@ -256,7 +256,7 @@ def world_of(plan):
     ride, motion = None, standing(plan.get("lean", [[0, 0]]))
     if "ride" in plan:
         kind = CarRide if (plan.get("config") or {}).get("VEHICLE") == "car" else script.Ride
-        ride = kind([getattr(script, name)(*more) for name, *more in plan["ride"]])
+        ride = kind([getattr(script, name)(*arguments) for name, *arguments in plan["ride"]])
         motion = ride.motion
     part = sensor_errors.Sensor(seed=seed)
     world = part.world(motion)

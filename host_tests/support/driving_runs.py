@@ -47,9 +47,9 @@ def samples(legs, vehicle="car", tilt_deg=0.0, noise_g=0.003, start_mps=0.0):
     speed = start_mps
     for seconds, acceleration, yaw_dps in legs:
         for _ in range(round(seconds * RATE_HZ)):
-            before, speed = speed, max(0.0, speed + acceleration / RATE_HZ)
-            camber = math.radians(tilt_deg) if before == speed == 0.0 else 0.0
-            force = [math.sin(camber), math.cos(camber), (speed - before) * RATE_HZ / G]
+            previous, speed = speed, max(0.0, speed + acceleration / RATE_HZ)
+            camber = math.radians(tilt_deg) if previous == speed == 0.0 else 0.0
+            force = [math.sin(camber), math.cos(camber), (speed - previous) * RATE_HZ / G]
             rate = [0.0, yaw_dps, 0.0]
             side = speed * math.radians(yaw_dps) / G
             if vehicle == "car":
@@ -129,8 +129,8 @@ def drive(legs, mount, options):
     alignment = method(vehicle, options.get("up"), options.get("bias"))
     moved_at, other = options.get("moved", [1e9, mount])
     bias = options.get("gyro_bias", [0.0, 0.0, 0.0])
-    made = samples(legs, vehicle, **options.get("samples", {}))
-    for k, (force, rate, speed) in enumerate(made):
+    rows = samples(legs, vehicle, **options.get("samples", {}))
+    for k, (force, rate, speed) in enumerate(rows):
         m = mount if k < moved_at * RATE_HZ else other
         turning = mounted(m, rate)
         alignment.update(mounted(m, force), [turning[i] + bias[i] for i in range(3)], 0 if k == 0 else 10000)

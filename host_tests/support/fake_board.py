@@ -128,12 +128,12 @@ class FakeBoard(Transport):
 
     def _os(self) -> types.SimpleNamespace:
         def ilistdir(path: str) -> list[tuple[str, int, int, int]]:
-            found = self.path(path).iterdir()
-            return [(p.name, 0x4000, 0, 0) if p.is_dir() else (p.name, 0x8000, 0, p.stat().st_size) for p in found]
+            entries = self.path(path).iterdir()
+            return [(p.name, 0x4000, 0, 0) if p.is_dir() else (p.name, 0x8000, 0, p.stat().st_size) for p in entries]
 
         def stat(path: str) -> tuple[int, ...]:
-            found = self.path(path).stat()
-            return (0x4000 if self.path(path).is_dir() else 0x8000, 0, 0, 0, 0, 0, found.st_size, 0, 0, 0)
+            status = self.path(path).stat()
+            return (0x4000 if self.path(path).is_dir() else 0x8000, 0, 0, 0, 0, 0, status.st_size, 0, 0, 0)
 
         def change(function: Callable[..., Any], *arguments: Any) -> None:
             self.before_change()

@@ -63,9 +63,9 @@ def transform(offset, slope, matrix, sums, n):
     for i in range(3):
         calibration.gyro_bias[i] = 2.0 - i
     calibration.set_scale(4096, 65.5)
-    both = Transform(calibration)
+    transform_of_both = Transform(calibration)
     force, rate = [0.0] * 3, [0.0] * 3
-    both.apply_sum(array("i", sums), n, force, rate)
+    transform_of_both.apply_sum(array("i", sums), n, force, rate)
     sensor_force, sensor_rate = [0.0] * 3, [0.0] * 3
     calibration.apply([value / n for value in sums], sensor_force, sensor_rate)
     plain_force, plain_rate = [0.0] * 3, [0.0] * 3

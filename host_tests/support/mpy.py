@@ -51,7 +51,7 @@ def run_mpy(
             file.write_text(script, encoding="utf-8")
         else:
             file = script.resolve()
-        done = subprocess.run(
+        process = subprocess.run(
             unix_port.command("-X", f"heapsize={heap}", str(file), *args),
             env=environment,
             cwd=directory or scratch,
@@ -60,9 +60,9 @@ def run_mpy(
             text=True,
             timeout=300,
         )
-    said = done.stdout + done.stderr
+    output = process.stdout + process.stderr
     # The package's main() does not return every exit status. Scripts that take data print JSON at their end. Before
     # that, a board's console may print tracebacks.
-    came_to_its_end = done.returncode == 0 and (bool(stdin) or "Traceback (most recent" not in said)
-    assert came_to_its_end, f"MicroPython says:\n{said}"
-    return done.stdout
+    came_to_its_end = process.returncode == 0 and (bool(stdin) or "Traceback (most recent" not in output)
+    assert came_to_its_end, f"MicroPython says:\n{output}"
+    return process.stdout

@@ -27,5 +27,5 @@ class PageTurner:
     def check(self):
         """Raise AssertionError if a wanted view never appeared. The message names the views that appeared."""
         if self._wanted:
-            seen = ", ".join(sorted(set(self._seen))) or "nothing"
-            raise AssertionError(f"no view {self._wanted[0]} after {len(self._seen)} presses, only: {seen}")
+            pages = ", ".join(sorted(set(self._seen))) or "nothing"
+            raise AssertionError(f"no view {self._wanted[0]} after {len(self._seen)} presses, only: {pages}")

@@ -37,10 +37,10 @@ def _rows(title):
     table = _SECTION.split(f"\n`{title}`, ")[1].split("\n\n")[1]
     rows = []
     for line in table.splitlines()[2:]:
-        place, kind, what, *unknown = (cell.strip() for cell in line.strip("|").split("|"))
-        first, _, last = place.partition("-")
+        position, kind, quantity, *unknown = (cell.strip() for cell in line.strip("|").split("|"))
+        first, _, last = position.partition("-")
         lacking = int(unknown[0]) if unknown and unknown[0] else None
-        rows.append((int(first), int(last or first), kind, what, lacking))
+        rows.append((int(first), int(last or first), kind, quantity, lacking))
     return rows
 
 
@@ -51,8 +51,8 @@ def own(title, data):
     """
     rows = _rows(title)
     assert len(data) == rows[-1][1] + 1
-    found = {}
-    for first, last, kind, what, lacking in rows:
+    values = {}
+    for first, last, kind, quantity, lacking in rows:
         number = int.from_bytes(bytes(data[first : last + 1]), "little", signed=kind == "signed")
-        found[re.split("[,:]", what)[0]] = None if number == lacking else number
-    return found
+        values[re.split("[,:]", quantity)[0]] = None if number == lacking else number
+    return values

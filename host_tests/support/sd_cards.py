@@ -18,14 +18,14 @@ def eject():
 
 def rides(board):
     """Return {path: content in base64} of all files on the card, as a computer reads them."""
-    found = {}
+    contents = {}
     try:
         os.mount(os.VfsFat(board.card), READER)
     except OSError:
         return None
-    _collect(READER, found)
+    _collect(READER, contents)
     os.umount(READER)
-    return found
+    return contents
 
 
 def _collect(folder, found):

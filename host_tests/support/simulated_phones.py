@@ -29,9 +29,9 @@ class Phone:
     def handle(self, name):
         """Return the handle of a characteristic in the services that the board has registered."""
         service, kind = PLACES[name]
-        for uuid, made in self._board.radio.services:
-            for found, _, handle in made:
-                if (uuid, found) == (service, kind):
+        for uuid, characteristics in self._board.radio.services:
+            for uuid_of, _, handle in characteristics:
+                if (uuid, uuid_of) == (service, kind):
                     return handle
         return None
 

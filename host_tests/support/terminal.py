@@ -39,16 +39,16 @@ class Terminal:
         nothing for SILENT_S counts as dead.
         """
         drawn, heard_s = 0, time.monotonic()
-        while not (found := re.search(pattern, self._seen)):
+        while not (match := re.search(pattern, self._seen)):
             piece = self._read()
             drawn += len(piece)
             heard_s = time.monotonic() if piece else heard_s
             self._seen += piece
-            why = f"{pattern!r} never came: {self._seen[-3000:]}"
-            assert drawn < DRAWN and time.monotonic() - heard_s < SILENT_S, why
+            reason = f"{pattern!r} never came: {self._seen[-3000:]}"
+            assert drawn < DRAWN and time.monotonic() - heard_s < SILENT_S, reason
             time.sleep(0.05)
         self._seen = ""
-        return found
+        return match
 
     def end(self) -> int:
         """Return the exit status. Remaining output is read, because the command could not end otherwise."""

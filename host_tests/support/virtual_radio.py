@@ -86,10 +86,10 @@ class Air:
         if self.radio.services and self.peripheral is None:
             self.peripheral = self._make("the board")
             self.loop.create_task(self._power_on())
-        found = (self.radio.found, self.radio.named)
-        if found != self._advertised and self.peripheral and self.peripheral.powered_on:
-            self._advertised = found
-            self.loop.create_task(self._advertise(*found))
+        state = (self.radio.found, self.radio.named)
+        if state != self._advertised and self.peripheral and self.peripheral.powered_on:
+            self._advertised = state
+            self.loop.create_task(self._advertise(*state))
         self.loop.pump()
 
     def close(self):
@@ -126,8 +126,8 @@ class Air:
             delegate = _Pin(self.radio.ask_pin, pairing.PairingDelegate.DISPLAY_OUTPUT_ONLY)
             device.pairing_config_factory = lambda _: pairing.PairingConfig(True, True, True, delegate)
         for service, characteristics in self.radio.services:
-            made = [self._characteristic(*one) for one in characteristics]
-            device.add_service(Service(uuid_of(service), made))
+            characteristics_made = [self._characteristic(*definition) for definition in characteristics]
+            device.add_service(Service(uuid_of(service), characteristics_made))
         device.on("connection", self._connected)
         await device.power_on()
 
@@ -146,11 +146,11 @@ class Air:
             self.radio.paired = self.radio.paired or bool(connection.authenticated)
             self.radio.write(handle, data)
 
-        made = Characteristic(
+        characteristic = Characteristic(
             uuid_of(kind), Characteristic.Properties(flags & 0x1A), allowed, CharacteristicValue(read, write)
         )
-        self._characteristics[handle] = made
-        return made
+        self._characteristics[handle] = characteristic
+        return characteristic
 
     async def _advertise(self, found, named):
         if self._connection is None and found is not None:
@@ -205,26 +205,26 @@ class Central:
 
     async def find(self, wanted, seconds=5.0):
         """Return the first Advertisement that names this service. Raises TimeoutError without one."""
-        found = self.air.loop.create_future()
+        discovered = self.air.loop.create_future()
 
         def seen(advertisement):
             kinds = core.AdvertisingData
             listed = [
-                core.UUID.from_bytes(data[at : at + size])
+                core.UUID.from_bytes(data[offset : offset + size])
                 for kind, size in (
                     (kinds.COMPLETE_LIST_OF_16_BIT_SERVICE_CLASS_UUIDS, 2),
                     (kinds.COMPLETE_LIST_OF_128_BIT_SERVICE_CLASS_UUIDS, 16),
                 )
                 for data in advertisement.data.get_all(kind, raw=True)
-                for at in range(0, len(data), size)
+                for offset in range(0, len(data), size)
             ]
-            if uuid_of(wanted) in listed and not found.done():
-                found.set_result(advertisement)
+            if uuid_of(wanted) in listed and not discovered.done():
+                discovered.set_result(advertisement)
 
         self.device.on("advertisement", seen)
         await self.device.start_scanning(active=True)
         try:
-            return await asyncio.wait_for(found, seconds)
+            return await asyncio.wait_for(discovered, seconds)
         finally:
             await self.device.stop_scanning()
 
@@ -233,8 +233,8 @@ class Central:
         self.peer = Peer(self.connection)
         await self.peer.discover_services()
         for service in self.peer.services:
-            for one in await service.discover_characteristics():
-                self.characteristics[str(service.uuid), str(one.uuid)] = one
+            for characteristic in await service.discover_characteristics():
+                self.characteristics[str(service.uuid), str(characteristic.uuid)] = characteristic
 
     def place(self, service, kind):
         return self.characteristics[str(uuid_of(service)), str(uuid_of(kind))]

@@ -77,8 +77,8 @@ def test_a_lean_is_drawn_as_number_arc_and_side(picture, lean_deg, digits, colum
     assert [line[1] for line in lines[: len(columns)]] == list(columns) and lines[0][2:] == (2, 7, 1)
     assert len(columns) < 61 or lines[60][2] == 22
     arrow = lines[len(columns) + 2 :]  # after the two sides of the degree sign
-    point, back = (125, 102) if lean_deg > 0 else (2, 25)
-    assert [line[1:] for line in (arrow[0], arrow[-1])] == [(point, 40, 1, 1), (back, 26, 29, 1)] if side else not arrow
+    point, base = (125, 102) if lean_deg > 0 else (2, 25)
+    assert [line[1:] for line in (arrow[0], arrow[-1])] == [(point, 40, 1, 1), (base, 26, 29, 1)] if side else not arrow
     assert not side or len(arrow) == 24
     words = [call for call in canvas.calls if call[0] == "text"]
     assert words == [side] * (side is not None) + [("text", "REC", 48, 56, 1)]

@@ -125,8 +125,8 @@ def test_six_positions_are_taken_in_any_order_and_checked():
     lines = six(panel)
     assert lines[0] == ("Side up, still:", "any of the six")
     for k, side in enumerate(SIDES):
-        holding, done, following = lines[1 + 3 * k : 4 + 3 * k]
-        assert holding[0] == f"Side {side}, hold" and done == (f"Side {side} done", f"{k + 1}/6, turn it")
+        holding, confirmed, following = lines[1 + 3 * k : 4 + 3 * k]
+        assert holding[0] == f"Side {side}, hold" and confirmed == (f"Side {side} done", f"{k + 1}/6, turn it")
         missing = [other for other in ("+x", "-x", "+y", "-y", "+z", "-z") if other not in SIDES[: k + 1]]
         assert following == ("Side up, still:", " ".join(missing)) if missing else following[0] == "Check: slant it"
     panel.turn(15.0, (1, 2, 3))

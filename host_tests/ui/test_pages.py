@@ -13,9 +13,9 @@ D = pages.DEGREE
 
 
 def meter(**values) -> Any:
-    shown = reading((0, 0, 0, 0, 0, 0, 0))
-    vars(shown).update(values)
-    return shown
+    fake_meter = reading((0, 0, 0, 0, 0, 0, 0))
+    vars(fake_meter).update(values)
+    return fake_meter
 
 
 @pytest.mark.parametrize(
@@ -41,10 +41,10 @@ def meter(**values) -> Any:
 )
 def test_lines_of_a_page(page, values, lines):
     values = {"smooth_force": [values.pop("left", 0.0), 1.02, values.pop("forward", 0.0)]} | values
-    shown = getattr(pages, page)(
+    drawn = getattr(pages, page)(
         meter(max_accel_g=0.42, max_brake_g=0.91, **values) if page == "acceleration" else meter(**values)
     )
-    assert shown == lines if isinstance(lines, tuple) else shown[0] == lines
+    assert drawn == lines if isinstance(lines, tuple) else drawn[0] == lines
 
 
 @pytest.mark.parametrize(
@@ -82,8 +82,8 @@ def test_the_raw_page_is_calibrated_and_not_turned():
 
 def test_before_alignment_tilt_and_g_are_the_sensors_own():
     """The page shows "Not aligned" and the next step in turn, for two seconds each."""
-    shown = meter(smooth_force=[0.5, 0.866, -0.25])
-    lines = [pages.not_aligned(shown, seconds, "todo") for seconds in range(5)]
+    fake_meter = meter(smooth_force=[0.5, 0.866, -0.25])
+    lines = [pages.not_aligned(fake_meter, seconds, "todo") for seconds in range(5)]
     assert lines == [(f"Raw   30{D} -0.25g", hint) for hint in ["Not aligned"] * 2 + ["todo"] * 2 + ["Not aligned"]]
 
 
@@ -140,9 +140,9 @@ BRAKE, SPEED = {"state": alignment.WAITING_FOR_BRAKING}, {"state": alignment.WAI
 def test_each_state_of_a_drive_has_its_lines(values, result, fault, lines):
     from kickstand.ui import drive_page
 
-    known = {"counted": 2, "problem": None, "ready": False, "quality_deg": 1.2} | values
+    state = {"counted": 2, "problem": None, "ready": False, "quality_deg": 1.2} | values
     drive: Any = Panel(SPEED="wheel").app.drive
-    drive.drive = type("Drive", (alignment.DriveAlignment,), known)(alignment.MOTORCYCLE)
+    drive.drive = type("Drive", (alignment.DriveAlignment,), state)(alignment.MOTORCYCLE)
     drive.result = result
     drive.speed.source.fault = lambda now_ms: fault
     assert drive_page.lines(drive, 0) == lines

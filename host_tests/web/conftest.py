@@ -17,11 +17,11 @@ from support.recordings import analysis_rides
 def files(tmp_path_factory) -> dict[str, bytes]:
     """Write the site once, with the command. Return its files, {path: content}."""
     out = tmp_path_factory.mktemp("web") / "made" / "site"
-    done = run("web", "--out", out)
-    if done.status == 2:
-        pytest.skip(f"no packages for the pages: {done.err}")
+    result = run("web", "--out", out)
+    if result.status == 2:
+        pytest.skip(f"no packages for the pages: {result.err}")
     written = {path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("*") if path.is_file()}
-    assert (done.status, done.out) == (
+    assert (result.status, result.out) == (
         *(0, f"written: {out}, {len(written)} files for a web server; they do not work if opened directly\n"),
     )
     return written
@@ -82,7 +82,7 @@ def node():
             let text = "";
             for await (const piece of process.stdin) text += piece;
             console.log(JSON.stringify(await ({function})(JSON.parse(text))));"""
-        done = wheel.node(
+        process = wheel.node(
             ["--input-type=module", "-e", code],
             return_completed_process=True,
             input=json.dumps(argument),
@@ -90,7 +90,7 @@ def node():
             stderr=subprocess.PIPE,
             encoding="utf-8",
         )
-        assert done.returncode == 0, done.stderr
-        return json.loads(done.stdout)
+        assert process.returncode == 0, process.stderr
+        return json.loads(process.stdout)
 
     return call

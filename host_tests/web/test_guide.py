@@ -111,8 +111,8 @@ BEGIN = "Press the button to begin again."
 def test_each_refusal_and_fault_has_its_step(node, state, words, number, text):
     """The display says why, in the words of ui/messages.py."""
     tick = {"powered": True, "plugged": True, "pose": "kickstand", "phase": "kickstand", "t_s": 1.0, "stage": 0}
-    ((_, shown_words, shown_number, shown, _),) = node(STEPS, [{**tick, "state": state}])
-    assert (shown_words, shown_number) == (words, number) and text in shown
+    ((_, shown_words, shown_number, step_shown, _),) = node(STEPS, [{**tick, "state": state}])
+    assert (shown_words, shown_number) == (words, number) and text in step_shown
 
 
 def test_a_disarmed_save_is_whole(stages):

@@ -33,11 +33,11 @@ def test_missing_npm_is_named_with_its_remedy(install, monkeypatch, tmp_path):
 
 
 def test_versions_and_hashes_are_fixed():
-    wanted, locked = (json.loads((npm_packages.NPM / name).read_text()) for name in npm_packages.LISTS)
-    packages = {name.removeprefix("node_modules/"): one for name, one in locked["packages"].items() if name}
-    assert wanted["dependencies"].items() <= {name: one["version"] for name, one in packages.items()}.items()
-    assert all(re.fullmatch(r"\d+\.\d+\.\d+[\w-]*", version) for version in wanted["dependencies"].values())
-    assert all(one["integrity"].startswith("sha512-") and "resolved" not in one for one in packages.values())
+    listed, locked = (json.loads((npm_packages.NPM / name).read_text()) for name in npm_packages.LISTS)
+    packages = {name.removeprefix("node_modules/"): entry for name, entry in locked["packages"].items() if name}
+    assert listed["dependencies"].items() <= {name: entry["version"] for name, entry in packages.items()}.items()
+    assert all(re.fullmatch(r"\d+\.\d+\.\d+[\w-]*", version) for version in listed["dependencies"].values())
+    assert all(entry["integrity"].startswith("sha512-") and "resolved" not in entry for entry in packages.values())
 
 
 def test_missing_libraries_of_the_page_rides_are_named(monkeypatch):

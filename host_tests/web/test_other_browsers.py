@@ -30,10 +30,10 @@ def test_two_presses_a_ride_and_a_bend_show_the_lean(browser, faster_address):
 
     def wait_for(words):
         begin_s = time.monotonic()
-        while words not in (seen := browser.run(LOOK))[0]:
-            assert time.monotonic() - begin_s < PATIENCE_S, seen
+        while words not in (texts := browser.run(LOOK))[0]:
+            assert time.monotonic() - begin_s < PATIENCE_S, texts
             time.sleep(0.1)
-        return seen
+        return texts
 
     wait_for("Press the button")
     browser.click("#press")
@@ -45,7 +45,7 @@ def test_two_presses_a_ride_and_a_bend_show_the_lean(browser, faster_address):
     browser.click("#do")
     wait_for("Lean it")
     browser.run(LEAN)
-    _, shown, true = wait_for("That is all")
-    assert shown.endswith("° right") and true.endswith("° right")
-    shown_deg, true_deg = (float(text.partition("°")[0]) for text in (shown, true))
+    _, displayed, true = wait_for("That is all")
+    assert displayed.endswith("° right") and true.endswith("° right")
+    shown_deg, true_deg = (float(text.partition("°")[0]) for text in (displayed, true))
     assert true_deg > 26.0 and shown_deg == pytest.approx(true_deg, abs=2.0)

@@ -29,7 +29,7 @@ def test_on_paper_there_is_the_text_alone(chromium, address):
     page.set_viewport_size({"width": 673, "height": 1000})  # the width of A4 paper without margins
     page.emulate_media(media="print", color_scheme="dark")
     hidden = page.locator("header, footer, main nav, .quick").all()
-    assert hidden and not any(one.is_visible() for one in hidden)
+    assert hidden and not any(element.is_visible() for element in hidden)
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)" and rider.fits()
     cut = "all => all.filter((one) => one.scrollWidth > one.clientWidth + 1).length"
     assert page.eval_on_selector_all("article .wide, article pre", cut) == 0

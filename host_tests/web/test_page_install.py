@@ -64,13 +64,13 @@ def test_a_new_board_gets_the_firmware_and_its_settings(line, page, board):
     assert look(line, board).startswith("Imagined Pico with RP2040, MicroPython 1.26.1 is there.")
     assert page.get_attribute("[name=BUTTON_PIN]", "placeholder") == "15"
     choose(page, "SIDE", '"right"')
-    for value, where, words in (
+    for value, element, words in (
         ("99", "#fault-BUTTON_PIN", "but it must be a number from 0 to 48"),
         ("5", "#config", "a pin is used twice"),
         ("fifteen", "#fault-BUTTON_PIN", "fifteen is not a value"),
     ):
         choose(page, "BUTTON_PIN", value)
-        assert words in line.rider.text(where) and page.is_disabled("#install")
+        assert words in line.rider.text(element) and page.is_disabled("#install")
     assert line.rider.axe() == []
     for kind in PHONE, LAPTOP:
         page.set_viewport_size(kind["viewport"])
@@ -96,12 +96,12 @@ def test_riders_settings_are_shown_and_kept(line, page, board):
 
 
 def test_config_with_more_than_settings_stays_with_the_rider(line, page, board):
-    own = b"import sys\nRECORD = sys.platform == 'rp2'\n"
-    board.path("config.py").write_bytes(own)
+    user_config = b"import sys\nRECORD = sys.platform == 'rp2'\n"
+    board.path("config.py").write_bytes(user_config)
     look(line, board)
     assert "own config.py, line 1 is not a setting" in line.rider.text("#by-hand") and page.is_hidden("#settings")
     assert "Its own config.py stays" in line.install()
-    assert board.path("config.py").read_bytes() == own
+    assert board.path("config.py").read_bytes() == user_config
 
 
 def test_a_board_of_a_shop_is_offered_by_its_name(line, page, board):
@@ -161,9 +161,9 @@ def test_status_equals_the_output_of_the_command(line, page, board, monkeypatch)
     assert line.status().startswith("Kickstand is not on the board at this port: install it with the page Install")
     report = "Kickstand 9.9.9\nSensor   MPU6050 at 0x68\n\nDisplay  none found"
     board.path("kickstand/__init__.py").write_text(f"def status():\n    print({report!r})\n")
-    shown = line.status()
+    status = line.status()
     fake_board.plug_in(monkeypatch, board)
-    assert shown == command.works("status").out.rstrip() == report
+    assert status == command.works("status").out.rstrip() == report
     line.rider.context.grant_permissions(["clipboard-read", "clipboard-write"])
     page.click("#status-copy")
     page.wait_for_selector("#status-said:has-text('Copied')")

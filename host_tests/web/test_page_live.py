@@ -126,7 +126,7 @@ def test_simulated_board_is_watched_without_a_real_one(chromium, address):
     page = rider.page
     page.evaluate("document.documentElement.dataset.serial = 'no'")
     values = "#chart", "#max-left", "#lean"
-    assert not any(page.is_visible(one) for one in values)
+    assert not any(page.is_visible(selector) for selector in values)
     page.click("#simulated")
     for side in "right", "left":
         page.wait_for_selector(f"#side:has-text('{side}')")
@@ -140,7 +140,7 @@ def test_simulated_board_is_watched_without_a_real_one(chromium, address):
     page.click("#simulated-stop")
     assert rider.text("#pretend-said") == "Stopped."
     page.wait_for_selector("#lean:has-text('--')", state="attached")
-    assert not any(page.is_visible(one) for one in values)
+    assert not any(page.is_visible(selector) for selector in values)
     assert rider.errors == [] and rider.strangers() == []
     rider.context.close()
 

@@ -106,8 +106,8 @@ def test_the_page_flashes_nothing_in_a_bend(visit):
     rider.wait(3)
     samples = rider.page.evaluate(LOOK, 3)
     assert len(samples) > 60
-    for label, shown, todo in samples:
-        assert re.match(r"Display: Lean \d+° right", label) and re.match(r"\d+° right$", shown) and "sure" not in todo
+    for label, lean, todo in samples:
+        assert re.match(r"Display: Lean \d+° right", label) and re.match(r"\d+° right$", lean) and "sure" not in todo
 
 
 ACTIVE = "document.activeElement.id || document.activeElement.value"

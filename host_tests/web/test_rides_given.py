@@ -48,15 +48,15 @@ def sorted_out(tmp_path, monkeypatch):
 def test_a_ride_gets_its_calibration_and_the_last_track(sorted_out, log, names, expected):
     """The rides are sorted as a reader counts. A calibration that belongs to another ride is not used."""
     contents = {"csv": log, "json": CALIBRATION, "gpx": TRACK}
-    found = sorted_out({name: contents[name.lower().rpartition(".")[2]] for name in names.split()})
-    assert found["why"] == {}
-    calibrations = [(one["log"], one["calibration"]) for one in found["rides"]]
+    result = sorted_out({name: contents[name.lower().rpartition(".")[2]] for name in names.split()})
+    assert result["why"] == {}
+    calibrations = [(ride["log"], ride["calibration"]) for ride in result["rides"]]
     assert calibrations == list(expected.items())
-    assert {one["track"] for one in found["rides"]} == {"y.GPX" if "gpx" in names else ""}
+    assert {ride["track"] for ride in result["rides"]} == {"y.GPX" if "gpx" in names else ""}
 
 
 def test_each_file_gets_its_kind_or_its_reason(sorted_out, log):
-    found = sorted_out(
+    result = sorted_out(
         {
             "log.csv": log,
             "lap.csv": app_exports.racechrono(RIDING),
@@ -69,10 +69,10 @@ def test_each_file_gets_its_kind_or_its_reason(sorted_out, log):
             "picture.png": b"\x89PNG\r\n\x1a\n" + bytes(8),
         }
     )
-    kinds = found["kinds"]
+    kinds = result["kinds"]
     assert (kinds["log.csv"], kinds["c.json"], kinds["x.gpx"]) == ("log", "calibration", "track")
     assert kinds["lap.csv"].startswith("of RaceChrono")
-    assert [(one["log"], one["isLog"]) for one in found["rides"]] == [("lap.csv", False), ("log.csv", True)]
+    assert [(ride["log"], ride["isLog"]) for ride in result["rides"]] == [("lap.csv", False), ("log.csv", True)]
     for name, words in (
         ("d.json", "is no calibration: version is missing: give the"),
         ("table.csv", "no table of sensors"),
@@ -80,9 +80,9 @@ def test_each_file_gets_its_kind_or_its_reason(sorted_out, log):
         ("ride.parquet", "is Parquet, which this page cannot read: give the ride as CSV"),
         ("picture.png", "not text: give what an app has exported"),
     ):
-        reason = found["why"].pop(name)
+        reason = result["why"].pop(name)
         assert words in reason and not any(part in reason for part in ("\n", "kickstand", "--"))
-    assert found["why"] == {}
+    assert result["why"] == {}
 
 
 def two_tables():
@@ -115,16 +115,16 @@ TABLE = app_exports.any_table(RIDING)
 )
 def test_files_of_one_recording_are_one_ride(sorted_out, files, logs, asks):
     """The page asks for the columns of an unknown logger's table."""
-    found = sorted_out(files)
-    assert {one["log"]: sorted(one["files"]) for one in found["rides"]} == logs
-    assert all((one["table"] is not None) is asks for one in found["rides"])
+    result = sorted_out(files)
+    assert {ride["log"]: sorted(ride["files"]) for ride in result["rides"]} == logs
+    assert all((ride["table"] is not None) is asks for ride in result["rides"])
 
 
 def test_an_archive_is_one_ride_with_its_own_name(sorted_out, tmp_path):
     path = app_exports.into(tmp_path / "lap.zip", app_exports.phyphox(RIDING))
-    found = sorted_out({"lap.zip": path.read_bytes()})
-    assert [(one["log"], one["files"], one["table"]) for one in found["rides"]] == [("lap.zip", ["lap.zip"], None)]
-    assert found["kinds"]["lap.zip"].startswith("of phyphox")
+    result = sorted_out({"lap.zip": path.read_bytes()})
+    assert [(ride["log"], ride["files"], ride["table"]) for ride in result["rides"]] == [("lap.zip", ["lap.zip"], None)]
+    assert result["kinds"]["lap.zip"].startswith("of phyphox")
 
 
 def test_the_report_is_that_of_the_command(sorted_out, ride, calibration):
@@ -132,9 +132,9 @@ def test_the_report_is_that_of_the_command(sorted_out, ride, calibration):
     from support.command import works
 
     sorted_out({path.name: path.read_bytes() for path in (ride, calibration)})
-    shown = json.loads(rides_guest.look(ride.name, calibration.name, lambda done, total: None))
-    assert shown["json"] == json.loads(works("report", ride, "--json").out) | {"ride": ride.name}
-    assert shown["warnings"] == [] and "Plotly.newPlot" in shown["page"]
+    report = json.loads(rides_guest.look(ride.name, calibration.name, lambda done, total: None))
+    assert report["json"] == json.loads(works("report", ride, "--json").out) | {"ride": ride.name}
+    assert report["warnings"] == [] and "Plotly.newPlot" in report["page"]
     (path,) = json.loads(rides_guest.smooth(ride.name, calibration.name, lambda done, total: None)).values()
     works("smooth", ride, "--out", "lean.csv")
     assert Path(path).read_text() == Path("lean.csv").read_text()

@@ -99,14 +99,14 @@ def test_each_board_gets_its_own_machine_code(files):
     """Four modules contain machine code. All other files are the same for every board."""
     packed = archive(files, "install.zip")
     modules = {name[1:-2] + "mpy" for name in firmware_files() if name.startswith("/kickstand/")}
-    first, *others = archives.ARCHITECTURES
+    first, *other_architectures = archives.ARCHITECTURES
     compiled = {
-        one: {name.removeprefix(f"compiled/{one}/") for name in packed if name.startswith(f"compiled/{one}/")}
-        for one in archives.ARCHITECTURES
+        arch: {name.removeprefix(f"compiled/{arch}/") for name in packed if name.startswith(f"compiled/{arch}/")}
+        for arch in archives.ARCHITECTURES
     }
     assert {f"kickstand/{name}" for name in compiled[first]} == modules
     machine_code = {name for name in modules if packed[f"compiled/{first}/{name.removeprefix('kickstand/')}"][2]}
-    for other in others:
+    for other in other_architectures:
         assert {f"kickstand/{name}" for name in compiled[other]} == machine_code
     assert len(machine_code) == 4 and {name for name in modules if name.endswith("_viper.mpy")} == machine_code
 
@@ -151,8 +151,8 @@ def test_a_page_lists_all_documents_and_its_own_headings(files):
         assert text.count('aria-current="page"') == 2, name
         headings = re.findall(r'<h3 id="([^"]+)"', text)
         if headings and not name.endswith(documents.ALL):
-            (here,) = re.findall('<nav class="here".*?</nav>', text, re.S)
-            assert re.findall(r'class="level-2"><a href="#([^"]+)"', here) == headings
+            (nav,) = re.findall('<nav class="here".*?</nav>', text, re.S)
+            assert re.findall(r'class="level-2"><a href="#([^"]+)"', nav) == headings
 
 
 def test_one_page_has_all_the_words(files):

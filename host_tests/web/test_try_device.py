@@ -60,12 +60,12 @@ def test_a_first_visit_is_recorded_every_20_ms(board):
     assert records[0]["phase"] == "kickstand" and records[0]["lean_deg"] == pytest.approx(-12.0, abs=0.1)
     first = records[1]["display"]
     assert first["codes"] == [[0x20] * 16] * 2 and first["shown_deg"] is None
-    shown = texts(records)
-    assert [any(words in text for text in shown) for words in ("On stand: press", "Aligned!")] == [True, True]
-    assert len(shown) < 0.2 * len(records)
+    display = texts(records)
+    assert [any(words in text for text in display) for words in ("On stand: press", "Aligned!")] == [True, True]
+    assert len(display) < 0.2 * len(records)
     states = [tick["state"] for tick in records if "state" in tick]
     assert states[0]["code"] == "starting" and states[-1]["view"] == "align" and set(states[-1]) == set(STATE)
-    assert all(one != other for one, other in itertools.pairwise(states)) and len(states) < 30
+    assert all(state != other for state, other in itertools.pairwise(states)) and len(states) < 30
     board.order("pose", 15.0)
     records += ticks(board, 20.0)
     board.order("lean", -25.0)
@@ -99,13 +99,13 @@ def test_wire_power_and_display_may_be_pulled(board):
     board.order("power", True)
     assert board.state() == {"view": "starting"}
     records = ticks(board, 15.0)
-    shown = last(records, "display")
-    assert records[-1]["powered"] and shown["lit"] and len(shown["pixels"]) == 1024
+    display = last(records, "display")
+    assert records[-1]["powered"] and display["lit"] and len(display["pixels"]) == 1024
     assert any("On stand" in text for text in texts(records)) and not any("?" in text for text in texts(records))
     for kind, pixels in (("lcd", 0), ("sh1106", 1024)):  # a display that has power lights up after its initialisation
         board.order("display", kind)
-        shown = last(ticks(board, board.board.clock.now_us / 1e6 + 3.0), "display")
-        assert shown["lit"] and len(shown.get("pixels", [])) == pixels and shown["text"][0].startswith("Raw")
+        display = last(ticks(board, board.board.clock.now_us / 1e6 + 3.0), "display")
+        assert display["lit"] and len(display.get("pixels", [])) == pixels and display["text"][0].startswith("Raw")
 
 
 def test_time_goes_on_in_safe_mode(board):
@@ -186,11 +186,11 @@ def test_no_display_is_shown_half_written(tmp_path, monkeypatch):
         for lean_deg in (30, -25, 10, -40, 0, 5, 45, -3):
             for order in [("lean", lean_deg), ("wait", 3), SHORT]:
                 drive.do(*order)
-    shown = [(tick["t_s"], tick["display"]["text"][0]) for tick in drive.records if "display" in tick]
-    assert len(shown) > 100 and [line for _, line in shown if not WHOLE.match(line)] == []
-    pages = [(t_s, re.sub(r"[-+\d.°]+|left|right|Brake|Accel", "", line).strip()) for t_s, line in shown if t_s > 1.0]
-    changes = [pages[0], *(other for one, other in itertools.pairwise(pages) if one[1] != other[1])]
-    assert all(other[0] - one[0] > LASTING_S for one, other in itertools.pairwise(changes))
+    display = [(tick["t_s"], tick["display"]["text"][0]) for tick in drive.records if "display" in tick]
+    assert len(display) > 100 and [line for _, line in display if not WHOLE.match(line)] == []
+    pages = [(t_s, re.sub(r"[-+\d.°]+|left|right|Brake|Accel", "", line).strip()) for t_s, line in display if t_s > 1.0]
+    changes = [pages[0], *(other for state, other in itertools.pairwise(pages) if state[1] != other[1])]
+    assert all(other[0] - state[0] > LASTING_S for state, other in itertools.pairwise(changes))
 
 
 @pytest.mark.parametrize(("on", "two_lines", "letter"), [(True, True, 0x41), (False, True, 0x20), (True, False, 0x20)])

@@ -12,12 +12,15 @@ CHIP = click.option(
 )
 
 
-@click.command(short_help="An emulated board that flash can deploy to.")
+@click.command()
 @click.option("--port", type=click.IntRange(1024, 65535), default=2040, help="The TCP port of the board's console.")
 @CHIP
 @DISPLAY
 def emulate_command(port: int, chip: str, display: str) -> None:
-    """Start an emulated board on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
+    """Start an emulated board that flash can deploy to.
+
+    It is at socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike.
+    """
     click.echo("starting: the emulator is being loaded, then the board is switched on, which takes some seconds")
     ready_emulator(chip)
     from .emulate import emulate

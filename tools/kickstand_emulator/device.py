@@ -32,16 +32,12 @@ class EmulatedDevice(ABC):
         world: The board's motion, as for simulator.Board. None means that the board lies level and at rest.
         files: The content of the board's flash, see flash_image.py.
         fitted: Other arguments of simulator.Board.
-
-    NAME: Name of the board.
-    FLASH: Location of the file system in its flash.
-    MPY: Version of the bytecode that the board accepts, see bytecode.py.
-    SINK: Code for the board that defines a class Sink. Sink.write() passes bytes to the function given to listen().
     """
 
-    NAME: str
-    FLASH: FileSystem
-    MPY: int
+    NAME: str  # name of the board
+    FLASH: FileSystem  # location of the file system in its flash
+    MPY: int  # version of the bytecode that the board accepts, see bytecode.py
+    # Code for the board that defines a class Sink. Sink.write() passes bytes to the function given to listen().
     SINK: str
 
     def __init__(self, board: Board) -> None:

@@ -104,9 +104,9 @@ def emulate(port: int, say: Callable[[str], None], chip: str = "rp2040", display
 
 def _run(device: EmulatedDevice, server: ConsoleServer) -> None:
     """Advance the time by one step, but not faster than real time. The time-outs of mpremote use the host's clock."""
-    begun, before = time.monotonic(), device.time_s
+    begun, previous_s = time.monotonic(), device.time_s
     device.run(_STEP_S, server.poll)
-    time.sleep(max(0.0, device.time_s - before - (time.monotonic() - begun)))
+    time.sleep(max(0.0, device.time_s - previous_s - (time.monotonic() - begun)))
 
 
 def _watch(device: EmulatedDevice, server: ConsoleServer, bike: HandBike, address: str) -> None:
@@ -133,11 +133,11 @@ def below(on: bool, address: str) -> str:
 
 
 def _print(device: EmulatedDevice, server: ConsoleServer, bike: ScriptedBike, say: Callable[[str], None]) -> None:
-    shown: list[str] = device.lcd()
+    lines: list[str] = device.lcd()
     while True:
         _run(device, server)
         bike.follow(device)
-        if device.lcd() != shown:
-            shown = device.lcd()
+        if device.lcd() != lines:
+            lines = device.lcd()
             say(f"{device.time_s:8.2f} s")
-            say("\n".join(lcd_lines(shown)))
+            say("\n".join(lcd_lines(lines)))

@@ -207,8 +207,8 @@ class Sink:
 
     def _last_output(self) -> str:
         self._said.seek(0)
-        said = self._said.read().decode(errors="replace").strip()
-        return said.rpartition("\n")[2] or "it said nothing"
+        output = self._said.read().decode(errors="replace").strip()
+        return output.rpartition("\n")[2] or "it said nothing"
 
     def _sync(self) -> None:
         self._command(SYNC)

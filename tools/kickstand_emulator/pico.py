@@ -84,9 +84,9 @@ class Pico(EmulatedDevice):
         A program never starts such an operation in the middle of an I2C transfer. The method therefore first waits for
         a millisecond without a transfer.
         """
-        before = None
-        while before != (begun := [dict(bus.transfers) for bus in self.board.buses]) or self._transferring():
-            before = begun
+        previous = None
+        while previous != (begun := [dict(bus.transfers) for bus in self.board.buses]) or self._transferring():
+            previous = begun
             self.run(0.001)
         self.chip.sleep(seconds)
 

@@ -160,10 +160,10 @@ class Cluster:
             yield from self._collect(suspects)
         for index in suspects:
             self._submit(function, items, index)
-            again: list[int] = []
+            crashed: list[int] = []
             while self._under_way:
-                yield from self._collect(again)
-            if again:
+                yield from self._collect(crashed)
+            if crashed:
                 yield index, None, CRASHED, "its worker died twice: out of memory, or a crash of a library"
 
     def _submit(self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]], index: int) -> None:
@@ -210,21 +210,21 @@ class Cluster:
 
     def _check_workers(self) -> None:
         """Raise InputError if no worker has existed for _LOST_S. Without a worker the tasks would wait for ever."""
-        now = time.monotonic()
+        now_s = time.monotonic()
         if self._client.scheduler_info(n_workers=1)["workers"]:
-            self._working_s = now
-        elif now - self._working_s > _LOST_S:
+            self._working_s = now_s
+        elif now_s - self._working_s > _LOST_S:
             raise InputError(f"all workers{self._where()} have ended; {KEPT}")
 
     def _where(self) -> str:
         return f" at {self._address}" if self._address else ""
 
     def _end_overdue_tasks(self) -> Iterator[Outcome]:
-        now = time.monotonic()
+        now_s = time.monotonic()
         for key, (began_s, worker) in list(self._started.items()):
             if key not in self._under_way:
                 self._started.pop(key, None)
-            elif now - began_s > self._timeout_s:
+            elif now_s - began_s > self._timeout_s:
                 index, future = self._under_way.pop(key)
                 self._started.pop(key, None)
                 future.cancel(force=True)

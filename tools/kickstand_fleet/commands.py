@@ -9,7 +9,7 @@ from kickstand_tools.common.progress import Bar
 from . import KEPT
 
 
-@click.command(short_help="Align many vehicles, find moved mounts, test their brakes.")
+@click.command()
 @click.argument("manifests", nargs=-1, required=True, metavar="MANIFEST.csv|GLOB")
 @click.option("--out", required=True, metavar="DIR", help="The directory to write to, or an address such as s3://...")
 @click.option("--scheduler", metavar="ADDRESS", help="A Dask cluster at tcp://... Default: this computer.")
@@ -28,7 +28,7 @@ from . import KEPT
     "--vehicle", type=VEHICLES, default="car", help="The kind of vehicle, for a GLOB. A manifest has its own column."
 )
 def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **options: Any) -> None:
-    """Align many vehicles, find mounts that moved, and measure brake tests.
+    """Align many vehicles, find moved mounts, test their brakes.
 
     The manifest is CSV with the columns vehicle,path,kind and optionally mount: one line per log, in chronological
     order. With a GLOB each matching file is one vehicle. Paths may start with s3://. To resume a run, repeat the

@@ -59,43 +59,30 @@ TIGHT_DPS = 20.0
 
 @dataclass
 class Intervals:
-    """n intervals of a log. Each interval lasts from one speed to the next speed.
+    """n intervals of a log. Each interval lasts from one speed to the next speed."""
 
-    t_s: Middle of each interval, shape (n), in s from the log's beginning.
-    force: Mean force of each interval, shape (n, 3), in g along the sensor's axes.
-    terms: The regressors of level, forward, left and arm, shape (n, 4).
-    weight: Weight of each interval, shape (n), in s.
-    speed: Mean speed of each interval, shape (n), in m/s.
-    sway: Covariance of the quick changes of force, shape (n, 3, 3), in g^2. Zero for intervals without usable sway.
-    """
-
-    t_s: Array
-    force: Array
-    terms: Array
-    weight: Array
-    speed: Array
+    t_s: Array  # middle of each interval, shape (n), in s from the log's beginning
+    force: Array  # mean force of each interval, shape (n, 3), in g along the sensor's axes
+    terms: Array  # the regressors of level, forward, left and arm, shape (n, 4)
+    weight: Array  # weight of each interval, shape (n), in s
+    speed: Array  # mean speed of each interval, shape (n), in m/s
+    # Covariance of the quick changes of force, shape (n, 3, 3), in g^2. Zero for intervals without usable sway.
     sway: Array
 
 
 @dataclass
 class Blocks(Table):
-    """m consecutive blocks of intervals in one or several logs.
+    """m consecutive blocks of intervals in one or several logs."""
 
-    square: Sums of products of two terms, shape (m, 4, 4). The road's slope is filtered out, see _without_road().
-    product: Sums of products of a term and a component of the force, shape (m, 4, 3), filtered like square.
-    sway: Sway of each block, shape (m, 3, 3). The matrix is divided by its trace, so a rough road counts like a smooth
-        road.
-    log: Index of each block's log, shape (m).
-    t_s: Beginning of each block in its log, shape (m), in s.
-    end_s: End of each block in its log, shape (m), in s.
-    """
-
+    # Sums of products of two terms, shape (m, 4, 4). The road's slope is filtered out, see _without_road().
     square: Array
-    product: Array
+    product: Array  # sums of products of a term and a component of the force, shape (m, 4, 3), filtered like square
+    # Sway of each block, shape (m, 3, 3). The matrix is divided by its trace, so a rough road counts like a smooth
+    # road.
     sway: Array
-    log: Array
-    t_s: Array
-    end_s: Array
+    log: Array  # index of each block's log, shape (m)
+    t_s: Array  # beginning of each block in its log, shape (m), in s
+    end_s: Array  # end of each block in its log, shape (m), in s
 
 
 def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
@@ -158,8 +145,8 @@ def blocks(logs: list[Intervals]) -> Blocks:
         begin_s.append(log.t_s[starts])
         end_s.append(log.t_s[np.append(starts[1:], len(log.t_s)) - 1])
     if not square:
-        none = np.zeros(0)
-        return Blocks(np.zeros((0, 4, 4)), np.zeros((0, 4, 3)), np.zeros((0, 3, 3)), np.zeros(0, int), none, none)
+        empty = np.zeros(0)
+        return Blocks(np.zeros((0, 4, 4)), np.zeros((0, 4, 3)), np.zeros((0, 3, 3)), np.zeros(0, int), empty, empty)
     return Blocks(*(np.concatenate(parts) for parts in (square, product, sway, log_index, begin_s, end_s)))
 
 
@@ -282,10 +269,10 @@ def _integrals(columns: Iterable[Array], t_s: Array, step: Array, time: Array) -
 def _thinned(time: Array, speed: Array) -> tuple[Array, Array]:
     """Keep at most one speed per INTERVAL_S. Returns the times and the speeds that are kept."""
     selected, last = [], -np.inf
-    for k, now in enumerate(time.tolist()):
-        if now - last >= INTERVAL_S:
+    for k, time_s in enumerate(time.tolist()):
+        if time_s - last >= INTERVAL_S:
             selected.append(k)
-            last = now
+            last = time_s
     return time[selected], speed[selected]
 
 

@@ -32,18 +32,12 @@ _LEAST_BLOCKS = 4
 
 @dataclass
 class Forward:
-    """The alignment of a mount.
+    """The alignment of a mount."""
 
-    frame: Rotation from sensor to vehicle axes, shape (3, 3). Its rows are left, up, forward.
-    sigma_deg: Standard error of forward about up.
-    attitude_deg: Standard error of the whole rotation.
-    halves_deg: Angle between forward from the first half of the driving and forward from the second half.
-    """
-
-    frame: Array
-    sigma_deg: float
-    attitude_deg: float
-    halves_deg: float
+    frame: Array  # rotation from sensor to vehicle axes, shape (3, 3). Its rows are left, up, forward.
+    sigma_deg: float  # standard error of forward about up
+    attitude_deg: float  # standard error of the whole rotation
+    halves_deg: float  # angle between forward from the first half of the driving and forward from the second half
 
     @property
     def sure(self) -> bool:

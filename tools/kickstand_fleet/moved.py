@@ -56,18 +56,13 @@ STEP_SHARE = 0.7  # a tilt is sudden if more than this share of the tilt happens
 
 @dataclass
 class Move:
-    """A rotation of the mount.
+    """A rotation of the mount."""
 
-    log: Index of the log in which the mount rotated, or of the first log after the rotation.
-    at_s: Time of the rotation from the beginning of that log. None if the mount rotated before that log.
-    turn_deg: Rotation vector along the vehicle's left, up and forward, shape (3).
-    sigma_deg: Standard deviations of turn_deg, shape (3).
-    """
-
-    log: int
+    log: int  # index of the log in which the mount rotated, or of the first log after the rotation
+    # Time of the rotation from the beginning of that log. None if the mount rotated before that log.
     at_s: float | None
-    turn_deg: Array
-    sigma_deg: Array
+    turn_deg: Array  # rotation vector along the vehicle's left, up and forward, shape (3)
+    sigma_deg: Array  # standard deviations of turn_deg, shape (3)
 
     @property
     def angle_deg(self) -> float:
@@ -171,18 +166,12 @@ def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
 
 @dataclass
 class _PartAlignment:
-    """The alignment on one side of a comparison.
+    """The alignment on one side of a comparison."""
 
-    frame: Rotation from sensor to vehicle axes, shape (3, 3).
-    variance: Variances of pitch, yaw and roll, shape (3), in degrees^2.
-    sway_deg: Direction of the sway, in degrees from forward.
-    sway_variance: Variance of sway_deg, in degrees^2. Infinite without sway.
-    """
-
-    frame: Array
-    variance: Array
-    sway_deg: float
-    sway_variance: float
+    frame: Array  # rotation from sensor to vehicle axes, shape (3, 3)
+    variance: Array  # variances of pitch, yaw and roll, shape (3), in degrees^2
+    sway_deg: float  # direction of the sway, in degrees from forward
+    sway_variance: float  # variance of sway_deg, in degrees^2. Infinite without sway.
 
 
 def _align_part(part: Blocks) -> _PartAlignment | None:
@@ -226,12 +215,12 @@ def _moment_of_jump(log: Intervals, move: Move) -> float | None:
     # Unit vector of the direction in which the vertical moves
     tips = (left * move.turn_deg[2] - forward * move.turn_deg[0]) / tilt
     best, moment = 0.0, move.at_s
-    for now in time[np.abs(time - move.at_s) < 2.5 * STEP_S]:
-        early = (time > now - STEP_GAP_S - STEP_S) & (time < now - STEP_GAP_S)
-        late = (time > now + STEP_GAP_S) & (time < now + STEP_GAP_S + STEP_S)
+    for time_s in time[np.abs(time - move.at_s) < 2.5 * STEP_S]:
+        early = (time > time_s - STEP_GAP_S - STEP_S) & (time < time_s - STEP_GAP_S)
+        late = (time > time_s + STEP_GAP_S) & (time < time_s + STEP_GAP_S + STEP_S)
         if np.count_nonzero(early) < 3 or np.count_nonzero(late) < 3:
             continue
         step = np.degrees((np.median(level[late], axis=0) - np.median(level[early], axis=0)) @ tips)
         if step > best:
-            best, moment = float(step), float(now)
+            best, moment = float(step), float(time_s)
     return moment if best > STEP_SHARE * tilt or tilt > SURELY_DEG else None

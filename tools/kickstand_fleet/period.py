@@ -127,18 +127,13 @@ def _result(period: Period, signals_to: str | None) -> PeriodResult:
 
 @dataclass
 class _Drive:
-    """The alignment from the logs of a period.
+    """The alignment from the logs of a period."""
 
-    fit: Alignment by the firmware's method.
-    intervals: Intervals of each log. Empty if the firmware refused the logs and no other method can help.
-    moves: Moves of the mount.
-    forward: Alignment from all logs, or None if they do not determine it.
-    """
-
-    fit: DriveFit
+    fit: DriveFit  # alignment by the firmware's method
+    # Intervals of each log. Empty if the firmware refused the logs and no other method can help.
     intervals: list[evidence.Intervals] = field(default_factory=list)
-    moves: list[Move] = field(default_factory=list)
-    forward: Forward | None = None
+    moves: list[Move] = field(default_factory=list)  # moves of the mount
+    forward: Forward | None = None  # alignment from all logs, or None if they do not determine it
 
 
 def _drive(period: Period, logs: list[Log]) -> _Drive:
@@ -249,13 +244,13 @@ def _mirrored(driven: list[evidence.Intervals]) -> bool:
 def _moved_words(moves: list[Move], logs: list[Log]) -> str:
     first = moves[0]
     name = logs[first.log].name
-    more = f", and {len(moves) - 1} times more" if len(moves) > 1 else ""
+    repeats = f", and {len(moves) - 1} times more" if len(moves) > 1 else ""
     turned = f"the mount was turned by {first.angle_deg:.0f} degrees"
     if first.at_s is None:
-        return f"{turned} before {name}{more}: give {name} and the logs after it another mount in the manifest"
+        return f"{turned} before {name}{repeats}: give {name} and the logs after it another mount in the manifest"
     return (
-        f"{turned} in {name} at {first.at_s:.0f} s{more}: cut it there (kickstand cut), and give the second part and "
-        "the logs after it another mount in the manifest"
+        f"{turned} in {name} at {first.at_s:.0f} s{repeats}: cut it there (kickstand cut), and give the second part "
+        "and the logs after it another mount in the manifest"
     )
 
 

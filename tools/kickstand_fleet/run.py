@@ -14,7 +14,7 @@ from kickstand_tools.common.output import check_directory, new_directory
 
 from . import KEPT, files, tables
 from .cluster import run_tasks
-from .journal import Journal, StoreJournal
+from .journal import Journal
 from .manifest import Period
 from .period import AFTERWARDS, CHANGED, DISK_FULL, PeriodResult, failed, work_on_period
 from .show import plot
@@ -82,12 +82,11 @@ def run_fleet(
     with contextlib.ExitStack() as opened:
         if files.is_remote(str(out)):
             directory = str(out).rstrip("/")
-            journal = opened.enter_context(StoreJournal(files.join(directory, "journal")))
         else:
             check_directory(Path(out))
             directory = str(Path(out).resolve())  # absolute, because workers may have another working directory
             opened.enter_context(new_directory(Path(directory) / PLOTS))
-            journal = opened.enter_context(Journal(Path(directory) / "journal.jsonl"))
+        journal = Journal(files.join(directory, "journal"))
         marks = _marks(periods)
         keys = _keys(periods, marks, with_signals)
         signals_to = files.join(directory, SIGNALS) if with_signals else None
@@ -107,11 +106,10 @@ def run_fleet(
                 if progress:
                     progress(finished, len(keys))
                 if time.monotonic() - last_s > pause_s:
-                    journal.sync()
-                    before_s = time.monotonic()
+                    begin_s = time.monotonic()
                     write_results(directory, journal.results(keys), len(keys))
                     last_s = time.monotonic()
-                    pause_s = max(_WRITE_S, _SHARE * (last_s - before_s))
+                    pause_s = max(_WRITE_S, _SHARE * (last_s - begin_s))
         except BaseException:  # including Ctrl-C
             # An InputError is ignored: if the disk is full, the first error already reports it
             with contextlib.suppress(InputError):
@@ -145,15 +143,15 @@ def _note_changed(period: Period, marks: dict[str, str], result: PeriodResult) -
     Returns True if there is such a log, because the result may then come from the old or the new version. Logs in a
     store are not checked: a file read from a store is always one complete version.
     """
-    now = files.identities(path for path in period.paths if not files.is_remote(path))
-    changed = [path for path, mark in now.items() if mark != marks[path]]
+    current = files.identities(path for path in period.paths if not files.is_remote(path))
+    changed = [path for path, mark in current.items() if mark != marks[path]]
     for path in map(files.printable, changed):
         whose = {"vehicle": period.vehicle, "mount": period.mount, "log": path, "reason": CHANGED}
         result.errors.append(whose | {"message": f"{path} has changed during the run: run the command again"})
     return bool(changed)
 
 
-def _keep(directory: str, journal: Journal | StoreJournal, key: str, result: PeriodResult, again: bool) -> None:
+def _keep(directory: str, journal: Journal, key: str, result: PeriodResult, again: bool) -> None:
     """Save a result in the journal, and write its picture. again: True if the next run should recompute the result.
 
     Raises InputError if a file cannot be written, or if the disk was full when the signals were written.
@@ -167,7 +165,10 @@ def _keep(directory: str, journal: Journal | StoreJournal, key: str, result: Per
             result.alignment["plot"] = path
         except InputError as error:
             unshown = error
-    journal.add(key, result, again or bool(missing) or unshown is not None)
+    try:
+        journal.add(key, result, again or bool(missing) or unshown is not None)
+    except InputError as error:
+        raise InputError(f"{error}; {KEPT}") from error
     if unshown:
         raise unshown
     full = next((row for row in missing if row["reason"] == DISK_FULL), None)

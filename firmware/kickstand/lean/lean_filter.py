@@ -70,6 +70,7 @@ class LeanFilter:
         self._good_s = 0.0
         self._kept_speed = None  # (speed, variance) for the next start of the filter
         self._gap = False  # True if the next start of the filter follows missing readings
+        self.lying_s = 0.0  # time for which the bike has lain on its side, by force and rates alone
         self.restart()
 
     def restart(self):
@@ -226,6 +227,10 @@ class LeanFilter:
             self.consistency.gap()
             self._forget()  # forget the sensor's errors too, because they may be NaN
             return
+        if self._lies(means):
+            self.lying_s += seconds
+        else:
+            self.lying_s = 0.0
         if self._impossible(means, seconds):
             self.consistency.fail("odd-up")
             self._failed = True
@@ -245,6 +250,14 @@ class LeanFilter:
             self._stand(means)
             return  # no update, because this window's innovations belong to the state before _stand()
         self._work = self._process(means, seconds, roll_acceleration)
+
+    def _lies(self, means):
+        """True if the force is gravity on a bike that lies on its side and does not turn. On a bike in balance the
+        force points to the bike's up axis, even if the estimated lean is wrong."""
+        force = sqrt(means[5] * means[5] + means[6] * means[6] + means[7] * means[7])
+        if abs(means[5]) < measurements.LYING_SIDE * force or abs(force - 1.0) > measurements.LYING_FORCE:
+            return False
+        return max(max(means[2:5]), -min(means[2:5])) < measurements.LYING_RATE
 
     def _impossible(self, means, seconds):
         """True if the lean has been impossible for a bike, and the force does not confirm it. The force does confirm

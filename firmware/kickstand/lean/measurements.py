@@ -58,6 +58,11 @@ SIGMA_DOUBT_BIAS = radians(2.5)
 # restarts later.
 IMPOSSIBLE_LEAN = radians(80.0)  # rad
 IMPOSSIBLE_S = 1.0  # s
+# A bike lies on its side if the force to the side is above LYING_SIDE of the whole force, the force differs from 1 g by
+# less than LYING_FORCE, and each rate is below LYING_RATE.
+LYING_SIDE = 0.82  # ratio: sine of 55 degrees. Larger: bikes that fell on their luggage are not found.
+LYING_FORCE = 0.2  # g. Larger: a ride on a mount that has turned by 90 degrees is mistaken for a fall.
+LYING_RATE = 0.15  # rad/s. Larger: the same.
 # For MOVING_S after a measured speed above MOVING_SPEED the bike is not at rest.
 MOVING_SPEED = 2.0  # m/s. Larger: slow riding on a smooth road is mistaken for rest.
 MOVING_S = 2.5  # s. Larger: a stop is detected later.

@@ -14,8 +14,8 @@ MAX_VARIANCE = (SIGMA_SHARE * radians(3.0)) ** 2
 DOUBTED_VARIANCE = (SIGMA_SHARE * radians(2.0)) ** 2  # after repeated misfits, a lean of larger variance is not shown
 TRIM_MAX_VARIANCE = radians(0.5) ** 2  # a trim of larger variance is not kept
 _TRIM_STEP_DEG = const(0.3)  # smaller changes of the trim are not saved, because saving wears the flash
-FALLEN_DEG = 65.0  # smallest lean of a fallen bike; the bike has fallen if the lean lasts for _FALLEN_US
-_FALLEN_US = const(1_000_000)
+FALLEN_DEG = 65.0  # smallest lean of a fallen bike
+_FALLEN_S = const(0.75)  # the bike has fallen if it has lain for four windows of the filter, about a second
 # Half of the time for which a lean must last to count as a maximum. The jerk of a pothole is shorter than the whole
 # time
 HELD_US = 75_000
@@ -72,7 +72,6 @@ class LeanMeter:
         """Restart filter and smoothing after missing readings. Keep the maxima and the sensor's errors."""
         self.filter.restart()
         self._fresh = True
-        self._flat_us = 0
         self.fallen = False
         self.lean_deg = 0.0
 
@@ -181,11 +180,9 @@ class LeanMeter:
             smooth[1] += gain * (force[1] - smooth[1])
         self.lean_deg = lean = self.filter.update(force, self.rate, dt_us) if self._leans else 0.0
         if abs(lean) >= FALLEN_DEG:
-            self._flat_us += dt_us
-            self.fallen = self._flat_us >= _FALLEN_US
+            self.fallen = self.filter.lying_s > _FALLEN_S
             return
-        if self._flat_us:
-            self._flat_us = 0
+        if self.fallen:
             self.fallen = False
         if not (
             -self.max_left_deg <= lean <= self.max_right_deg and -self.max_brake_g <= smooth[2] <= self.max_accel_g

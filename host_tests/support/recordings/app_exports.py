@@ -51,8 +51,8 @@ class Riding:
 
     def without(self, begin_s: float, end_s: float) -> "Riding":
         """Return the ride without the samples between two times."""
-        kept = (self.t_s < begin_s) | (self.t_s >= end_s)
-        return Riding(*(getattr(self, name)[kept] for name in self.__dataclass_fields__))
+        valid = (self.t_s < begin_s) | (self.t_s >= end_s)
+        return Riding(*(getattr(self, name)[valid] for name in self.__dataclass_fields__))
 
     @property
     def phone_g(self) -> np.ndarray:
@@ -127,14 +127,14 @@ def phyphox(ride: Riding, separator: str = ",", comma: bool = False) -> dict[str
 
     gyro, fixes = ride.every(2, 1), ride.each_second()
     metres = ["Time (s)", *[f"{axis} (m/s^2)" for axis in "XYZ"]]
-    place = ["Time (s)", "Latitude (°)", "Longitude (°)", "Height (m)", "Velocity (m/s)", "Direction (°)"]
-    none = np.zeros(len(fixes.t_s))
+    header = ["Time (s)", "Latitude (°)", "Longitude (°)", "Height (m)", "Velocity (m/s)", "Direction (°)"]
+    zeros = np.zeros(len(fixes.t_s))
     start = separator.join(['"START"', number(0.0), number(START_UTC_S, 15), '"2024"'])
     return {
         "Gyroscope.csv": table(["Time (s)", *[f"{axis} (rad/s)" for axis in "XYZ"]], gyro.t_s, gyro.phone_rad),
         "Linear Accelerometer.csv": table(metres, ride.t_s, 9.81 * (ride.phone_g - ride.gravity_g)),
         "Accelerometer.csv": table(metres, ride.t_s, 9.81 * ride.phone_g),
-        "Location.csv": table(place, fixes.t_s, fixes.lat_deg, fixes.lon_deg, none, fixes.speed_mps, none),
+        "Location.csv": table(header, fixes.t_s, fixes.lat_deg, fixes.lon_deg, zeros, fixes.speed_mps, zeros),
         "meta/device.csv": f'"property"{separator}"value"\n"deviceModel"{separator}"Pixel"\n',
         "meta/time.csv": separator.join(f'"{name}"' for name in ("event", "experiment time", "system time", "text"))
         + f"\n{start}\n",
@@ -191,8 +191,8 @@ def sensorlog(ride: Riding, separator: str = ",", accelerometer: bool = True) ->
     force, rates, gravity = -ride.phone_g, ride.phone_rad, -ride.gravity_g
     for k, t in enumerate(ride.t_s.tolist()):
         fix = k // 100 * 100
-        at = START_UTC_S + t
-        clock = f"2024-05-17 11:{30 + int(at - 1_715_938_200) // 60:02d}:{(at - 1_715_938_200) % 60:06.3f} +0200"
+        utc = START_UTC_S + t
+        clock = f"2024-05-17 11:{30 + int(utc - 1_715_938_200) // 60:02d}:{(utc - 1_715_938_200) % 60:06.3f} +0200"
         row = [clock, str(k), f"{START_UTC_S + ride.t_s[fix]:.3f}"]
         row += [f"{ride.lat_deg[fix]:.7f}", f"{ride.lon_deg[fix]:.7f}", f"{ride.speed_mps[fix]:.3f}"]
         if accelerometer:
@@ -231,18 +231,18 @@ def racechrono(ride: Riding, sign: float = 1.0, version: int = 3) -> str:
     Version 3 has three header lines and repeats some names. Version 2 has one header line, with units in brackets.
     """
     force, rates = sign * ride.phone_g, np.degrees(ride.phone_rad)
-    none = [""] * len(ride.t_s)
+    empty = [""] * len(ride.t_s)
     speed = [f"{value:.2f}" for value in ride.speed_mps]
     columns: list[tuple[str, str, str, Sequence[str]]] = [
         ("timestamp", "unix time", "", [f"{START_UTC_S + t:.3f}" for t in ride.t_s]),
-        ("fragment_id", "", "", ["0"] * len(none)),
-        ("lap_number", "", "", none),
+        ("fragment_id", "", "", ["0"] * len(empty)),
+        ("lap_number", "", "", empty),
         ("elapsed_time", "s", "", [f"{t:.3f}" for t in ride.t_s]),
         ("latitude", "deg", "100: gps", [f"{value:.7f}" for value in ride.lat_deg]),
         ("longitude", "deg", "100: gps", [f"{value:.7f}" for value in ride.lon_deg]),
         ("speed", "m/s", "100: gps", speed),
-        ("lateral_acc", "G", "calc", none),
-        ("lean_angle", "deg", "calc", none),
+        ("lateral_acc", "G", "calc", empty),
+        ("lean_angle", "deg", "calc", empty),
         ("speed", "m/s", "calc", speed),
         *[(f"{axis}_acc", "G", "101: acc", [f"{v:.5f}" for v in column]) for axis, column in zip("xyz", force.T)],
         *[
@@ -270,14 +270,14 @@ def racebox(ride: Riding, per_mps: float = 3.6, laps: bool = False) -> str:
     rows = []
     for k, (left, up, forward) in enumerate(ride.force_g.tolist()):
         about_left, about_up, about_forward = ride.rates_dps[k].tolist()
-        at = ride.t_s[k] + 0.25
+        t_s = ride.t_s[k] + 0.25
         rows.append(
-            [str(k + 1), f"2024-05-17T09:30:{at:06.3f}Z", f"{ride.lat_deg[k]:.7f}", f"{ride.lon_deg[k]:.7f}", "34.5"]
+            [str(k + 1), f"2024-05-17T09:30:{t_s:06.3f}Z", f"{ride.lat_deg[k]:.7f}", f"{ride.lon_deg[k]:.7f}", "34.5"]
             + [f"{per_mps * ride.speed_mps[k]:.2f}", f"{forward:.3f}", f"{left:.3f}", f"{up:.3f}", "0"]
             + [f"{about_forward:.2f}", f"{about_left:.2f}", f"{about_up:.2f}"]
         )
-    before = "Format,RaceBox CSV\nTrack,Home\nLap 1, 33.821, sectors, 9.01,6.759,9.764,0,8.288\n\n" if laps else ""
-    return before + lines(names, rows)
+    head = "Format,RaceBox CSV\nTrack,Home\nLap 1, 33.821, sectors, 9.01,6.759,9.764,0,8.288\n\n" if laps else ""
+    return head + lines(names, rows)
 
 
 def vbo(ride: Riding, speed: str = "kmh") -> str:

@@ -63,9 +63,9 @@ def cut_a_piece(text: bytes, chance: random.Random) -> bytes:
 
 @_of_lines
 def double_lines(lines: list[bytes], chance: random.Random) -> list[bytes]:
-    at = chance.randrange(len(lines))
+    index = chance.randrange(len(lines))
     many = chance.choice((1, 1, 5, 60))
-    return lines[:at] + lines[at : at + 1] * many + lines[at:]
+    return lines[:index] + lines[index : index + 1] * many + lines[index:]
 
 
 @_of_lines
@@ -76,16 +76,16 @@ def exchange_lines(lines: list[bytes], chance: random.Random) -> None:
 
 @_of_lines
 def shuffle_lines(lines: list[bytes], chance: random.Random) -> list[bytes]:
-    rest = lines[1:]
-    chance.shuffle(rest)
-    return lines[:1] + rest
+    body = lines[1:]
+    chance.shuffle(body)
+    return lines[:1] + body
 
 
 @_of_cells
 def lose_a_column(rows: Rows, chance: random.Random) -> None:
-    place = chance.randrange(max(1, len(rows[0])))
+    column = chance.randrange(max(1, len(rows[0])))
     for row in rows:
-        del row[place : place + 1]
+        del row[column : column + 1]
 
 
 @_of_cells
@@ -115,8 +115,8 @@ def scale_a_column(rows: Rows, chance: random.Random) -> None:
     size = chance.choice(SIZES)
     places = chance.choice(([0], [1, 2, 3], [4, 5, 6], [7], [1], [5]))
     begin = chance.choice((1, len(rows) // 2))
-    for place in places:
-        _renumber(rows[begin:], place, lambda value: b"%.9g" % (value * size))
+    for column in places:
+        _renumber(rows[begin:], column, lambda value: b"%.9g" % (value * size))
 
 
 @_of_cells
@@ -139,14 +139,14 @@ def go_wild(rows: Rows, chance: random.Random) -> None:
     g, dps = chance.choice(((19.0, 2400.0), (4.0, 2400.0), (19.0, 10.0)))
     for row in rows[begin : begin + chance.choice((1, 20, 1000))]:
         if len(row) > 6:
-            row[1:7] = [b"%.4f" % chance.uniform(-most, most) for most in (g, g, g, dps, dps, dps)]
+            row[1:7] = [b"%.4f" % chance.uniform(-limit, limit) for limit in (g, g, g, dps, dps, dps)]
 
 
 @_of_cells
 def freeze(rows: Rows, chance: random.Random) -> None:
-    at = chance.randrange(len(rows))
-    for row in rows[at : at + chance.choice((10, 60, 10_000))]:
-        row[1:] = rows[at][1:]
+    begin = chance.randrange(len(rows))
+    for row in rows[begin : begin + chance.choice((10, 60, 10_000))]:
+        row[1:] = rows[begin][1:]
 
 
 def other_separators(text: bytes, chance: random.Random) -> bytes:
@@ -164,13 +164,13 @@ def other_encoding(text: bytes, chance: random.Random) -> bytes:
 
 
 def put_nul_bytes(text: bytes, chance: random.Random) -> bytes:
-    at = chance.choice((0, len(text), chance.randrange(len(text) + 1)))
-    return text[:at] + bytes(chance.choice((1, 7, 5000))) + (text[at:] if chance.random() < 0.5 else b"")
+    offset = chance.choice((0, len(text), chance.randrange(len(text) + 1)))
+    return text[:offset] + bytes(chance.choice((1, 7, 5000))) + (text[offset:] if chance.random() < 0.5 else b"")
 
 
 def quote(text: bytes, chance: random.Random) -> bytes:
-    at = chance.randrange(len(text) + 1)
-    return text[:at] + b'"' + text[at:]
+    offset = chance.randrange(len(text) + 1)
+    return text[:offset] + b'"' + text[offset:]
 
 
 @_of_lines
@@ -206,7 +206,7 @@ def broken(bases: list[bytes], number: int) -> tuple[str, bytes, str]:
     if chance.random() < 0.2:
         name, text = "RIDE.csv.gz", gzip.compress(text, 1, mtime=0)
         if chance.random() < 0.7:
-            again = chance.choice((flip_bytes, cut_end, put_nul_bytes, cut_a_piece))
-            ways.append(again)
-            text = again(text, chance)
+            second = chance.choice((flip_bytes, cut_end, put_nul_bytes, cut_a_piece))
+            ways.append(second)
+            text = second(text, chance)
     return name, text, ", ".join(way.__name__ for way in ways)

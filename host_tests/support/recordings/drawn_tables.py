@@ -84,17 +84,17 @@ def draw(seed: int) -> DrawnTable:
             for a, g in zip(accel, gyro)
         ]
     clock, time_cells = _clock(time_s, random)
-    said = f"{kind} {accel_unit} {gyro_unit} {hz:g} Hz {clock}"
+    label = f"{kind} {accel_unit} {gyro_unit} {hz:g} Hz {clock}"
     shape = str(random.choice(list(SHAPES), p=list(SHAPES.values())))
     if shape == "table":
         names = _names(random, accel_unit, gyro_unit)
         text = _table(random, names, clock, time_cells, cells)
-        said += "" if names else " no header"
+        label += "" if names else " no header"
     else:
         text = {"labels": _labels, "events": _events, "two sensors": _two_sensors}[shape](
             random, clock, time_cells, cells
         )
-    return DrawnTable(text, time_s, force, rates, kind, f"{said} {shape}")
+    return DrawnTable(text, time_s, force, rates, kind, f"{label} {shape}")
 
 
 def motion(kind: str, hz: float, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -138,21 +138,21 @@ def _names(random: np.random.Generator, accel_unit: str, gyro_unit: str) -> list
 
 
 def _clock(time_s: np.ndarray, random: np.random.Generator) -> tuple[str, list[str]]:
-    which = str(
+    form = str(
         random.choice(
             ["s", "ms", "us", "epoch s", "epoch ms", "clock", "date"], p=(0.25, 0.3, 0.15, 0.08, 0.12, 0.05, 0.05)
         )
     )
-    if which in TIMES:
-        size, names = TIMES[which]
+    if form in TIMES:
+        size, names = TIMES[form]
         begin = random.uniform(0.0, 1000.0) if random.random() < 0.5 else 0.0
-        digits = 3 if which == "s" else 0
+        digits = 3 if form == "s" else 0
         return str(random.choice(names.split())), [f"{(begin + t) * size:.{digits}f}" for t in time_s]
-    if which == "epoch s":
+    if form == "epoch s":
         return "timestamp", [f"{EPOCH_S + t:.3f}" for t in time_s]
-    if which == "epoch ms":
+    if form == "epoch ms":
         return "time", [f"{1000.0 * (EPOCH_S + t):.0f}" for t in time_s]
-    if which == "clock":
+    if form == "clock":
         return "time", [f"12:{30 + int(t // 60):02d}:{t % 60:06.3f}" for t in time_s]
     return "datetime", [f"2024-05-17T09:{30 + int(t // 60):02d}:{t % 60:06.3f}Z" for t in time_s]
 
@@ -183,20 +183,20 @@ def _labels(random: np.random.Generator, clock: str, time: list[str], cells: Cel
     names = [name for axes in NAMES[random.integers(3)] for name in axes.split()]
     mark, between = str(random.choice([": ", ":", " = "])), str(random.choice(["\t", ", ", " "]))
     lines = []
-    for at, row in zip(time, cells):
+    for time_s, row in zip(time, cells):
         pairs = between.join(name + mark + cell for name, cell in zip(names, row))
-        stamp = at.partition("T")[2].rstrip("Z") or at
-        lines.append(f"{stamp} -> {pairs}" if stamped else f"{clock}{mark}{at}{between}{pairs}")
+        stamp = time_s.partition("T")[2].rstrip("Z") or time_s
+        lines.append(f"{stamp} -> {pairs}" if stamped else f"{clock}{mark}{time_s}{between}{pairs}")
     return "\n".join(lines) + "\n"
 
 
 def _events(random: np.random.Generator, clock: str, time: list[str], cells: Cells) -> str:
     """Write one row per event. Rows of the inertial unit have all six values."""
     lines = [f"{clock},sensor,v1,v2,v3,v4,v5,v6"]
-    for k, (at, row) in enumerate(zip(time, cells)):
-        lines.append(",".join((at, "IMU", *row)))
+    for k, (stamp, row) in enumerate(zip(time, cells)):
+        lines.append(",".join((stamp, "IMU", *row)))
         if k % 5 == 0:
-            lines.append(f"{at},{random.choice(['MAG', 'BARO'])},{1.0 + 0.01 * k:.2f},2.5,3.5,,,")
+            lines.append(f"{stamp},{random.choice(['MAG', 'BARO'])},{1.0 + 0.01 * k:.2f},2.5,3.5,,,")
     return "\n".join(lines) + "\n"
 
 
@@ -204,6 +204,6 @@ def _two_sensors(random: np.random.Generator, clock: str, time: list[str], cells
     """Write one row per event, alternately from accelerometer and gyro."""
     names = [("accelerometer", "gyroscope"), ("ACC", "GYR"), ("acc", "gyro")][random.integers(3)]
     lines = [f"{clock},type,x,y,z"]
-    for at, row in zip(time, cells):
-        lines += [",".join((at, names[0], *row[:3])), ",".join((at, names[1], *row[3:]))]
+    for stamp, row in zip(time, cells):
+        lines += [",".join((stamp, names[0], *row[:3])), ",".join((stamp, names[1], *row[3:]))]
     return "\n".join(lines) + "\n"

@@ -38,8 +38,8 @@ def with_telemetry(video: Path, rate_dps: np.ndarray, rate_hz: float) -> Path:
     packets = [_packet(rate_dps[begin : begin + count]) for begin in range(0, len(rate_dps) - count + 1, count)]
     content = video.read_bytes()
     moov = _find(content, b"moov")
-    head, inner, rest = content[: moov.start], content[moov.start + 8 : moov.stop], content[moov.stop :]
-    assert not rest  # the track is added at the end, so the earlier parts of the file keep their offsets
+    head, inner, tail = content[: moov.start], content[moov.start + 8 : moov.stop], content[moov.stop :]
+    assert not tail  # the track is added at the end, so the earlier parts of the file keep their offsets
     length = 8 + len(inner) + len(_track(packets, 0))
     grown = inner + _track(packets, len(head) + length + 8)
     video.write_bytes(head + _box(b"moov", grown) + _box(b"mdat", b"".join(packets)))
@@ -66,12 +66,12 @@ def _box(name: bytes, content: bytes) -> bytes:
 
 
 def _find(content: bytes, name: bytes) -> slice:
-    place = 0
-    while place < len(content):
-        size, found = struct.unpack_from(">I4s", content, place)
-        if found == name:
-            return slice(place, place + size)
-        place += size
+    offset = 0
+    while offset < len(content):
+        size, kind = struct.unpack_from(">I4s", content, offset)
+        if kind == name:
+            return slice(offset, offset + size)
+        offset += size
     raise AssertionError(name)
 
 
@@ -85,10 +85,10 @@ def _track(packets: list[bytes], begin: int) -> bytes:
     gmin = struct.pack(">IHHHHHH", 0, 64, 0x8000, 0x8000, 0x8000, 0, 0)
     dref = struct.pack(">II", 0, 1) + _box(b"url ", struct.pack(">I", 1))
     stsd = struct.pack(">II", 0, 1) + _box(b"gpmd", struct.pack(">6xHI", 1, 0))
-    places, place = [], begin
+    places, offset = [], begin
     for packet in packets:
-        places.append(place)
-        place += len(packet)
+        places.append(offset)
+        offset += len(packet)
     stbl = (
         _box(b"stsd", stsd)
         + _box(b"stts", struct.pack(">IIII", 0, 1, count, 1000))

@@ -69,9 +69,9 @@ def _low_pass(values: np.ndarray, delay_s: float, step_s: float) -> np.ndarray:
 
 def _wander(chance: np.random.Generator, count: int, sigma_m: float, changes_s: float) -> np.ndarray:
     """Return `count` errors in m: a correlated error that decays within changes_s, and a little white noise."""
-    kept, values = np.exp(-1.0 / changes_s), [chance.normal(0.0, sigma_m)]
-    for push in chance.normal(0.0, sigma_m * np.sqrt(1.0 - kept * kept), count - 1):
-        values.append(kept * values[-1] + push)
+    decay, values = np.exp(-1.0 / changes_s), [chance.normal(0.0, sigma_m)]
+    for push in chance.normal(0.0, sigma_m * np.sqrt(1.0 - decay * decay), count - 1):
+        values.append(decay * values[-1] + push)
     return np.array(values) + chance.normal(0.0, 0.3, count)
 
 
@@ -105,8 +105,8 @@ def write_fit(path: Path, track: Track) -> Path:
         record = int(utc_s) - FIT_EPOCH_S, round(lat * SEMICIRCLES), round(lon * SEMICIRCLES), round(1000.0 * speed)
         body += struct.pack("<BIiiH", 0, *record)
     head = struct.pack("<BBHI4s", 14, 0x20, 2132, len(body), b".FIT")
-    whole = head + struct.pack("<H", _crc(head)) + body
-    path.write_bytes(whole + struct.pack("<H", _crc(whole)))
+    content = head + struct.pack("<H", _crc(head)) + body
+    path.write_bytes(content + struct.pack("<H", _crc(content)))
     return path
 
 

@@ -67,22 +67,22 @@ def blocks(count, ride=1, length=block_length, trim_deg=0.0, speed=False, places
     """
     block = RideBlock(5000)
     body = pack(CHIP.who_am_i, CHIP.accel_range_g, calibration(trim_deg))
-    written, held = [], []
+    written, pending = [], []
     source, time_us = turns(1_000_000, seed=ride), 2_000_000
     for index in range(count):
         block.begin(length(index), ride, index, time_us, CHIP, 200, body)
         while not block.full():
             sums, n, dt_us = next(source)
-            if speed and len(held) % 100 == 0:
-                block.add_speed(len(held))
-            if places_every and len(held) % places_every == 0:
-                block.add_place(place(len(held) // places_every))
+            if speed and len(pending) % 100 == 0:
+                block.add_speed(len(pending))
+            if places_every and len(pending) % places_every == 0:
+                block.add_place(place(len(pending) // places_every))
             block.add(sums, n, dt_us)
             time_us += dt_us
-            held.append((tuple(sums[:3] + sums[4:]), n, dt_us))
+            pending.append((tuple(sums[:3] + sums[4:]), n, dt_us))
         block.close()
         written.append(bytes(block.buffer[: block.length]))
-    return written, held
+    return written, pending
 
 
 def begun(length, sequence=0, block=None):

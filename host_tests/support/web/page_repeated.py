@@ -17,15 +17,15 @@ from kickstand_tools.web.device import Device, PageDevice
 def page(orders, until_s):
     """Run the page's loop as worker.mjs does, but with time slices of other lengths."""
     device = PageDevice()
-    done, slice_s, now_s = [], 0.007, 0.0
+    ticks, slice_s, now_s = [], 0.007, 0.0
     for at_s, name, value in orders:
         while now_s < at_s:
             slice_s = 0.007 if slice_s > 0.09 else slice_s + 0.011
             now_s = min(at_s, now_s + slice_s)
             device.run_to(now_s)
-        done.append([device.order(name, value), name, value])
+        ticks.append([device.order(name, value), name, value])
     device.run_to(until_s)
-    return done, json.loads(device.take())
+    return ticks, json.loads(device.take())
 
 
 def loop(orders, until_s):

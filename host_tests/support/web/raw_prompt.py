@@ -72,6 +72,7 @@ class RawPrompt:
 def said(blocks):
     """Return the output of usb_stream for these blocks."""
     return b"".join(
-        b"".join(base64.b64encode(block[at : at + 256]) + b"\r\n" for at in range(0, len(block), 256)) + b".\r\n"
+        b"".join(base64.b64encode(block[offset : offset + 256]) + b"\r\n" for offset in range(0, len(block), 256))
+        + b".\r\n"
         for block in blocks
     )

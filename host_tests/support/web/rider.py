@@ -96,12 +96,12 @@ class Rider:
     def axe(self):
         """Return the findings of axe-core in the light and the dark style, one line per finding."""
         axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
-        found = []
+        violations = []
         for scheme in ("light", "dark"):
             self.page.emulate_media(color_scheme=scheme)
-            for one in axe.run(self.page).response["violations"]:
-                found += [f"{one['id']}: {node['html']}: {node['failureSummary']}" for node in one["nodes"]]
-        return found
+            for rule in axe.run(self.page).response["violations"]:
+                violations += [f"{rule['id']}: {node['html']}: {node['failureSummary']}" for node in rule["nodes"]]
+        return violations
 
     def fits(self):
         """Return True if the page is not wider than its window."""

@@ -28,8 +28,8 @@ class Rides:
 
     def show(self, *files):
         """Choose these files, unless their report is already shown."""
-        same = self.given == set(files) and set(self.held()) == {file.name for file in files}
-        if not same or self.page.is_hidden("#report"):
+        is_listed = self.given == set(files) and set(self.held()) == {file.name for file in files}
+        if not is_listed or self.page.is_hidden("#report"):
             assert self.give(*files) == ""
 
     def add(self, *files):
@@ -81,7 +81,7 @@ def assert_near(found, wanted):
         for key in wanted:
             assert_near(found[key], wanted[key])
     elif isinstance(wanted, list):
-        for one, other in zip(found, wanted, strict=True):
-            assert_near(one, other)
+        for actual, other in zip(found, wanted, strict=True):
+            assert_near(actual, other)
     else:
         assert found == (pytest.approx(wanted, abs=0.0021) if type(wanted) is float else wanted)

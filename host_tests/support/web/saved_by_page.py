@@ -10,14 +10,14 @@ from kickstand_tools.rides.stream import StreamLog
 
 def saved(rider, tmp_path):
     """Save all offered files by clicks. Return {name: content}."""
-    found = {}
+    files = {}
     for link in rider.page.locator("#files a").all():
         with rider.page.expect_download() as download:
             link.click()
         path = tmp_path / download.value.suggested_filename
         download.value.save_as(path)
-        found[path.name] = path.read_bytes()
-    return found
+        files[path.name] = path.read_bytes()
+    return files
 
 
 def recorded(blocks):

@@ -48,9 +48,9 @@ class SerialLine:
         if not self.connected:
             return None
         self._device.run(self.STEP_S)
-        said = base64.b64encode(bytes(self._said)).decode()
+        text = base64.b64encode(bytes(self._said)).decode()
         self._said.clear()
-        return said
+        return text
 
     def _hears(self, text):
         data = base64.b64decode(text)
@@ -74,14 +74,14 @@ class SerialLine:
     def status(self):
         """Let the page read the board's status. Return the shown status, or the error that the page shows."""
         self.rider.page.click("#status")
-        why = self._said_by("#status", "#status-said")
-        return self.rider.text("#status-text") if self.rider.page.is_visible("#status-text") else why
+        reason = self._said_by("#status", "#status-said")
+        return self.rider.text("#status-text") if self.rider.page.is_visible("#status-text") else reason
 
     def check(self):
         """Let the page check the board. Return the shown findings, or the error that the page shows."""
         self.rider.page.click("#check")
-        why = self._said_by("#check", "#status-said")
-        return self.rider.text("#status-text") if self.rider.page.is_visible("#status-text") else why
+        reason = self._said_by("#check", "#status-said")
+        return self.rider.text("#status-text") if self.rider.page.is_visible("#status-text") else reason
 
     def _said_by(self, button, where="#install-said"):
         self.rider.page.wait_for_selector(f"{button}:enabled", timeout=600_000)

@@ -23,10 +23,10 @@ class Missing(Exception):
 
 
 def _program(*names):
-    found = next(filter(None, map(shutil.which, names)), None)
-    if found is None:
+    path = next(filter(None, map(shutil.which, names)), None)
+    if path is None:
         raise Missing(names[0])
-    return found
+    return path
 
 
 def _until(function, error):
@@ -58,8 +58,8 @@ class _Browser:
 
     def click(self, selector):
         query = {"using": "css selector", "value": selector}
-        found = self._command("FindElement", "POST", "element", query)
-        (element,) = found.get("value", found).values()
+        reply = self._command("FindElement", "POST", "element", query)
+        (element,) = reply.get("value", reply).values()
         self._command("ElementClick", "POST", f"element/{element}/click", {"id": element})
 
     def _command(self, name, method, path, body):

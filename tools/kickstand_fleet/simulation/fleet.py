@@ -49,26 +49,17 @@ MATRIX = tuple(f"{row}_{axis}" for row in ("left", "up", "forward") for axis in 
 
 @dataclass
 class MadeVehicle:
-    """A vehicle of the fleet.
+    """A vehicle of the fleet."""
 
-    name: Name of the vehicle in the manifest.
-    kind: "car", "bus" or "motorcycle".
-    trouble: The vehicle's fault, a key of TROUBLES, or "".
-    paths: Paths of the logs.
-    mounts: Rotation of each mounting, shape (3, 3), as in VehicleSensor. There are two mountings if the mount moved.
-    moved_deg: Angle by which the mount moved.
-    moved_log: Index of the log in which the mount moved, or of the first log after it moved.
-    moved_s: Time in that log at which the mount moved. NaN if it moved before that log.
-    """
-
-    name: str
-    kind: str
-    trouble: str
-    paths: list[Path]
+    name: str  # name of the vehicle in the manifest
+    kind: str  # "car", "bus" or "motorcycle"
+    trouble: str  # the vehicle's fault, a key of TROUBLES, or ""
+    paths: list[Path]  # paths of the logs
+    # Rotation of each mounting, shape (3, 3), as in VehicleSensor. There are two mountings if the mount moved.
     mounts: list[Array]
-    moved_deg: float = 0.0
-    moved_log: int | None = None
-    moved_s: float = float("nan")
+    moved_deg: float = 0.0  # angle by which the mount moved
+    moved_log: int | None = None  # index of the log in which the mount moved, or of the first log after it moved
+    moved_s: float = float("nan")  # time in that log at which the mount moved. NaN if it moved before that log.
 
     @property
     def reasons(self) -> str:
@@ -134,8 +125,8 @@ def _vehicle(
 ) -> MadeVehicle:
     kind = ("car", "bus", "motorcycle")[k % 3]
     name = f"{kind}-{k:04d}"
-    several = trouble in ("moved-between", "dies") or (trouble in ("", "garbage", "empty", "missing"))
-    drives = int(chance.integers(2, 4)) if several and (trouble or chance.random() < 0.5) else 1
+    has_several_drives = trouble in ("moved-between", "dies") or (trouble in ("", "garbage", "empty", "missing"))
+    drives = int(chance.integers(2, 4)) if has_several_drives and (trouble or chance.random() < 0.5) else 1
     sensor = random_sensor(chance)
     receiver = Receiver(float(chance.choice([0.2, 0.5, 1.0])), float(chance.uniform(0.0, 1.2)))
     if trouble == "late":

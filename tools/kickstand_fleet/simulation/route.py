@@ -14,38 +14,24 @@ _FASTEST_LATERAL_MPS2 = 3.0
 
 @dataclass
 class Handling:
-    """The way a kind of vehicle is driven. Each field is a range (smallest, largest).
+    """The way a kind of vehicle is driven. Each field is a range (smallest, largest)."""
 
-    cruise_mps: Cruising speed.
-    speed_up_mps2: Acceleration when speeding up.
-    brake_mps2: Deceleration when braking.
-    lateral_mps2: Lateral acceleration in bends.
-    """
-
-    cruise_mps: tuple[float, float]
-    speed_up_mps2: tuple[float, float]
-    brake_mps2: tuple[float, float]
-    lateral_mps2: tuple[float, float]
+    cruise_mps: tuple[float, float]  # cruising speed
+    speed_up_mps2: tuple[float, float]  # acceleration when speeding up
+    brake_mps2: tuple[float, float]  # deceleration when braking
+    lateral_mps2: tuple[float, float]  # lateral acceleration in bends
 
 
 @dataclass
 class Route:
-    """A route of n samples. Each field has shape (n).
+    """A route of n samples. Each field has shape (n)."""
 
-    time: Time in s.
-    speed: Speed in m/s.
-    acceleration: Acceleration forward, in m/s2.
-    yaw_rate: Yaw rate in rad/s, positive to the left.
-    slope: Slope of the road, in rad, positive uphill.
-    camber: Sideways slope of the road, in rad, positive if the road falls to the right.
-    """
-
-    time: Array
-    speed: Array
-    acceleration: Array
-    yaw_rate: Array
-    slope: Array
-    camber: Array
+    time: Array  # time in s
+    speed: Array  # speed in m/s
+    acceleration: Array  # acceleration forward, in m/s2
+    yaw_rate: Array  # yaw rate in rad/s, positive to the left
+    slope: Array  # slope of the road, in rad, positive uphill
+    camber: Array  # sideways slope of the road, in rad, positive if the road falls to the right
 
 
 def random_route(

@@ -22,34 +22,22 @@ _COUNT_G, _COUNT_DPS = 1.0 / 16384.0, 1.0 / 131.0
 
 @dataclass
 class VehicleSensor:
-    """The mounting and the errors of a sensor.
+    """The mounting and the errors of a sensor."""
 
-    mount: Rotation from sensor to vehicle axes, shape (3, 3). Its rows are left, up, forward.
-    offset_g: Offset of the accelerometer, shape (3), in g.
-    slope: Slope of the accelerometer, shape (3).
-    bias_dps: Bias of the gyro, shape (3), in deg/s.
-    """
-
-    mount: Array
-    offset_g: Array
-    slope: Array
-    bias_dps: Array
+    mount: Array  # rotation from sensor to vehicle axes, shape (3, 3). Its rows are left, up, forward.
+    offset_g: Array  # offset of the accelerometer, shape (3), in g
+    slope: Array  # slope of the accelerometer, shape (3)
+    bias_dps: Array  # bias of the gyro, shape (3), in deg/s
 
 
 @dataclass
 class Receiver:
-    """The receiver that measures the speed.
+    """The receiver that measures the speed."""
 
-    every_s: Time between two values.
-    late_s: Delay of each value.
-    factor: Factor on each value. The factor is 3.6 for a receiver that wrongly sends km/h.
-    until_s: Time of the last value.
-    """
-
-    every_s: float = 1.0
-    late_s: float = 0.3
-    factor: float = 1.0
-    until_s: float = float("inf")
+    every_s: float = 1.0  # time between two values
+    late_s: float = 0.3  # delay of each value
+    factor: float = 1.0  # factor on each value. The factor is 3.6 for a receiver that wrongly sends km/h.
+    until_s: float = float("inf")  # time of the last value
 
 
 def random_sensor(chance: np.random.Generator) -> VehicleSensor:

@@ -70,7 +70,9 @@ def _written_help(entry_point: EntryPoint) -> click.Command | None:
         return None
     for node in ast.parse(file.read_bytes()).body:
         if isinstance(node, ast.FunctionDef) and node.name == entry_point.attr:
-            calls = [call for call in node.decorator_list if ast.unparse(call).startswith("click.command(")]
+            calls = [
+                call for call in node.decorator_list if ast.unparse(call).startswith(("click.command(", "click.group("))
+            ]
             keywords = [word for call in calls if isinstance(call, ast.Call) for word in call.keywords]
             texts = {word.arg: ast.literal_eval(word.value) for word in keywords if word.arg in ("help", "short_help")}
             if calls:

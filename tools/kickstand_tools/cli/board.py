@@ -26,7 +26,7 @@ _NAMED_ONE_BY_ONE = 5
 @click.option("--config", is_flag=True, help="Also replace the board's config.py, which is otherwise kept.")
 @click.option("--yes", is_flag=True, help="Rename files of another project on the board without asking.")
 def flash_command(port: str | None, config: bool, yes: bool) -> None:
-    """Copy the firmware to a board that runs MicroPython, check it, and start it."""
+    """Copy the firmware to a board, and start it. The board must run MicroPython."""
     with Bar("") as bar:
         result = flash(port, config, bar.reach_in, agree=None if yes else _agree)
     echo(f"{result.board} on {result.port}")
@@ -40,17 +40,17 @@ def flash_command(port: str | None, config: bool, yes: bool) -> None:
         echo(f"note: {setting} is not used, because a '#' is in front of it: remove it, and flash --config")
     if result.why_sources:
         echo(f"note: {result.why_sources}: the board gets the sources and starts more slowly")
-    done = result.installed
-    if done.config_differs:
+    installed = result.installed
+    if installed.config_differs:
         echo("kept: config.py on the board is not this version's; --config would replace it")
-    if len(done.removed) > _NAMED_ONE_BY_ONE:
-        echo(f"removed: {len(done.removed)} files that are no longer part of the firmware")
+    if len(installed.removed) > _NAMED_ONE_BY_ONE:
+        echo(f"removed: {len(installed.removed)} files that are no longer part of the firmware")
     else:
-        for path in done.removed:
+        for path in installed.removed:
             echo(f"removed: {path[1:]} is no longer part of the firmware")
     echo(
-        f"copied {len(done.copied)} files, {done.copied_bytes / 1000:.1f} kB, and verified them; "
-        f"{len(done.kept)} left as they were"
+        f"copied {len(installed.copied)} files, {installed.copied_bytes / 1000:.1f} kB, and verified them; "
+        f"{len(installed.kept)} left as they were"
     )
     echo("restarted: the display shows the rest")
 
@@ -79,9 +79,9 @@ def status_command(port: str | None, wirings: bool) -> None:
 @click.command()
 @PORT
 def check_command(port: str | None) -> None:
-    """Measure a board and everything wired to it in two minutes, and print each figure with its limit.
+    """Measure a board and everything wired to it, in two minutes.
 
-    Keep the sensor still. The exit status is 1 if a figure exceeds its limit."""
+    Each figure is printed with its limit. Keep the sensor still. The exit status is 1 if a figure exceeds its limit."""
     checked = check(port, echo)
     echo(verdict(checked.findings))
     if checked.faults:
@@ -93,7 +93,7 @@ def check_command(port: str | None) -> None:
 @click.option("--out", type=PATH, default=Path(), help="The directory to write to. Default: the current one.")
 @click.option("--delete", is_flag=True, help="Delete completely fetched rides from the board.")
 def pull_command(port: str | None, out: Path, delete: bool) -> None:
-    """Fetch the rides that a board has recorded, as logs with their calibration."""
+    """Fetch the rides that a board has recorded. Each ride is a log with its calibration."""
 
     def say(ride: PulledRide) -> None:
         for problem in ride.problems:

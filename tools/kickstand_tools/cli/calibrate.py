@@ -30,23 +30,23 @@ def calibrate_command() -> None:
     """Compute a calibration from recorded poses or drives."""
 
 
-@calibrate_command.command(short_help="Measure the sensor's errors, from six poses.")
+@calibrate_command.command()
 @file_argument("poses", "LOG.csv | POSE.csv...", nargs=-1, required=True)
 @OUT
 def six(poses: tuple[Path, ...], out: Path) -> None:
-    """Measure the sensor's errors from six still poses, each side up once, in any order.
+    """Measure the sensor's errors, from six still poses.
 
-    One log of the whole procedure calibrates accelerometer and gyro. Lay the sensor still for three seconds on each
-    side, and once at a slant. The turns between the poses calibrate the gyro. Six logs of one pose each give only
-    offset and slope of the accelerometer. A seventh log, of a slanted pose, checks them.
+    Each side is up once, in any order. One log of the whole procedure calibrates accelerometer and gyro. Lay the sensor
+    still for three seconds on each side, and once at a slant. The turns between the poses calibrate the gyro. Six logs
+    of one pose each give only offset and slope of the accelerometer. A seventh log, of a slanted pose, checks them.
     """
     check_output(out, list(poses))
-    found = fit_procedure(poses[0]) if len(poses) == 1 else fit_six_positions(poses)
-    print_lines(_six_lines(found))
-    _write(out, found.calibration)
+    fit = fit_procedure(poses[0]) if len(poses) == 1 else fit_six_positions(poses)
+    print_lines(_six_lines(fit))
+    _write(out, fit.calibration)
 
 
-@calibrate_command.command(short_help="Align to the bike, from a pose on the kickstand and an upright pose.")
+@calibrate_command.command()
 @file_argument("kickstand", "KICKSTAND.csv")
 @file_argument("upright", "UPRIGHT.csv")
 @click.option("--calibration", type=PATH, help="The result of `kickstand calibrate six`, which is extended.")
@@ -54,16 +54,19 @@ def six(poses: tuple[Path, ...], out: Path) -> None:
 @OUT
 @RIGHT_HANDED
 def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out: Path) -> None:
-    """Find how the sensor is mounted on the bike, from a pose on the kickstand and an upright pose."""
+    """Align to the bike, from poses on the kickstand and upright.
+
+    The result says how the sensor is mounted.
+    """
     check_output(out, [kickstand, upright])
-    before = read_calibration(calibration) if calibration else None
-    found = fit_two_positions(kickstand, upright, before, side)
-    print_lines(_two_lines(found))
-    warn(upright, of_calibration(found.calibration, before))
-    _write(out, found.calibration)
+    earlier = read_calibration(calibration) if calibration else None
+    fit = fit_two_positions(kickstand, upright, earlier, side)
+    print_lines(_two_lines(fit))
+    warn(upright, of_calibration(fit.calibration, earlier))
+    _write(out, fit.calibration)
 
 
-@calibrate_command.command(short_help="Align to any vehicle, from driving with braking.")
+@calibrate_command.command()
 @file_argument("logs", "LOG.csv...", nargs=-1, required=True)
 @click.option("--calibration", type=PATH, help="An earlier calibration, by six positions or two poses.")
 @click.option("--vehicle", type=VEHICLES, help="Default: motorcycle if calibrated by two poses, otherwise car.")
@@ -71,26 +74,28 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
 @OUT
 @RIGHT_HANDED
 def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None, method: str, out: Path) -> None:
-    """Find how the sensor is mounted on a vehicle. The logs must have a speed, stops, and straight-line braking."""
+    """Align to any vehicle, from driving with braking.
+
+    The logs must have a speed, stops, and straight-line braking."""
     check_output(out, list(logs))
-    before = read_calibration(calibration) if calibration else None
+    earlier = read_calibration(calibration) if calibration else None
     several = len(logs) > 1
     with Bar("driving") as bar:
-        found = fit_drive(
-            logs, before, vehicle, method, bar.reach, lambda event: print_lines(_event_lines(event, several))
+        fit = fit_drive(
+            logs, earlier, vehicle, method, bar.reach, lambda event: print_lines(_event_lines(event, several))
         )
-    for name, notice in found.notices:
+    for name, notice in fit.notices:
         warn(name, [notice])
-    warn(logs[0], of_calibration(found.calibration))
-    if before and not found.poses:
+    warn(logs[0], of_calibration(fit.calibration))
+    if earlier and not fit.poses:
         for log in logs:
-            problem = contradiction(check_log(read_log(log), axes=False).bins, before)
+            problem = contradiction(check_log(read_log(log), axes=False).bins, earlier)
             warn(log, [problem] if problem else [])
-    print_lines(_drive_lines(found, several))
-    _write(out, found.calibration)
+    print_lines(_drive_lines(fit, several))
+    _write(out, fit.calibration)
 
 
-@calibrate_command.command(short_help="Align to a motorcycle, from riding with bends.")
+@calibrate_command.command()
 @file_argument("log", "LOG.csv")
 @click.option(
     "--phone",
@@ -100,13 +105,13 @@ def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None,
 @OUT
 @RIGHT_HANDED
 def ride(log: Path, phone: str | None, out: Path) -> None:
-    """Find how the sensor is mounted on a motorcycle, from a ride with bends. No poses and no speed are needed."""
+    """Align to a motorcycle, from riding with bends. No poses and no speed are needed."""
     check_output(out, [log])
     with Bar("aligning") as bar:
-        found = fit_ride(log, phone, bar.reach)
-    warn(log, found.notices)
-    print_lines(_ride_lines(found))
-    _write(out, found.calibration)
+        fit = fit_ride(log, phone, bar.reach)
+    warn(log, fit.notices)
+    print_lines(_ride_lines(fit))
+    _write(out, fit.calibration)
 
 
 def _write(out: Path, calibration: CalibrationFile) -> None:
@@ -128,8 +133,8 @@ def _six_lines(found: SixPositions) -> Iterable[str]:
     yield "gyro bias  " + _along_axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
     if found.turns:
         matrix, sigma = found.calibration.gyro_matrix, found.calibration.gyro_sigma
-        scales, known = 100.0 * (1.0 / matrix.diagonal() - 1.0), 100.0 * sigma.diagonal()
-        yield f"gyro scale  {_along_axes(scales, '%+.2f %%')}, by {found.turns} turns, known to {max(known):.1f} %"
+        scales, errors = 100.0 * (1.0 / matrix.diagonal() - 1.0), 100.0 * sigma.diagonal()
+        yield f"gyro scale  {_along_axes(scales, '%+.2f %%')}, by {found.turns} turns, known to {max(errors):.1f} %"
         if found.turns < found.all_turns:
             left_out = found.all_turns - found.turns
             yield f"warning: {left_out} of {found.all_turns} turns left out, too quick or with a gap: turn more slowly"
@@ -183,8 +188,8 @@ def _drive_lines(found: DriveFit, several: bool) -> Iterable[str]:
             yield f"the two poses had forward {yaw_deg:.1f} degrees off{costs}: now corrected"
     yield from _matrix_lines(found.calibration.vehicle_from_sensor)
     if not found.calibration.six_done:
-        what = "warning: no six-position calibration: an offset of 50 mg tilts the vertical by 3 degrees"
-        yield f"{what}: calibrate six first"
+        warning = "warning: no six-position calibration: an offset of 50 mg tilts the vertical by 3 degrees"
+        yield f"{warning}: calibrate six first"
 
 
 def _event_lines(event: events.DriveEvent, several: bool) -> Iterable[str]:

@@ -34,7 +34,7 @@ class Time(click.ParamType):
             numbers = [*(int(cell) for cell in cells[:-1]), float(cells[-1])]
         except ValueError:
             numbers = [-1.0]
-        seconds = sum(60**place * number for place, number in enumerate(reversed(numbers)))
+        seconds = sum(60**power * number for power, number in enumerate(reversed(numbers)))
         if len(cells) > 3 or min(numbers) < 0 or not seconds < float("inf"):
             self.fail(f"{text!r} is not a time: give seconds such as 60 or 12.5, or minutes and seconds such as 1:00")
         return sign * seconds

@@ -4,41 +4,31 @@ The exit status is then 2.
 """
 
 import contextlib
-import importlib
 import os
 import signal
 import sys
 import threading
 from collections.abc import Iterator
+from importlib.metadata import EntryPoint
 
 import click
 
 from ..common.errors import DISTRIBUTION, InputError, cause, printable
 from . import added
 
-# Each command with its module and its line of help. The module contains the function NAME_command. The module is
-# imported only when the command runs, because most modules import numpy, which takes long
+# The commands of each module, which contains the functions NAME_command. A module is imported only if one of its
+# commands runs, because most modules import numpy, which takes long. The list of commands reads their docstrings.
+MODULES = {
+    "board": ("check", "flash", "pull", "record", "status"),
+    "calibrate": ("calibrate",),
+    "ride": ("compare", "cut", "export", "import", "join", "overlay", "plot", "replay", "report", "smooth"),
+    "simulated": ("simulate",),
+    "without_a_board": ("demo", "try", "web"),
+}
 COMMANDS = {
-    "calibrate": (".calibrate", "Compute a calibration from recorded poses or drives."),
-    "check": (".board", "Measure a board and everything wired to it, in two minutes."),
-    "compare": (".ride", "Compare the leans of two devices on one bike."),
-    "cut": (".ride", "Cut a stretch out of a log."),
-    "demo": (".without_a_board", "Run the firmware on a simulated board, in the terminal."),
-    "export": (".ride", "Write a ride for another program."),
-    "flash": (".board", "Copy the firmware to a board, and start it."),
-    "import": (".ride", "Convert a recording of another app or logger to a log."),
-    "join": (".ride", "Add a phone's or a watch's track to a ride without GPS."),
-    "overlay": (".ride", "Draw the lean over a video of the ride."),
-    "plot": (".ride", "Draw a ride, as a picture and as a page that you can zoom."),
-    "pull": (".board", "Fetch the rides that a board has recorded."),
-    "record": (".board", "Write a log live over USB."),
-    "replay": (".ride", "Compute the lean as the firmware shows it during a ride."),
-    "report": (".ride", "Print maxima, time at large leans, and brake tests."),
-    "simulate": (".simulated", "Simulate a ride with its true lean, or drives of a fleet."),
-    "smooth": (".ride", "Compute a more exact lean afterwards, from the whole ride."),
-    "status": (".board", "Show a board's versions, settings, sensor and calibration."),
-    "try": (".without_a_board", "Run your own code as user.py on the simulated board."),
-    "web": (".without_a_board", "Open the lean meter's pages in the browser."),
+    name: EntryPoint(name, f"kickstand_tools.cli.{module}:{name}_command", added.GROUP)
+    for module, names in MODULES.items()
+    for name in names
 }
 
 
@@ -50,15 +40,14 @@ class CommandGroup(click.Group):
 
     def get_command(self, ctx: click.Context | None, cmd_name: str) -> click.Command | None:
         if cmd_name in COMMANDS:
-            return getattr(importlib.import_module(COMMANDS[cmd_name][0], __package__), f"{cmd_name}_command")
+            return COMMANDS[cmd_name].load()
         entry_point = added.entry_points().get(cmd_name)
         return added.command(entry_point) if entry_point else None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        lines = {name: words for name, (_, words) in COMMANDS.items()}
-        others = {name: added.help_line(entry_point) for name, entry_point in added.entry_points().items()}
+        commands = added.entry_points() | COMMANDS
         with formatter.section("Commands"):
-            formatter.write_dl(sorted((others | lines).items()))
+            formatter.write_dl([(name, added.help_line(commands[name])) for name in sorted(commands)])
 
 
 @click.group(
@@ -133,15 +122,15 @@ def _ended_by_signals() -> Iterator[None]:
     def end(number: int, _frame: object) -> None:
         raise _Ended(number)
 
-    before = {}
+    handlers = {}
     if threading.current_thread() is threading.main_thread():
         names = ("SIGTERM", "SIGHUP")  # Windows has no SIGHUP, and nohup ignores it
         numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
-        before = {n: signal.signal(n, end) for n in numbers if signal.getsignal(n) == signal.SIG_DFL}
+        handlers = {n: signal.signal(n, end) for n in numbers if signal.getsignal(n) == signal.SIG_DFL}
     try:
         yield
     finally:
-        for number, handler in before.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)
 
 

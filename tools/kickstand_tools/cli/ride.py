@@ -65,25 +65,25 @@ def import_command(
     check_output(out, _inputs(source))
     named = _pairs(columns, "--columns") if columns is not None else None
     with spinner("importing"):
-        found = import_recording(source, named, _pairs(units or "", "--units"), from_s, to_s)
-        write_imported(out, found)
-    Console().print(_import_table(found))
-    common.print_lines(f"{taken.quantity}: {taken.why}" for taken in found.taken if taken.why)
-    common.warn(source, found.notices)
-    t_s, gaps_s = found.log.t_s, found.gaps_s
+        imported = import_recording(source, named, _pairs(units or "", "--units"), from_s, to_s)
+        write_imported(out, imported)
+    Console().print(_import_table(imported))
+    common.print_lines(f"{column.quantity}: {column.why}" for column in imported.taken if column.why)
+    common.warn(source, imported.notices)
+    t_s, gaps_s = imported.log.t_s, imported.gaps_s
     count = "1 gap" if len(gaps_s) == 1 else f"{len(gaps_s)} gaps"
     gaps = f", {count} of {gaps_s.sum():.1f} s in all" if len(gaps_s) else ""
-    common.echo(f"written: {out}, {len(t_s)} samples in {t_s[-1]:.1f} s, {found.rate_hz:.0f} per second{gaps}")
-    if found.vehicle_axes:
+    common.echo(f"written: {out}, {len(t_s)} samples in {t_s[-1]:.1f} s, {imported.rate_hz:.0f} per second{gaps}")
+    if imported.vehicle_axes:
         common.echo("x is left, y up, z forward, as far as the logger was mounted so")
-    beside = calibration_path(out)
-    if beside.exists():
-        common.echo(f"{beside} belongs to an earlier ride.")
+    calibration = calibration_path(out)
+    if calibration.exists():
+        common.echo(f"{calibration} belongs to an earlier ride.")
         common.echo("If the sensor has been moved since, recalibrate: kickstand calibrate ride")
-    elif found.shortfalls:
-        common.warn(source, found.shortfalls)
-    elif not any(isinstance(notice, WrongAxes) for notice in found.notices):
-        common.echo(f"next: kickstand calibrate ride {out} --out {beside}")
+    elif imported.shortfalls:
+        common.warn(source, imported.shortfalls)
+    elif not any(isinstance(notice, WrongAxes) for notice in imported.notices):
+        common.echo(f"next: kickstand calibrate ride {out} --out {calibration}")
         common.echo(f"      kickstand report {out}")
         common.echo(f"      kickstand plot {out} --out plots")
 
@@ -100,9 +100,9 @@ def join_command(ride: Path, track: Path, out: Path) -> None:
     """
     check_output(out, [ride, track])
     with spinner("reading the track"):
-        given = read_track(track)
+        points = read_track(track)
     with Bar("reading") as bar:
-        joined = join_track(ride, given, bar.reach)
+        joined = join_track(ride, points, bar.reach)
     common.warn(ride, joined.notices)
     with Bar("writing") as bar:
         count = write_joined(out, joined, bar.reach)
@@ -123,9 +123,10 @@ def join_command(ride: Path, track: Path, out: Path) -> None:
 def compare_command(
     a: Path, b: Path, calibration_a: Path | None, calibration_b: Path | None, picture: Path | None, as_json: bool
 ) -> None:
-    """Compare the leans of two devices on one bike, from two recordings of the same ride.
+    """Compare the leans of two devices on one bike.
 
-    The devices can be two phones, or a phone and the board. The clocks are aligned by matching the rates of rotation.
+    Give two recordings of the same ride. The devices can be two phones, or a phone and the board. The clocks are
+    aligned by matching the rates of rotation.
     """
     paths = [given or calibration_beside(log) for log, given in ((a, calibration_a), (b, calibration_b))]
     if picture is not None:
@@ -133,16 +134,16 @@ def compare_command(
         check_output(picture, [a, b, *paths])
     of_a, of_b = (read_calibration(path) for path in paths)
     with Bar("comparing") as bar:
-        found = agreement.compare_rides(a, b, of_a, of_b, bar.reach)
-    for log, notices in zip((a, b), found.notices.values()):
+        agreed = agreement.compare_rides(a, b, of_a, of_b, bar.reach)
+    for log, notices in zip((a, b), agreed.notices.values()):
         common.warn(log, notices)
     if picture is not None:
         with whole_file(picture) as path:
-            agreement.draw(path, found)
+            agreement.draw(path, agreed)
     if as_json:
-        common.echo(json.dumps(found.as_data()))
+        common.echo(json.dumps(agreed.as_data()))
     else:
-        common.print_lines(agreement.words(found))
+        common.print_lines(agreement.words(agreed))
         common.print_lines([f"written: {picture}"] if picture is not None else [])
 
 
@@ -189,7 +190,10 @@ def smooth_command(ride: Path, calibration: Path | None, out: Path, **stretch: f
 @common.OUT
 @common.RIGHT_HANDED
 def export_command(ride: Path, form: str, calibration: Path | None, live: bool, out: Path) -> None:
-    """Export a ride for maps (gpx), Circuit Tools (vbo), RaceChrono, or data frames (parquet, csv)."""
+    """Export a ride for another program.
+
+    The programs are maps (gpx), Circuit Tools (vbo), RaceChrono, and data frames (parquet, csv).
+    """
     check_output(out, [*_inputs(ride), calibration or calibration_path(ride)])
     opened = _opened(ride, calibration, live)
     with Bar("exporting") as bar:
@@ -206,12 +210,12 @@ def export_command(ride: Path, form: str, calibration: Path | None, live: bool, 
 @common.JSON
 @common.RIGHT_HANDED
 def report_command(ride: Path, calibration: Path | None, live: bool, as_json: bool, **stretch: float | None) -> None:
-    """Summarise a ride: maxima, time at large leans, and each stop measured as a brake test."""
-    seen = _overview(ride, calibration, live, **stretch)
+    """Summarise a ride: maxima, time at large leans, and stops as brake tests."""
+    ride_overview = _overview(ride, calibration, live, **stretch)
     if as_json:
-        common.echo(json.dumps(as_data(seen)))
+        common.echo(json.dumps(as_data(ride_overview)))
     else:
-        Console().print(page(seen))
+        Console().print(page(ride_overview))
 
 
 @click.command()
@@ -227,9 +231,9 @@ def plot_command(
 ) -> None:
     """Draw a ride as a picture (PNG) and as a page that you can zoom (HTML)."""
     plot.check(out)
-    seen = _overview(ride, calibration, live, **stretch)
+    ride_overview = _overview(ride, calibration, live, **stretch)
     with spinner("drawing"):
-        written = list(plot.draw(seen, out, tiles))
+        written = list(plot.draw(ride_overview, out, tiles))
     common.print_lines(f"written: {path}" for path in written)
 
 
@@ -238,7 +242,10 @@ def plot_command(
 @common.STRETCH
 @common.OUT
 def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) -> None:
-    """Cut a stretch out of a log, such as a still pose for calibrate two or six, or one of several rides."""
+    """Cut a stretch out of a log.
+
+    Use it for a still pose for calibrate two or six, or for one of several rides.
+    """
     if from_s is None and to_s is None:
         raise click.UsageError("Give --from, --to or both: seconds from the beginning of the log.")
     check_output(out, [log])
@@ -277,21 +284,23 @@ def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) 
 def overlay_command(
     ride: Path, calibration: Path | None, video: Path | None, fps: str | None, out: Path, **options: Any
 ) -> None:
-    """Draw lean, forces, speed and maxima over a video, or write them as a transparent clip.
+    """Draw the lean over a video, or write it as a transparent clip.
 
-    .mov is ProRes 4444, .webm is VP9, both with alpha. The gauge shows -- while the lean is unknown.
+    The gauge also shows forces, speed and maxima. .mov is ProRes 4444, .webm is VP9, both with alpha. The lean is --
+    while the lean is unknown.
     """
     calibration = _given_or_beside(ride, calibration, out, *([video] if video else []))
     rate = float(fps) if fps else None
     with Bar("reading and drawing") as bar:
-        made = overlay(ride, out, calibration, video, fps=rate, progress=bar.reach, **options)
-    common.warn(ride, made.notices)
-    if made.correlation is not None:
+        drawn = overlay(ride, out, calibration, video, fps=rate, progress=bar.reach, **options)
+    common.warn(ride, drawn.notices)
+    if drawn.correlation is not None:
         common.echo(
-            f"the video begins at {made.offset_s:.2f} s of the ride, found with the camera's gyro (correlation "
-            f"{made.correlation:.2f}): --offset {made.offset_s:.2f}"
+            f"the video begins at {drawn.offset_s:.2f} s of the ride, found with the camera's gyro (correlation "
+            f"{drawn.correlation:.2f}): --offset {drawn.offset_s:.2f}"
         )
-    common.echo(f"written: {out}, {made.pictures} frames, {made.end_s - made.begin_s:.1f} s, {made.fps:g} per second")
+    seconds = drawn.end_s - drawn.begin_s
+    common.echo(f"written: {out}, {drawn.pictures} frames, {seconds:.1f} s, {drawn.fps:g} per second")
 
 
 def _from_export(source: Path, calibration: Path | None) -> tuple[Imported, CalibrationFile] | None:
@@ -302,32 +311,32 @@ def _from_export(source: Path, calibration: Path | None) -> tuple[Imported, Cali
 
     Returns the imported recording and its calibration. Returns None for other files, such as a log.
     """
-    found = None
+    imported = None
     if not is_log(source):
         with spinner("importing"):
-            found = import_of_app(source)
-    if found is None:
+            imported = import_of_app(source)
+    if imported is None:
         return None
-    said = f"{source}: imported from {found.app}, {len(found.log.t_s)} samples, {found.rate_hz:.0f} per second"
-    beside = calibration_path(source)
-    path = calibration or (beside if beside.exists() else None)
+    line = f"{source}: imported from {imported.app}, {len(imported.log.t_s)} samples, {imported.rate_hz:.0f} per second"
+    default = calibration_path(source)
+    path = calibration or (default if default.exists() else None)
     if path is not None:
-        known = read_calibration(path)
+        parameters = read_calibration(path)
     else:
         with Bar("aligning") as bar:
-            fit = fit_ride(found.log, None, bar.reach)
-        known = fit.calibration
-        said += f"; aligned by its bends, {common.known_to(fit)}"
-    common.echo(said, err=True)
-    return found, known
+            fit = fit_ride(imported.log, None, bar.reach)
+        parameters = fit.calibration
+        line += f"; aligned by its bends, {common.known_to(fit)}"
+    common.echo(line, err=True)
+    return imported, parameters
 
 
 def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> Ride:
     """Open a ride, which may have to be imported (see _from_export())."""
-    taken = _from_export(source, calibration)
-    log, known = (source, calibration) if taken is None else (taken[0].log, taken[1])
+    imported = _from_export(source, calibration)
+    log, parameters = (source, calibration) if imported is None else (imported[0].log, imported[1])
     with Bar("reading") as bar:
-        return open_ride(_stretch(log, **stretch), known, smoothed=not live, progress=bar.reach)
+        return open_ride(_stretch(log, **stretch), parameters, smoothed=not live, progress=bar.reach)
 
 
 def _log_of(source: Path, calibration: Path | None, out: Path) -> tuple[Path | Log, CalibrationFile]:
@@ -338,19 +347,19 @@ def _log_of(source: Path, calibration: Path | None, out: Path) -> tuple[Path | L
     if is_log(source) or source.suffix.lower() == ".json":
         return source, read_calibration(_given_or_beside(source, calibration, out))
     check_output(out, [*_inputs(source), *([calibration] if calibration else [])])
-    taken = _from_export(source, calibration)
-    if taken is None:
+    opened = _from_export(source, calibration)
+    if opened is None:
         return source, read_calibration(_given_or_beside(source, calibration, out))
-    return taken[0].log, taken[1]
+    return opened[0].log, opened[1]
 
 
 def _overview(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> Overview:
     """Return the overview of a ride from _opened(). Print all its notices."""
     opened = _opened(source, calibration, live, **stretch)
     with Bar("computing the lean") as bar:
-        seen = overview(opened, bar.reach)
-    common.warn(source, seen.notices)
-    return seen
+        ride_overview = overview(opened, bar.reach)
+    common.warn(source, ride_overview.notices)
+    return ride_overview
 
 
 def _inputs(source: Path) -> list[Path]:
@@ -388,25 +397,25 @@ def _pairs(text: str, option: str) -> dict[str, str]:
 
 def _import_table(found: Imported) -> Table:
     table = Table(title=found.app, title_justify="left", box=None, pad_edge=False)
-    for column in ("quantity", "from", "unit", "rate", "axes and sign"):
-        table.add_column(column, overflow="fold")
-    for taken in found.taken:
-        rate = f"{taken.rate_hz:{'.0f' if taken.rate_hz >= 10.0 else '.2g'}} Hz" if taken.rate_hz else ""
-        table.add_row(taken.quantity, taken.source, taken.unit, rate, taken.sign)
+    for title in ("quantity", "from", "unit", "rate", "axes and sign"):
+        table.add_column(title, overflow="fold")
+    for column in found.taken:
+        rate = f"{column.rate_hz:{'.0f' if column.rate_hz >= 10.0 else '.2g'}} Hz" if column.rate_hz else ""
+        table.add_row(column.quantity, column.source, column.unit, rate, column.sign)
     return table
 
 
 def _joined_lines(joined: Joined) -> Iterator[str]:
-    found, began = joined.match, joined.match.start_utc_s
+    match, began = joined.match, joined.match.start_utc_s
     late_s = began - joined.track.utc_s[0]
-    when = (datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=began)).strftime("%Y-%m-%d %H:%M:%S.%f")[:-4]
+    date = (datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=began)).strftime("%Y-%m-%d %H:%M:%S.%f")[:-4]
     side = "after" if late_s >= 0.0 else "before"
     yield (
-        f"the ride began at {when} UTC by the track's clock, +- {found.sigma_s:.2f} s: {abs(late_s):.2f} s {side} the "
+        f"the ride began at {date} UTC by the track's clock, +- {match.sigma_s:.2f} s: {abs(late_s):.2f} s {side} the "
         "track's first point"
     )
-    yield f"match: correlation {found.correlation:.2f} over {found.common_s / 60.0:.1f} minutes"
-    if abs(found.drift) * found.common_s > 3.0 * found.sigma_s:  # a smaller drift is uncertain
-        yield f"the ride's clock is {abs(found.drift) * 1e6:.0f} ppm {'slow' if found.drift > 0.0 else 'fast'}"
+    yield f"match: correlation {match.correlation:.2f} over {match.common_s / 60.0:.1f} minutes"
+    if abs(match.drift) * match.common_s > 3.0 * match.sigma_s:  # a smaller drift is uncertain
+        yield f"the ride's clock is {abs(match.drift) * 1e6:.0f} ppm {'slow' if match.drift > 0.0 else 'fast'}"
     if joined.own_speed:
         yield "the log's own speed is kept"

@@ -69,18 +69,18 @@ def simulate_command(profile: str | None, seed: int, vehicles: int | None, out: 
     if (out / "MANIFEST.csv").exists():
         raise InputError(f"{out} holds a fleet, whose truth would be lost: give --out another directory")
     with spinner("simulating a ride"):
-        made = simulate(profile, seed, out, **of_a_ride)
-    echo(f"written: {out / 'RIDE.csv'}, {len(made.time)} samples, with its poses and TRUTH.csv")
-    begin = made.truth["lean_deg"][0]
-    echo(f"lean, > 0 to the right: {made.stand_deg:.1f} degrees in KICKSTAND.csv; RIDE.csv begins at {begin:.1f}")
+        ride = simulate(profile, seed, out, **of_a_ride)
+    echo(f"written: {out / 'RIDE.csv'}, {len(ride.time)} samples, with its poses and TRUTH.csv")
+    begin = ride.truth["lean_deg"][0]
+    echo(f"lean, > 0 to the right: {ride.stand_deg:.1f} degrees in KICKSTAND.csv; RIDE.csv begins at {begin:.1f}")
 
 
 def _check_fleet(out: Path) -> None:
     """Raise an error if the options or the directory belong to a single ride."""
     context = click.get_current_context()
-    given = click.core.ParameterSource.COMMANDLINE
+    typed = click.core.ParameterSource.COMMANDLINE
     for option in context.command.params:
-        if option.name not in ("seed", "vehicles", "out") and context.get_parameter_source(option.name or "") is given:
+        if option.name not in ("seed", "vehicles", "out") and context.get_parameter_source(option.name or "") is typed:
             raise click.UsageError(f"{option.opts[0]} is of a single ride: leave it or --fleet out.")
     if (out / "RIDE.csv").exists():
         raise InputError(f"{out} holds a ride, whose truth would be lost: give --out another directory")

@@ -23,7 +23,10 @@ _CPYTHON = click.option("--cpython", is_flag=True, help="Run the firmware on CPy
 @_CPYTHON
 @DISPLAY
 def demo_command(**chosen: Any) -> None:
-    """Watch the firmware on a simulated board: a press on the kickstand, a press upright, and a ride."""
+    """Run the firmware on a simulated board, in the terminal.
+
+    You see a press on the kickstand, a press upright, and a ride.
+    """
     _demo(**chosen)
 
 
@@ -33,7 +36,7 @@ def demo_command(**chosen: Any) -> None:
 @_CPYTHON
 @DISPLAY
 def try_command(**chosen: Any) -> None:
-    """Try your own code: FILE runs as user.py on the simulated board, during the demo's ride."""
+    """Run your own code as user.py on the simulated board, during the demo's ride."""
     _demo(**chosen)
 
 

@@ -30,12 +30,12 @@ class DeviceStopped(Exception):
 def _watch(device: DeviceProcess, engine: str, by_hand: bool, score: Score) -> None:
     """Draw until the device ends or the user quits."""
     keys = _HAND_HELP if by_hand else _HELP
-    known = _KEYS | BIKE_KEYS if by_hand else _KEYS
+    bindings = _KEYS | BIKE_KEYS if by_hand else _KEYS
     state, paused = None, False
     with keyboard() as pressed, Live(screen=True, auto_refresh=False) as live:
         while not device.ended:
             for key in pressed(0.03):
-                command = known.get(key)
+                command = bindings.get(key)
                 if command == "quit":
                     return
                 if command:
@@ -49,20 +49,20 @@ def _watch(device: DeviceProcess, engine: str, by_hand: bool, score: Score) -> N
 
 def _print(device: DeviceProcess, score: Score, console: bool) -> None:
     """Print each frame of the display when it changes. console: also print the board's console output."""
-    said, said_s = [""], 0.0
+    printed, said_s = [""], 0.0
     while not device.ended:
         ticks = device.ticks(1.0)
         while console and device.console:
             print(device.console.pop(0), flush=True)
         for state in ticks:
             score.add(state)
-            same_page = state["lcd"][0][:4] == said[0][:4]
+            same_page = state["lcd"][0][:4] == printed[0][:4]
             between = state["lcd"][0].startswith("?")  # the new picture of an OLED may be incomplete
-            if state["lcd"] == said or ((same_page or between) and state["t_s"] - said_s < FRAME_S):
+            if state["lcd"] == printed or ((same_page or between) and state["t_s"] - said_s < FRAME_S):
                 continue
-            said, said_s = state["lcd"], state["t_s"]
+            printed, said_s = state["lcd"], state["t_s"]
             print(f"{said_s:6.2f} s  {state['phase']}, true lean {lean_text(state['lean_deg'])}")
-            print("\n".join(oled_lines(state["pixels"]) if "pixels" in state else lcd_lines(said)), flush=True)
+            print("\n".join(oled_lines(state["pixels"]) if "pixels" in state else lcd_lines(printed)), flush=True)
 
 
 def demo(hand: bool = False, cpython: bool = False, display: str = "lcd", user: Path | None = None) -> None:

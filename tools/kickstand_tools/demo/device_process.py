@@ -39,8 +39,8 @@ class DeviceProcess:
             environment["MICROPYPATH"] += ":" + self._directory.name
         else:
             command = [sys.executable, "-m", "kickstand_tools.demo.device", *arguments]
-            own = [firmware_path.search_path(), self._directory.name, os.environ.get("PYTHONPATH")]
-            path = os.pathsep.join(filter(None, own))
+            folders = [firmware_path.search_path(), self._directory.name, os.environ.get("PYTHONPATH")]
+            path = os.pathsep.join(filter(None, folders))
             environment = os.environ | {"PYTHONPATH": path}
         self._process = subprocess.Popen(
             command,

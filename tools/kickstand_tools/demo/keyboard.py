@@ -57,9 +57,9 @@ else:
             pressed = select.select([terminal], [], [], wait_s)[0]
             return split(os.read(terminal, 1024).decode(errors="replace")) if pressed else []
 
-        before = termios.tcgetattr(terminal)
+        attributes = termios.tcgetattr(terminal)
         tty.setcbreak(terminal)
         try:
             yield keys
         finally:
-            termios.tcsetattr(terminal, termios.TCSADRAIN, before)
+            termios.tcsetattr(terminal, termios.TCSADRAIN, attributes)

@@ -12,25 +12,16 @@ _STANDING = ("kickstand", "upright", "moving", "wait")
 
 
 class State(TypedDict):
-    """One tick of the device.
+    """One tick of the device."""
 
-    t_s: Simulated time.
-    of_s: Duration of the run. None if the bike is steered by hand.
-    lcd: Both lines of the display.
-    lean_deg: True lean, positive to the right.
-    speed_mps: True speed.
-    phase: Name of the bike's present manoeuvre.
-    pressed: True while the button is pressed.
-    pixels: Pixels of an OLED as hex, 64 rows of 128 pixels. A byte has 8 pixels, the leftmost in bit 7.
-    """
-
-    t_s: float
-    of_s: float | None
-    lcd: list[str]
-    lean_deg: float
-    speed_mps: float
-    phase: str
-    pressed: bool
+    t_s: float  # simulated time
+    of_s: float | None  # duration of the run. None if the bike is steered by hand.
+    lcd: list[str]  # both lines of the display
+    lean_deg: float  # True lean, positive to the right
+    speed_mps: float  # True speed
+    phase: str  # name of the bike's present manoeuvre
+    pressed: bool  # True while the button is pressed
+    # Pixels of an OLED as hex, 64 rows of 128 pixels. A byte has 8 pixels, the leftmost in bit 7.
     pixels: NotRequired[str]
 
 
@@ -60,9 +51,9 @@ class Score:
         phase = state["phase"]
         self._turns += phase == "held turn" != self._phase
         self._phase = phase
-        shown = shown_lean(state["lcd"])
-        if shown is not None:
-            self._pairs.setdefault(self._part(phase), []).append((state["lean_deg"], shown))
+        lean = shown_lean(state["lcd"])
+        if lean is not None:
+            self._pairs.setdefault(self._part(phase), []).append((state["lean_deg"], lean))
 
     def _part(self, phase: str) -> str:
         if phase == "held turn":
@@ -106,12 +97,12 @@ def table(figures: dict[str, Figures]) -> Table | str:
 
 
 def _figures(pairs: list[tuple[float, float]]) -> Figures:
-    errors = [shown - true for true, shown in pairs]
+    errors = [lean - true for true, lean in pairs]
     count = len(pairs)
     return Figures(
         count,
         sum(true for true, _ in pairs) / count,
-        sum(shown for _, shown in pairs) / count,
+        sum(lean for _, lean in pairs) / count,
         sqrt(sum(error * error for error in errors) / count),
         max(errors, key=abs),
     )

@@ -111,13 +111,13 @@ def bike(lean_deg: float, shown_deg: float | None) -> Text:
 
 
 def _figures(state: State) -> Table:
-    shown = shown_lean(state["lcd"])
+    lean = shown_lean(state["lcd"])
     table = Table.grid(padding=(0, 1))
     table.add_column(width=12, justify="right", style="grey70")
     table.add_column(width=_LEFT_COLUMNS - 14, no_wrap=True)
     table.add_row("true lean", Text(lean_text(state["lean_deg"]), style=_TRUE))
-    table.add_row("shown lean", Text("-" if shown is None else lean_text(shown, digits=0), style=_SHOWN))
-    table.add_row("error", "-" if shown is None else f"{shown - state['lean_deg']:+.1f}°")
+    table.add_row("shown lean", Text("-" if lean is None else lean_text(lean, digits=0), style=_SHOWN))
+    table.add_row("error", "-" if lean is None else f"{lean - state['lean_deg']:+.1f}°")
     table.add_row("speed", f"{3.6 * state['speed_mps']:.0f} km/h")
     table.add_row("bike", state["phase"])
     table.add_row("button", Text("● pressed", style="bold red") if state["pressed"] else "○")

@@ -30,9 +30,9 @@ def check(program: Path, engine: str) -> None:
     source = program.read_bytes()
     wrong = _by_micropython(program) if engine == "MicroPython" else _by_cpython(source)
     if wrong:
-        line, _, what = wrong.partition(":")
-        where = f"{program}, line {line}" if line else f"{program}"
-        raise InputError(f"{where}: {what}: {engine} cannot run this file: correct it, or give your program")
+        line, _, problem = wrong.partition(":")
+        location = f"{program}, line {line}" if line else f"{program}"
+        raise InputError(f"{location}: {problem}: {engine} cannot run this file: correct it, or give your program")
 
 
 def _by_micropython(program: Path) -> str:

@@ -1,5 +1,6 @@
 """Reads recorded logs: CSV with the columns of COLUMNS, plain or gzipped. It judges nothing: see checks.log."""
 
+import contextlib
 import itertools
 from collections.abc import Iterator
 from pathlib import Path
@@ -70,10 +71,11 @@ def read_with_rows(source: Source, progress: Progress | None = None) -> tuple[Lo
 
 def check_first_line(log: Path) -> None:
     """Raise InputError if the first line of a file is not the header of a log, or if no other line follows."""
-    pieces = (text for text, _ in chunks(log, CHUNK_BYTES, []))
-    _, rest = _header(str(log), next(pieces, b""))
-    if not rest.strip() and not any(text.strip() for text in pieces):
-        raise InputError(f"{log} is empty: there are no readings below the names of its columns")
+    with contextlib.closing(chunks(log, CHUNK_BYTES, [])) as pieces:
+        first, _ = next(pieces, (b"", 0))
+        _, rest = _header(str(log), first)
+        if not rest.strip() and not any(text.strip() for text, _ in pieces):
+            raise InputError(f"{log} is empty: there are no readings below the names of its columns")
 
 
 def is_log(path: Path) -> bool:
@@ -141,8 +143,17 @@ class _Column:
 
 
 def _parsed(file: File, progress: Progress | None) -> Log:
-    name, total, notices = name_of(file), total_bytes(file), list[Message]()
-    pieces = chunks(file, CHUNK_BYTES, notices)
+    # An error holds the frames that it went through, so without closing() the file would stay open as long as the error
+    notices: list[Message] = []
+    with contextlib.closing(chunks(file, CHUNK_BYTES, notices)) as pieces:
+        columns = _columns(pieces, name_of(file), notices, total_bytes(file), progress)
+    return _log(name_of(file), columns, notices)
+
+
+def _columns(
+    pieces: Iterator[tuple[bytes, int]], name: str, notices: list[Message], total: int, progress: Progress | None
+) -> dict[str, _Column]:
+    """Convert the text of a log to its columns."""
     first, position = next(pieces, (b"", 0))
     names, rest = _header(name, first)
     index = {column: names.index(column) for column in COLUMNS + OPTIONAL if column in names}
@@ -164,7 +175,7 @@ def _parsed(file: File, progress: Progress | None) -> Log:
                 growing.extend(values.get(column, nothing))
         if progress:
             progress(done, total)
-    return _log(name, columns, notices)
+    return columns
 
 
 def _log(name: str, columns: dict[str, _Column], notices: list[Message]) -> Log:

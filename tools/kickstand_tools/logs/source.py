@@ -6,7 +6,7 @@ import os
 import stat
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import IO, Any, cast
 
@@ -58,7 +58,7 @@ def log_stem(name: str) -> str:
     return name[: len(name) - len(ending)]
 
 
-def chunks(source: File, size: int, remarks: list[Message] | None = None) -> Iterator[tuple[bytes, int]]:
+def chunks(source: File, size: int, remarks: list[Message] | None = None) -> Generator[tuple[bytes, int], None, None]:
     """Yield the unpacked text in chunks of whole lines.
 
     Line ends are converted to line feeds. The last line may have no line end. NUL bytes at the end are left out.

@@ -33,18 +33,18 @@ def camera_offset_s(ride: BinMotion, camera: Telemetry) -> tuple[float, float]:
     count = np.bincount(cell)
     rate = np.column_stack([np.bincount(cell, axis) for axis in camera.rate_dps.T]) / np.maximum(count, 1)[:, None]
     filmed, ridden = _turning(rate - np.median(rate[count > 0], axis=0)), _turning(ride.rate_dps)
-    found, common = correlations(ridden, ride.valid, filmed, count > 0)
-    found = np.where(common * STEP_S >= _LEAST_S, found, 0.0)
-    likely = log_likelihood_ratio(found, common, STEP_S / _ALIKE_S)
+    correlation, common = correlations(ridden, ride.valid, filmed, count > 0)
+    correlation = np.where(common * STEP_S >= _LEAST_S, correlation, 0.0)
+    likely = log_likelihood_ratio(correlation, common, STEP_S / _ALIKE_S)
     best = peaks(likely, round(_APART_S / STEP_S), 2)
-    if not best or likely[best[0]] < _LEAST_EVIDENCE or found[best[0]] < _LEAST_CORRELATION:
+    if not best or likely[best[0]] < _LEAST_EVIDENCE or correlation[best[0]] < _LEAST_CORRELATION:
         raise InputError("at no time does the camera turn like the bike")
     if len(best) > 1 and likely[best[1]] > likely[best[0]] - _LEAST_LEAD:
         raise InputError("the camera turns like the bike at several times")
-    at = best[0]
-    between = peak_offset(found[at - 1 : at + 2]) if 0 < at < len(found) - 1 else 0.0
-    shift = at - (len(filmed) - 1) + between
-    return shift * STEP_S - float(camera.t_s[0]), float(found[at])
+    index = best[0]
+    between = peak_offset(correlation[index - 1 : index + 2]) if 0 < index < len(correlation) - 1 else 0.0
+    shift = index - (len(filmed) - 1) + between
+    return shift * STEP_S - float(camera.t_s[0]), float(correlation[index])
 
 
 def _turning(rate_dps: Array) -> Array:

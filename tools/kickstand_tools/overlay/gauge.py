@@ -53,14 +53,14 @@ class Gauge:
         left_deg, right_deg: the largest lean to each side so far.
         """
         picture = self._still.copy()
-        known = math.isfinite(lean_deg)
-        if known:
+        is_known = math.isfinite(lean_deg)
+        if is_known:
             self._fill(picture, lean_deg)
             bike = parts.bike(34.0 * self._unit)
             turned = bike.rotate(-max(-75.0, min(75.0, lean_deg)), Image.Resampling.BICUBIC)
             parts.put(picture, turned, self._px(_MIDDLE, 61.0))
         self._marks(picture, left_deg, right_deg)
-        self._number(picture, lean_deg, known)
+        self._number(picture, lean_deg, is_known)
         self._show_forces(picture, forward_g, left_g)
         if self._has_speed:
             scale = _MPH if self._mph else _KMH
@@ -145,8 +145,8 @@ class Gauge:
             pen.pieslice([0, 0, size * finer - 1, size * finer - 1], begin, end, fill=255)
 
         mask = ImageChops.multiply(parts.smooth_mask((size, size), draw, finer=2), self._band)
-        at = round(self._dial[0] - self._radius), round(self._dial[1] - self._radius)
-        picture.paste(ACCENT, at, mask)
+        corner = round(self._dial[0] - self._radius), round(self._dial[1] - self._radius)
+        picture.paste(ACCENT, corner, mask)
 
     def _marks(self, picture: Image.Image, left_deg: float, right_deg: float) -> None:
         """Mark the largest leans: a line across the dial, and numbers below its ends."""
@@ -172,15 +172,15 @@ class Gauge:
                 parts.put(picture, mark, self._px(_MIDDLE + sign * 54.0, 84.0))
 
     def _show_forces(self, picture: Image.Image, forward_g: float, left_g: float) -> None:
-        known = math.isfinite(forward_g) and math.isfinite(left_g)
-        braking = known and forward_g < 0.0
+        is_known = math.isfinite(forward_g) and math.isfinite(left_g)
+        braking = is_known and forward_g < 0.0
         ends = (
             ("BRAKE" if braking else "ACCEL", abs(forward_g), 92.0 - 3.5),
             ("SIDE" if abs(left_g) < 0.005 else "LEFT" if left_g > 0.0 else "RIGHT", abs(left_g), 95.5),
         )
         for word, value, y in ends:
-            self._text(picture, f"{word} {value:.2f} g" if known else "-- g", 6.5, WHITE, (_SIDE, y))
-        if known:
+            self._text(picture, f"{word} {value:.2f} g" if is_known else "-- g", 6.5, WHITE, (_SIDE, y))
+        if is_known:
             (x, y), scale = self._forces, self._forces_radius / MOST_G
             size = min(1.0, MOST_G / max(math.hypot(forward_g, left_g), 1e-9)) * scale
             spot = parts.spot(round(7.0 * self._unit), ACCENT)

@@ -21,14 +21,10 @@ _NESTED = b"\0"
 
 @dataclass
 class Telemetry:
-    """Readings of the camera's gyro.
+    """Readings of the camera's gyro."""
 
-    t_s: time since the video's first picture, in s, shape (n).
-    rate_dps: rates about the camera's axes, in deg/s, shape (n, 3).
-    """
-
-    t_s: Array
-    rate_dps: Array
+    t_s: Array  # time since the video's first picture, in s, shape (n)
+    rate_dps: Array  # rates about the camera's axes, in deg/s, shape (n, 3)
 
 
 def telemetry(video: Video) -> Telemetry | None:
@@ -37,10 +33,10 @@ def telemetry(video: Video) -> Telemetry | None:
         return None
     times, rates = [], []
     try:
-        found = packets(video, video.telemetry)
+        payloads = packets(video, video.telemetry)
     except ValueError:  # ffmpeg's output is not a list of packets
         return None
-    for at_s, lasts_s, packet in found:
+    for at_s, lasts_s, packet in payloads:
         samples = [values for values in streams(packet, b"GYRO") if len(values)]
         if samples and lasts_s > 0.0 and np.all(np.abs(samples[0]) < 1e3):
             rate = samples[0]
@@ -76,9 +72,9 @@ def _of_stream(body: bytes, key: bytes) -> Iterator[Array]:
 
 def _items(data: bytes) -> Iterator[tuple[bytes, bytes, int, bytes]]:
     """Yield key, type, size of one sample and bytes of all samples for each item. Items are padded to four bytes."""
-    place = 0
-    while place + 8 <= len(data):
-        name, kind, size, count = struct.unpack_from(">4scBH", data, place)
-        place += 8
-        yield name, kind, size, data[place : place + size * count]
-        place += (size * count + 3) // 4 * 4
+    offset = 0
+    while offset + 8 <= len(data):
+        name, kind, size, count = struct.unpack_from(">4scBH", data, offset)
+        offset += 8
+        yield name, kind, size, data[offset : offset + size * count]
+        offset += (size * count + 3) // 4 * 4

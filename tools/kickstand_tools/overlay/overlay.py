@@ -97,33 +97,33 @@ def overlay(
     if filmed and offset_s is None:
         offset_s, correlation = _found_offset(opened.checked, filmed)
     reading = opened.read(progress)
-    seen = shown(reading)
-    begin_s, end_s = _part(seen, filmed, offset_s, from_s, to_s, opened.name)
+    values = shown(reading)
+    begin_s, end_s = _part(values, filmed, offset_s, from_s, to_s, opened.name)
     rate = fps or (filmed.fps if filmed else _FPS)
     count = max(1, round((end_s - begin_s) * rate))
-    moments = seen.at(begin_s + np.arange(count) / rate)
+    moments = values.at(begin_s + np.arange(count) / rate)
     from .gauge import Gauge
 
     size = min(filmed.width, filmed.height) if filmed else height or _CLIP_HEIGHT
-    gauge = Gauge(size, seen.has_speed, mph)
-    done = 0
+    gauge = Gauge(size, values.has_speed, mph)
+    written = 0
 
     def drawn() -> None:
-        nonlocal done
-        done += 1
+        nonlocal written
+        written += 1
         if progress:
-            progress(done, count)
+            progress(written, count)
 
     def pictures() -> Iterator[bytes]:
         for k in range(count):
             yield gauge.picture(*(float(value[k]) for value in moments.values)).tobytes()
 
-    given = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", f"{gauge.width}x{gauge.height}", "-r", f"{rate:g}", "-i", "-"]
+    raw = f"-f rawvideo -pix_fmt rgba -s {gauge.width}x{gauge.height} -r {rate:g} -i -".split()
     if filmed is None:
-        arguments = [*given, *_TRANSPARENT[out.suffix.lower()]]
+        arguments = [*raw, *_TRANSPARENT[out.suffix.lower()]]
     else:
         assert offset_s is not None
-        arguments = _laid_over(filmed, begin_s - offset_s, end_s - begin_s, fps, given, round(MARGIN * size))
+        arguments = _laid_over(filmed, begin_s - offset_s, end_s - begin_s, fps, raw, round(MARGIN * size))
     with whole_file(out) as temporary:
         temporary.touch()  # if this fails, the system gives the reason; ffmpeg would not report the reason
         write_video(temporary, arguments, pictures(), drawn)
@@ -168,12 +168,12 @@ def _part(
     begin_s, end_s = (s if s is None or s >= 0.0 else max(0.0, last_s + s) for s in (from_s, to_s))
     if video is not None and offset_s is not None:
         first, last = offset_s, offset_s + video.seconds
-        where = f"the video lasts from {first:.1f} to {last:.1f} s of the ride {name}, which ends at {last_s:.1f} s"
+        limits = f"the video lasts from {first:.1f} to {last:.1f} s of the ride {name}, which ends at {last_s:.1f} s"
         if first >= last_s or last <= 0.0:
-            raise InputError(f"{where}: they have nothing in common, check --offset")
+            raise InputError(f"{limits}: they have nothing in common, check --offset")
         if begin_s is None and end_s is None and (first < -_BEYOND_S or last > last_s + _BEYOND_S):
             within = f"--from {max(first, 0.0):.1f} --to {min(last, last_s):.1f}"
-            raise InputError(f"{where}: check --offset, or take what they have in common with {within}")
+            raise InputError(f"{limits}: check --offset, or take what they have in common with {within}")
         if begin_s is not None or end_s is not None:  # replace a missing limit by the end of the common part
             begin_s, end_s = begin_s or 0.0, last_s if end_s is None else min(end_s, last_s)
         begin_s = first if begin_s is None else max(first, begin_s)

@@ -46,8 +46,8 @@ def text(words: str, height: float, colour: Colour) -> Image.Image:
     ascent = font.getbbox("0", stroke_width=stroke)  # gives all texts the same baseline
     top, bottom = min(top, ascent[1]), max(bottom, ascent[3])
     picture = Image.new("RGBA", (int(right - left) + 2, int(bottom - top) + 2), DARK[:3] + (0,))
-    place = 1 - left, 1 - top
-    ImageDraw.Draw(picture).text(place, words, font=font, fill=colour, stroke_width=stroke, stroke_fill=DARK)
+    origin = 1 - left, 1 - top
+    ImageDraw.Draw(picture).text(origin, words, font=font, fill=colour, stroke_width=stroke, stroke_fill=DARK)
     return picture
 
 
@@ -68,8 +68,8 @@ def arrow(size: float, to_the_right: bool, colour: Colour) -> Image.Image:
 
     def draw(pen: ImageDraw.ImageDraw, finer: int) -> None:
         near, far = width * finer, (side - width) * finer
-        tip, back = (far, near) if to_the_right else (near, far)
-        pen.polygon([(tip, side * finer / 2.0), (back, near), (back, far)], fill=255)
+        tip, base = (far, near) if to_the_right else (near, far)
+        pen.polygon([(tip, side * finer / 2.0), (base, near), (base, far)], fill=255)
 
     return outlined(smooth_mask((side, side), draw), colour, width)
 

@@ -45,16 +45,16 @@ class Shown:
 
     def at(self, t_s: Array) -> "Shown":
         """Interpolate the values at other times. The values are NaN before the ride, after it and in gaps."""
-        before = np.clip(np.searchsorted(self.t_s, t_s, side="right") - 1, 0, len(self.t_s) - 2)
+        index = np.clip(np.searchsorted(self.t_s, t_s, side="right") - 1, 0, len(self.t_s) - 2)
         lean, forward, left = (
-            _along_lines(self.t_s, value, before, t_s, _GAP_S) for value in (self.lean_deg, self.forward_g, self.left_g)
+            _along_lines(self.t_s, value, index, t_s, _GAP_S) for value in (self.lean_deg, self.forward_g, self.left_g)
         )
-        known = np.flatnonzero(np.isfinite(self.speed_mps))
+        valid = np.flatnonzero(np.isfinite(self.speed_mps))
         speed = np.full(len(t_s), np.nan)
-        if len(known) > 1:
-            at_s = self.t_s[known]
-            place = np.clip(np.searchsorted(at_s, t_s, side="right") - 1, 0, len(known) - 2)
-            speed = _along_lines(at_s, self.speed_mps[known], place, t_s, _SPEED_S)
+        if len(valid) > 1:
+            at_s = self.t_s[valid]
+            speed_index = np.clip(np.searchsorted(at_s, t_s, side="right") - 1, 0, len(valid) - 2)
+            speed = _along_lines(at_s, self.speed_mps[valid], speed_index, t_s, _SPEED_S)
         last = np.searchsorted(self.t_s, t_s, side="right") - 1
         most_left, most_right = (np.where(last >= 0, value[last], 0.0) for value in (self.left_deg, self.right_deg))
         return Shown(t_s, lean, forward, left, speed, most_left, most_right)

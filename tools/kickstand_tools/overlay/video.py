@@ -95,13 +95,13 @@ def packets(video: Video, stream: int) -> list[tuple[float, float, bytes]]:
     tick = re.search(r"#tb 0: (\d+)/(\d+)", listed)
     if not tick:
         return []
-    unit_s, found, begin = int(tick[1]) / int(tick[2]), [], 0
+    unit_s, result, begin = int(tick[1]) / int(tick[2]), [], 0
     for line in listed.splitlines():
         if not line.startswith("#"):
-            _, _, at, lasts, size, *_ = (cell.strip() for cell in line.split(","))
-            found.append((int(at) * unit_s, int(lasts) * unit_s, data[begin : begin + int(size)]))
+            _, _, offset, lasts, size, *_ = (cell.strip() for cell in line.split(","))
+            result.append((int(offset) * unit_s, int(lasts) * unit_s, data[begin : begin + int(size)]))
             begin += int(size)
-    return found
+    return result
 
 
 def write_video(

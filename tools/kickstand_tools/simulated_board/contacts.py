@@ -30,11 +30,11 @@ class Contact:
 
     def _set_at(self, at_us, closed):
         def act():
-            now = closed and self._clock.now_us < self._broken_us
-            if now != self.closed:
-                self.closed = now
+            is_closed = closed and self._clock.now_us < self._broken_us
+            if is_closed != self.closed:
+                self.closed = is_closed
                 if self._edge:
-                    self._edge(0 if now else 1)
+                    self._edge(0 if is_closed else 1)
 
         self._clock.at(at_us, act)
 

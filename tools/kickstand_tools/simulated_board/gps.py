@@ -9,9 +9,9 @@ _HOME = 48.1173, 11.5166667  # degrees north and east
 def _angle(degrees, digits, sides):
     """Return an angle as NMEA writes it: degrees with `digits` digits, minutes, and the letter of its side."""
     parts = int(abs(degrees) * 6e6 + 0.5)  # the angle in units of 0.00001 minutes
-    whole, rest = parts // 6_000_000, parts % 6_000_000
+    whole, remainder = parts // 6_000_000, parts % 6_000_000
     side = sides[1] if degrees < 0.0 else sides[0]
-    return "%0*d%02d.%05d,%s" % (digits, whole, rest // 100_000, rest % 100_000, side)
+    return "%0*d%02d.%05d,%s" % (digits, whole, remainder // 100_000, remainder % 100_000, side)
 
 
 def sentence(body):

@@ -33,8 +33,8 @@ def shown_lean(lines):
 
     Returns None if the two lines are another page.
     """
-    found = _LEAN_PAGE.match(lines[0])
-    return found and float(found.group(1)) * (-1.0 if found.group(2) == "left" else 1.0)
+    match = _LEAN_PAGE.match(lines[0])
+    return match and float(match.group(1)) * (-1.0 if match.group(2) == "left" else 1.0)
 
 
 class Lcd:
@@ -98,7 +98,7 @@ class Lcd:
     def codes(self):
         """Return two lists of the 16 visible character codes."""
         places = [(self._shift + i) % _LINE for i in range(COLUMNS)]
-        return [[self.ddram[start + place] for place in places] for start in (0x00, 0x40)]
+        return [[self.ddram[start + column] for column in places] for start in (0x00, 0x40)]
 
     def text(self):
         """Return two strings of the 16 visible characters. The strings are blank while the display is off."""
@@ -125,14 +125,14 @@ class Lcd:
         """
         if self.wiring != 1:
             self._raw, value = value, self._as_usual(value)
-        before = self._port
+        previous = self._port
         self._port = value
-        if (before ^ value) & _LIGHT:
+        if (previous ^ value) & _LIGHT:
             self.changes += 1
-        if value & _E and not before & _E:
-            self._rs = before & _RS  # RS must be stable 40 ns before E rises (tAS), so a change with E comes too late
-        elif before & _E and not value & _E:
-            self._latch(before & ~_RS | self._rs)
+        if value & _E and not previous & _E:
+            self._rs = previous & _RS  # RS must be stable 40 ns before E rises (tAS), so a change with E comes too late
+        elif previous & _E and not value & _E:
+            self._latch(previous & ~_RS | self._rs)
         return True
 
     def read_byte(self):

@@ -287,8 +287,8 @@ class Mpu6050:
         last = (now - self._first_us) * 1000 // self._period_ns
         if self._fifo_registers and self._regs[USER_CTRL] & FIFO_ENABLED:
             # Skip samples that later samples would push out of the FIFO, because its final content is the same
-            kept = self.fifo.size // len(self._fifo_registers) + 2
-            for number in range(max(self._next, last + 1 - kept), last + 1):
+            capacity = self.fifo.size // len(self._fifo_registers) + 2
+            for number in range(max(self._next, last + 1 - capacity), last + 1):
                 self._sample(number)
                 self._queue()
         else:

@@ -85,9 +85,9 @@ class Oled:
 
         Columns and rows are both reversed, because modules are mounted with the cable's edge at the top.
         """
-        seen = bytearray(WIDTH // 8 * HEIGHT)
+        rows = bytearray(WIDTH // 8 * HEIGHT)
         if not self.backlight:
-            return seen
+            return rows
         for y in range(HEIGHT):
             at = y if self._flipped_rows else HEIGHT - 1 - y
             row = (at + self.start_line + self._offset) % HEIGHT
@@ -95,8 +95,8 @@ class Oled:
                 column = self._first + (x if self._flipped_columns else WIDTH - 1 - x)
                 lit = self._all_on or self.ram[(row >> 3) * self._columns + column] >> (row & 7) & 1
                 if bool(lit) != self.inverted and y <= self._mux:
-                    seen[(y * WIDTH + x) >> 3] |= 0x80 >> (x & 7)
-        return seen
+                    rows[(y * WIDTH + x) >> 3] |= 0x80 >> (x & 7)
+        return rows
 
     @property
     def rows(self):
@@ -142,9 +142,9 @@ class Oled:
     # The controller
 
     def _store(self, value):
-        at = self._page * self._columns + self._column
-        if self.ram[at] != value:
-            self.ram[at] = value
+        index = self._page * self._columns + self._column
+        if self.ram[index] != value:
+            self.ram[index] = value
             self.changes += 1
         first, last, top, bottom = self._window
         if self._mode == 2:  # the address stays within the page; an SH1106 stops at its last column

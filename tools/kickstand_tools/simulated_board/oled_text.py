@@ -72,9 +72,9 @@ def _digit(pages, page, x):
     """Return the large digit at column x whose top is in this page, or None."""
     from kickstand.ui.glance import DIGITS
 
-    seen = b"".join([bytes(pages[page + row][x : x + _DIGIT_COLUMNS]) for row in range(_DIGIT_ROWS)])
+    pattern = b"".join([bytes(pages[page + row][x : x + _DIGIT_COLUMNS]) for row in range(_DIGIT_ROWS)])
     for digit in range(10):
-        if seen == DIGITS[len(seen) * digit : len(seen) * (digit + 1)]:
+        if pattern == DIGITS[len(pattern) * digit : len(pattern) * (digit + 1)]:
             return digit
     return None
 
@@ -93,11 +93,11 @@ def _picture(pages, below):
     if reason is not None:
         return "Lean  --", reason.strip()
     if below.startswith("pk"):
-        whole, hundredths = _digit(pages, 1, 0), _number(pages, 1, 34, 62)
+        integer, hundredths = _digit(pages, 1, 0), _number(pages, 1, 34, 62)
         word = "".join([_LETTERS.get(cell, "?") for cell in _cells(pages[1])[11:]])
-        if whole is None or hundredths is None:
+        if integer is None or hundredths is None:
             return None
-        return "%s   %5.2f g" % (word[0].upper() + word[1:], whole + hundredths / 100), below
+        return "%s   %5.2f g" % (word[0].upper() + word[1:], integer + hundredths / 100), below
     if "max" in below:
         left = _number(pages, 1, 2, 30)
         right = _number(pages, 1, 74, 102) if _digit(pages, 1, 102) is not None else _digit(pages, 1, 74)

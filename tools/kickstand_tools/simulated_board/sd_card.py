@@ -65,8 +65,8 @@ class SdCard:
         if self._taking == SECTOR + 2 and len(data) == SECTOR:
             self._content, self._taking = bytes(data), 2
             return b"\xff" * SECTOR
-        rest = len(self._answer) - self._at
-        if rest >= len(data) > 6:
+        remaining = len(self._answer) - self._at
+        if remaining >= len(data) > 6:
             self._at += len(data)
             return self._answer[self._at - len(data) : self._at]
         return bytes([self._exchange(value) for value in data])

@@ -230,8 +230,8 @@ class Board:
         """Call receive(bytes) with the bytes that arrive on this pin. The bytes are noise if the GPS receiver sends at
         another rate."""
         if self.gps and pin == self._gps_pin:
-            same = baud == self.gps.baud
-            self.gps.connect(receive if same else lambda data: receive(bytes([b & 0xE6 for b in data])))
+            is_same_rate = baud == self.gps.baud
+            self.gps.connect(receive if is_same_rate else lambda data: receive(bytes([b & 0xE6 for b in data])))
 
     def watch_pin(self, number, edge):
         """Call edge(level) when the part wired to this pin changes its level. None ends the calls."""

@@ -11,41 +11,25 @@ _SPEED_SMOOTHING_S = 0.15  # time that a hand needs to change throttle or brake
 
 @dataclass
 class Leg:
-    """A part of a ride. None keeps the value of the previous leg.
+    """A part of a ride. None keeps the value of the previous leg."""
 
-    phase: Name of the rider's action.
-    seconds: Duration of the leg.
-    speed_mps: Speed at the end of the leg. The acceleration is constant.
-    lean_deg: Lean of the centre of mass, positive to the right. This lean is reached within roll_s of the start, then
-        held.
-    roll_s: Time for the change of lean.
-    slope_percent: Slope of the road at the end of the leg.
-    hang_m: Offset of the centre of mass to the right of the bike's plane.
-    lift_deg: Pitch caused by a wheelie.
-    engine: 0 off, 1 running.
-    crosswind_mps2: Acceleration to the right caused by wind.
-    bank_deg: Tilt of the road to the right.
-    """
-
-    phase: str
-    seconds: float
-    speed_mps: float | None = None
+    phase: str  # name of the rider's action
+    seconds: float  # duration of the leg
+    speed_mps: float | None = None  # speed at the end of the leg. The acceleration is constant.
+    # Lean of the centre of mass, positive to the right. This lean is reached within roll_s of the start, then held.
     lean_deg: float | None = None
-    roll_s: float = 1.5
-    slope_percent: float | None = None
-    hang_m: float | None = None
-    lift_deg: float | None = None
-    engine: float | None = None
-    crosswind_mps2: float | None = None
-    bank_deg: float | None = None
+    roll_s: float = 1.5  # time for the change of lean
+    slope_percent: float | None = None  # slope of the road at the end of the leg
+    hang_m: float | None = None  # offset of the centre of mass to the right of the bike's plane
+    lift_deg: float | None = None  # pitch caused by a wheelie
+    engine: float | None = None  # 0 off, 1 running
+    crosswind_mps2: float | None = None  # acceleration to the right caused by wind
+    bank_deg: float | None = None  # tilt of the road to the right
 
 
 @dataclass
 class RiderCommands:
-    """The commands of a ride as signals of n samples. The units are s, m, m/s, m/s2 and rad. See Leg for the fields.
-
-    phase: Index of each sample's phase in the list `phases`.
-    """
+    """The commands of a ride as signals of n samples. The units are s, m, m/s, m/s2 and rad. See Leg for the fields."""
 
     rate_hz: float
     time: Signal
@@ -58,7 +42,7 @@ class RiderCommands:
     engine: Signal
     crosswind: Signal
     bank: Signal
-    phase: np.ndarray
+    phase: np.ndarray  # index of each sample's phase in the list `phases`
     phases: list[str]
 
 

@@ -12,20 +12,14 @@ from .physics.signals import band_noise, smoothstep
 
 @dataclass(frozen=True)
 class Hand:
-    """The movements of a hand that turns a sensor.
+    """The movements of a hand that turns a sensor."""
 
-    still_s: Range (shortest, longest) of the time for holding still.
-    turn_s: Range (shortest, longest) of the time for a turn by 90 degrees. A half turn takes 1.6 times as long.
-    heading_deg: Largest rotation about the vertical during a turn.
-    detour_deg: Deviation from the shortest rotation.
-    push_g: Acceleration during a turn, rms.
-    """
-
-    still_s: tuple[float, float] = (4.5, 6.0)
+    still_s: tuple[float, float] = (4.5, 6.0)  # range (shortest, longest) of the time for holding still
+    # Range (shortest, longest) of the time for a turn by 90 degrees. A half turn takes 1.6 times as long.
     turn_s: tuple[float, float] = (0.9, 2.0)
-    heading_deg: float = 60.0
-    detour_deg: float = 15.0
-    push_g: float = 0.1
+    heading_deg: float = 60.0  # largest rotation about the vertical during a turn
+    detour_deg: float = 15.0  # deviation from the shortest rotation
+    push_g: float = 0.1  # acceleration during a turn, rms
 
 
 def procedure(

@@ -16,34 +16,21 @@ _CLOSING_S = 45.0  # time for the straight and the stop at the end of every ride
 
 @dataclass
 class Conditions:
-    """Road, engine, weather and sensor of a ride. The defaults describe an ordinary day.
+    """Road, engine, weather and sensor of a ride. The defaults describe an ordinary day."""
 
-    roughness: Roughness of the road in m3, see road.CLASS_A.
-    engine_rms_g: Engine vibration at 6000/min, rms.
-    shift_rpm: Engine speed at which the rider changes up.
-    unrest_deg: Random changes of the lean at speed, rms.
-    gust_mps2: Changes of the crosswind, rms.
-    sway_m: Movement of the centre of mass from side to side, rms.
-    slip_deg: Angle between the bike's heading and its motion, rms.
-    start_c: Temperature of the chip at power-on.
-    rise_c: Rise of the temperature while the chip warms up, most of it within 10 to 15 minutes.
-    drift: Factor on the temperature drift of an ordinary sensor's biases.
-    creep_deg: Angle by which the sensor's mount has rotated at the end of the ride.
-    bumps: Tuples (phase, spacing in m, height in m, length in m). During this phase of the ride, the road has bumps of
-        this size.
-    """
-
-    roughness: float = CLASS_B
-    engine_rms_g: float = 0.1
-    shift_rpm: float = 5000.0
-    unrest_deg: float = 0.4
-    gust_mps2: float = 0.0
-    sway_m: float = 0.0
-    slip_deg: float = 0.0
-    start_c: float = 22.0
-    rise_c: float = 7.0
-    drift: float = 1.0
-    creep_deg: float = 0.0
+    roughness: float = CLASS_B  # roughness of the road in m3, see road.CLASS_A
+    engine_rms_g: float = 0.1  # engine vibration at 6000/min, rms
+    shift_rpm: float = 5000.0  # engine speed at which the rider changes up
+    unrest_deg: float = 0.4  # random changes of the lean at speed, rms
+    gust_mps2: float = 0.0  # changes of the crosswind, rms
+    sway_m: float = 0.0  # movement of the centre of mass from side to side, rms
+    slip_deg: float = 0.0  # angle between the bike's heading and its motion, rms
+    start_c: float = 22.0  # temperature of the chip at power-on
+    rise_c: float = 7.0  # rise of the temperature while the chip warms up, most of it within 10 to 15 minutes
+    drift: float = 1.0  # factor on the temperature drift of an ordinary sensor's biases
+    creep_deg: float = 0.0  # angle by which the sensor's mount has rotated at the end of the ride
+    # Tuples (phase, spacing in m, height in m, length in m). During this phase of the ride, the road has bumps of this
+    # size.
     bumps: list[tuple[str, float, float, float]] = field(default_factory=list)
 
 
@@ -74,7 +61,7 @@ class Plan:
 
         No leg gets shorter than _SHORTEST_S, so the ride may stay longer than `seconds`.
         """
-        steady = [leg for before, leg in pairwise(self.legs) if leg.speed_mps in (None, before.speed_mps)]
+        steady = [leg for previous, leg in pairwise(self.legs) if leg.speed_mps in (None, previous.speed_mps)]
         while steady and (over := sum(leg.seconds for leg in self.legs) - seconds):
             longest = max(steady, key=lambda leg: leg.seconds)
             cut = min(over, longest.seconds - _SHORTEST_S)

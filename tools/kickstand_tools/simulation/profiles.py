@@ -211,9 +211,9 @@ def weight(plan: Plan) -> Conditions:
     by 1 to 2 cm.
     """
     conditions = street(plan)
-    beside = plan.side() * plan.uniform(0.01, 0.02)
+    offset_m = plan.side() * plan.uniform(0.01, 0.02)
     for leg in plan.legs:
-        leg.hang_m = beside
+        leg.hang_m = offset_m
         if leg.lean_deg is not None and abs(leg.lean_deg) > 12.0:
             leg.hang_m += plan.uniform(0.02, 0.05) * (1.0 if leg.lean_deg > 0 else -1.0)
     conditions.sway_m = 0.004

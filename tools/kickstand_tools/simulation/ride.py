@@ -242,8 +242,8 @@ def _distances_in_phase(command: RiderCommands, phase: str, spacing_m: float) ->
     """Return the distances at which the ride is in this phase. The distances are multiples of spacing_m."""
     if phase not in command.phases:
         return []
-    met = command.distance[command.phase == command.phases.index(phase)]
-    return sorted({float(k) * spacing_m for k in np.floor(met / spacing_m)})
+    passed = command.distance[command.phase == command.phases.index(phase)]
+    return sorted({float(k) * spacing_m for k in np.floor(passed / spacing_m)})
 
 
 def _impact(chance: np.random.Generator, command: RiderCommands) -> NDArray[np.float64]:

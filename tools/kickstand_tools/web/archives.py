@@ -59,20 +59,20 @@ def tools(*modules: str) -> dict[str, Path]:
     finder = _ToolsFinder([str(firmware_path.TOOLS)])
     for name in modules:
         finder.import_hook("kickstand_tools." + name.removesuffix(".py").replace("/", "."))
-    found = {Path(path) for module in finder.modules.values() if (path := vars(module)["__file__"])}
-    beside = {file for path in found for file in path.parent.iterdir() if file.suffix in (".html", ".js", ".css")}
-    return {path.relative_to(firmware_path.TOOLS).as_posix(): path for path in sorted(found | beside)}
+    paths = {Path(path) for module in finder.modules.values() if (path := vars(module)["__file__"])}
+    resources = {file for path in paths for file in path.parent.iterdir() if file.suffix in (".html", ".js", ".css")}
+    return {path.relative_to(firmware_path.TOOLS).as_posix(): path for path in sorted(paths | resources)}
 
 
 def zipped(contents: Mapping[str, bytes]) -> bytes:
     """Pack {name: content} in a ZIP file."""
-    made = io.BytesIO()
-    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in sorted(contents.items()):
             entry = zipfile.ZipInfo(name, _DATE)
             entry.compress_type = zipfile.ZIP_DEFLATED
             archive.writestr(entry, data)
-    return made.getvalue()
+    return content.getvalue()
 
 
 def install_archive() -> bytes:
@@ -104,19 +104,19 @@ def _compiled() -> dict[str, bytes]:
     have only the files with machine code. Without a compiler the result is empty, and the board gets the sources.
     """
     sources = sorted(firmware_path.PACKAGE.rglob("*.py"))
-    first, *others = ARCHITECTURES
+    first, *remaining = ARCHITECTURES
     try:
         with ThreadPoolExecutor() as pool:
-            made = dict(zip(sources, pool.map(lambda source: bytecode.cross_compiled(source, first), sources)))
-            found = {(first, source): data for source, data in made.items()}
-            for source in [source for source, data in made.items() if data[2]]:
-                found |= {(other, source): bytecode.cross_compiled(source, other) for other in others}
+            compiled = dict(zip(sources, pool.map(lambda source: bytecode.cross_compiled(source, first), sources)))
+            files = {(first, source): data for source, data in compiled.items()}
+            for source in [source for source, data in compiled.items() if data[2]]:
+                files |= {(other, source): bytecode.cross_compiled(source, other) for other in remaining}
     except bytecode.CannotCompile:
         return {}
     package = firmware_path.PACKAGE
     return {
         f"compiled/{architecture}/{source.relative_to(package).with_suffix('.mpy').as_posix()}": data
-        for (architecture, source), data in found.items()
+        for (architecture, source), data in files.items()
     }
 
 
@@ -132,10 +132,11 @@ def rides_archive() -> bytes:
         import gpxpy
     except ImportError as error:
         raise InputError("the page Rides needs fitdecode and gpxpy: " + extra("web")) from error
-    found = tools("web/rides_guest.py")
-    for package in (firmware_path.PACKAGE, *(Path(one.__path__[0]) for one in (fitdecode, gpxpy, jinja2, markupsafe))):
-        found |= {path.relative_to(package.parent).as_posix(): path for path in package.rglob("*.py")}
-    return zipped({name: path.read_bytes() for name, path in found.items()})
+    files = tools("web/rides_guest.py")
+    libraries = (Path(library.__path__[0]) for library in (fitdecode, gpxpy, jinja2, markupsafe))
+    for package in (firmware_path.PACKAGE, *libraries):
+        files |= {path.relative_to(package.parent).as_posix(): path for path in package.rglob("*.py")}
+    return zipped({name: path.read_bytes() for name, path in files.items()})
 
 
 def numpy_archive(conda: bytes) -> tuple[bytes, bytes]:
@@ -146,7 +147,7 @@ def numpy_archive(conda: bytes) -> tuple[bytes, bytes]:
         archive: a ZIP file from which numpy can be imported.
         licences: the text of its licences.
     """
-    kept, licences = {}, b""
+    members, licences = {}, b""
     with tarfile.open(fileobj=io.BytesIO(conda)) as package:
         for entry in package:
             file = package.extractfile(entry) if entry.isfile() else None
@@ -155,8 +156,8 @@ def numpy_archive(conda: bytes) -> tuple[bytes, bytes]:
             if entry.name.startswith(_LICENCES):
                 licences += file.read()
             elif entry.name.startswith(f"{_NUMPY}numpy/") and _wanted(entry.name):
-                kept[entry.name.removeprefix(_NUMPY)] = file.read()
-    return zipped(kept), licences
+                members[entry.name.removeprefix(_NUMPY)] = file.read()
+    return zipped(members), licences
 
 
 def _wanted(name: str) -> bool:

@@ -67,8 +67,8 @@ class LiveStream:
         calibration = io.StringIO()
         write_calibration(calibration, ride_log.calibration(first))
         stem = f"live-{self._began:%Y%m%d-%H%M%S}-{first.crc & 0xFFFF:04x}"
-        made = {f"{stem}.csv": self._log, f"{stem}.cal.json": calibration}
-        return [(name, file.getvalue().encode("ascii")) for name, file in made.items()]
+        contents = {f"{stem}.csv": self._log, f"{stem}.cal.json": calibration}
+        return [(name, file.getvalue().encode("ascii")) for name, file in contents.items()]
 
 
 def pull(line, name, progress):
@@ -90,5 +90,5 @@ def pull(line, name, progress):
             refused = error.line(page=True)
         written = [path for ride in rides if ride.log for path in (ride.log, calibration_path(ride.log))]
         files = [(path.name, path.read_bytes()) for path in written]
-    found = [vars(ride) | {"log": ride.log and ride.log.name} for ride in rides]
-    return json.dumps({"refused": refused, "rides": found}), files
+    entries = [vars(ride) | {"log": ride.log and ride.log.name} for ride in rides]
+    return json.dumps({"refused": refused, "rides": entries}), files

@@ -164,11 +164,11 @@ class Device:
     def _display(self):
         """Return the result of display(). While an OLED receives a new picture, the text still describes the old
         picture."""
-        seen = display(self.board.lcd)
-        if not seen["text"][0].startswith("?"):
-            self._text = {name: seen[name] for name in ("text", "shown_deg")}
-        seen.update(self._text)
-        return seen
+        state = display(self.board.lcd)
+        if not state["text"][0].startswith("?"):
+            self._text = {name: state[name] for name in ("text", "shown_deg")}
+        state.update(self._text)
+        return state
 
     def take(self):
         """Return the records since the last call, one per TICK_S, as a JSON list of objects.

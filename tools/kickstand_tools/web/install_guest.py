@@ -40,7 +40,7 @@ class Installation:
                 try:
                     board = flash.describe_supported(transport, name)
                     self._pose = transport.eval(_POSE)
-                    there = others.read(transport)
+                    files = others.read(transport)
                 finally:
                     connection.restart(transport)
         except InputError as error:
@@ -50,18 +50,18 @@ class Installation:
         for module in [module for module in sys.modules if module.startswith("kickstand.")]:
             del sys.modules[module]  # the firmware identifies its board at import, so import it again
         settings, self._by_hand, self._own = {}, None, None
-        found = others.find(there, lambda path: _judged(path, *self._pose), True)
-        own = None if CONFIG in found.moves else there.texts.get(CONFIG)
+        plan = others.find(files, lambda path: _judged(path, *self._pose), True)
+        config = None if CONFIG in plan.moves else files.texts.get(CONFIG)
         try:
-            self._own = None if own is None else config_text.decoded(own)
+            self._own = None if config is None else config_text.decoded(config)
             settings = config_text.values(self._own or "")
         except InputError as error:
             self._by_hand = str(error)
         with config_check.posed(*self._pose):
             defaults = vars(config_check.default_settings())
             usual = {name: _written(value) for name, value in defaults.items() if name.isupper()}
-        said = {"board": board, "settings": settings, "usual": usual, "by_hand": self._by_hand}
-        return json.dumps(said | {"others": found.words()})
+        described = {"board": board, "settings": settings, "usual": usual, "by_hand": self._by_hand}
+        return json.dumps(described | {"others": plan.words()})
 
     def check(self, wanted):
         """Check the config.py with new settings by the firmware's own rules.
@@ -80,13 +80,13 @@ class Installation:
                 return json.dumps({"text": text, "fault": [name, str(error)]})
         self._path.write_text(text, encoding="utf-8")
         with config_check.posed(*self._pose):
-            found = config_check.fault(self._path)
-        if found:
-            line, reason = found
+            fault = config_check.fault(self._path)
+        if fault:
+            line, reason = fault
             setting = line and re.match(r"\w+", config_text.lines(text)[line - 1])
             mentioned = next((name for name in values if re.search(rf"\b{name}\b", reason)), None)
-            found = [setting[0] if setting else mentioned, reason.partition(": correct it")[0]]
-        return json.dumps({"text": text, "fault": found})
+            fault = [setting[0] if setting else mentioned, reason.partition(": correct it")[0]]
+        return json.dumps({"text": text, "fault": fault})
 
     def install(self, line, name, wanted, progress):
         """Install the firmware on the board. A config.py that the form cannot change is kept.
@@ -106,12 +106,12 @@ class Installation:
         try:
             replaces = text is not None and text != self._own
             board = BrowserBoard(line, name)
-            done = flash.flash(board, replaces, progress, compiler=_compiled, judge=_judged)
+            result = flash.flash(board, replaces, progress, compiler=_compiled, judge=_judged)
         except InputError as error:
             return json.dumps({"refused": error.line(page=True)})
-        installed = done.installed
+        installed = result.installed
         counts = {"copied": len(installed.copied), "kept": len(installed.kept)}
-        return json.dumps({"board": done.board, "config_kept": CONFIG not in installed.copied} | counts)
+        return json.dumps({"board": result.board, "config_kept": CONFIG not in installed.copied} | counts)
 
 
 def status(line, name):

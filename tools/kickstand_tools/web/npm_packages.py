@@ -36,17 +36,17 @@ def find() -> dict[str, bytes]:
     Raises InputError if the packages cannot be installed.
     """
     lists = b"".join((NPM / name).read_bytes() for name in LISTS)
-    kept = Path.home() / ".cache" / "kickstand" / f"web-{hashlib.sha256(lists).hexdigest()[:16]}"
-    if not kept.is_dir():
-        _install(kept)
+    cache = Path.home() / ".cache" / "kickstand" / f"web-{hashlib.sha256(lists).hexdigest()[:16]}"
+    if not cache.is_dir():
+        _install(cache)
     try:
         return {
-            f"{folder}/{name}": (kept / "node_modules" / package / name).read_bytes()
+            f"{folder}/{name}": (cache / "node_modules" / package / name).read_bytes()
             for folder, (package, names) in PACKAGES.items()
             for name in names
         }
     except OSError as error:
-        raise InputError(f"{kept} is incomplete: remove it, and it is fetched again") from error
+        raise InputError(f"{cache} is incomplete: remove it, and it is fetched again") from error
 
 
 def _install(kept: Path) -> None:
@@ -64,7 +64,7 @@ def _install(kept: Path) -> None:
         with tempfile.TemporaryDirectory(dir=kept.parent, ignore_cleanup_errors=True) as directory:
             for name in LISTS:
                 shutil.copy(NPM / name, directory)
-            done = npm(
+            process = npm(
                 ["ci", "--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error"],
                 return_completed_process=True,
                 cwd=directory,
@@ -75,8 +75,8 @@ def _install(kept: Path) -> None:
                 errors="replace",
                 timeout=_TIMEOUT_S,
             )
-            if done.returncode != 0:
-                raise InputError(f"what the pages carry cannot be fetched: {_reason(str(done.stdout))}")
+            if process.returncode != 0:
+                raise InputError(f"what the pages carry cannot be fetched: {_reason(str(process.stdout))}")
             _rename(directory, kept)
     except subprocess.TimeoutExpired:
         raise InputError("what the pages carry cannot be fetched: npm took too long; is there a network?")
@@ -96,5 +96,5 @@ def _rename(directory: str, kept: Path) -> None:
 def _reason(said: str) -> str:
     """Return why npm failed: its first error line that is not only a code."""
     lines = [line.removeprefix("npm error ").strip() for line in said.splitlines() if line.startswith("npm error")]
-    whole = [line for line in lines if " " in line and not line.startswith(("code ", "errno ", "syscall "))]
-    return f"npm says: {whole[0]}" if whole else "npm failed; is there a network?"
+    sentences = [line for line in lines if " " in line and not line.startswith(("code ", "errno ", "syscall "))]
+    return f"npm says: {sentences[0]}" if sentences else "npm failed; is there a network?"

@@ -17,34 +17,23 @@ from ..logs.reader import is_log
 
 @dataclass
 class GivenRide:
-    """A ride among the given files.
+    """A ride among the given files."""
 
-    log: a file, or a folder with the files of one recording.
-    files: names of all its files.
-    calibration: name of its calibration file, or "".
-    track: name of a .gpx or .fit file to join with the ride, or "".
-    table: the table whose columns the user must choose; None if the columns are known.
-    """
-
-    log: str
-    files: list[str]
-    calibration: str = ""
-    track: str = ""
+    log: str  # a file, or a folder with the files of one recording
+    files: list[str]  # names of all its files
+    calibration: str = ""  # name of its calibration file, or ""
+    track: str = ""  # name of a .gpx or .fit file to join with the ride, or ""
+    # The table whose columns the user must choose; None if the columns are known
     table: mapped.MappedTable | None = None
 
 
 @dataclass
 class Given:
-    """The result of sorted_out().
+    """The result of sorted_out()."""
 
-    rides: sorted by name.
-    kinds: {name of a file: its kind}.
-    refused: {name of a file: the reason why it cannot be used}.
-    """
-
-    rides: list[GivenRide] = field(default_factory=list)
-    kinds: dict[str, str] = field(default_factory=dict)
-    refused: dict[str, InputError] = field(default_factory=dict)
+    rides: list[GivenRide] = field(default_factory=list)  # sorted by name
+    kinds: dict[str, str] = field(default_factory=dict)  # {name of a file: its kind}
+    refused: dict[str, InputError] = field(default_factory=dict)  # {name of a file: the reason why it cannot be used}
 
 
 def sorted_out(names: list[str]) -> Given:
@@ -55,7 +44,7 @@ def sorted_out(names: list[str]) -> Given:
 
     names: names of the files, in the order in which the user chose them.
     """
-    found, loose = Given(), []
+    inputs, loose = Given(), []
     track = ""
     calibrations = []
     for name in names:
@@ -63,32 +52,33 @@ def sorted_out(names: list[str]) -> Given:
             if name.lower().endswith(".json"):
                 read_calibration(Path(name))
                 calibrations.append(name)
-                found.kinds[name] = "calibration"
+                inputs.kinds[name] = "calibration"
             elif name.lower().endswith((".gpx", ".fit")):
                 read_track(Path(name))
-                track, found.kinds[name] = name, "track"
+                track, inputs.kinds[name] = name, "track"
             elif is_log(Path(name)):
-                found.rides.append(GivenRide(name, [name]))
-                found.kinds[name] = "log"
+                inputs.rides.append(GivenRide(name, [name]))
+                inputs.kinds[name] = "log"
             else:
                 files = read_files(Path(name))
                 if any(file.name.endswith(".parquet") for file in files):
                     raise InputError(f"{name} is Parquet, which this page cannot read: give the ride as CSV")
                 if zipfile.is_zipfile(name):
-                    _add(found, name, [name], files)
+                    _add(inputs, name, [name], files)
                 else:
                     loose += files
         except InputError as error:
-            found.refused[name] = error
+            inputs.refused[name] = error
     for name, files in _recordings_among(loose):
-        _add(found, name, [file.name for file in files], files)
-    found.rides.sort(key=lambda ride: _by_number(ride.log))
-    beside = {ride.log: calibration_path(Path(ride.log)).name for ride in found.rides}
-    free = [name for name in calibrations if name not in beside.values()]
-    for ride in found.rides:
-        ride.calibration = beside[ride.log] if beside[ride.log] in calibrations else next(reversed(free), "")
+        _add(inputs, name, [file.name for file in files], files)
+    inputs.rides.sort(key=lambda ride: _by_number(ride.log))
+    default_names = {ride.log: calibration_path(Path(ride.log)).name for ride in inputs.rides}
+    free = [name for name in calibrations if name not in default_names.values()]
+    for ride in inputs.rides:
+        name = default_names[ride.log]
+        ride.calibration = name if name in calibrations else next(reversed(free), "")
         ride.track = track
-    return found
+    return inputs
 
 
 def _in_folder(name: str, files: list[RecordingFile]) -> str:
@@ -107,27 +97,27 @@ def _recordings_among(files: list[RecordingFile]) -> Iterator[tuple[str, list[Re
     Yields the name and the files of each recording. The files of a recording with several files are written to a new
     folder, and its name is the folder's name.
     """
-    found = recordings(files)
-    used = {id(file) for _, group in found for file in group}
-    for app, group in found:
+    matches = recordings(files)
+    used = {id(file) for _, group in matches for file in group}
+    for app, group in matches:
         yield group[0].name if len(group) == 1 else _in_folder(f"{app.NAME} recording", group), group
-    left = [file for file in files if id(file) not in used]
-    table = mapped.table_in(left) if len(left) > 1 else None
+    remaining = [file for file in files if id(file) not in used]
+    table = mapped.table_in(remaining) if len(remaining) > 1 else None
     if table is not None and table.joined and not table.findings.lacking:
-        yield _in_folder("recording", left), left
+        yield _in_folder("recording", remaining), remaining
     else:
-        yield from ((file.name, [file]) for file in left)
+        yield from ((file.name, [file]) for file in remaining)
 
 
 def _add(found: Given, log: str, names: list[str], files: list[RecordingFile]) -> None:
     """Add a ride, or the reason why the files are not a ride."""
-    known = recordings(files)
-    table = None if known else mapped.table_in(files)
-    if not known and (table is None or len(table.sheet.columns) < len(mapped.REQUIRED)):
+    parts = recordings(files)
+    table = None if parts else mapped.table_in(files)
+    if not parts and (table is None or len(table.sheet.columns) < len(mapped.REQUIRED)):
         found.refused |= dict.fromkeys(names, mapped.unknown(files, log))
         return
     found.rides.append(GivenRide(log, names, table=table))
-    found.kinds |= dict.fromkeys(names, f"of {known[0][0].NAME}" if known else "table")
+    found.kinds |= dict.fromkeys(names, f"of {parts[0][0].NAME}" if parts else "table")
 
 
 def _by_number(name: str) -> list[tuple[int, str]]:

@@ -72,13 +72,13 @@ def rides(given, names):
     names = json.loads(names)
     for name in names:
         Path(name).symlink_to(Path(given, name))
-    found = sorted_out(names)
+    inputs = sorted_out(names)
     rides = [
-        vars(one) | {"isLog": found.kinds.get(one.log) == "log", "table": one.table and asked_for(one.table)}
-        for one in found.rides
+        vars(ride) | {"isLog": inputs.kinds.get(ride.log) == "log", "table": ride.table and asked_for(ride.table)}
+        for ride in inputs.rides
     ]
-    refused = {name: _one_line(error.line(page=True)) for name, error in found.refused.items()}
-    return {"rides": rides, "kinds": found.kinds, "why": refused}
+    refused = {name: _one_line(error.line(page=True)) for name, error in inputs.refused.items()}
+    return {"rides": rides, "kinds": inputs.kinds, "why": refused}
 
 
 def asked_for(table: mapped.MappedTable) -> dict[str, Any]:
@@ -92,17 +92,17 @@ def asked_for(table: mapped.MappedTable) -> dict[str, Any]:
         certain: true if all required columns are certain.
         picture: result of MappedTable.first_seconds().
     """
-    found = table.findings
-    keys = [[key, words, key in mapped.REQUIRED, found.columns.get(key, "")] for key, words in mapped.WORDS.items()]
+    findings = table.findings
+    keys = [[key, words, key in mapped.REQUIRED, findings.columns.get(key, "")] for key, words in mapped.WORDS.items()]
     units = []
     for key, words in (("t", "time"), ("a", "acceleration"), ("g", "rates"), ("speed", "speed")):
-        likely, why = found.units.get(key, ""), found.found[key].why if key in found.found else ""
+        likely, reason = findings.units.get(key, ""), findings.found[key].why if key in findings.found else ""
         choices = [*mapped.UNIT_KEYS[key], *([mapped.COUNTS] if key in "ag" else [])]
         if likely and likely not in choices:
             choices.insert(0, likely)
-        units.append([key, f"unit of the {words}", [[unit, unit] for unit in choices], likely, why])
+        units.append([key, f"unit of the {words}", [[unit, unit] for unit in choices], likely, reason])
     units[1][2] += [[f"-{unit}", f"{unit}, all of the opposite sign"] for unit, _ in list(units[1][2])]
-    words = {"lacking": table.lacking, "certain": found.decided, "picture": table.first_seconds()}
+    words = {"lacking": table.lacking, "certain": findings.decided, "picture": table.first_seconds()}
     return {"columns": table.sheet.columns, "keys": keys, "units": units} | words
 
 
@@ -125,10 +125,10 @@ def take(log, is_log, columns, units, track, progress):
         return {"log": log}
     out, warnings, words = log, [], ""
     if not is_log:
-        found = import_recording(log, json.loads(columns) or None, json.loads(units))
+        imported = import_recording(log, json.loads(columns) or None, json.loads(units))
         out = str(_result_path(log, f"{log.partition('.')[0]}.csv"))
-        write_imported(out, found)
-        warnings = [notice.line(page=True) for notice in [*found.notices, *found.shortfalls]]
+        write_imported(out, imported)
+        warnings = [notice.line(page=True) for notice in [*imported.notices, *imported.shortfalls]]
     if track:
         try:
             joined = join_track(Path(out), Path(track), progress)
@@ -138,8 +138,8 @@ def take(log, is_log, columns, units, track, progress):
             words = f"{track} is joined: correlation {match.correlation:.2f}, known to {match.sigma_s:.2f} s."
         except InputError as error:
             warnings.append(f"{track} is not joined: {_one_line(error.line(page=True))}")
-    made = {"path": out} if out != log else {}
-    return {"log": out, "warnings": warnings, "words": words} | made
+    entry = {"path": out} if out != log else {}
+    return {"log": out, "warnings": warnings, "words": words} | entry
 
 
 @in_json
@@ -158,13 +158,13 @@ def look(log, calibration, progress):
     """
     _smoothed.clear()
     ride = open_ride(Path(log), Path(calibration), smoothed=True)
-    seen = overview(ride, progress, _smoothed.setdefault(log, []).append)
+    ride_overview = overview(ride, progress, _smoothed.setdefault(log, []).append)
     table = {"units": report.STOPS_UNITS, "title": report.STOPS_TITLE, "terms": report.STOPS_TERMS}
     return {
-        "words": asdict(report.words(seen, on_page=True)) | table,
-        "json": report.as_data(seen) | {"ride": Path(log).name},
-        "warnings": [notice.line(page=True) for notice in seen.notices],
-        "page": page(seen, f'<script src="{PLOTLY}"></script>', "'self'"),
+        "words": asdict(report.words(ride_overview, on_page=True)) | table,
+        "json": report.as_data(ride_overview) | {"ride": Path(log).name},
+        "warnings": [notice.line(page=True) for notice in ride_overview.notices],
+        "page": page(ride_overview, f'<script src="{PLOTLY}"></script>', "'self'"),
         "plotly": PLOTLY,
         "stem": ride.stem,
     }
@@ -193,11 +193,11 @@ def align(log, progress):
         path: path of the calibration.
         roll_deg, pitch_deg, yaw_deg: its standard errors.
     """
-    found = fit_ride(Path(log), progress=progress)
+    fit = fit_ride(Path(log), progress=progress)
     out = _result_path(log, calibration_path(Path(log)).name)
-    write_calibration(out, found.calibration)
-    known = {name: round(getattr(found, name), 1) for name in ("roll_deg", "pitch_deg", "yaw_deg")}
-    return {"path": str(out), **known}
+    write_calibration(out, fit.calibration)
+    errors = {name: round(getattr(fit, name), 1) for name in ("roll_deg", "pitch_deg", "yaw_deg")}
+    return {"path": str(out), **errors}
 
 
 def _result_path(log, name):
@@ -221,10 +221,10 @@ def raising(function):
 
     @functools.wraps(function)
     def checked(*matrices):
-        found = function(*matrices)
-        if np.any(np.isnan(found)) and all(np.all(np.isfinite(matrix)) for matrix in matrices):
+        result = function(*matrices)
+        if np.any(np.isnan(result)) and all(np.all(np.isfinite(matrix)) for matrix in matrices):
             raise np.linalg.LinAlgError("Singular matrix")
-        return found
+        return result
 
     return checked
 

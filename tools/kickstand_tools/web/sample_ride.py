@@ -35,17 +35,17 @@ def sample_ride() -> dict[str, bytes]:
 
     The log contains values of a GPS receiver. The calibration comes from six positions and then from two poses.
     """
-    made = _ride()
+    ride = _ride()
     with tempfile.TemporaryDirectory() as directory:
         folder = Path(directory)
-        seven, stand, upright = write_poses(folder, made)
+        seven, stand, upright = write_poses(folder, ride)
         six = fit_six_positions(seven)
         write_calibration(folder / CALIBRATION, fit_two_positions(stand, upright, six.calibration).calibration)
-        n = len(made.time) // _EACH * _EACH
-        means = made.readings[:n].reshape(-1, _EACH, 7).mean(axis=1)
-        truth = {name: values[:n:_EACH] for name, values in made.truth.items()}
-        rate_hz = made.rate_hz / _EACH
-        recorded = replace(made, rate_hz=rate_hz, time=made.time[:n:_EACH], readings=means, truth=truth)
+        n = len(ride.time) // _EACH * _EACH
+        means = ride.readings[:n].reshape(-1, _EACH, 7).mean(axis=1)
+        truth = {name: values[:n:_EACH] for name, values in ride.truth.items()}
+        rate_hz = ride.rate_hz / _EACH
+        recorded = replace(ride, rate_hz=rate_hz, time=ride.time[:n:_EACH], readings=means, truth=truth)
         write_ride(folder / "RIDE.csv", recorded, speed=True)
         packed = gzip.compress((folder / "RIDE.csv").read_bytes(), mtime=0)
         return {LOG: packed, CALIBRATION: (folder / CALIBRATION).read_bytes()}
@@ -56,10 +56,10 @@ def preview() -> str:
 
     Returns an SVG element. The style sheet sets the colours of its classes left, right and road.
     """
-    made = _ride()
-    each = round(_EACH_S * made.rate_hz)
-    lean = made.truth["lean_deg"][::each]
-    lat, lon, _ = (values[::each] for values in positions(made))
+    ride = _ride()
+    step = round(_EACH_S * ride.rate_hz)
+    lean = ride.truth["lean_deg"][::step]
+    lat, lon, _ = (values[::step] for values in positions(ride))
     across = np.linspace(0.0, _WIDE, len(lean))
     middle = _CHART / 2.0
     high = middle - lean * (middle - _EDGE) / np.max(np.abs(lean))
@@ -70,8 +70,8 @@ def preview() -> str:
         corners = [(0.0, middle), *zip(across.tolist(), (middle - below).tolist()), (_WIDE, middle)]
         areas.append(element("path", d=path(corners), class_=side, fill_opacity=0.5))
     largest = [
-        element("text", side, x=across[at], y=place, text_anchor="middle")
-        for side, at, place in (("right", int(np.argmax(lean)), 16.0), ("left", int(np.argmin(lean)), _CHART - 4.0))
+        element("text", side, x=across[index], y=text_y, text_anchor="middle")
+        for side, index, text_y in (("right", int(np.argmax(lean)), 16.0), ("left", int(np.argmin(lean)), _CHART - 4.0))
     ]
     east, north = (lon - lon[0]) * np.cos(np.radians(lat[0])), lat - lat[0]
     scale = min((_WIDE - 2.0 * _EDGE) / np.ptp(east), (_MAP - 2.0 * _EDGE) / np.ptp(north))

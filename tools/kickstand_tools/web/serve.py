@@ -66,7 +66,8 @@ class Server(ThreadingHTTPServer):
     def _end_silent_connection(self) -> bool:
         """End the oldest connection that has sent no request, and take its place. Return False without one."""
         with contextlib.suppress(OSError, StopIteration, RuntimeError):
-            next(one for one in list(self._open) if one not in self.has_asked).shutdown(socket.SHUT_RDWR)
+            silent = (connection for connection in list(self._open) if connection not in self.has_asked)
+            next(silent).shutdown(socket.SHUT_RDWR)
             return self._free.acquire(timeout=FULL_S)
         return False
 

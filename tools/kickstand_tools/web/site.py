@@ -12,18 +12,14 @@ from ..common import firmware_path
 from ..common.errors import DISTRIBUTION
 from ..common.output import check_directory, new_directory, whole_file
 from ..common.templates import filled, source_hash
-from ..pictures import building, lcd, wiring
-from ..pictures.lcd_font import ROM
 from . import archives, npm_packages, sample_ride
 from .documents import documents
+from .lcd_font import ROM
 
 PAGE = Path(__file__).resolve().parent / "page"
 # Large files that only visitors with a board or a ride need. The browser fetches them on demand.
 LATER = ("esptool/", "firmware.zip", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip", "sample/")
-_BOARDS = {"pico": wiring.PICO, "esp32": wiring.ESP32}
-_NARROW = 4  # number of poses side by side in the drawing for phones
 _STYLE = "style.css"  # the style sheet is a template too
-_SHOWN = ("Kickstand", "starting")  # the text on the drawn display
 # The service worker does not store these files. The browser stores the worker itself, and index.html is stored as "./".
 _NOT_KEPT = ("service_worker.js", "index.html")
 _WHEN_READ = (*LATER, documents.FOLDER)  # the service worker stores these when they are first opened
@@ -32,8 +28,8 @@ _WHEN_READ = (*LATER, documents.FOLDER)  # the service worker stores these when 
 def python_files() -> dict[str, str]:
     """Return {path for import: source} of the firmware's package and of the tools' modules that the page Try runs."""
     package = firmware_path.PACKAGE
-    found = {path.relative_to(package.parent).as_posix(): path for path in sorted(package.rglob("*.py"))}
-    return {name: path.read_text(encoding="utf-8") for name, path in (found | archives.tools("web/device.py")).items()}
+    files = {path.relative_to(package.parent).as_posix(): path for path in sorted(package.rglob("*.py"))}
+    return {name: path.read_text(encoding="utf-8") for name, path in (files | archives.tools("web/device.py")).items()}
 
 
 def site_files() -> dict[str, bytes]:
@@ -47,8 +43,7 @@ def site_files() -> dict[str, bytes]:
     files = npm_packages.find()
     files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in sorted(PAGE.rglob("*.*"))}
     files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # a browser shows a file with the suffix .txt
-    files |= wiring_files()
-    values = {"home": home(), "boards": wiring_tables(), "preview": sample_ride.preview()}
+    values = {"home": home(), "preview": sample_ride.preview()}
     library = files["plotly/plotly.min.js"].decode()
     values["charts"] = " ".join(map(source_hash, (library, *page.SCRIPTS)))  # hashes for the content security policy
     files |= {name: _filled(name, **values) for name in files if name.endswith(".html") or name == _STYLE}
@@ -65,27 +60,9 @@ def site_files() -> dict[str, bytes]:
     sizes = {name: len(data) for name, data in files.items() if name.startswith(LATER)}
     files["sizes.json"] = json.dumps(sizes).encode()
     version = hashlib.sha256(b"".join(name.encode() + data for name, data in sorted(files.items()))).hexdigest()[:12]
-    kept = sorted(["./", *(name for name in files if name not in _NOT_KEPT and not name.startswith(_WHEN_READ))])
-    files["service_worker.js"] = _filled("service_worker.js", files=kept, version=version)
+    stored = sorted(["./", *(name for name in files if name not in _NOT_KEPT and not name.startswith(_WHEN_READ))])
+    files["service_worker.js"] = _filled("service_worker.js", files=stored, version=version)
     return files
-
-
-def wiring_files() -> dict[str, bytes]:
-    """Return {name in the site: SVG} of the wiring drawings and the other drawings for building the device."""
-    display = lcd.draw([list(line.ljust(16).encode("ascii")) for line in _SHOWN], bytes(64))
-    drawn = building.drawings(display, display) | {"six_positions_narrow.svg": building.six_positions(_NARROW)}
-    return {name: svg.encode() for name, svg in drawn.items()}
-
-
-def wiring_tables() -> dict[str, tuple[str, list[tuple[str, str, str]]]]:
-    """Return the tables of the wiring drawings.
-
-    The result is {board: (title, rows)}. A row is (part, the part's pin, the board's pin).
-    """
-    return {
-        name: (board.title, [(part, *both) for part, pins in wiring.connections(board) for both in pins.items()])
-        for name, board in _BOARDS.items()
-    }
 
 
 def home() -> str:
@@ -94,7 +71,7 @@ def home() -> str:
         named = metadata.metadata(DISTRIBUTION).get_all("Project-URL") or []
     except metadata.PackageNotFoundError:
         named = []
-    return dict(one.split(", ", 1) for one in named).get("Homepage", "")
+    return dict(entry.split(", ", 1) for entry in named).get("Homepage", "")
 
 
 def shop_boards() -> dict[str, dict[str, str]]:
@@ -106,10 +83,10 @@ def shop_boards() -> dict[str, dict[str, str]]:
     text = (firmware_path.documents() / "firmware" / "docs" / "settings.md").read_text(encoding="utf-8")
     boards = {}
     for line in re.findall(r"(?m)^\| board \| `SENSOR_SDA`.*\n\|.*\n((?:\|.*\n)+)", text)[0].splitlines():
-        name, sensor, display, button, more, _ = (cell.strip() for cell in line.strip("|").split("|"))
+        name, sensor, display, button, options, _ = (cell.strip() for cell in line.strip("|").split("|"))
         pins = re.findall(r"\d+", re.sub(r"\(.*?\)", "", f"{sensor} {display} {button}"))
         names = "SENSOR_SDA", "SENSOR_SCL", "LCD_SDA", "LCD_SCL", "BUTTON_PIN"
-        boards[name] = dict(zip(names, pins, strict=True)) | dict(re.findall(r"`(\w+) = (\w+)`", more))
+        boards[name] = dict(zip(names, pins, strict=True)) | dict(re.findall(r"`(\w+) = (\w+)`", options))
     return boards
 
 

@@ -1,6 +1,5 @@
 """The commands that the workshop adds to `kickstand`: evaluate, bands and bench."""
 
-import contextlib
 import json
 from pathlib import Path
 from typing import Any
@@ -10,14 +9,13 @@ from kickstand_emulator.commands import CHIP, ready_emulator
 from kickstand_tools.cli.common import JSON, PATH, warn
 from kickstand_tools.cli.simulated import LINES_S, PROFILE_NAMES, pose_options, seconds_option
 from kickstand_tools.common.errors import extra
-from kickstand_tools.common.output import check_directory, new_directory
 from kickstand_tools.common.progress import Bar
 from kickstand_tools.simulation.physics.mount import MOUNTS
 from kickstand_tools.simulation.physics.road import CLASSES
 from kickstand_tools.simulation.profiles import MAIN, check_profile
 from rich.console import Console
 
-from .evaluation import bands, integrity, integrity_report, picture, report, runs
+from .evaluation import bands, integrity, report, runs
 from .evaluation.estimators import missing
 
 FAULTS_SECONDS = 120.0  # default riding time with each fault
@@ -30,7 +28,6 @@ _WIDTH = 110  # width in columns of a table that is not printed to a terminal
 @seconds_option(60.0, "Riding time of each ride, without start and stop.")
 @pose_options(1.0, "Change of pitch between the two poses, degrees.")
 @click.option("--recording", type=PATH, help="Also compare the filters on this recorded ride, which needs a speed.")
-@click.option("--out", type=PATH, help="Write evaluation.json and lean.png, or faults.json and faults.png, here.")
 @click.option("--faults", is_flag=True, help="Instead measure how long a faulty sensor's wrong lean is shown as good.")
 @click.option("--first-seed", type=click.IntRange(min=0), default=0, help="With --faults: the lowest seed.")
 @click.option("--whole-device", is_flag=True, help="With --faults: run every ride on the whole simulated board.")
@@ -38,7 +35,6 @@ _WIDTH = 110  # width in columns of a table that is not printed to a terminal
 def evaluate_command(
     profiles: str,
     recording: Path | None,
-    out: Path | None,
     faults: bool,
     first_seed: int,
     whole_device: bool,
@@ -47,61 +43,44 @@ def evaluate_command(
 ) -> None:
     """Compare the shown lean and other filters with the truth of simulated rides."""
     if faults:
-        seconds = of_the_rides["seconds"] if _given("seconds") else FAULTS_SECONDS
-        _faults(integrity.jobs(of_the_rides["seeds"], first_seed, seconds, whole_device), out, as_json)
+        seconds = of_the_rides["seconds"] if _is_on_command_line("seconds") else FAULTS_SECONDS
+        jobs = integrity.jobs(of_the_rides["seeds"], first_seed, seconds, whole_device)
+        with Bar("riding with faults", len(jobs), patience_s=0.0, lines_s=LINES_S) as bar:
+            outcomes = integrity.evaluate(jobs, lambda: bar.advance(1))
+        _print(integrity.document(outcomes) if as_json else integrity.fault_table(outcomes))
         return
-    if _given("first_seed") or whole_device:
+    if _is_on_command_line("first_seed") or whole_device:
         raise click.UsageError("--first-seed and --whole-device belong to --faults.")
-    names = [name.strip() for name in profiles.split(",")]
-    jobs = runs.jobs(names, traces=out is not None, **of_the_rides)
-    if out is not None:
-        picture.check()
-        check_directory(out)
+    rides = runs.jobs([name.strip() for name in profiles.split(",")], **of_the_rides)
     absent = missing()
     if absent:
         click.echo(f"left out, not installed: {', '.join(absent)}: {extra('evaluate')}", err=True)
-    with new_directory(out) if out is not None else contextlib.nullcontext():
-        with Bar("riding", len(jobs), patience_s=0.0, lines_s=LINES_S) as bar:
-            found = runs.evaluate(jobs, recording, lambda: bar.advance(1))
-        for result in found.results:
-            if result.refusal is not None:
-                where = f"{result.job.profile}, seed {result.job.seed}"
-                click.echo(f"{where}, not calibrated: {result.refusal}", err=True)
-        warn(str(recording), found.recorded.notices if found.recorded else ())
-        if as_json:
-            click.echo(json.dumps(report.document(found), indent=2))
-        else:
-            console = _console()
-            console.print(report.table(found.results))
-            if found.recorded:
-                console.print(report.real_table(found.recorded.scores, found.recorded.name))
-        if out is not None:
-            figures, drawing = report.write(found, out)
-            click.echo(f"written: {figures} and {drawing}", err=True)
+    with Bar("riding", len(rides), patience_s=0.0, lines_s=LINES_S) as bar:
+        evaluation = runs.evaluate(rides, recording, lambda: bar.advance(1))
+    for result in evaluation.results:
+        if result.refusal is not None:
+            click.echo(f"{result.job.profile}, seed {result.job.seed}, not calibrated: {result.refusal}", err=True)
+    recorded = evaluation.recorded
+    warn(str(recording), recorded.notices if recorded else ())
+    if as_json:
+        _print(report.document(evaluation))
+    else:
+        _print(
+            report.table(evaluation.results), *([report.real_table(recorded.scores, recorded.name)] if recorded else [])
+        )
 
 
-def _given(option: str) -> bool:
-    """True if the command line has this option."""
+def _is_on_command_line(option: str) -> bool:
     return click.get_current_context().get_parameter_source(option) is click.core.ParameterSource.COMMANDLINE
 
 
-def _faults(jobs: list[integrity.FaultJob], out: Path | None, as_json: bool) -> None:
-    """Run `evaluate --faults`. out: directory to write to, or None."""
-    if out is not None:
-        picture.check()
-        check_directory(out)
-    with new_directory(out) if out is not None else contextlib.nullcontext():
-        with Bar("riding with faults", len(jobs), patience_s=0.0, lines_s=LINES_S) as bar:
-            found = integrity.evaluate(jobs, lambda: bar.advance(1))
-        if as_json:
-            click.echo(json.dumps(integrity_report.document(found), indent=2))
-        else:
-            console = _console()
-            console.print(integrity_report.fault_table(found))
-            console.print(integrity_report.diagram_table(found))
-        if out is not None:
-            figures, drawing = integrity_report.write(found, out)
-            click.echo(f"written: {figures} and {drawing}", err=True)
+def _print(*results: Any) -> None:
+    """Print data as JSON, and tables as tables. Without a terminal the console is wide enough for a table."""
+    console = Console()
+    if isinstance(results[0], dict):
+        click.echo(json.dumps(results[0]))
+    else:
+        (console if console.is_terminal else Console(width=_WIDTH)).print(*results)
 
 
 @click.command()
@@ -120,25 +99,16 @@ def bands_command(
     """
     check_profile(profile)
     with Bar("measuring", len(recordings) + 1 + len(CLASSES), patience_s=0.0, lines_s=LINES_S) as bar:
-        found = {}
+        rides = {}
         for path in recordings:
-            found[path.name] = bands.of_recording(path)
+            rides[path.name] = bands.of_recording(path)
             bar.advance(1)
         for road in (None, *CLASSES):
             name = profile if road is None else f"{profile}, road {road}"
-            found[name] = bands.of_simulated(profile, seed, seconds, road, mount)
+            rides[name] = bands.of_simulated(profile, seed, seconds, road, mount)
             bar.advance(1)
-    if as_json:
-        plain = {name: {key: rms.tolist() for key, rms in figures.items()} for name, figures in found.items()}
-        click.echo(json.dumps({"bands_hz": bands.BANDS_HZ, "rides": plain}))
-    else:
-        _console().print(bands.table(found))
-
-
-def _console() -> Console:
-    """Return a console for standard output. Without a terminal the console is wide enough for a table."""
-    console = Console()
-    return console if console.is_terminal else Console(width=_WIDTH)
+    data = {name: {key: rms.tolist() for key, rms in figures.items()} for name, figures in rides.items()}
+    _print({"bands_hz": bands.BANDS_HZ, "rides": data} if as_json else bands.table(rides))
 
 
 @click.command()
@@ -151,7 +121,4 @@ def bench_command(seconds: int, chip: str, as_json: bool) -> None:
     from .bench.bench import bench, tables
 
     result = bench(seconds, chip)
-    if as_json:
-        click.echo(json.dumps(result))
-    else:
-        Console().print(tables(result))
+    _print(result if as_json else tables(result))

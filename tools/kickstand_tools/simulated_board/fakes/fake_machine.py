@@ -188,14 +188,14 @@ class _Controller:
         return bytes(buf)
 
     def scan(self):
-        found = []
+        addresses = []
         for address in range(0x08, 0x78):
             try:
                 self.writeto(address, b"")
             except OSError:
                 continue
-            found.append(address)
-        return found
+            addresses.append(address)
+        return addresses
 
     def _spend(self, bits):
         ns = self._ns + bits * self._bit_ns

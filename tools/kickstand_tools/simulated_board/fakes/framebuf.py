@@ -28,13 +28,13 @@ class FrameBuffer:
         """Set a pixel to a colour. Without a colour, return the pixel."""
         if not (0 <= x < self._width and 0 <= y < self._height):
             return None
-        at, bit = self._place(x, y)
+        index, bit = self._place(x, y)
         if colour is None:
-            return 1 if self._buffer[at] & bit else 0
+            return 1 if self._buffer[index] & bit else 0
         if colour:
-            self._buffer[at] |= bit
+            self._buffer[index] |= bit
         else:
-            self._buffer[at] &= 0xFF ^ bit
+            self._buffer[index] &= 0xFF ^ bit
         return None
 
     def fill(self, colour):

@@ -75,16 +75,11 @@ class Bike:
 
 @dataclass
 class Roll:
-    """Motion in roll and yaw.
+    """Motion in roll and yaw."""
 
-    lean: Lean of the chassis, in rad.
-    balance: Lean of the centre of mass, in rad.
-    yaw_rate: Rate about the vertical, in rad/s.
-    """
-
-    lean: Signal
-    balance: Signal
-    yaw_rate: Signal
+    lean: Signal  # lean of the chassis, in rad
+    balance: Signal  # lean of the centre of mass, in rad
+    yaw_rate: Signal  # rate about the vertical, in rad/s
 
 
 def chassis_lean(balance: Signal, bike: Bike, bank: Signal | float = 0.0, hang: Signal | float = 0.0) -> Signal:
@@ -139,8 +134,8 @@ def roll(command: RiderCommands, bike: Bike, unrest: Signal) -> Roll:
     needed /= 1.0 + bike.wheel_inertia
     steered = smoothstep((v - _STANDS_MPS) / (_RIDES_MPS - _STANDS_MPS))
     lock = bike.max_curvature
-    wanted = needed / (lock * np.maximum(v, 0.1) ** 2)
-    curvature = steered * lock * wanted / (1.0 + wanted**6) ** (1.0 / 6.0)  # limited smoothly near the steering lock
+    steer = needed / (lock * np.maximum(v, 0.1) ** 2)
+    curvature = steered * lock * steer / (1.0 + steer**6) ** (1.0 / 6.0)  # limited smoothly near the steering lock
     yaw_rate = smoothed(curvature * v, _STEERING_S, rate) / np.cos(command.slope)
     hang = command.hang
     return Roll(chassis_lean(balance, bike, command.bank * smoothstep(v / 5.0), hang), balance, yaw_rate)

@@ -39,31 +39,20 @@ _DLPF = _dlpf()
 
 @dataclass(frozen=True)
 class Chip:
-    """The errors of one sensor along x, y, z at 25 C, and their changes with temperature.
+    """The errors of one sensor along x, y, z at 25 C, and their changes with temperature."""
 
-    accel_matrix: Readings divided by true forces, shape (3, 3). The diagonal has the scale factors, the other elements
-        are cross-axis sensitivities.
-    accel_offset: Offset, shape (3), in g.
-    gyro_matrix: The same as accel_matrix for the rates.
-    gyro_bias: Bias, shape (3), in deg/s.
-    accel_per_c: Change of the offset per C, shape (3), in g.
-    gyro_per_c: Change of the bias per C, shape (3), in deg/s.
-    gyro_walk: Random walk of the bias, in deg/s per sqrt(s).
-    accel_range_g: Range of the accelerometer.
-    gyro_range_dps: Range of the gyro.
-    low_pass: False if no filter precedes the sampling.
-    """
-
+    # Readings divided by true forces, shape (3, 3). The diagonal has the scale factors, the other elements are
+    # cross-axis sensitivities.
     accel_matrix: NDArray[np.float64]
-    accel_offset: NDArray[np.float64]
-    gyro_matrix: NDArray[np.float64]
-    gyro_bias: NDArray[np.float64]
-    accel_per_c: NDArray[np.float64]
-    gyro_per_c: NDArray[np.float64]
-    gyro_walk: float = 0.004
-    accel_range_g: float = 8.0
-    gyro_range_dps: float = 500.0
-    low_pass: bool = True
+    accel_offset: NDArray[np.float64]  # Offset, shape (3), in g
+    gyro_matrix: NDArray[np.float64]  # the same as accel_matrix for the rates
+    gyro_bias: NDArray[np.float64]  # Bias, shape (3), in deg/s
+    accel_per_c: NDArray[np.float64]  # change of the offset per C, shape (3), in g
+    gyro_per_c: NDArray[np.float64]  # change of the bias per C, shape (3), in deg/s
+    gyro_walk: float = 0.004  # random walk of the bias, in deg/s per sqrt(s)
+    accel_range_g: float = 8.0  # range of the accelerometer
+    gyro_range_dps: float = 500.0  # range of the gyro
+    low_pass: bool = True  # False if no filter precedes the sampling
 
     @staticmethod
     def random(chance: np.random.Generator, share: float = 1.0, drift: float = 1.0) -> "Chip":

@@ -19,24 +19,15 @@ _BLOCK = 100_000  # number of rows that are computed at a time, to limit memory
 
 @dataclass
 class Motion:
-    """The motion of the rear contact point, and the attitude of the chassis.
+    """The motion of the rear contact point, and the attitude of the chassis."""
 
-    rate_hz: Number of samples per second.
-    speed: Speed in m/s.
-    slope: Slope of the road, in rad.
-    yaw_rate: Rate about the vertical, in rad/s.
-    lean: Lean of the chassis, in rad.
-    pitch: Pitch of the chassis against the horizontal, in rad, positive if the nose is up.
-    heave: Vertical acceleration of the rear of the chassis against the road, in m/s2.
-    """
-
-    rate_hz: float
-    speed: Signal
-    slope: Signal
-    yaw_rate: Signal
-    lean: Signal
-    pitch: Signal
-    heave: Signal
+    rate_hz: float  # number of samples per second
+    speed: Signal  # speed in m/s
+    slope: Signal  # slope of the road, in rad
+    yaw_rate: Signal  # rate about the vertical, in rad/s
+    lean: Signal  # lean of the chassis, in rad
+    pitch: Signal  # pitch of the chassis against the horizontal, in rad, positive if the nose is up
+    heave: Signal  # vertical acceleration of the rear of the chassis against the road, in m/s2
 
 
 def body_rates(motion: Motion) -> NDArray[np.float64]:

@@ -17,16 +17,12 @@ _SAG_LIMIT = np.radians(3.0)  # largest sag of a holder, because springs are onl
 
 @dataclass(frozen=True)
 class Holder:
-    """A soft holder. Sensor and holder behave like a mass on springs, along each axis and about each axis.
+    """A soft holder. Sensor and holder behave like a mass on springs, along each axis and about each axis."""
 
-    hz: Natural frequency along and about left, up and forward, shape (3).
-    damping: Damping ratio along and about these axes, shape (3).
-    sag: Rotation per g of force, shape (3), in rad per g. A forward force rotates the holder about left. A force to the
-        left rotates it about forward. No force rotates it about up.
-    """
-
-    hz: NDArray[np.float64]
-    damping: NDArray[np.float64]
+    hz: NDArray[np.float64]  # natural frequency along and about left, up and forward, shape (3)
+    damping: NDArray[np.float64]  # damping ratio along and about these axes, shape (3)
+    # Rotation per g of force, shape (3), in rad per g. A forward force rotates the holder about left. A force to the
+    # left rotates it about forward. No force rotates it about up.
     sag: NDArray[np.float64]
 
     @staticmethod
@@ -49,13 +45,13 @@ class Holder:
             force: force of the sensor, shape (n, 3), in g.
             rates: rates of the sensor, shape (n, 3), in deg/s.
         """
-        held = np.column_stack([self._by_spring(column, k, rate_hz) for k, column in enumerate(force.T)])
-        turned = np.zeros_like(held)
-        turned[:, 0] = (self.sag[0] * held[:, 2]).clip(-_SAG_LIMIT, _SAG_LIMIT)
-        turned[:, 2] = (-self.sag[2] * held[:, 0]).clip(-_SAG_LIMIT, _SAG_LIMIT)
+        sprung = np.column_stack([self._by_spring(column, k, rate_hz) for k, column in enumerate(force.T)])
+        turned = np.zeros_like(sprung)
+        turned[:, 0] = (self.sag[0] * sprung[:, 2]).clip(-_SAG_LIMIT, _SAG_LIMIT)
+        turned[:, 2] = (-self.sag[2] * sprung[:, 0]).clip(-_SAG_LIMIT, _SAG_LIMIT)
         turning = np.column_stack([derivative(column, rate_hz) for column in turned.T])
         held_rates = np.column_stack([self._by_spring(column, k, rate_hz) for k, column in enumerate(rates.T)])
-        return held - np.cross(turned, held), held_rates + np.degrees(turning)
+        return sprung - np.cross(turned, sprung), held_rates + np.degrees(turning)
 
     def _by_spring(self, x: Signal, axis: int, rate_hz: float) -> Signal:
         """Return the motion of a mass on a spring whose base moves by x."""
@@ -69,16 +65,11 @@ class Holder:
 
 @dataclass(frozen=True)
 class Mount:
-    """The sensor, its mount, and the logger that reads it.
+    """The sensor, its mount, and the logger that reads it."""
 
-    chip: The sensor.
-    holder: The soft holder. None for a firm mount.
-    rise_c: Replaces Conditions.rise_c, unless None.
-    """
-
-    chip: Chip
-    holder: Holder | None = None
-    rise_c: float | None = None
+    chip: Chip  # the sensor
+    holder: Holder | None = None  # the soft holder. None for a firm mount.
+    rise_c: float | None = None  # replaces Conditions.rise_c, unless None
 
 
 def holder(chance: np.random.Generator, chip: Chip) -> Mount:

@@ -29,18 +29,12 @@ _RATE_DPS = np.array([0.0, 8.0, 14.0])
 
 @dataclass
 class Shaking:
-    """The motion of the chassis that the road causes.
+    """The motion of the chassis that the road causes."""
 
-    heave: Vertical acceleration of the rear, shape (n), in m/s2.
-    pitch: Pitch, shape (n), in rad.
-    force: Additional force along left, up and forward, shape (n, 3), in m/s2.
-    rates: Additional rates about left, up and forward, shape (n, 3), in rad/s.
-    """
-
-    heave: Signal
-    pitch: Signal
-    force: NDArray[np.float64]
-    rates: NDArray[np.float64]
+    heave: Signal  # vertical acceleration of the rear, shape (n), in m/s2
+    pitch: Signal  # Pitch, shape (n), in rad
+    force: NDArray[np.float64]  # additional force along left, up and forward, shape (n, 3), in m/s2
+    rates: NDArray[np.float64]  # additional rates about left, up and forward, shape (n, 3), in rad/s
 
 
 def transmitted(f: Signal) -> NDArray:

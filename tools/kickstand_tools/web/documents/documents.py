@@ -82,14 +82,15 @@ def document_files(home: str) -> dict[str, bytes]:
     Returns {path in the site: content}.
     """
     root = firmware_path.documents()
-    made = {path: _converted(root, path, home) for path in PATHS}
-    groups = [(title, [Entry(made[path].title, page_of(path), path) for path in paths]) for title, paths in GROUPS]
-    shown = {page_of(path): (document, path) for path, document in made.items()} | {ALL: (_on_one_page(root, home), "")}
+    converted = {path: _converted(root, path, home) for path in PATHS}
+    groups = [(title, [Entry(converted[path].title, page_of(path), path) for path in paths]) for title, paths in GROUPS]
+    pages = {page_of(path): (document, path) for path, document in converted.items()}
+    pages[ALL] = _on_one_page(root, home), ""
     files = {
         f"{FOLDER}{page}": filled(
             _TEMPLATE, document=document, path=path, groups=groups, home=home, start=page_of(PATHS[0]), all=ALL
         ).encode()
-        for page, (document, path) in shown.items()
+        for page, (document, path) in pages.items()
     }
     pictures = (root / _PICTURES).iterdir()
     return files | {f"{FOLDER}pictures/{picture.name}": picture.read_bytes() for picture in sorted(pictures)}
@@ -100,9 +101,9 @@ def _on_one_page(root: Path, home: str) -> Document:
 
     Each anchor begins with its document's name.
     """
-    made = [(_name_of(path), _converted(root, path, home, together=True)) for path in PATHS]
-    headings = [Heading(2, name, document.title) for name, document in made]
-    html = "\n".join(f'<section id="{name}">\n{document.html}</section>' for name, document in made)
+    converted = [(_name_of(path), _converted(root, path, home, together=True)) for path in PATHS]
+    headings = [Heading(2, name, document.title) for name, document in converted]
+    html = "\n".join(f'<section id="{name}">\n{document.html}</section>' for name, document in converted)
     about = "Search them with your browser, or print them."
     return Document("All on one page", about, headings, f"<h2>All on one page</h2>\n<p>{about}</p>\n{html}")
 
@@ -113,7 +114,7 @@ def _name_of(path: str) -> str:
 
 def _converted(root: Path, path: str, home: str, together: bool = False) -> Document:
     """Return a document as HTML. together: True for the page with all documents."""
-    here = posixpath.dirname(path)
+    folder = posixpath.dirname(path)
 
     def link(target: str) -> str | None:
         """Return the target's address in the site. A file that is not in the site gets its address in the project."""
@@ -125,7 +126,7 @@ def _converted(root: Path, path: str, home: str, together: bool = False) -> Docu
         if target.startswith("https:"):
             return target
         name, mark, anchor = target.partition("#")
-        file = posixpath.normpath(posixpath.join(here, name)) if name else path
+        file = posixpath.normpath(posixpath.join(folder, name)) if name else path
         if file in PATHS:
             if together:
                 return f"#{_name_of(file)}{_BETWEEN if anchor else ''}{anchor}"

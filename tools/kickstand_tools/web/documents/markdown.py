@@ -16,32 +16,21 @@ Link = Callable[[str], str | None]
 
 @dataclass
 class Heading:
-    """A heading of a document.
+    """A heading of a document."""
 
-    level: 1 for the title.
-    name: its anchor.
-    text: its text without markup.
-    """
-
-    level: int
-    name: str
-    text: str
+    level: int  # 1 for the title
+    name: str  # its anchor
+    text: str  # its text without markup
 
 
 @dataclass
 class Document:
-    """A converted document.
+    """A converted document."""
 
-    title: text of the first heading.
-    about: text of the first paragraph.
-    headings: all headings except the title.
-    html: the whole document.
-    """
-
-    title: str
-    about: str
-    headings: list[Heading]
-    html: str
+    title: str  # text of the first heading
+    about: str  # text of the first paragraph
+    headings: list[Heading]  # all headings except the title
+    html: str  # the whole document
 
 
 def anchor(text: str) -> str:
@@ -65,24 +54,25 @@ def converted(text: str, link: Link, picture: Callable[[str], str], deeper: int 
     markdown = MarkdownIt("commonmark", {"html": True}).enable("table")
     tokens = markdown.parse(text)
     headings, about, table = [], "", 0
-    for at, token in enumerate(tokens):
-        inside = tokens[at + 1] if at + 1 < len(tokens) else token
+    for index, token in enumerate(tokens):
+        inside = tokens[index + 1] if index + 1 < len(tokens) else token
         if token.type == "heading_open":
             words = _words(inside)
-            same = sum(heading.text == words for heading in headings)  # GitHub numbers equal headings
-            headings.append(Heading(int(token.tag[1]), name + anchor(words) + (f"-{same}" if same else ""), words))
+            same_text = sum(heading.text == words for heading in headings)  # GitHub numbers equal headings
+            suffix = f"-{same_text}" if same_text else ""
+            headings.append(Heading(int(token.tag[1]), name + anchor(words) + suffix, words))
             token.attrSet("id", headings[-1].name)
         elif token.type == "paragraph_open" and not about:
             about = _words(inside)
         elif token.type == "th_open" and not inside.content:
-            token.tag = tokens[at + 2].tag = "td"  # an empty cell is not a header
+            token.tag = tokens[index + 2].tag = "td"  # an empty cell is not a header
         elif token.type == "html_block":
             token.content = _with_pictures(token.content, picture)
         elif token.type == "inline":
             token.children = _linked(token.children or [], link, picture)
         if token.type.startswith("heading_"):
             token.tag = f"h{int(token.tag[1]) + deeper}"
-    title, *rest = headings
+    title, *following = headings
     html = str(markdown.renderer.render(tokens, markdown.options, {}))
     named = "".join(f' {key}="{value}"' for key, value in _SCROLLED.items())
 
@@ -93,7 +83,7 @@ def converted(text: str, link: Link, picture: Callable[[str], str], deeper: int 
 
     html = re.sub("<table>", framed, html).replace("</table>", "</table></div>")
     html = html.replace("<pre><code", '<pre tabindex="0"><code')
-    return Document(title.text, about, rest, html)
+    return Document(title.text, about, following, html)
 
 
 def _words(inline: Token) -> str:
@@ -107,7 +97,7 @@ def _words(inline: Token) -> str:
 
 def _linked(children: list[Token], link: Link, picture: Callable[[str], str]) -> list[Token]:
     """Return the tokens with new addresses. Links for which link() returns None are removed."""
-    kept: list[Token] = []
+    result: list[Token] = []
     open_links: list[bool] = []
     for token in children:
         if token.type == "link_open":
@@ -125,8 +115,8 @@ def _linked(children: list[Token], link: Link, picture: Callable[[str], str]) ->
             token.attrSet("loading", "lazy")
         elif token.type == "html_inline":
             token.content = _with_pictures(token.content, picture)
-        kept.append(token)
-    return kept
+        result.append(token)
+    return result
 
 
 def _with_pictures(html: str, picture: Callable[[str], str]) -> str:

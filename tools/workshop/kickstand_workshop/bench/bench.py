@@ -142,8 +142,8 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
     mpy = device_class(chip).MPY
     files = flash_image.firmware(True, mpy) | _calibration()
     del files["/main.py"]
-    here = Path(__file__).parent
-    files |= {f"{name}.mpy": cross_compiled(here / f"{name}.py", architecture(mpy)) for name in _GUEST}
+    folder = Path(__file__).parent
+    files |= {f"{name}.mpy": cross_compiled(folder / f"{name}.py", architecture(mpy)) for name in _GUEST}
     arrays: list[np.ndarray] = []
     stages: list[np.ndarray] = []
     result: dict[str, Any] = {}
@@ -166,9 +166,9 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
         if chosen.get("SPEED") == "wheel":
             device.fit_wheel(lambda t_s: _SPEED_MPS)
         code = f"{device.SINK}import bench_guest\nbench_guest.run({detail}, {seconds}, Sink(), {chosen})\n"
-        said = device.exec(code, limit_s=2.0 * seconds + 30.0)
+        output = device.exec(code, limit_s=2.0 * seconds + 30.0)
         # The figures follow the output of a Sink
-        result["figures"] = ast.literal_eval(said.rpartition("\x02")[2].strip())
+        result["figures"] = ast.literal_eval(output.rpartition("\x02")[2].strip())
     turns = result["figures"]["turns"]
     result["took"] = arrays[0][:turns]
     asked_for = arrays[1][: result["figures"]["collections_by_app"]]

@@ -19,7 +19,7 @@ _ROWS = 10  # number of modules in the table
 
 # Each module is imported after the modules that it imports. So the time of a module does not contain the times of the
 # modules that it imports.
-_GUEST = """
+_TIMED_IMPORTS = """
 from time import ticks_diff, ticks_us
 took = []
 for name in {names}:
@@ -32,20 +32,13 @@ print("took", took)
 
 @dataclass(frozen=True)
 class Boot:
-    """The parts of a start. All times but the last count from power-on.
+    """The parts of a start. All times but the last count from power-on."""
 
-    micropython_s: Time at which main.py begins.
-    starting_s: Time at which the display says that Kickstand starts.
-    sampling_s: Time at which the sensor is set up and samples.
-    lean_s: Time at which the display shows the first lean.
-    import_s: Time for importing each module, by its name.
-    """
-
-    micropython_s: float
-    starting_s: float
-    sampling_s: float
-    lean_s: float
-    import_s: dict[str, float]
+    micropython_s: float  # time at which main.py begins
+    starting_s: float  # time at which the display says that Kickstand starts
+    sampling_s: float  # time at which the sensor is set up and samples
+    lean_s: float  # time at which the display shows the first lean
+    import_s: dict[str, float]  # time for importing each module, by its name
 
 
 def boot(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes], compiled: bool = True) -> Boot:
@@ -101,8 +94,8 @@ def _imports(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes
     names = list(dict.fromkeys(names))
     files = {path: content for path, content in files.items() if path.lstrip("/") != "main.py"}
     with kind(world, files) as device:
-        said = device.exec(_GUEST.format(names=names), _LIMIT_S)
-    took_us = ast.literal_eval(said.split("took ")[1])
+        output = device.exec(_TIMED_IMPORTS.format(names=names), _LIMIT_S)
+    took_us = ast.literal_eval(output.split("took ")[1])
     return {name: us / 1e6 for name, us in zip(names, took_us, strict=True)}
 
 

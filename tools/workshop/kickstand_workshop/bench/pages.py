@@ -27,16 +27,11 @@ _PAINT = "performance.getEntriesByName('first-contentful-paint')[0].startTime"
 
 
 class PageFigures(NamedTuple):
-    """The figures of a page that is opened for the first time.
+    """The figures of a page that is opened for the first time."""
 
-    paint_ms: Time until the first paint.
-    ready_ms: Time until the page can be used.
-    size: Bytes of the compressed files that the page loads until it is ready.
-    """
-
-    paint_ms: float
-    ready_ms: float
-    size: int
+    paint_ms: float  # time until the first paint
+    ready_ms: float  # time until the page can be used
+    size: int  # bytes of the compressed files that the page loads until it is ready
 
 
 def measure(browser: Any, address: str, files: dict[str, bytes], name: str) -> PageFigures:
@@ -48,17 +43,17 @@ def measure(browser: Any, address: str, files: dict[str, bytes], name: str) -> P
     name: The page, a key of READY.
     """
     context = browser.new_context(service_workers="block", **PHONE)
-    asked: set[str] = set()
-    context.on("request", lambda request: asked.add(request.url.removeprefix(address)))
+    requests: set[str] = set()
+    context.on("request", lambda request: requests.add(request.url.removeprefix(address)))
     page = context.new_page()
     context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": SLOWER})
     page.goto(address + name)
     page.wait_for_selector(READY[name])
     ready_ms = page.evaluate("performance.now()")
-    size = sum(len(gzip.compress(files[path or "index.html"])) for path in asked if (path or "index.html") in files)
-    found = PageFigures(page.evaluate(_PAINT), ready_ms, size)
+    size = sum(len(gzip.compress(files[path or "index.html"])) for path in requests if (path or "index.html") in files)
+    figures = PageFigures(page.evaluate(_PAINT), ready_ms, size)
     context.close()
-    return found
+    return figures
 
 
 def main() -> None:

@@ -34,12 +34,12 @@ class SampleCount:
 
     def lost(self) -> int:
         """Return the number of samples that are lost: overwritten, or removed from the FIFO before they were read."""
-        taken = self.taken()  # taken() is called first, because it updates the FIFO
+        samples = self.taken()  # taken() is called first, because it updates the FIFO
         frame = len(self._sensor._fifo_registers)
         if frame:
-            kept = self._popped + self._sensor.fifo.count - self._waiting
-            return taken - kept // frame
-        return max(0, taken - 1 - len(self._read))  # the latest sample can still be read
+            accounted = self._popped + self._sensor.fifo.count - self._waiting
+            return samples - accounted // frame
+        return max(0, samples - 1 - len(self._read))  # the latest sample can still be read
 
     def _on_start(self, address: int, read: bool) -> bool:
         acknowledged = self._start(address, read)

@@ -32,12 +32,12 @@ def bands_of(force_g: NDArray[np.float64], rate_dps: NDArray[np.float64], rate_h
     columns = force_g[:, 1], force_g[:, 0], *rate_dps.T
     window = np.hanning(len(force_g))
     frequency = np.fft.rfftfreq(len(force_g), 1.0 / rate_hz)
-    found = {}
+    figures = {}
     for name, values in zip(QUANTITIES, columns, strict=True):
         power = np.abs(np.fft.rfft((values - values.mean()) * window)) ** 2 * 2.0 / len(values) / np.sum(window**2)
         inside = [power[(frequency >= low) & (frequency < high)].sum() for low, high in BANDS_HZ]
-        found[name] = np.sqrt(np.array(inside))
-    return found
+        figures[name] = np.sqrt(np.array(inside))
+    return figures
 
 
 def bands_of_log(log: Log, calibration: CalibrationFile) -> Figures:
@@ -53,9 +53,9 @@ def bands_of_log(log: Log, calibration: CalibrationFile) -> Figures:
     def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Average the samples in each step, to avoid aliasing. Interpolate linearly between the means."""
         count = np.bincount(number, minlength=len(time))
-        there = count > 0
+        has_data = count > 0
         total = np.bincount(number, values, minlength=len(time))
-        return np.interp(time, time[there], total[there] / count[there])
+        return np.interp(time, time[has_data], total[has_data] / count[has_data])
 
     force, rate = (np.column_stack([mean(column) for column in values.T]) for values in (force, rate))
     busy = np.flatnonzero(np.linalg.norm(rate - np.median(rate, axis=0), axis=1) > _RIDING_DPS)
@@ -76,21 +76,21 @@ def of_recording(path: Path) -> Figures:
 
 def of_simulated(profile: str, seed: int, seconds: float, road: str | None, mount: str | None) -> Figures:
     """Return the rms in each band for a simulated ride, with its true alignment."""
-    made = ride(profile, seed, seconds, road=road, mount=mount)
-    calibration = CalibrationFile(vehicle_from_sensor=made.vehicle_from_sensor, aligned=True)
-    return bands_of_log(Log.from_readings(made.readings, made.rate_hz, "RIDE.csv"), calibration)
+    simulated = ride(profile, seed, seconds, road=road, mount=mount)
+    calibration = CalibrationFile(vehicle_from_sensor=simulated.vehicle_from_sensor, aligned=True)
+    return bands_of_log(Log.from_readings(simulated.readings, simulated.rate_hz, "RIDE.csv"), calibration)
 
 
 def table(found: dict[str, Figures]) -> Table:
     """Return a table with a block of lines for each quantity. found: the rms in each band, by the name of the ride."""
-    made = Table(title="rms by band of frequency, Hz", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    made.add_column("ride", overflow="fold")
+    report = Table(title="rms by band of frequency, Hz", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    report.add_column("ride", overflow="fold")
     for low, high in BANDS_HZ:
-        made.add_column(f"{low:g}-{high:g}", justify="right")
+        report.add_column(f"{low:g}-{high:g}", justify="right")
     for quantity in QUANTITIES:
-        made.add_row(quantity, style="cyan")
+        report.add_row(quantity, style="cyan")
         digits = 3 if quantity.endswith(" g") else 2
         for k, (name, figures) in enumerate(found.items()):
             cells = [f"{value:.{digits}f}" for value in figures[quantity]]
-            made.add_row("  " + name, *cells, end_section=k == len(found) - 1)
-    return made
+            report.add_row("  " + name, *cells, end_section=k == len(found) - 1)
+    return report

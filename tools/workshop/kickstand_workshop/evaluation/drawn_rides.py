@@ -44,24 +44,15 @@ WAVES_PER_M = 0.03, 4.0
 
 @dataclass
 class DrawnRide:
-    """A ride with the logs of its devices and its true motion.
+    """A ride with the logs of its devices and its true motion."""
 
-    logs: one log per device on the bike. Each has its own clock.
-    calibrations: one calibration per device.
-    time_s: time of each true value, in s.
-    lean_deg: true lean at time_s.
-    speed_mps: true speed at time_s.
-    kind: the kind of ride, a key of DRAWN.
-    mounts: one mount per device, a key of MOUNTS.
-    """
-
-    logs: list
-    calibrations: list
-    time_s: np.ndarray
-    lean_deg: np.ndarray
-    speed_mps: np.ndarray
-    kind: str
-    mounts: list
+    logs: list  # one log per device on the bike. Each has its own clock.
+    calibrations: list  # one calibration per device
+    time_s: np.ndarray  # time of each true value, in s
+    lean_deg: np.ndarray  # true lean at time_s
+    speed_mps: np.ndarray  # true speed at time_s
+    kind: str  # the kind of ride, a key of DRAWN
+    mounts: list  # one mount per device, a key of MOUNTS
 
     def true_lean(self, k):
         """Return the true lean at the samples of device k."""
@@ -121,13 +112,13 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
     drawn = str(chance.choice(list(DRAWN)))
     kind = kind or drawn
     legs, total = DRAWN[kind](chance), 0.0
-    kept = []
+    selected = []
     for leg in legs:
         total += leg[0]
-        if total > seconds - 8.0 and len(kept) > 3:
+        if total > seconds - 8.0 and len(selected) > 3:
             break
-        kept.append(leg)
-    time, lean, v = course_of([*kept, (8.0, 0.0, 15.0)])
+        selected.append(leg)
+    time, lean, v = course_of([*selected, (8.0, 0.0, 15.0)])
     n = len(time)
     riding = np.clip((v - 1.0) / 3.0, 0.0, 1.0)
     # The chassis's lean differs from the lean of balance, because the tyres are wide, the road is tilted and the rider
@@ -136,8 +127,8 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
     balance = np.radians(lean + wander)
     tilt = np.radians(chance.uniform(-2.5, 2.5) + chance.uniform(0.3, 1.0) * smooth_noise(chance, n, 8.0))
     tyre, height = chance.uniform(0.03, 0.08), chance.uniform(0.55, 0.7)
-    met = balance - tilt
-    flank = np.arctan2(tyre * np.sin(met), height - tyre + tyre * np.cos(met))
+    camber_lean = balance - tilt
+    flank = np.arctan2(tyre * np.sin(camber_lean), height - tyre + tyre * np.cos(camber_lean))
     rider = np.radians(
         np.exp(chance.uniform(np.log(0.3), np.log(1.5))) * smooth_noise(chance, n, chance.uniform(0.7, 3.0))
     )
@@ -161,8 +152,8 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
     used = mounts or [str(chance.choice(list(MOUNTS), p=list(MOUNTS.values())))]
     logs, calibrations = [], []
     for mount in used:
-        place = chance.uniform(0.2, 0.8), chance.uniform(0.1, 1.0)
-        force, rates = perfect_readings(v, yaw_rate, slope, chassis, pitch, place[0], slip, rear, place[1])
+        position = chance.uniform(0.2, 0.8), chance.uniform(0.1, 1.0)
+        force, rates = perfect_readings(v, yaw_rate, slope, chassis, pitch, position[0], slip, rear, position[1])
         sensor = np.random.default_rng([seed, 26, len(logs)]) if sheet else None
         log, calibration = _device(chance, mount, force, np.degrees(rates), v, engine, turns, sensor)
         logs.append(log)
@@ -254,8 +245,8 @@ def _of_the_sheet(chance, time, force, rates, mounting):
     upright, stand = 1.5 * chance.choice((-1.0, 1.0)), -chance.uniform(8.0, 15.0)
     slope, change = chance.uniform(-0.5, 0.5), chance.uniform(-1.0, 1.0)
     two = [
-        poses.standing(chance, chip, mounting, lean, pitch, home_c, held)
-        for lean, pitch, held in ((stand, slope + change, False), (upright, slope, True))
+        poses.standing(chance, chip, mounting, lean, pitch, home_c, is_still)
+        for lean, pitch, is_still in ((stand, slope + change, False), (upright, slope, True))
     ]
     calibration = fit_two_positions(
         Log.from_readings(two[0], 200.0, "KICKSTAND.csv"),
@@ -272,22 +263,22 @@ def _road(chance, v, wheelbase, roughness):
 
     The bike rides at the speed v over a road with waves as in ISO 8608. Springs and tyres filter the waves.
     """
-    at = np.cumsum(v) / FINE_HZ
+    distance = np.cumsum(v) / FINE_HZ
     edges = np.geomspace(WAVES_PER_M[0], WAVES_PER_M[1], 241)
     waves = np.sqrt(edges[1:] * edges[:-1]) * np.exp(chance.normal(0.0, 0.003, 240))
     sizes = np.sqrt(2.0 * roughness * (0.1 / waves) ** 2 * np.diff(edges))
     phases = chance.uniform(0.0, 2.0 * np.pi, len(waves))
-    grid = np.arange(0.0, at[-1] + wheelbase + 1.0, 0.04)
+    grid = np.arange(0.0, distance[-1] + wheelbase + 1.0, 0.04)
     height = np.zeros_like(grid)
     for wave, size, phase in zip(waves, sizes, phases):
         height += size * np.sin(2.0 * np.pi * wave * grid + phase)
     body, wheel = (chance.uniform(1.5, 2.5), chance.uniform(0.3, 0.5)), (chance.uniform(12.0, 15.0), 0.3)
-    found = []
+    heights = []
     for begin in (0.0, wheelbase):
-        met = np.interp(at + begin, grid, height)
-        met -= met[0]
-        found.append(_through(_through(met, *_spring(*body, True)), *_spring(*wheel)))
-    return found
+        profile = np.interp(distance + begin, grid, height)
+        profile -= profile[0]
+        heights.append(_through(_through(profile, *_spring(*body, True)), *_spring(*wheel)))
+    return heights
 
 
 def _spring(hz, damping, by_its_foot=False):
@@ -334,13 +325,13 @@ def figures(seed):
     """
     ride = drawn_ride(seed)
     live, off, sigma = judged(ride)
-    seen = ~np.isnan(live)
+    is_shown = ~np.isnan(live)
     ratio = np.abs(off) / sigma
     return (
         seed,
         ride.kind,
         ride.mounts[0],
-        *(rms(live[seen]), float(np.max(np.abs(live[seen]))), float(np.mean(seen))),
+        *(rms(live[is_shown]), float(np.max(np.abs(live[is_shown]))), float(np.mean(is_shown))),
         *(rms(off), float(np.max(np.abs(off))), float(np.mean(ratio < 1.0)), float(np.mean(ratio < 2.0))),
         float(np.mean(sigma)),
     )
@@ -361,13 +352,13 @@ def main(which, count):
         print(FORM % (*row[:5], *shares), "" if row[6] <= row[3] else "worse than live", flush=True)
         rows.append(row)
     for mount in MOUNTS:
-        some = np.array([row[3:] for row in rows if row[2] == mount])
-        if len(some):
-            live, smoothed = np.sqrt(np.mean(some[:, [0, 3]] ** 2, axis=0))
-            worse = np.count_nonzero(some[:, 3] > some[:, 0])
-            print(f"{mount:9} {len(some):3} rides: live {live:.2f}, worst {some[:, 1].max():.1f};", end=" ")
-            print(f"smoothed {smoothed:.2f}, worst {some[:, 4].max():.1f},", end=" ")
-            print(f"within 1 and 2 sigma {some[:, 5].mean():.0%} {some[:, 6].mean():.0%}; worse than live {worse}")
+        chosen = np.array([row[3:] for row in rows if row[2] == mount])
+        if len(chosen):
+            live, smoothed = np.sqrt(np.mean(chosen[:, [0, 3]] ** 2, axis=0))
+            worse = np.count_nonzero(chosen[:, 3] > chosen[:, 0])
+            print(f"{mount:9} {len(chosen):3} rides: live {live:.2f}, worst {chosen[:, 1].max():.1f};", end=" ")
+            print(f"smoothed {smoothed:.2f}, worst {chosen[:, 4].max():.1f},", end=" ")
+            print(f"within 1 and 2 sigma {chosen[:, 5].mean():.0%} {chosen[:, 6].mean():.0%}; worse than live {worse}")
 
 
 if __name__ == "__main__":

@@ -32,16 +32,11 @@ PACKAGES |= {f"{name} best": package for name, package in PACKAGES.items()}
 
 @dataclass
 class Samples:
-    """N calibrated samples of a log.
+    """N calibrated samples of a log."""
 
-    time: Evenly spaced times, shape (N), in s.
-    force: Force along left, up, forward, shape (N, 3), in g.
-    rate: Rate about the same axes, shape (N, 3), in deg/s.
-    """
-
-    time: NDArray[np.float64]
-    force: NDArray[np.float64]
-    rate: NDArray[np.float64]
+    time: NDArray[np.float64]  # evenly spaced times, shape (N), in s
+    force: NDArray[np.float64]  # force along left, up, forward, shape (N, 3), in g
+    rate: NDArray[np.float64]  # rate about the same axes, shape (N, 3), in deg/s
 
     @property
     def rate_hz(self) -> float:
@@ -68,10 +63,10 @@ def complementary(samples: Samples) -> NDArray[np.float64]:
     leaned = np.degrees(np.arctan2(samples.force[:, 0], samples.force[:, 1]))
     step = samples.rate[:, 2] / samples.rate_hz
     result = np.empty_like(leaned)
-    now = leaned[0]
+    lean = leaned[0]
     for k in range(len(leaned)):
-        now = COMPLEMENTARY * (now + step[k]) + (1.0 - COMPLEMENTARY) * leaned[k]
-        result[k] = now
+        lean = COMPLEMENTARY * (lean + step[k]) + (1.0 - COMPLEMENTARY) * leaned[k]
+        result[k] = lean
     return result
 
 
@@ -100,11 +95,11 @@ def fusion(samples: Samples, **settings: float) -> NDArray[np.float64]:
         setattr(chosen, name, value)
     ahrs.set_settings(chosen)
     ahrs.set_sample_period(1.0 / samples.rate_hz)
-    found = np.empty((len(gyro), 4))
+    quaternions = np.empty((len(gyro), 4))
     for k in range(len(gyro)):
         ahrs.update_no_magnetometer(gyro[k], accel[k])
-        found[k] = ahrs.get_quaternion()
-    return _roll(found)
+        quaternions[k] = ahrs.get_quaternion()
+    return _roll(quaternions)
 
 
 OTHERS: dict[str, Callable[[Samples], NDArray[np.float64]]] = {

@@ -22,42 +22,26 @@ ACCEL_RANGE_G, GYRO_RANGE_DPS = 16.0, 500.0  # ranges of the sensor, the default
 
 @dataclass
 class Part:
-    """The n readings during a fault. The fault changes force, rate and lost in place.
+    """The n readings during a fault. The fault changes force, rate and lost in place."""
 
-    force: Force in the chip's axes, shape (n, 3), in g.
-    rate: Rate in the chip's axes, shape (n, 3), in deg/s.
-    lost: True for readings that never arrive, shape (n).
-    rate_hz: Number of readings per second.
-    axis: Index of the faulty axis, for a fault of one axis.
-    sign: Direction of the fault, 1 or -1.
-    chance: Source of random numbers.
-    """
-
-    force: Array
-    rate: Array
-    lost: NDArray[np.bool_]
-    rate_hz: float
-    axis: int
-    sign: float
-    chance: np.random.Generator
+    force: Array  # force in the chip's axes, shape (n, 3), in g
+    rate: Array  # rate in the chip's axes, shape (n, 3), in deg/s
+    lost: NDArray[np.bool_]  # True for readings that never arrive, shape (n)
+    rate_hz: float  # number of readings per second
+    axis: int  # index of the faulty axis, for a fault of one axis
+    sign: float  # direction of the fault, 1 or -1
+    chance: np.random.Generator  # source of random numbers
 
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault of the sensor.
+    """A fault of the sensor."""
 
-    name: Description of the fault.
-    kind: SEEN, ILL or HARMLESS.
-    change: Function that applies the fault to a Part.
-    seconds: Duration of the fault. None if it lasts until the end of the ride.
-    from_start: True if the fault exists from power-on. False if it begins in mid-ride.
-    """
-
-    name: str
-    kind: str
-    change: Callable[[Part], None]
-    seconds: float | None = None
-    from_start: bool = False
+    name: str  # description of the fault
+    kind: str  # SEEN, ILL or HARMLESS
+    change: Callable[[Part], None]  # function that applies the fault to a Part
+    seconds: float | None = None  # duration of the fault. None if it lasts until the end of the ride.
+    from_start: bool = False  # True if the fault exists from power-on. False if it begins in mid-ride.
 
     @property
     def title(self) -> str:
@@ -100,8 +84,8 @@ def _gyro_axis_scaled(part: Part, scale: float) -> None:
 
 
 def _gyro_axes_swapped(part: Part) -> None:
-    others = [k for k in range(3) if k != part.axis]
-    part.rate[:, others] = part.rate[:, others[::-1]].copy()
+    axes = [k for k in range(3) if k != part.axis]
+    part.rate[:, axes] = part.rate[:, axes[::-1]].copy()
 
 
 def _gyro_bias_steps(part: Part, dps: float) -> None:
@@ -167,8 +151,8 @@ def _readings_lost(part: Part) -> None:
 
 def _readings_lost_now_and_then(part: Part) -> None:
     """Lose the readings of 0.3 s every ten seconds."""
-    every, n = round(10.0 * part.rate_hz), round(0.3 * part.rate_hz)
-    part.lost[np.arange(len(part.lost)) % every < n] = True
+    period, n = round(10.0 * part.rate_hz), round(0.3 * part.rate_hz)
+    part.lost[np.arange(len(part.lost)) % period < n] = True
 
 
 def _all(name: str, kind: str, change: Callable[[Part], None]) -> Iterator[Fault]:
@@ -218,18 +202,12 @@ FAULTS: tuple[Fault, ...] = (
 
 @dataclass
 class Ill:
-    """The readings of a ride with a fault.
+    """The readings of a ride with a fault."""
 
-    readings: Readings in the chip's order, shape (n, 7).
-    lost: True for readings that never arrive, shape (n).
-    first: Index of the first reading with the fault.
-    end: Index after the last reading with the fault.
-    """
-
-    readings: Array
-    lost: NDArray[np.bool_]
-    first: int
-    end: int
+    readings: Array  # readings in the chip's order, shape (n, 7)
+    lost: NDArray[np.bool_]  # True for readings that never arrive, shape (n)
+    first: int  # index of the first reading with the fault
+    end: int  # index after the last reading with the fault
 
     @property
     def saturated(self) -> NDArray[np.bool_]:
@@ -253,17 +231,17 @@ def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: i
     vehicle_from_sensor: Rotation from sensor to bike axes, shape (3, 3).
     """
     chance = np.random.default_rng([seed, *fault.title.encode()])
-    made = readings.copy()
-    lost = np.zeros(len(made), dtype=bool)
+    faulty = readings.copy()
+    lost = np.zeros(len(faulty), dtype=bool)
     first = 0 if fault.from_start else round(begin_s * rate_hz)
-    end = len(made) if fault.seconds is None else min(len(made), first + round(fault.seconds * rate_hz))
+    end = len(faulty) if fault.seconds is None else min(len(faulty), first + round(fault.seconds * rate_hz))
     span = slice(first, end)
     # Apply a fault of the kind SEEN along the chip's own axes. A rotated fault would not show in the counts
     square = seed // 3 % 2 == 0 and fault.kind != SEEN
     turned = vehicle_from_sensor if square else np.eye(3)
     part = Part(
-        made[span, :3] @ turned.T,
-        made[span, 4:] @ turned.T,
+        faulty[span, :3] @ turned.T,
+        faulty[span, 4:] @ turned.T,
         lost[span],
         rate_hz,
         seed % 3,
@@ -271,6 +249,6 @@ def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: i
         chance,
     )
     fault.change(part)
-    made[span, :3] = (part.force @ turned).clip(-ACCEL_RANGE_G, ACCEL_RANGE_G)
-    made[span, 4:] = (part.rate @ turned).clip(-GYRO_RANGE_DPS, GYRO_RANGE_DPS)
-    return Ill(made, lost, first, end)
+    faulty[span, :3] = (part.force @ turned).clip(-ACCEL_RANGE_G, ACCEL_RANGE_G)
+    faulty[span, 4:] = (part.rate @ turned).clip(-GYRO_RANGE_DPS, GYRO_RANGE_DPS)
+    return Ill(faulty, lost, first, end)

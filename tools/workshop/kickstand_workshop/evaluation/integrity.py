@@ -2,12 +2,14 @@
 
 The lean is judged as in aviation. At each moment the lean is good (shown and right), hidden, or misleading. A lean is
 right if its error is at most WRONG_DEG. A wrong lean is misleading if it is shown for over STANDS_S.
+summaries(), fault_table() and document() report the results for each fault.
 """
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from kickstand.lean.meter import FALLEN_DEG
@@ -18,6 +20,8 @@ from kickstand_tools.simulation.physics.mount import MOUNTS
 from kickstand_tools.simulation.physics.road import CLASSES
 from kickstand_tools.simulation.ride import SimulatedRide, ride
 from numpy.typing import NDArray
+from rich import box
+from rich.table import Table
 
 from .faults import FAULTS, SEEN, Fault, Ill, apply
 from .runs import calibrated_by_poses, on_all_processors
@@ -31,33 +35,25 @@ RECOVERY_S = 10.0
 TURN = 2  # number of readings per pass of the app's loop
 GPS_LATE_S = 0.4
 PROFILES = "street", "track", "hills", "city", "sweeper"
-SIGMA_EDGES = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0])  # limits of the classes of claimed sigma, in degrees
-# Classes of claimed accuracy. "display" is for the lean on the display of the whole device, which shows no sigma
-CLAIMS = [f"{low:g}-{high:g}" for low, high in pairwise(SIGMA_EDGES)] + ["display", "hidden"]
-# Limits of the classes of error, in degrees
-ERROR_EDGES = np.array([0.0, 1.0, 2.0, 3.0, 5.0, WRONG_DEG, 12.0, 20.0, 40.0, 180.0])
+CAPTION = (
+    f"misleading: seconds per ride in which an error over {WRONG_DEG:.0f} degrees was shown for over {STANDS_S:.0f} s, "
+    "mean and largest; shown: share of the riding time with a lean; hidden, named: median of the seconds from the "
+    "start of the fault, and share of the rides; right again: share of the rides whose lean is right 10 s after the "
+    "end of the fault"
+)
 
 
 @dataclass(frozen=True)
 class FaultJob:
-    """A ride to simulate, with or without a fault.
+    """A ride to simulate, with or without a fault."""
 
-    fault: The fault, or None.
-    seed: Seed of the ride and of the fault.
-    seconds: Riding time.
-    road: Class of the road, as for simulation.ride.ride().
-    mount: Fault of the mount, as for simulation.ride.ride().
-    profile: Profile of the ride. None lets the seed choose it from PROFILES.
-    device: True to run the whole device, False to run only the lean meter.
-    """
-
-    fault: Fault | None
-    seed: int
-    seconds: float = 120.0
-    road: str | None = None
-    mount: str | None = None
-    profile: str | None = None
-    device: bool = False
+    fault: Fault | None  # the fault, or None
+    seed: int  # seed of the ride and of the fault
+    seconds: float = 120.0  # riding time
+    road: str | None = None  # class of the road, as for simulation.ride.ride()
+    mount: str | None = None  # fault of the mount, as for simulation.ride.ride()
+    profile: str | None = None  # profile of the ride. None lets the seed choose it from PROFILES.
+    device: bool = False  # True to run the whole device, False to run only the lean meter
 
     @property
     def gps(self) -> bool:
@@ -73,52 +69,30 @@ class FaultJob:
 
 @dataclass
 class Trace:
-    """The display during a ride, and the truth. The arrays have one entry per pass of the loop, shape (n).
+    """The display during a ride, and the truth. The arrays have one entry per pass of the loop, shape (n)."""
 
-    time: Time in s.
-    lean: Lean of the meter, in degrees.
-    sigma: Standard deviation that the meter claims, in degrees.
-    shown: True if the lean is shown.
-    true: True lean, in degrees.
-    speed: True speed, in m/s.
-    named_s: Time at which the display named a fault, or NaN.
-    first_s: Start of the fault.
-    end_s: End of the fault.
-    """
-
-    time: Array
-    lean: Array
-    sigma: Array
-    shown: NDArray[np.bool_]
-    true: Array
-    speed: Array
-    named_s: float
-    first_s: float
-    end_s: float
+    time: Array  # time in s
+    lean: Array  # lean of the meter, in degrees
+    shown: NDArray[np.bool_]  # True if the lean is shown
+    true: Array  # True lean, in degrees
+    speed: Array  # True speed, in m/s
+    named_s: float  # time at which the display named a fault, or NaN
+    first_s: float  # start of the fault
+    end_s: float  # end of the fault
 
 
 @dataclass
 class Outcome:
-    """The result of a ride. Only the time after the bike set off counts.
+    """The result of a ride. Only the time after the bike set off counts."""
 
-    job: The ride.
-    misleading_s: Time with a misleading lean.
-    longest_s: Longest single stretch with a misleading lean.
-    available: Share of the riding time in which a lean is shown.
-    hidden_after_s: Time from the start of the fault until the lean is hidden. NaN if it is never hidden.
-    named_after_s: Time from the start of the fault until the display names the fault. NaN if it never does.
-    recovered: True if the lean is right RECOVERY_S after the fault ends. None for a fault that does not end.
-    diagram: Seconds in each class of CLAIMS and each class of ERROR_EDGES, shape (len(CLAIMS), len(ERROR_EDGES) - 1).
-    """
-
-    job: FaultJob
-    misleading_s: float
-    longest_s: float
-    available: float
-    hidden_after_s: float
-    named_after_s: float
+    job: FaultJob  # the ride
+    misleading_s: float  # time with a misleading lean
+    longest_s: float  # longest single stretch with a misleading lean
+    available: float  # share of the riding time in which a lean is shown
+    hidden_after_s: float  # time from the start of the fault until the lean is hidden. NaN if it is never hidden.
+    named_after_s: float  # time from the start of the fault until the display names the fault. NaN if it never does.
+    # True if the lean is right RECOVERY_S after the fault ends. None for a fault that does not end.
     recovered: bool | None
-    diagram: Array
 
 
 def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -137,27 +111,19 @@ def judge(job: FaultJob, trace: Trace) -> Outcome:
     wrong[:off] = False
     times = [(end - first) * step for first, end in stretches(wrong) if (end - first) * step > STANDS_S]
     riding = trace.speed > 0.5
-    there = trace.time >= max(trace.first_s, trace.time[off])
-    hidden_s = _first(trace.time, there & ~trace.shown) - trace.first_s
+    faulty = trace.time >= max(trace.first_s, trace.time[off])
     recovered = None
     if trace.end_s < trace.time[-1] - RECOVERY_S:
-        stands = (trace.time > trace.end_s + RECOVERY_S - STANDS_S) & (trace.time <= trace.end_s + RECOVERY_S)
-        recovered = bool(np.all(trace.shown[stands] & (error[stands] <= WRONG_DEG)))
-    row = np.digitize(trace.sigma, SIGMA_EDGES[1:-1])
-    row[np.isnan(trace.sigma)] = len(CLAIMS) - 2
-    row[~trace.shown] = len(CLAIMS) - 1
-    column = np.digitize(error, ERROR_EDGES[1:-1])
-    diagram = np.zeros((len(CLAIMS), len(ERROR_EDGES) - 1))
-    np.add.at(diagram, (row[riding], column[riding]), step)
+        checked = (trace.time > trace.end_s + RECOVERY_S - STANDS_S) & (trace.time <= trace.end_s + RECOVERY_S)
+        recovered = bool(np.all(trace.shown[checked] & (error[checked] <= WRONG_DEG)))
     return Outcome(
         job,
         sum(times),
         max(times, default=0.0),
         float(np.mean(trace.shown[riding])) if riding.any() else 1.0,
-        hidden_s,
+        _first(trace.time, faulty & ~trace.shown) - trace.first_s,
         trace.named_s - trace.first_s,
         recovered,
-        diagram,
     )
 
 
@@ -166,23 +132,23 @@ def _first(time: Array, mask: NDArray[np.bool_]) -> float:
 
 
 @lru_cache(maxsize=4)
-def _made(
+def _simulated(
     profile: str, seed: int, seconds: float, road: str | None, mount: str | None
 ) -> tuple[SimulatedRide, CalibrationFile]:
-    made = ride(profile, seed, seconds, road=road, mount=mount)
+    simulated = ride(profile, seed, seconds, road=road, mount=mount)
     try:
-        return made, calibrated_by_poses(made)
+        return simulated, calibrated_by_poses(simulated)
     except InputError:  # calibrate without the slanted pose, which refuses sensors with large cross-axis errors
-        return made, calibrated_by_poses(replace(made, poses=made.poses[:6]))
+        return simulated, calibrated_by_poses(replace(simulated, poses=simulated.poses[:6]))
 
 
 def follow(job: FaultJob) -> Trace:
     """Simulate the job's ride, and return what the rider saw."""
-    made, calibration = _made(
-        job.profile or PROFILES[job.seed % len(PROFILES)], job.seed, job.seconds, job.road, job.mount
-    )
-    of = device_trace_of if job.device else trace_of
-    return of(job, made.readings, made.rate_hz, calibration, made.truth["lean_deg"], made.truth["speed_mps"])
+    profile = job.profile or PROFILES[job.seed % len(PROFILES)]
+    simulated, calibration = _simulated(profile, job.seed, job.seconds, job.road, job.mount)
+    true, speed = simulated.truth["lean_deg"], simulated.truth["speed_mps"]
+    run_ride = device_trace_of if job.device else trace_of
+    return run_ride(job, simulated.readings, simulated.rate_hz, calibration, true, speed)
 
 
 def _ill(job: FaultJob, readings: Array, rate_hz: float, calibration: CalibrationFile) -> Ill:
@@ -198,20 +164,19 @@ def device_trace_of(
 ) -> Trace:
     """Run the whole device over any ride. The arguments are the same as for trace_of().
 
-    The Trace has ten entries per second. Its sigma is NaN, because the display shows no sigma.
+    The Trace has ten entries per second.
     """
     ill = _ill(job, readings, rate_hz, calibration)
     end = len(readings) - 1
 
-    def known(t_s: float) -> float:
+    def speed_at(t_s: float) -> float:
         return float(speed[min(end, int(t_s * rate_hz))])
 
-    time, lean, named_s = display_of(ill.readings, rate_hz, calibration, ill.lost, known if job.gps else None)
-    at = np.minimum(end, (time * rate_hz).astype(int))
+    time, lean, named_s = display_of(ill.readings, rate_hz, calibration, ill.lost, speed_at if job.gps else None)
+    index = np.minimum(end, (time * rate_hz).astype(int))
     shown = ~np.isnan(lean)
-    nothing = np.full(len(time), np.nan)
-    lean = np.where(shown, lean, true[at])
-    return Trace(time, lean, nothing, shown, true[at], speed[at], named_s, ill.first / rate_hz, ill.end / rate_hz)
+    lean = np.where(shown, lean, true[index])
+    return Trace(time, lean, shown, true[index], speed[index], named_s, ill.first / rate_hz, ill.end / rate_hz)
 
 
 def trace_of(
@@ -237,26 +202,25 @@ def trace_of(
     last = np.arange(1, turns + 1) * TURN - 1
     late = round(GPS_LATE_S * rate_hz)
     replay = Replay(calibration.to_firmware(), delay_s=calibration.delay_s())
-    lean, sigma, shown = np.zeros(turns), np.full(turns, 180.0), np.zeros(turns, dtype=bool)
+    lean, shown = np.zeros(turns), np.zeros(turns, dtype=bool)
     named_s = float("nan")
     meter = replay.meter
-    before = None
+    previous = None
     step_us = round(1e6 * TURN / rate_hz)
     for k in range(turns):
         if job.gps and k % round(rate_hz / TURN) == 0:
             meter.measure_speed(float(speed[max(0, int(last[k]) - late)]) if k else NO_SPEED)
         if lost[k]:
-            lean[k], sigma[k], shown[k] = lean[k - 1], sigma[k - 1], False
+            lean[k] = lean[k - 1]
             continue
-        meter.update_in_vehicle(force[k], rate[k], 0 if before is None else (k - before) * step_us)
-        before = k
+        meter.update_in_vehicle(force[k], rate[k], 0 if previous is None else (k - previous) * step_us)
+        previous = k
         lean[k] = meter.lean_deg
-        sigma[k] = np.degrees(np.sqrt(max(0.0, meter.filter.variance)))
         shown[k] = meter.trusted and not meter.fallen and abs(meter.lean_deg) <= FALLEN_DEG
         if named_s != named_s and meter.odd:
             named_s = k * TURN / rate_hz
     time = last / rate_hz
-    return Trace(time, lean, sigma, shown, true[last], speed[last], named_s, first / rate_hz, end / rate_hz)
+    return Trace(time, lean, shown, true[last], speed[last], named_s, first / rate_hz, end / rate_hz)
 
 
 def run(job: FaultJob) -> Outcome:
@@ -291,9 +255,99 @@ def evaluate(jobs: list[FaultJob], done: Callable[[], None] = lambda: None) -> l
         job = jobs[k]
         return (job.seed, str(job.profile), str(job.road), str(job.mount))
 
-    order = sorted(range(len(jobs)), key=ride_of)  # jobs with the same ride are adjacent, so _made() can reuse the ride
-    found: dict[int, Outcome] = {}
+    order = sorted(
+        range(len(jobs)), key=ride_of
+    )  # jobs with the same ride are adjacent, so _simulated() can reuse the ride
+    outcomes: dict[int, Outcome] = {}
     for k, outcome in zip(order, on_all_processors(run, [jobs[k] for k in order], chunk=8), strict=True):
-        found[k] = outcome
+        outcomes[k] = outcome
         done()
-    return [found[k] for k in range(len(jobs))]
+    return [outcomes[k] for k in range(len(jobs))]
+
+
+@dataclass
+class FaultSummary:
+    """The results of all rides with one fault. The shares are of the rides.
+
+    kind: Kind of the fault, or "none".
+    title: Name of the fault.
+    rides: Number of rides.
+    misleading_s, most_s: Mean and largest time with a misleading lean.
+    available: Mean share of the riding time in which a lean is shown.
+    hidden_s, hidden: Median time from the start of the fault until the lean is hidden, or NaN, and the share.
+    named_s, named: Likewise until the display names the fault.
+    recovered: Share in which the lean is right after the fault. NaN for a fault that does not end.
+    """
+
+    kind: str
+    title: str
+    rides: int
+    misleading_s: float
+    most_s: float
+    available: float
+    hidden_s: float
+    hidden: float
+    named_s: float
+    named: float
+    recovered: float
+
+
+def summaries(outcomes: list[Outcome]) -> list[FaultSummary]:
+    """Return one FaultSummary per fault, in the order in which the faults first appear."""
+    groups: dict[tuple[str, str], list[Outcome]] = {}
+    for outcome in outcomes:
+        fault = outcome.job.fault
+        groups.setdefault((fault.kind if fault else "none", outcome.job.title), []).append(outcome)
+    return [_summary(kind, title, rides) for (kind, title), rides in groups.items()]
+
+
+def _summary(kind: str, title: str, rides: list[Outcome]) -> FaultSummary:
+    misleading = [o.misleading_s for o in rides]
+    recovered = [o.recovered for o in rides if o.recovered is not None]
+    return FaultSummary(
+        kind,
+        title,
+        len(rides),
+        float(np.mean(misleading)),
+        max(misleading),
+        float(np.mean([o.available for o in rides])),
+        *_median_and_share([o.hidden_after_s for o in rides]),
+        *_median_and_share([o.named_after_s for o in rides]),
+        float(np.mean(recovered)) if recovered else float("nan"),
+    )
+
+
+def _median_and_share(values: list[float]) -> tuple[float, float]:
+    """Return the median of the values that are not NaN, and their share."""
+    finite = [value for value in values if np.isfinite(value)]
+    return float(np.median(finite)) if finite else float("nan"), len(finite) / len(values)
+
+
+def fault_table(outcomes: list[Outcome]) -> Table:
+    """Return a table with one line per fault, and one block of lines per kind of fault."""
+    table = Table(title="Rides with a fault of the sensor", caption=CAPTION, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table.add_column("fault", overflow="fold")
+    heads = "mis-\nleading,most,shown,hidden\nafter,of\nrides,named\nafter,of\nrides,right\nagain"
+    for head in heads.split(","):
+        table.add_column(head, justify="right")
+    kind = ""
+    for s in summaries(outcomes):
+        if s.kind != kind:
+            kind = s.kind
+            table.add_row(kind, style="cyan")
+        seconds = [f"{s.misleading_s:.1f}", f"{s.most_s:.1f}"]
+        hidden, named = ("--" if np.isnan(time_s) else f"{time_s:.1f}" for time_s in (s.hidden_s, s.named_s))
+        recovered = "--" if np.isnan(s.recovered) else f"{100.0 * s.recovered:.0f} %"
+        shares = [f"{100.0 * share:.0f} %" for share in (s.hidden, s.named)]
+        shown = f"{100.0 * s.available:.1f} %"
+        table.add_row("  " + s.title, *seconds, shown, hidden, shares[0], named, shares[1], recovered)
+    return table
+
+
+def document(outcomes: list[Outcome]) -> dict[str, Any]:
+    """Return all figures for JSON. A figure that is NaN becomes null."""
+    rides = [{"fault": o.job.title, "seed": o.job.seed, **vars(o)} for o in outcomes]
+    for entry in rides:
+        del entry["job"]
+    data = {"faults": [vars(s) for s in summaries(outcomes)], "rides": rides}
+    return json.loads(json.dumps(data), parse_constant=lambda _: None)

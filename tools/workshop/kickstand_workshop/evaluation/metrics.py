@@ -17,22 +17,14 @@ _STRAIGHT_DPS, _STRAIGHT_DEG, _STRAIGHT_MPS, _STRAIGHT_S = 2.0, 6.0, 5.0, 1.0
 
 @dataclass
 class LeanScore:
-    """The errors of a shown lean. A figure is NaN if the ride does not determine it.
+    """The errors of a shown lean. A figure is NaN if the ride does not determine it."""
 
-    rms_deg: Root of the mean square of the error.
-    p95_deg: 95th percentile of the absolute error.
-    worst_deg: Largest absolute error.
-    slope: Shown lean divided by true lean.
-    lag_ms: Delay of the shown lean. Positive if the lean is late.
-    straight_bias_deg: Mean error on straights in the last tenth of the ride.
-    """
-
-    rms_deg: float
-    p95_deg: float
-    worst_deg: float
-    slope: float
-    lag_ms: float
-    straight_bias_deg: float
+    rms_deg: float  # root of the mean square of the error
+    p95_deg: float  # 95th percentile of the absolute error
+    worst_deg: float  # largest absolute error
+    slope: float  # shown lean divided by true lean
+    lag_ms: float  # delay of the shown lean. Positive if the lean is late.
+    straight_bias_deg: float  # mean error on straights in the last tenth of the ride
 
 
 def rms(error: NDArray) -> float:
@@ -72,12 +64,12 @@ def lag_ms(shown: NDArray, true: NDArray, rate_hz: float) -> float:
 
 def straights(truth: dict[str, NDArray], rate_hz: float) -> NDArray[np.bool_]:
     """Return True where the bike has ridden straight ahead for at least a second at over 5 m/s, shape (n)."""
-    now = (
+    is_straight = (
         (np.abs(truth["yaw_rate_dps"]) < _STRAIGHT_DPS)
         & (np.abs(truth["lean_deg"]) < _STRAIGHT_DEG)
         & (truth["speed_mps"] > _STRAIGHT_MPS)
     )
-    since = np.arange(len(now)) - np.maximum.accumulate(np.where(now, -1, np.arange(len(now))))
+    since = np.arange(len(is_straight)) - np.maximum.accumulate(np.where(is_straight, -1, np.arange(len(is_straight))))
     return since > _STRAIGHT_S * rate_hz
 
 

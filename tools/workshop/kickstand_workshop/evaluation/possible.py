@@ -68,16 +68,16 @@ def gps_lean(made: SimulatedRide, rate_hz: float) -> NDArray[np.float64]:
     """
     time, truth = made.time, made.truth
     chance = np.random.default_rng(len(time))
-    at = np.arange(time[0], time[-1], 1.0 / rate_hz)
+    fix_s = np.arange(time[0], time[-1], 1.0 / rate_hz)
     course = np.cumsum(np.radians(truth["yaw_rate_dps"])) / made.rate_hz
-    speed, course = (np.interp(at, time, values) for values in (truth["speed_mps"], course))
+    speed, course = (np.interp(fix_s, time, values) for values in (truth["speed_mps"], course))
     speed, course = (
-        speed + GPS_MPS * chance.normal(size=len(at)),
-        course + GPS_MPS / np.maximum(speed, 1.0) * (chance.normal(size=len(at))),
+        speed + GPS_MPS * chance.normal(size=len(fix_s)),
+        course + GPS_MPS / np.maximum(speed, 1.0) * (chance.normal(size=len(fix_s))),
     )
     yaw_rate = np.diff(course, prepend=course[0]) * rate_hz
     lean = -np.degrees(np.arctan(speed * yaw_rate / STANDARD_GRAVITY))
-    return lean[np.searchsorted(at, time, side="right").clip(1) - 1]
+    return lean[np.searchsorted(fix_s, time, side="right").clip(1) - 1]
 
 
 def leans(made: SimulatedRide) -> dict[str, NDArray[np.float64]]:

@@ -32,30 +32,21 @@ _LEANED_DEG = 5.0  # smallest lean for the fit of the slope. The reference is ra
 
 @dataclass
 class RealScore:
-    """The errors of a lean against the rough reference.
+    """The errors of a lean against the rough reference."""
 
-    rms_deg: Root of the mean square of the error.
-    slope: Shown lean divided by reference lean, for reference leans over 5 degrees.
-    """
-
-    rms_deg: float
-    slope: float
+    rms_deg: float  # root of the mean square of the error
+    slope: float  # shown lean divided by reference lean, for reference leans over 5 degrees
 
 
 @dataclass
 class RecordingScores:
-    """The scores of all estimators on a recording.
+    """The scores of all estimators on a recording."""
 
-    name: Name of the recording's file.
-    scores: Score of each estimator, by its name.
-    traces: "time" in s, and the leans in degrees, positive to the right: "reference" and each estimator. Each has shape
-        (N).
-    notices: Remarks about the recording, and about readings that contradict its calibration.
-    """
-
-    name: str
-    scores: dict[str, RealScore]
+    name: str  # name of the recording's file
+    scores: dict[str, RealScore]  # score of each estimator, by its name
+    # "time" in s, and the leans in degrees, positive to the right: "reference" and each estimator. Each has shape (N).
     traces: dict[str, NDArray[np.float64]]
+    # Remarks about the recording, and about readings that contradict its calibration
     notices: list[Message] = field(default_factory=list)
 
 
@@ -66,13 +57,13 @@ def compare(path: Path) -> RecordingScores:
     reference = reference_lean(log, calibration)
     time = log.t_s
     riding = speed > _RIDING_MPS
-    shown = estimate(log, calibration)
+    leans = estimate(log, calibration)
     scores = {
         name: RealScore(rms((lean - reference)[riding]), slope(lean[riding], reference[riding], _LEANED_DEG))
-        for name, lean in shown.items()
+        for name, lean in leans.items()
     }
     notices = read_ride(log, calibration).notices
-    return RecordingScores(path.name, scores, {"time": time, "reference": reference, **shown}, notices)
+    return RecordingScores(path.name, scores, {"time": time, "reference": reference, **leans}, notices)
 
 
 def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64]:
@@ -85,7 +76,7 @@ def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64
 
 def _speed(log: Log) -> NDArray[np.float64]:
     """Return the speed at each sample in m/s, interpolated between the logged values."""
-    there = ~np.isnan(log.speed_mps)
-    if np.count_nonzero(there) < 2:
+    has_speed = ~np.isnan(log.speed_mps)
+    if np.count_nonzero(has_speed) < 2:
         raise InputError(f"{log.name} has no speed: without it there is no reference")
-    return np.interp(log.t_s, log.t_s[there], log.speed_mps[there])
+    return np.interp(log.t_s, log.t_s[has_speed], log.speed_mps[has_speed])

@@ -1,16 +1,15 @@
-"""Reports an evaluation: tables for a terminal, data for JSON, and files. Each figure is computed over all seeds."""
+"""Reports an evaluation: tables for a terminal, and data for JSON. Each figure is computed over all seeds."""
 
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich import box
 from rich.table import Table
 
-from . import picture, possible
+from . import possible
 from .metrics import LeanScore
 from .real_ride import RealScore
 from .runs import Evaluation, Result
@@ -36,17 +35,17 @@ def pooled(scores: list[LeanScore]) -> dict[str, float]:
         [value for s in scores if not np.isnan(value := getattr(s, name))]
         for name in ("slope", "lag_ms", "straight_bias_deg")
     )
-    nothing = float("nan")
+    unknown = float("nan")
     return {
         "rms": float(np.sqrt(np.mean(rms * rms))),
         "worst_ride_rms": float(rms.max()),
         "p95": float(np.mean([s.p95_deg for s in scores])),
         "worst": float(max(s.worst_deg for s in scores)),
-        "slope": float(np.mean(slopes)) if slopes else nothing,
-        "slope_low": min(slopes, default=nothing),
-        "slope_high": max(slopes, default=nothing),
-        "lag_ms": float(np.mean(lags)) if lags else nothing,
-        "straight_bias": max(biases, key=abs, default=nothing),
+        "slope": float(np.mean(slopes)) if slopes else unknown,
+        "slope_low": min(slopes, default=unknown),
+        "slope_high": max(slopes, default=unknown),
+        "lag_ms": float(np.mean(lags)) if lags else unknown,
+        "straight_bias": max(biases, key=abs, default=unknown),
     }
 
 
@@ -61,22 +60,22 @@ def by_profile(results: list[Result]) -> dict[str, dict[str, dict[str, float]]]:
         names = rides[0].scores if rides else {}
         summary[profile] = {name: pooled([r.scores[name] for r in rides]) for name in names}
         least = summary[profile].get(possible.NAME, {}).get("rms", float("nan"))
-        for each in summary[profile].values():
-            each["ratio"] = each["rms"] / least
+        for figures in summary[profile].values():
+            figures["ratio"] = figures["rms"] / least
     return summary
 
 
 def table(results: list[Result]) -> Table:
     """Return a table of the simulated rides, with a block of lines per profile."""
-    made = _table("Shown lean against the truth of simulated rides", CAPTION)
-    made.add_column("profile (rides)", no_wrap=True)
+    report = _table("Shown lean against the truth of simulated rides", CAPTION)
+    report.add_column("profile (rides)", no_wrap=True)
     for head in ("rms", "ratio", "worst\nride", "95 %", "worst", "slope", "range", "lag ms", "bias"):
-        made.add_column(head, justify="right")
+        report.add_column(head, justify="right")
     for profile, methods in by_profile(results).items():
         rides = sum(r.job.profile == profile and r.refusal is None for r in results)
-        made.add_row(f"{profile} ({rides})", style="cyan")
+        report.add_row(f"{profile} ({rides})", style="cyan")
         for k, (name, s) in enumerate(methods.items()):
-            made.add_row(
+            report.add_row(
                 "  " + name,
                 _shown(s["rms"], ".2f"),
                 _shown(s["ratio"], ".1f"),
@@ -90,22 +89,22 @@ def table(results: list[Result]) -> Table:
                 style="bold" if name == "kickstand" else "",
                 end_section=k == len(methods) - 1,
             )
-    return made
+    return report
 
 
 def real_table(scores: dict[str, RealScore], name: str) -> Table:
     """Return a table of the recorded ride. name: name of its file."""
-    made = _table(
+    report = _table(
         f"{name}: against atan(v * yaw rate / g) averaged over 1 s",
         "The reference is rough and too small. Use it to compare methods, not to measure errors in degrees.",
     )
-    made.add_column("recorded ride", no_wrap=True)
+    report.add_column("recorded ride", no_wrap=True)
     for head in ("rms", "slope beyond\n5 deg"):
-        made.add_column(head, justify="right")
+        report.add_column(head, justify="right")
     for method, s in scores.items():
         style = "bold" if method == "kickstand" else ""
-        made.add_row("  " + method, _shown(s.rms_deg, ".2f"), _shown(s.slope, ".3f"), style=style)
-    return made
+        report.add_row("  " + method, _shown(s.rms_deg, ".2f"), _shown(s.slope, ".3f"), style=style)
+    return report
 
 
 def _table(title: str, caption: str) -> Table:
@@ -114,29 +113,18 @@ def _table(title: str, caption: str) -> Table:
 
 
 def document(evaluation: Evaluation) -> dict[str, Any]:
-    """Return all figures for a JSON file. A figure that cannot be computed from the rides is null."""
+    """Return all figures for JSON. A figure that cannot be computed from the rides is null."""
     rides = [
         {"profile": r.job.profile, "seed": r.job.seed, "refusal": r.refusal, "scores": _scores(r.scores)}
         for r in evaluation.results
     ]
     recorded = None if evaluation.recorded is None else _scores(evaluation.recorded.scores)
-    found = {"profiles": by_profile(evaluation.results), "rides": rides, "recorded": recorded}
-    return json.loads(json.dumps(found), parse_constant=lambda _: None)  # null, because JSON has no NaN and no infinity
-
-
-def write(evaluation: Evaluation, directory: Path) -> tuple[Path, Path]:
-    """Write evaluation.json and lean.png, and return their paths. Needs matplotlib (see picture.check())."""
-    figures, drawing = directory / "evaluation.json", directory / "lean.png"
-    figures.write_text(json.dumps(document(evaluation), indent=2) + "\n", encoding="ascii")
-    rides = {r.job.profile: r.traces for r in evaluation.results if r.traces}
-    if evaluation.recorded:
-        rides[evaluation.recorded.name] = evaluation.recorded.traces
-    picture.draw(drawing, rides)
-    return figures, drawing
+    data = {"profiles": by_profile(evaluation.results), "rides": rides, "recorded": recorded}
+    return json.loads(json.dumps(data), parse_constant=lambda _: None)  # null, because JSON has no NaN and no infinity
 
 
 def _scores(scores: Mapping[str, LeanScore | RealScore]) -> dict[str, dict[str, float]]:
-    """Return the scores of each estimator for the file. The suffix _deg is removed from the names of figures."""
+    """Return the scores of each estimator for JSON. The suffix _deg is removed from the names of figures."""
     return {name: {key.removesuffix("_deg"): value for key, value in asdict(s).items()} for name, s in scores.items()}
 
 

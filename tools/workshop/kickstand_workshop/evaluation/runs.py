@@ -27,39 +27,26 @@ from .metrics import LeanScore, score
 
 @dataclass(frozen=True)
 class Job:
-    """One ride to simulate.
+    """One ride to simulate."""
 
-    profile: Profile of the ride.
-    seed: Seed of the ride. The seed also sets the signs of the next two errors.
-    seconds: Riding time.
-    upright_error_deg: Error of the upright pose.
-    pitch_change_deg: Change of pitch between the two poses.
-    traces: True to keep the leans.
-    """
-
-    profile: str
-    seed: int
-    seconds: float = 640.0
-    upright_error_deg: float = 0.0
-    pitch_change_deg: float = 1.0
-    traces: bool = False
+    profile: str  # profile of the ride
+    seed: int  # seed of the ride. The seed also sets the signs of the next two errors.
+    seconds: float = 640.0  # riding time
+    upright_error_deg: float = 0.0  # error of the upright pose
+    pitch_change_deg: float = 1.0  # change of pitch between the two poses
+    traces: bool = False  # True to keep the leans
 
 
 @dataclass
 class Result:
-    """The result of a simulated ride.
+    """The result of a simulated ride."""
 
-    job: The ride.
-    scores: Score of each estimator, by its name.
-    traces: "time" in s, and the leans in degrees: "true" and each estimator. Shape (N) each. Empty unless the job keeps
-        the leans.
-    refusal: The firmware's reason for refusing the poses, or None.
-    """
-
-    job: Job
-    scores: dict[str, LeanScore] = field(default_factory=dict)
+    job: Job  # the ride
+    scores: dict[str, LeanScore] = field(default_factory=dict)  # score of each estimator, by its name
+    # "time" in s, and the leans in degrees: "true" and each estimator. Shape (N) each. Empty unless the job keeps the
+    # leans.
     traces: dict[str, NDArray[np.float64]] = field(default_factory=dict)
-    refusal: str | None = None
+    refusal: str | None = None  # the firmware's reason for refusing the poses, or None
 
 
 def jobs(profiles: list[str], seeds: int, traces: bool = False, **each: float) -> list[Job]:
@@ -79,14 +66,10 @@ def jobs(profiles: list[str], seeds: int, traces: bool = False, **each: float) -
 
 @dataclass
 class Evaluation:
-    """The results of all rides.
+    """The results of all rides."""
 
-    results: Results of the simulated rides, ordered by profile and then by seed.
-    recorded: Scores on the recorded ride, or None without a recording.
-    """
-
-    results: list[Result]
-    recorded: real_ride.RecordingScores | None
+    results: list[Result]  # results of the simulated rides, ordered by profile and then by seed
+    recorded: real_ride.RecordingScores | None  # scores on the recorded ride, or None without a recording
 
 
 def evaluate(jobs: list[Job], recording: Path | None = None, done: Callable[[], None] = lambda: None) -> Evaluation:
@@ -109,16 +92,16 @@ def run(job: Job) -> Result:
     The calibration uses one log of the six positions, and the two poses.
     """
     upright_sign, pitch_sign = (1, -1)[job.seed % 2], (1, -1)[job.seed // 2 % 2]
-    made = ride(
+    simulated = ride(
         job.profile, job.seed, job.seconds, upright_sign * job.upright_error_deg, pitch_sign * job.pitch_change_deg
     )
     try:
-        calibration = calibrated_by_log(made)
+        calibration = calibrated_by_log(simulated)
     except InputError as error:
         return Result(job, refusal=str(error))
-    shown = estimators.estimate(as_log(made), calibration) | possible.leans(made)
-    scores = {name: score(lean, made.truth, made.rate_hz) for name, lean in shown.items()}
-    traces = {"time": made.time, "true": made.truth["lean_deg"], **shown} if job.traces else {}
+    leans = estimators.estimate(as_log(simulated), calibration) | possible.leans(simulated)
+    scores = {name: score(lean, simulated.truth, simulated.rate_hz) for name, lean in leans.items()}
+    traces = {"time": simulated.time, "true": simulated.truth["lean_deg"], **leans} if job.traces else {}
     return Result(job, scores, traces)
 
 

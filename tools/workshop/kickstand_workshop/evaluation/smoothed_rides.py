@@ -17,18 +17,12 @@ from .runs import as_log, calibrated_by_poses
 
 @dataclass
 class Known:
-    """A ride with its true lean.
+    """A ride with its true lean."""
 
-    log: n samples.
-    calibration: of the sensor that recorded the log.
-    lean_deg: true lean, shape (n).
-    riding: True after the bike has set off, shape (n).
-    """
-
-    log: Log
-    calibration: CalibrationFile
-    lean_deg: np.ndarray
-    riding: np.ndarray
+    log: Log  # n samples
+    calibration: CalibrationFile  # of the sensor that recorded the log
+    lean_deg: np.ndarray  # true lean, shape (n)
+    riding: np.ndarray  # True after the bike has set off, shape (n)
 
     def live(self):
         """Return the lean that the firmware computes, shape (n), in degrees."""
@@ -42,9 +36,9 @@ class Known:
             smoothed: errors of the smoothed lean.
             sigma: standard deviations that smoothing computes.
         """
-        shown, found = replay(self.log, self.calibration), smooth(self.log, self.calibration)
-        live = np.where(np.isnan(shown.lean_sigma_deg), np.nan, shown.lean_deg - self.lean_deg)
-        return live[self.riding], (found.lean_deg - self.lean_deg)[self.riding], found.lean_sigma_deg[self.riding]
+        replayed, smoothed = replay(self.log, self.calibration), smooth(self.log, self.calibration)
+        live = np.where(np.isnan(replayed.lean_sigma_deg), np.nan, replayed.lean_deg - self.lean_deg)
+        return live[self.riding], (smoothed.lean_deg - self.lean_deg)[self.riding], smoothed.lean_sigma_deg[self.riding]
 
     def part(self, kept):
         """Return the ride with only the samples for which `kept` is True. kept: shape (n)."""
@@ -56,9 +50,9 @@ def simulated(profile, seed, seconds):
 
     The upright pose is 1.5 degrees off. The pitch between the two poses is 1 degree off.
     """
-    made = ride(profile, seed, seconds, 1.5 * (1, -1)[seed % 2], 1.0 * (1, -1)[seed // 2 % 2])
-    riding = np.cumsum(made.truth["speed_mps"] > 0.5) > 0
-    return Known(as_log(made), calibrated_by_poses(made), made.truth["lean_deg"], riding)
+    simulated_ride = ride(profile, seed, seconds, 1.5 * (1, -1)[seed % 2], 1.0 * (1, -1)[seed // 2 % 2])
+    riding = np.cumsum(simulated_ride.truth["speed_mps"] > 0.5) > 0
+    return Known(as_log(simulated_ride), calibrated_by_poses(simulated_ride), simulated_ride.truth["lean_deg"], riding)
 
 
 def other(kind, seed, **more):
@@ -87,10 +81,10 @@ def figures(row):
     rides = [
         other(kind, seed, seconds=300.0) if is_other else simulated(kind, seed, 300.0) for seed in (201, 202, 203, 204)
     ]
-    shown, off, sigma = (np.concatenate(values) for values in zip(*(known.judged() for known in rides)))
-    shown = shown[~np.isnan(shown)]
+    live, off, sigma = (np.concatenate(values) for values in zip(*(ride_of_kind.judged() for ride_of_kind in rides)))
+    live = live[~np.isnan(live)]
     within = [np.mean(np.abs(off) < times * sigma) for times in (1.0, 2.0)]
-    return rms(shown), np.max(np.abs(shown)), rms(off), np.max(np.abs(off)), *within
+    return rms(live), np.max(np.abs(live)), rms(off), np.max(np.abs(off)), *within
 
 
 if __name__ == "__main__":

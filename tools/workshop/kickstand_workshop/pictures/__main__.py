@@ -1,18 +1,22 @@
-"""Writes every picture to tools/pictures: .venv/bin/python -m kickstand_workshop.pictures"""
+"""Writes the pictures of the documents that show the firmware to tools/pictures:
+
+    .venv/bin/python -m kickstand_workshop.pictures
+
+The other drawings in this folder, such as the wiring, are their own sources.
+"""
 
 from kickstand_tools.common import firmware_path
 
 from ..browser import CHROMIUM
-from . import explained, page, ride
-from .drawn import drawn
+from . import displays, page, rides, terminal
 
 
 def main() -> None:
     directory = firmware_path.TOOLS / "pictures"
-    for name, svg in drawn().items():
+    for name, svg in (displays.draw() | {"demo.svg": terminal.draw()}).items():
         (directory / name).write_text(svg, encoding="utf-8")
-    (directory / "ride.png").write_bytes(ride.draw())
-    (directory / "lean_compared.png").write_bytes(explained.lean_compared())
+    (directory / "ride.png").write_bytes(rides.ride_plot())
+    (directory / "lean_compared.png").write_bytes(rides.lean_compared())
     if CHROMIUM:
         (directory / page.NAME).write_bytes(page.draw())
     else:

@@ -91,11 +91,11 @@ def _animated(shots: list[tuple[float, bytes]]) -> bytes:
     shots = shots[:: -(-len(shots) // _MOST)]
     size = (_WIDTH, _WIDTH * _SIZE[1] // _SIZE[0])
     pictures = [Image.open(io.BytesIO(shot)).convert("RGB").resize(size, Image.Resampling.LANCZOS) for _, shot in shots]
-    times = [at for at, _ in shots]
-    lasting = [round(1000 * (after - at) / _QUICKER) for at, after in pairwise(times)] + [round(1000 * _LAST_S)]
-    made = io.BytesIO()
+    times = [time_s for time_s, _ in shots]
+    lasting = [round(1000 * (end - begin) / _QUICKER) for begin, end in pairwise(times)] + [round(1000 * _LAST_S)]
+    content = io.BytesIO()
     style = {"quality": _QUALITY, "method": 5, "loop": 0}
     pictures[0].save(
-        made, "WEBP", save_all=True, append_images=pictures[1:], duration=lasting, xmp=looks().encode(), **style
+        content, "WEBP", save_all=True, append_images=pictures[1:], duration=lasting, xmp=looks().encode(), **style
     )
-    return made.getvalue()
+    return content.getvalue()

@@ -38,34 +38,20 @@ MAX_GROWTH = 3000
 
 @dataclass
 class Tallies:
-    """Counts and worst figures of all trips.
+    """Counts and worst figures of all trips."""
 
-    seed: Seed of the random numbers.
-    hours: Simulated time.
-    trips: Number of trips.
-    rides: Number of trips with each kind of ride.
-    faults: Number of faults, by name.
-    presses: Number of presses.
-    saves_cut: Number of times the power was cut while a calibration was saved.
-    alignments: Number of trips that aligned a bike for the first time.
-    pages: Number of changes of the display.
-    worst: Largest value of each figure, by name.
-    host_s: Time on this computer.
-    found: One line per broken invariant.
-    """
-
-    seed: int
-    hours: float = 0.0
-    trips: int = 0
-    rides: Counter[str] = field(default_factory=Counter)
-    faults: Counter[str] = field(default_factory=Counter)
-    presses: int = 0
-    saves_cut: int = 0
-    alignments: int = 0
-    pages: int = 0
-    worst: dict[str, float] = field(default_factory=dict)
-    host_s: float = 0.0
-    found: list[str] = field(default_factory=list)
+    seed: int  # seed of the random numbers
+    hours: float = 0.0  # simulated time
+    trips: int = 0  # number of trips
+    rides: Counter[str] = field(default_factory=Counter)  # number of trips with each kind of ride
+    faults: Counter[str] = field(default_factory=Counter)  # number of faults, by name
+    presses: int = 0  # number of presses
+    saves_cut: int = 0  # number of times the power was cut while a calibration was saved
+    alignments: int = 0  # number of trips that aligned a bike for the first time
+    pages: int = 0  # number of changes of the display
+    worst: dict[str, float] = field(default_factory=dict)  # largest value of each figure, by name
+    host_s: float = 0.0  # time on this computer
+    found: list[str] = field(default_factory=list)  # one line per broken invariant
 
     def keep_worst(self, name: str, value: float) -> None:
         """Keep the value if it is the largest value with this name."""
@@ -115,7 +101,7 @@ def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: 
     begun, said_h = time.monotonic(), 0.0
     chance = random.Random(seed)
     bike: SoakBoard | None = None
-    before = os.getcwd()
+    directory = os.getcwd()
     with tempfile.TemporaryDirectory() as folder:
         try:
             while figures.hours < hours:
@@ -133,7 +119,7 @@ def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: 
                     said_h = figures.hours
                     say(f"{said_h:.1f} h in {figures.host_s:.0f} s, {len(figures.found)} findings")
         finally:
-            os.chdir(before)
+            os.chdir(directory)
     return figures
 
 

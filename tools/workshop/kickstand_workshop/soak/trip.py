@@ -45,26 +45,17 @@ GPS_FAULTS = ("unplugged", "garbled", "void", "stuck")
 
 @dataclass
 class Trip:
-    """A trip.
+    """A trip."""
 
-    kind: Kind of the ride, a key of RIDES.
-    ride: Motion of the bike.
-    until_s: Time of the power cut.
-    presses: Start and duration of each press.
-    faults: Name, start and end of each fault.
-    calls: Method of Faults and its arguments, for each fault.
-    gps_faults: Faults of the GPS receiver, as for Gps.
-    cut_save: Number of bytes of the next calibration that are written before the power is cut. None
-        if the power is not cut in a save.
-    """
-
-    kind: str
-    ride: script.Ride
-    until_s: float
-    presses: list[tuple[float, float]]
-    faults: list[tuple[str, float, float]]
-    calls: list[tuple[str, tuple[Any, ...]]]
-    gps_faults: list[list[Any]] = field(default_factory=list)
+    kind: str  # kind of the ride, a key of RIDES
+    ride: script.Ride  # motion of the bike
+    until_s: float  # time of the power cut
+    presses: list[tuple[float, float]]  # start and duration of each press
+    faults: list[tuple[str, float, float]]  # Name, start and end of each fault
+    calls: list[tuple[str, tuple[Any, ...]]]  # method of Faults and its arguments, for each fault
+    gps_faults: list[list[Any]] = field(default_factory=list)  # faults of the GPS receiver, as for Gps
+    # Number of bytes of the next calibration that are written before the power is cut. None if the power is not cut in
+    # a save.
     cut_save: int | None = None
 
 
@@ -79,10 +70,10 @@ def make_trip(chance: random.Random, speed: str | None, aligned: bool) -> Trip:
     ride = script.Ride(_manoeuvres(chance, kind), vibration_g=chance.uniform(0.01, 0.08))
     ride_s = KICKSTAND_S + UPRIGHT_S + 2 * script.MOVE_S
     presses: list[tuple[float, float]] = []
-    again = aligned and chance.random() < 0.3
+    realigns = aligned and chance.random() < 0.3
     if not aligned:
         presses += [(3.0, SHORT_S), (ride_s - 6.0, SHORT_S)]
-    elif again:  # the alignment is the first entry of the menu
+    elif realigns:  # the alignment is the first entry of the menu
         presses += [(2.0, LONG_S), (4.5, LONG_S), (7.0, SHORT_S), (ride_s - 6.0, SHORT_S)]
     # Most trips have no presses during the ride, because a press leaves the page with the lean
     t_s = ride_s + chance.uniform(5, 40) if chance.random() < 0.4 else ride.seconds
@@ -92,7 +83,7 @@ def make_trip(chance: random.Random, speed: str | None, aligned: bool) -> Trip:
     names = [name for name in FAULTS if name != "wheel storm" or speed == "wheel"]
     faults, calls = [], []
     # Faults begin after the poses of an alignment
-    t_s = chance.uniform(3, 20) if aligned and not again else ride_s
+    t_s = chance.uniform(3, 20) if aligned and not realigns else ride_s
     while (t_s := t_s + QUIET_S + chance.expovariate(1 / 20)) < ride.seconds - 10.0:
         name, for_s = chance.choice(names), chance.choice((0.05, 0.3, 1.0, 4.0))
         method, arguments = FAULTS[name]

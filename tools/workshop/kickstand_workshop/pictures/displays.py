@@ -1,0 +1,164 @@
+"""Draws the displays of a simulated device at chosen moments of the demo's ride, as SVG.
+
+The device runs in a separate process, because the firmware uses the simulated board's clock and files. The process
+prints JSON: {name: [codes of both lines, character memory]} for a character display, {name: pixels} for an OLED.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from itertools import groupby
+from typing import Any
+
+from kickstand_tools.common import firmware_path
+from kickstand_tools.common.svg import drawing, element
+from kickstand_tools.demo.device import KICKSTAND_PRESS_S, LONG_PRESS_S, PART_SEED, PART_SHARE, SCRIPT, UPRIGHT_PRESS_S
+from kickstand_tools.simulated_board.oled import HEIGHT, WIDTH, Oled
+from kickstand_tools.simulated_board.simulator import Board
+from kickstand_tools.simulation.scripted.script import Ride
+from kickstand_tools.simulation.scripted.sensor_errors import Sensor
+from kickstand_tools.web.lcd_font import ROM
+
+# The demo's bike turns to the right from 32 to 39 s, brakes from 50 to 56 s, and then stands. The presses capture the
+# pose on the kickstand and the upright pose, then show the page of maxima and the page of braking
+PRESSES_S = (KICKSTAND_PRESS_S, UPRIGHT_PRESS_S, 48.0, 51.0)
+LONG_PRESS_AT_S = 58.0
+MOMENTS_S = {
+    "starting": 0.26,
+    "on_stand": 3.0,
+    "hold_still": 5.5,
+    "upright": 9.0,
+    "aligned": 16.0,
+    "lean": 36.0,
+    "maxima": 50.0,
+    "brake": 53.0,
+    "menu": 60.0,
+}
+UNPLUGGED_S = 44.0, 0.3  # start and duration of the fault that causes the page "unsure", an unplugged sensor
+OLED_MOMENTS_S = {"lean": 36.0, "unsure": 44.9, "maxima": 50.05, "brake": 53.07, "menu": 60.0}
+# Sizes in units of 0.1 mm, as on the usual module of 80 x 36 mm
+_DOT = (5, 6)  # width, height
+_PITCH = (6, 7)  # distance between dots
+_CELL = (36, 62)  # distance between characters
+_COLUMNS, _LINES = 16, 2
+_MARGIN = 34  # width of the glass around the characters
+_FRAME = 22  # width of the black metal around the glass
+_GLASS = (_COLUMNS * _CELL[0] + 2 * _MARGIN, _LINES * _CELL[1] + 2 * _MARGIN)
+_SIZE = (_GLASS[0] + 2 * _FRAME, _GLASS[1] + 2 * _FRAME)
+# Sizes in pixels of the panel. The usual module is 27 mm wide, and its panel 22 mm.
+_OLED_MARGIN, _OLED_FRAME = 4, 6
+_OLED_SIZE = (WIDTH + 2 * (_OLED_MARGIN + _OLED_FRAME), HEIGHT + 2 * (_OLED_MARGIN + _OLED_FRAME))
+
+
+def draw() -> dict[str, str]:
+    """Run both devices, which takes some seconds. Return {file name: SVG of a page of a display}."""
+    pages = {f"lcd_{name}.svg": draw_lcd(*page) for name, page in _device_pages("lcd").items()}
+    return pages | {f"oled_{name}.svg": draw_oled(page) for name, page in _device_pages("ssd1306").items()}
+
+
+def draw_lcd(codes: list[list[int]], cgram: list[int]) -> str:
+    """Return the display as SVG.
+
+    codes: two lists of 16 character codes.
+    cgram: the 64 bytes of the eight custom characters.
+    """
+    lit = [
+        _dot(column * _CELL[0] + x * _PITCH[0], line * _CELL[1] + y * _PITCH[1])
+        for line in range(_LINES)
+        for column in range(_COLUMNS)
+        for y, row in enumerate(_rows(codes[line][column], cgram))
+        for x in range(5)
+        if row & 0x10 >> x
+    ]
+    unlit = [_dot(x * _PITCH[0], y * _PITCH[1]) for y in range(8) for x in range(5)]
+    cell = element("path", d="".join(unlit), fill="#0d2f8c", fill_opacity=0.28)
+    shade = [element("stop", offset=at, stop_color=colour) for at, colour in enumerate(("#2f6bea", "#1b47b8"))]
+    size = {"width": _CELL[0], "height": _CELL[1], "patternUnits": "userSpaceOnUse"}
+    dots = [
+        element("rect", width=_COLUMNS * _CELL[0], height=_LINES * _CELL[1], fill="url(#cell)"),
+        element("path", d="".join(lit), fill="#f4f8ff"),
+    ]
+    glass = {"x": _FRAME, "y": _FRAME, "width": _GLASS[0], "height": _GLASS[1], "rx": 8}
+    return drawing(
+        _SIZE,
+        element("linearGradient", *shade, id="glass", x1=0, y1=0, x2=0, y2=1),
+        element("pattern", cell, id="cell", **size),
+        element("rect", width=_SIZE[0], height=_SIZE[1], rx=18, fill="#16181d"),
+        element("rect", **glass, fill="url(#glass)"),
+        element("g", *dots, transform=f"translate({_FRAME + _MARGIN} {_FRAME + _MARGIN})"),
+    )
+
+
+def _rows(code: int, cgram: list[int]) -> bytes:
+    return bytes(cgram[code % 8 * 8 : code % 8 * 8 + 8]) if code < 0x10 else ROM[code]
+
+
+def _dot(x: int, y: int) -> str:
+    return f"M{x} {y}h{_DOT[0]}v{_DOT[1]}h-{_DOT[0]}z"
+
+
+def draw_oled(pixels: list[int]) -> str:
+    """Return the display as SVG. pixels: 64 rows of 128 pixels. A byte has 8 pixels, the leftmost in bit 7."""
+    runs = []
+    for y in range(HEIGHT):
+        x = 0
+        for lit, run in groupby(pixels[(y * WIDTH + i) >> 3] >> (7 - i % 8) & 1 for i in range(WIDTH)):
+            length = len(list(run))
+            if lit:
+                runs.append(f"M{x} {y}h{length}v1h-{length}z")
+            x += length
+    inner = {"x": _OLED_FRAME, "y": _OLED_FRAME, "width": WIDTH + 2 * _OLED_MARGIN, "height": HEIGHT + 2 * _OLED_MARGIN}
+    return drawing(
+        _OLED_SIZE,
+        element("rect", width=_OLED_SIZE[0], height=_OLED_SIZE[1], rx=4, fill="#123a6b"),
+        element("rect", **inner, fill="#05070a"),
+        element(
+            "path",
+            d="".join(runs),
+            fill="#eaf5ff",
+            transform=f"translate({_OLED_FRAME + _OLED_MARGIN} {_OLED_FRAME + _OLED_MARGIN})",
+        ),
+    )
+
+
+def _device_pages(display: str) -> dict[str, Any]:
+    with tempfile.TemporaryDirectory() as flash:
+        process = subprocess.run(
+            [sys.executable, "-m", __name__, display],
+            env=os.environ | {"PYTHONPATH": firmware_path.search_path()},
+            cwd=flash,
+            stdout=subprocess.PIPE,
+            text=True,
+            check=True,
+        )
+    return json.loads(process.stdout.splitlines()[-1])
+
+
+def _run(display: str) -> dict[str, Any]:
+    """Run the device. After this function the process cannot run another device."""
+    ride = Ride(SCRIPT)
+    board = Board(Sensor(seed=PART_SEED, share=PART_SHARE).world(ride.motion), display=display)
+    for at_s in PRESSES_S:
+        board.press(at_s)
+    board.press(LONG_PRESS_AT_S, LONG_PRESS_S)
+    if display != "lcd":
+        board.faults.unplug_sensor(*UNPLUGGED_S)
+    pages = {}
+
+    def look(name: str) -> None:
+        lcd = board.lcd
+        pages[name] = list(lcd.pixels()) if isinstance(lcd, Oled) else (lcd.codes(), list(lcd.cgram))
+
+    for name, at_s in (MOMENTS_S if display == "lcd" else OLED_MOMENTS_S).items():
+        board.at(at_s, lambda name=name: look(name))
+    board.install()
+    from kickstand.start import main  # imported after install(), which replaces `machine` and `time`
+
+    board.run(main, ride.seconds)
+    return pages
+
+
+if __name__ == "__main__":
+    print("\n" + json.dumps(_run(sys.argv[1])))
