@@ -11,7 +11,7 @@ from kickstand_tools.analysis.plot.charts import (
     Chart,
     Charts,
 )
-from kickstand_tools.checks.mount import UpOff
+from kickstand_tools.calibration.mount import UpOff
 from kickstand_tools.estimation.smooth import NotTheBikes
 from small_rides import overview_of, samples
 

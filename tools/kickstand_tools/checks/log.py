@@ -83,8 +83,8 @@ def check_log(log: Log, axes: bool = True) -> CheckedLog:
     RefusedInput for a speed that is not in m/s.
 
     >>> import numpy as np
-    >>> from kickstand_tools.api import simulate_ride
-    >>> ride = simulate_ride("street", seed=1, seconds=60.0)
+    >>> from kickstand_tools.api import Log, simulate_ride
+    >>> ride = simulate_ride("street", seed=1, seconds=90.0)
     >>> log = Log.from_readings(ride.readings, ride.rate_hz)
     >>> log.gyro_dps = -log.gyro_dps
     >>> [notice.code for notice in check_log(log).notices]

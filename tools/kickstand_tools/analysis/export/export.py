@@ -38,7 +38,16 @@ RowsShare = kind(
 
 
 def export(ride: Ride, form: str, out: Path | str, progress: Progress | None = None) -> int:
-    """Write a ride of open_ride() to a file. Returns the number of rows. See export_with_notices()."""
+    """Write a ride of open_ride() to a file. Returns the number of rows. See export_with_notices().
+
+    >>> import tempfile
+    >>> import numpy as np
+    >>> from kickstand_tools.api import CalibrationFile, Log, open_ride
+    >>> log = Log(np.arange(300) / 100.0, np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3)))
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     export(open_ride(log, CalibrationFile(aligned=True)), "csv", f"{directory}/ride.csv")
+    300
+    """
     return export_with_notices(ride, form, out, progress)[0]
 
 
@@ -53,14 +62,6 @@ def export_with_notices(
     form: "csv" (gzipped if `out` ends in .gz), "gpx", "parquet", "racechrono" or "vbo".
     progress: called with (done, total) of the log's samples.
     Returns the number of rows, and remarks about the log. Raises InputError.
-
-    >>> import tempfile
-    >>> import numpy as np
-    >>> from kickstand_tools.api import CalibrationFile, Log, open_ride
-    >>> log = Log(np.arange(300) / 100.0, np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3)))
-    >>> with tempfile.TemporaryDirectory() as directory:
-    ...     export_with_notices(open_ride(log, CalibrationFile(aligned=True)), "csv", f"{directory}/ride.csv")
-    (300, [])
     """
     name, library = _NEEDS.get(form, ("", ""))
     if library and not find_spec(library):
