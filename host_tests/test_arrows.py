@@ -145,7 +145,6 @@ TOOLS = {
         "common",
         "signals",
         "logs",
-        "checks",
         "calibration",
         "estimation",
         "replay",

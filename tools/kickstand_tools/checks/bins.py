@@ -55,7 +55,7 @@ class LogBins:
         speed in each group, shape (k), in m/s.
         """
         merged = self.bins.merged(over)
-        return merged.means[:, :3], merged.means[:, 3:], merged.latest[:, 1]
+        return merged.means[:, :3], merged.means[:, 3:], merged.latest[:, 0]
 
 
 def log_bins(
@@ -67,9 +67,7 @@ def log_bins(
     force, rate: along the sensor's axes, shape (n, 3), in g and deg/s.
     speed_mps, lat_deg, lon_deg: shape (n); NaN for no new value.
     """
-    speed_s, position_s = (np.where(np.isnan(values), np.nan, time_s) for values in (speed_mps, lat_deg))
-    latest = speed_s, speed_mps, position_s, lat_deg, lon_deg
-    bins = binned(time_s, BIN_S, [*force.T, *rate.T], latest, MOST_BINS, 10 * MOST_BINS)
+    bins = binned(time_s, BIN_S, [*force.T, *rate.T], [speed_mps], MOST_BINS, 10 * MOST_BINS)
     if bins is None:
         return None
     has_samples = bins.count > 0
@@ -78,11 +76,17 @@ def log_bins(
         valid[begin:end] = end - begin < GAP_BINS
     number, sampled = np.arange(len(valid)), np.flatnonzero(has_samples)
     filled = np.column_stack([np.interp(number, sampled, column[sampled]) for column in bins.means.T]) * valid[:, None]
-    speeds, positions = _once_a_second(bins.latest[:, :2]), _once_a_second(bins.latest[:, 2:])
+    first_s = bins.first * BIN_S
+    speeds, positions = (_once_a_second(first_s, time_s, *track) for track in ((speed_mps,), (lat_deg, lon_deg)))
     return LogBins(bins, filled[:, :3], filled[:, 3:], valid, speeds, positions)
 
 
-def _once_a_second(values: Array) -> Array:
-    """Return the first row of each second without a NaN. The first column of `values` is the time."""
-    values = values[np.all(np.isfinite(values), axis=1)]
+def _once_a_second(first_s: float, time_s: Array, *columns: Array) -> Array:
+    """Return the first row of each second in which all columns have a value, with the time in front.
+
+    first_s: earlier rows are not used.
+    """
+    rows = np.flatnonzero(~np.isnan(columns[0]))
+    values = np.column_stack([column[rows] for column in (time_s, *columns)])
+    values = values[np.all(np.isfinite(values), axis=1) & (values[:, 0] >= first_s)]
     return values[runs(bin_numbers(values[:, 0], 1.0))] if len(values) else values

@@ -27,7 +27,7 @@ from .windows import Windows, windows_of
 
 SLOWEST_HZ = 10.0  # a log with a lower sample rate is not smoothed
 SEGMENT_S = 60.0  # longest part of a log between two cuts
-TOGETHER = 8  # number of segments estimated together, with one more before and one after
+TOGETHER = 6  # number of segments estimated together, with one more before and one after
 # LEANED_SHARE times the lean is added to the standard deviation of the lean, to cover errors that the model lacks,
 # such as the gyro's sensitivity to acceleration.
 LEANED_SHARE = 0.001
@@ -187,7 +187,8 @@ class Smoother:
             measured = self._ride.measured
             begin = int(np.count_nonzero(measured[whole.start : span.start]))
             own = slice(begin, begin + int(np.count_nonzero(measured[span])))
-            values = self._estimated(log.part(whole).part(measured[whole]), own)
+            part = log.part(whole)
+            values = self._estimated(part if np.all(measured[whole]) else part.part(measured[whole]), own)
             yield span, None if values is None else values[own]
             if progress:
                 progress(span.stop, len(log.t_s))

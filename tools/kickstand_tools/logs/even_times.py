@@ -67,10 +67,12 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
     if not np.all(np.isfinite(recorded)):
         raise InputError(f"{name}: some times are not numbers")
     time_us = np.rint(recorded * 1e6).astype(np.int64)
-    steps_us = np.diff(time_us)
-    if np.any(steps_us < 0):
-        at = recorded[int(np.argmax(steps_us < 0)) + 1]
-        raise InputError(f"{name}: time goes back at {at:g} s: it must increase")
+    between_us = np.diff(time_us)
+    if np.any(between_us < 0):
+        time_s = recorded[int(np.argmax(between_us < 0)) + 1]
+        raise InputError(f"{name}: time goes back at {time_s:g} s: it must increase")
+    if np.all(between_us > 0) and _is_even(between_us, float(np.median(between_us))):
+        return recorded  # the usual log, without further arrays
     starts = np.flatnonzero(np.diff(time_us, prepend=time_us[0] - 1))  # first sample of each time
     if len(starts) == 1:
         raise InputError(f"{name}: the time is the same in all samples: it must increase")
@@ -84,10 +86,8 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
     if repeated > OFTEN * len(recorded):
         tick_us = max(tick_us, usual_us)
     if np.any((counts > CROWD) & (counts > CROWDED * tick_us / period_us)):
-        at = recorded[starts[int(np.argmax(counts))]]
-        raise InputError(f"{name}: time stands still at {at:g} s, in {np.max(counts)} samples: it must increase")
-    if not repeated and (tick_us < COARSE * period_us or _one_step(between_us)):
-        return recorded
+        time_s = recorded[starts[int(np.argmax(counts))]]
+        raise InputError(f"{name}: time stands still at {time_s:g} s, in {np.max(counts)} samples: it must increase")
     times = _spread_repeated(recorded, starts, counts, period_us * 1e-6)
     if tick_us >= COARSE * period_us:
         times = _smooth(recorded, times, tick_us * 1e-6, period_us * 1e-6)
@@ -95,8 +95,13 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
     return np.asarray(np.maximum.accumulate(times - order) + order, dtype=float)
 
 
-def _one_step(between_us: Ints) -> bool:
-    return bool(np.count_nonzero(between_us == np.median(between_us)) >= EXACT * len(between_us))
+def _is_even(between_us: Ints, usual_us: float) -> bool:
+    """Return True if the steps between different times need no change: the clock's tick is fine, or nearly all steps
+    are equal."""
+    if np.count_nonzero(between_us == usual_us) >= EXACT * len(between_us):
+        return True
+    near = between_us <= 5.0 * usual_us
+    return bool(np.gcd.reduce(between_us) < COARSE * np.sum(between_us, where=near) / np.count_nonzero(near))
 
 
 def _spread_repeated(recorded: Array, starts: Ints, counts: Ints, period_s: float) -> Array:

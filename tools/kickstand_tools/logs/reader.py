@@ -129,8 +129,8 @@ class _Column:
         if self._values is None and not np.all(np.isnan(values)):
             self._values = np.full(2 * end, np.nan)
         if self._values is not None:
-            if end > len(self._values):  # a quarter more: in a browser, reserved memory is used memory
-                self._values.resize(end + end // 4, refcheck=False)
+            if end > len(self._values):  # a little more than needed: resize() uses the memory that it reserves
+                self._values.resize(end + end // 8, refcheck=False)
             self._values[self._length : end] = values
         self._length = end
 
@@ -152,7 +152,7 @@ def _parsed(file: File, progress: Progress | None) -> Log:
 
 def _columns(
     pieces: Iterator[tuple[bytes, int]], name: str, notices: list[Message], total: int, progress: Progress | None
-) -> dict[str, _Column]:
+) -> dict[str, Array]:
     """Convert the text of a log to its columns."""
     first, position = next(pieces, (b"", 0))
     names, rest = _header(name, first)
@@ -175,12 +175,12 @@ def _columns(
                 growing.extend(values.get(column, nothing))
         if progress:
             progress(done, total)
-    return columns
+    return {name: column.finished() for name, column in columns.items()}
 
 
-def _log(name: str, columns: dict[str, _Column], notices: list[Message]) -> Log:
+def _log(name: str, columns: dict[str, Array], notices: list[Message]) -> Log:
     """Make a log of its columns, with even times."""
-    time_us = np.rint(columns.pop("t_s").finished() * 1e6)
+    time_us = np.rint(columns.pop("t_s") * 1e6)
     start_s = float(time_us[0]) / 1e6 if len(time_us) else 0.0
     t_s = (time_us - round(start_s * 1e6)) * 1e-6
     del time_us
@@ -197,10 +197,10 @@ def _log(name: str, columns: dict[str, _Column], notices: list[Message]) -> Log:
     for axes in (COLUMNS[1:4], COLUMNS[4:7]):
         vector = np.empty((3, len(t_s)))
         for row, column in zip(vector, axes):
-            row[:] = columns.pop(column).finished()
+            row[:] = columns.pop(column)
         vectors.append(vector.T)
-    track = {column: columns.pop(column).finished() for column in TRACK}
-    temperature = columns.pop("temp_c").finished()
+    track = {column: columns.pop(column) for column in TRACK}
+    temperature = columns.pop("temp_c")
     return Log(
         t_s,
         *vectors,
