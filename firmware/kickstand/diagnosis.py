@@ -1,5 +1,8 @@
 """Finds out why the sensor or the display cannot be used, and which devices answer on an I2C bus.
 
+A device is identified by its registers (sources: the chips' data sheets and the register maps of their makers'
+drivers). They are only read, because a write could set a clock or damage another chip's calibration.
+
 This module is imported after a fault, and by kickstand.status() and kickstand check. These arguments have the same
 meaning in all functions:
 * sda, scl: the GPIO numbers of the bus.
@@ -13,9 +16,8 @@ from machine import Pin, SoftI2C
 from micropython import const
 
 from .errors import Notice
-from .imu.fifo_frames import FRAME
-from .imu.mpu6050 import NotKept
-from .imu.other_chips import MOTION, OTHER, SUPPORTED, name_of, who_am_i
+from .imu.axes import FRAME
+from .imu.mpu6050 import CHIPS, NotKept
 
 _SENSOR_ADDRESSES = const((0x68, 0x69))
 MOTION_ADDRESSES = _SENSOR_ADDRESSES + (0x6A, 0x6B)
@@ -30,6 +32,61 @@ _TIMEOUT_US = 1000
 _INT_ENABLE = const(0x38)  # register map p. 27; bit 0 enables the signal that a sample is ready
 _INT_STATUS = const(0x3A)  # p. 28
 _PERIODS = 4  # number of sample periods to wait while the FIFO fills
+_WHO_AM_I = 0x75
+_PWR_MGMT_1 = 0x6B
+_AS_AN_MPU = (0x40, 0x41, 0x01)  # values of PWR_MGMT_1 in chips like the MPU6050, after power-on and after a set-up
+OTHER, MOTION, SUPPORTED = 0, 1, 2  # kinds of devices; MOTION is a motion sensor without support in this firmware
+_TIME_BYTES = 10  # number of registers to read from a clock; the time is in seven of them, from register 0 or 3 on
+
+# Chips with an identification register. The columns are two addresses, the register, its content (all in hexadecimal)
+# and the name.
+_MOTION = """
+68 69 75 47 ICM-42688
+68 69 75 db ICM-42688-V
+68 69 75 42 ICM-42605
+68 69 75 44 ICM-42686
+68 69 75 67 ICM-42670
+68 69 75 60 ICM-42607
+68 69 75 6f IIM-42652
+68 69 75 4e ICM-40627
+68 69 75 3b ICM-40609
+68 69 72 e9 ICM-45686
+68 69 72 e5 ICM-45605
+68 69 00 d1 BMI160
+68 69 00 24 BMI270
+68 69 00 27 BMI260
+68 69 00 0f BMI088
+68 69 00 ea ICM-20948
+68 69 00 e1 ICM-20649
+68 69 00 e0 ICM-20648
+6a 6b 0f 69 LSM6DS3
+6a 6b 0f 6a LSM6DSL
+6a 6b 0f 6b LSM6DSR
+6a 6b 0f 6c LSM6DSO
+6a 6b 0f 70 LSM6DSV
+6a 6b 0f 68 LSM9DS1
+6a 6b 0f d4 L3GD20
+6a 6b 0f d7 L3GD20H
+6a 6b 00 05 QMI8658
+28 29 00 a0 BNO055
+18 19 00 fa BMI055
+18 19 00 1e BMI088
+18 19 0f 33 LIS3DH
+1d 53 00 e5 ADXL345
+"""
+# Other devices. The columns are the first address, the last address (in hexadecimal) and the name.
+_OTHERS = """
+76 77 barometer
+1e 1e compass
+0c 0d compass
+2c 2c compass
+50 57 EEPROM
+51 51 clock
+6f 6f clock
+3c 3d display
+20 27 display
+38 3f display
+"""
 
 
 def wire_fault(sda, scl):
@@ -88,7 +145,7 @@ def scan(sda, scl, reopen, addresses):
 
     Returns:
         notice: a Notice for a fault of the wires, or None.
-        devices: list of (address, name, kind) of each device that answers, see other_chips.name_of().
+        devices: list of (address, name, kind) of each device that answers, see name_of().
 
     Raises:
         The errors of reopen(), except OSError.
@@ -107,19 +164,21 @@ def scan(sda, scl, reopen, addresses):
     return notice, devices
 
 
-def explain_sensor(sda, scl, reopen, chip, error):
-    """Explain a failed set-up.
+def explain(sda, scl, reopen, chip, error):
+    """Explain a failed set-up, or test the FIFO.
 
     Args:
-        error: the OSError or UnknownChip that the set-up raised.
+        error: the OSError or UnknownChip that the set-up raised, or None to test the FIFO.
 
     Returns:
-        notice: a Notice with the reason.
-        addresses: sorted list of the I2C addresses that answer on the bus.
+        notice: a Notice with the reason; None if the FIFO works.
+        addresses: sorted list of the I2C addresses that answer on the bus; empty after a test of the FIFO.
 
     Raises:
-        The errors of reopen(), except OSError.
+        The errors of reopen(), except OSError. The errors of fifo_fault().
     """
+    if error is None:
+        return fifo_fault(chip), []
     notice, devices = scan(sda, scl, reopen, MOTION_ADDRESSES)
     if not notice:
         kept = not isinstance(error, NotKept)
@@ -196,33 +255,69 @@ def _repeats(chip):
     return len(frames) == 1 and _reading(chip) != first
 
 
-def bus_line(name, sda, scl, devices):
-    """Return one line of text about the devices that scan() has found.
+def name_of(i2c, address):
+    """Identify the device that answers at an address.
 
     Args:
-        name: the name of the bus.
-        devices: the devices from scan().
+        i2c: a machine.I2C.
+        address: the I2C address.
+
+    Returns:
+        name: the device's name, "" if it is unknown.
+        kind: OTHER, MOTION or SUPPORTED; OTHER if it is unknown.
     """
-    words = ", ".join([("0x%02x %s" % (address, found)).strip() for address, found, _ in devices])
-    return "%-13sSDA %d, SCL %d: %s" % (name + " bus", sda, scl, words or "nothing answers")
+    at_mpu = address & 0xFE == 0x68
+    # register 0 of a chip like the MPU6050 can hold any number, so it does not identify a chip
+    skipped = 0x00 if at_mpu and _reads(i2c, address, _PWR_MGMT_1) in _AS_AN_MPU else -1
+    mark = " %02x " % address
+    for line in _MOTION.split("\n"):
+        if mark in " %s " % line[:5]:
+            cells = line.split(" ")
+            register = int(cells[2], 16)
+            if register != skipped and _reads(i2c, address, register) == int(cells[3], 16):
+                return cells[4], MOTION
+    if at_mpu:
+        if is_clock(i2c, address):
+            return "clock", OTHER
+        chip = CHIPS.get(who_am_i(i2c, address))
+        return (chip[0], SUPPORTED) if chip else ("", OTHER)
+    for line in _OTHERS.split("\n"):
+        cells = line.split(" ")
+        if len(cells) == 3 and int(cells[0], 16) <= address <= int(cells[1], 16):
+            return cells[2], OTHER
+    return "", OTHER
 
 
-def show_wirings(open_lcd, count, show_ms):
-    """Show the number of each wiring on a character display.
+def who_am_i(i2c, address):
+    """Return the value of the register that is WHO_AM_I in an MPU6050, or -1 without an answer."""
+    return _reads(i2c, address, _WHO_AM_I)
 
-    Each number is sent with its own wiring. So the user can read only the number of the display's real wiring.
 
-    Args:
-        open_lcd: open_lcd(number) returns a Display for this wiring.
-        count: number of wirings.
-        show_ms: time to show each number.
-    """
-    for number in range(1, count + 1):
-        lcd = open_lcd(number)
-        lcd.show("This is readable", "LCD_WIRING = %d" % number)
-        lcd.flush()
-        print("%-13sLCD_WIRING = %d is shown for %d s" % ("", number, show_ms // 1000))
-        sleep_ms(show_ms)
-        lcd.show("", "")  # blank the display now, because it may not react to the next wiring
-        lcd.flush()
-    print("%-13sput the line that it has shown into config.py; if it has shown none: its contrast, or 5 V" % "")
+def is_clock(i2c, address):
+    """Return True if the first registers hold a time. The clocks DS1307, DS3231 and PCF8523 have the same address as
+    the sensor."""
+    try:
+        time = i2c.readfrom_mem(address, 0, _TIME_BYTES)
+    except OSError:
+        return False
+    # The registers hold seconds, minutes, hours, day of the week, date, month and year. In a PCF8523 these seven begin
+    # at register 3, and the date comes before the day of the week.
+    return _is_time(time, 0, 4, 3) or _is_time(time, 3, 6, 7)
+
+
+def _is_time(time, at, date_at, day_at):
+    limits = ((at, 0x7F, 0, 59), (at + 1, 0x7F, 0, 59), (at + 2, 0x3F, 0, 32), (date_at, 0x3F, 1, 31))
+    limits += ((day_at, 0xFF, 0, 7), (at + 5, 0x1F, 1, 12), (at + 6, 0xFF, 0, 99))
+    for place, mask, least, most in limits:
+        value = time[place] & mask
+        if value & 15 > 9 or not least <= (value >> 4) * 10 + (value & 15) <= most:
+            return False
+    return True
+
+
+def _reads(i2c, address, register):
+    """Return the value of a register, or -1 without an answer."""
+    try:
+        return i2c.readfrom_mem(address, register, 1)[0]
+    except OSError:
+        return -1

@@ -9,10 +9,6 @@ A code is a name for programs and is never shown. Three modules have words for e
 import gc
 import sys
 
-# The exceptions that the import of machine code can raise. Machine code cannot run on CPython, on a port without viper,
-# on an ESP32 without enough free memory, or on a kind of chip that it was not compiled for.
-NO_MACHINE_CODE = (ImportError, NameError, SyntaxError, MemoryError, ValueError)
-
 
 class Notice:
     """Something to report.
@@ -51,9 +47,16 @@ class Refusal(Exception):
     words = Notice.words
 
 
-def report(refusal):
+def report(refusal, notices=None):
     """Print a Refusal or Notice on the console, unless a recent print was slow. If the module with the sentences cannot
-    be loaded, print only the code."""
+    be loaded, print only the code.
+
+    Args:
+        refusal: the Refusal or Notice.
+        notices: App.notices, to show it on the display too, or None.
+    """
+    if notices is not None:
+        notices.append(refusal)
     try:
         from .console import tell
 
@@ -63,51 +66,31 @@ def report(refusal):
 
 
 def attempt(function, *arguments):
-    """Call a function as tried() does. If tried() returns a Notice, report it. Return the Notice or None."""
-    problem = tried(function, *arguments)
-    if problem:
-        report(problem)
-    return problem
+    """Call a function as tried() does. Report its Notice, and return the Notice or None."""
+    notice = tried(function, *arguments)[1]
+    if notice:
+        report(notice)
+    return notice
 
 
 def tried(function, *arguments):
-    """Call a function that may import modules. Return None, or a Notice if memory is short or the firmware is
-    incomplete.
+    """Call a function that may import modules.
+
+    Returns:
+        result: the function's result.
+        notice: None, or a Notice if memory is short or the firmware is incomplete.
 
     After a failure, remove the modules that the function began to import, because MicroPython would keep a
     half-imported module."""
     before = None
     try:
         before = tuple(sys.modules)
-        function(*arguments)
-        return None
+        return function(*arguments), None
     except (ImportError, MemoryError) as error:
         for name in [name for name in sys.modules if name not in before] if before else ():
             del sys.modules[name]
         gc.collect()
-        return Notice("incomplete" if isinstance(error, ImportError) else "no-memory", str(error))
-
-
-def checked(machine_code, plain, *arguments):
-    """Check the machine code of a function. Some releases of MicroPython had bugs in the compiler for some boards.
-
-    Args:
-        machine_code: the function in machine code.
-        plain: the same function in Python.
-        arguments: the arguments for one call of each function. The second call gets copies.
-
-    Returns:
-        machine_code if both functions give the same results. If the results differ, plain, after a report on the
-        console.
-    """
-    copies = [a if isinstance(a, (int, bytes)) else a[:] for a in arguments]
-    same = machine_code(*arguments) == plain(*copies)
-    for a, b in zip(arguments, copies):
-        same = same and (isinstance(a, int) or bytes(a) == bytes(b))  # MicroPython cannot compare array("f")
-    if same:
-        return machine_code
-    report(Notice("wrong-code", plain.__name__))
-    return plain
+        return None, Notice("incomplete" if isinstance(error, ImportError) else "no-memory", str(error))
 
 
 class CaptureError(Refusal):

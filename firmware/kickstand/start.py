@@ -27,8 +27,7 @@ _CHARGE_MS = const(100)
 # list with the import statements.
 STEPS = (
     "calibration.parameters calibration.store calibration.active calibration.transform lean.bike_model lean.kalman "
-    "lean.measurements lean.rest lean.upright_trim lean.dive lean.lean_filter lean.meter ui.messages ui.pages "
-    "ui.page_ring ui.screen rides.recording"
+    "lean.measurements lean.rest lean.upright_trim lean.dive lean.lean_filter lean.meter ui.pages ui.screen rides.rides"
 ).split()
 
 
@@ -64,9 +63,7 @@ def main(loop=None, closed_ms=5000):
         if machine.reset_cause() == machine.PWRON_RESET:
             button = open_button(chosen)
             if _held(button):
-                from .safe_mode import report_safe_mode  # imported here, because it is rarely needed
-
-                report_safe_mode(lcd, button, chosen.BUTTON_PIN, closed_ms)
+                _safe_mode(lcd, button, chosen.BUTTON_PIN, closed_ms)
                 return
         lcd.show("Kickstand", "starting")  # replace a lean that was shown before a reset
         run(chosen, lcd, loop)
@@ -77,10 +74,7 @@ def main(loop=None, closed_ms=5000):
         from .ui.messages import lines
 
         print("Kickstand stopped. " + sentence(error))
-        try:
-            _show(lcd or open_lcd(error.settings), *lines(error))
-        except SettingsError:  # the pins of the display are wrong or not set
-            pass
+        _last_words(lcd, *lines(error), error.settings)
     except KeyboardInterrupt:
         port.rest_watchdog()
         if lcd:
@@ -97,49 +91,59 @@ def main(loop=None, closed_ms=5000):
         machine.reset()
 
 
-def _last_words(lcd, line1, line2):
+def _safe_mode(lcd, button, pin, closed_ms):
+    """Say on display and console that nothing is started. If the button is not released, say that it is closed."""
+    print("Kickstand %s: safe mode, the button was held at power-up." % __version__)
+    _show(lcd, "Safe mode", "Ready for USB")
+    for _ in range(closed_ms // _CHARGE_MS):
+        sleep_ms(_CHARGE_MS)
+        if not button.held():
+            return
+    if closed_ms:
+        print("The button on GPIO %d stays closed: check its wires; turn a button with four legs by 90 degrees." % pin)
+        _show(lcd, "Button is closed", "check its wires")
+
+
+def _last_words(lcd, line1, line2, chosen=None):
     """Show two lines when the firmware ends.
 
     Args:
-        lcd: the Display, or None if it is not open yet. Without a Display one is opened on the default pins.
+        lcd: the Display, or None if it is not open yet.
+        chosen: the Settings for opening the display; None for the default pins.
     """
     try:
         if lcd is None:
             sys.modules.pop("config", None)  # config.py itself may have used up the memory
             gc.collect()
-            lcd = open_lcd(settings.Settings())
+            lcd = open_lcd(chosen or settings.Settings())
         _show(lcd, line1, line2)
-    except Exception:  # memory may be short or a file missing; the console already has the message
+    except Exception:  # wrong pins, short memory or a missing file; the console already has the message
         pass
 
 
-def _live(function, *arguments):
-    """Do a step of LIVE, and report an error. Return the error or None. The lean meter continues in any case."""
-    try:
-        problem = tried(function, *arguments)
-    except LiveError as error:
-        problem = error
-    if problem:
-        if problem.code == "no-memory":
-            problem = LiveError("live-memory", *problem.values)
-        report(problem)
-    return problem
-
-
-def _open_radio(opened, pin):
+def _open_radio(pin):
     from .live.radio import Radio
 
-    opened.append(Radio(pin))
+    return Radio(pin)
 
 
-def _attach(opened, app):
+def _attach(radio, app):
+    from .live.live import Live
+
+    app.live = Live(radio, app)
+
+
+def _live(notices, function, *arguments):
+    """Do a step of LIVE and return its result. Report an error: the lean meter continues in any case."""
     try:
-        from .live.live import attach
-
-        attach(opened[0], app)
-    except (ImportError, MemoryError):
-        opened[0].stop()
-        raise
+        result, notice = tried(function, *arguments)
+    except LiveError as error:
+        result, notice = None, error
+    if notice:
+        if notice.code == "no-memory":
+            notice = LiveError("live-memory", *notice.values)
+        report(notice, notices)
+    return result
 
 
 def run(chosen, lcd, loop=None):
@@ -150,9 +154,9 @@ def run(chosen, lcd, loop=None):
         lcd: the Display.
         loop: as for main().
     """
-    radio = []
+    notices = []
     # The radio comes first, because an ESP32-C3 may crash if its radio is switched on after 40 KB are allocated
-    problem = _live(_open_radio, radio, chosen.LIVE_PIN) if chosen.LIVE else None
+    radio = _live(notices, _open_radio, chosen.LIVE_PIN) if chosen.LIVE else None
     sensor = open_sensor(chosen)
     for name in STEPS + ["app"]:
         now_ms = ticks_ms()
@@ -163,8 +167,9 @@ def run(chosen, lcd, loop=None):
 
     print("Kickstand %s. Ctrl-C stops it." % __version__)
     app = App(chosen, lcd, sensor)
-    if chosen.LIVE:
-        problem = problem or _live(_attach, radio, app)
-        if problem:
-            app.screen.notify(problem, ticks_ms())
+    if radio:
+        _live(notices, _attach, radio, app)
+        if not app.live:
+            radio.stop()
+    app.notices.extend(notices)
     (loop or App.run)(app)

@@ -54,41 +54,23 @@ class UserCode:
     def __init__(self, app):
         self._app = app
         self._functions = {}
-        self._functions["import"] = _functions_of  # _call() also guards the import
+        self._functions["import"] = _functions_of  # call() also guards the import
         self._slow = {}  # number of slow calls in a row, per function
-        self._problems = []
         # Stored once, because each access to self._draw creates a new bound method. The display would then treat an
         # unchanged picture as a new picture.
         self._drawn = self._draw
         sys.modules.pop("user", None)
-        self._functions.update(self._call("import", "user") or {})
+        self._functions.update(self.call("import", "user") or {})
         pages = sorted([name for name in self._functions if name.startswith("page")])
         self.pages = [lambda name=name: self._page(name) for name in pages]
-        self._call("setup", app)
-
-    def take_problem(self):
-        """Return a Notice that was not shown yet, or None."""
-        return self._problems.pop(0) if self._problems else None
-
-    def lean(self, trusted):
-        """Call the owner's on_lean(). The app calls this method ten times per second.
-
-        Args:
-            trusted: True if the lean may be shown.
-        """
-        meter = self._app.meter
-        self._call("on_lean", meter.lean_deg, trusted, meter)
-
-    def press(self, event):
-        """Call the owner's on_press() after a press."""
-        self._call("on_press", event)
+        self.call("setup", app)
 
     def check_memory(self):
         """Disable user.py if it has used up the heap. Call this after gc.collect()."""
         if self._functions and gc.mem_free() < _LEAST_FREE:
             self._forget("memory")
 
-    def _call(self, name, *arguments):
+    def call(self, name, *arguments):
         """Call a function of the owner and return its result, or None if it is missing, disabled or fails."""
         function = self._functions.get(name)
         if function is None:
@@ -104,34 +86,31 @@ class UserCode:
         took_ms = ticks_diff(ticks_ms(), begun_ms)
         if name in ("import", "setup"):
             return result
+        count = self._slow.get(name)
         if took_ms <= _SLOW_MS:
-            if name in self._slow:
+            if count:
                 self._slow[name] = 0
             return result
-        if name not in self._slow:
-            self._report(Notice("user-slow", name, took_ms))
-        self._slow[name] = self._slow.get(name, 0) + 1
+        if count is None:
+            report(Notice("user-slow", name, took_ms), self._app.notices)
+        self._slow[name] = (count or 0) + 1
         if took_ms > _TOO_SLOW_MS or self._slow[name] >= _MOST_SLOW:
             return self._leave_out(name, "%d ms" % took_ms)
         return result
 
     def _leave_out(self, name, why):
         self._functions.pop(name, None)
-        self._report(Notice("user-failed", name, why))
+        report(Notice("user-failed", name, why), self._app.notices)
 
     def _forget(self, name):
         """Disable all functions of user.py and free their memory."""
         self._functions = {}
         sys.modules.pop("user", None)
         gc.collect()
-        self._report(Notice("user-memory", name))
-
-    def _report(self, notice):
-        report(notice)
-        self._problems.append(notice)
+        report(Notice("user-memory", name), self._app.notices)
 
     def _page(self, name):
-        shown = self._call(name, self._app)
+        shown = self.call(name, self._app)
         if name not in self._functions:
             return "user.py " + name, "left out"
         try:
@@ -145,6 +124,6 @@ class UserCode:
     def _draw(self, canvas, name, draw, *values):
         """Draw the picture of a page with the owner's function. If that function fails, disable the page."""
         self._functions["picture"] = draw
-        self._call("picture", canvas, *values)
+        self.call("picture", canvas, *values)
         if "picture" not in self._functions:
             self._functions.pop(name, None)

@@ -36,21 +36,11 @@ def test_a_ride_has_the_name_of_its_log():
     assert car.car and not car.smoothed
 
 
-def test_a_stretch_has_only_its_samples():
-    course, _ = read(Stretch(standing_log(), 1.0, 2.0))
-    assert 99 <= len(course.t_s) <= 101 and course.t_s[[0, -1]] == pytest.approx((1.0, 2.0), abs=0.011)
-
-
-def test_frozen_readings_are_left_out():
-    course, notices = read(frozen_log())
-    assert [notice.code for notice in notices] == ["frozen-readings"]
-    assert 400 <= len(course.t_s) <= 402 and np.max(np.diff(course.t_s)) == pytest.approx(4.0, abs=0.03)
-    with pytest.raises(InputError, match=r"RIDE\.csv: all readings are frozen"):
-        read(Stretch(frozen_log(), 3.0, 5.0))
+def test_only_the_frozen_time_within_the_stretch_counts():
     total = overview(api.open_ride(frozen_log(), ALIGNED)).summary
     assert (total.frozen_s, total.missing_s) == pytest.approx((4.0, 4.0), abs=0.03)
     part = overview(api.open_ride(Stretch(frozen_log(), 0.0, 1.5), ALIGNED)).summary
-    assert part.frozen_s == part.missing_s == 0.0  # the frozen part is not in the stretch
+    assert part.frozen_s == part.missing_s == 0.0
 
 
 @pytest.mark.parametrize(("calibration", "codes"), [(ALIGNED, ["readings-misfit"]), (CAR, [])])

@@ -33,13 +33,13 @@ class Chip:
 
 @pytest.fixture
 def made(tmp_path, monkeypatch):
-    """Return an ActiveCalibration at 0 ms, its meter, and a list of the arguments with which it calls changed()."""
+    """Return an ActiveCalibration at 0 ms, and its meter."""
     monkeypatch.chdir(tmp_path)
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):
         from kickstand.calibration.active import ActiveCalibration
 
-        meter, changes = Meter(), []
-        yield ActiveCalibration(meter, changes.append), meter, changes
+        meter = Meter()
+        yield ActiveCalibration(meter), meter
 
 
 def aligned(offset=0.0):
@@ -54,7 +54,7 @@ def stored():
 
 
 def test_the_stored_calibration_of_the_chip_is_loaded_once(made):
-    active, meter, changes = made
+    active, meter = made
     Store(0x68, 8).save(aligned(0.125))
     assert not active.aligned
     assert active.chip_started(Chip())
@@ -62,15 +62,17 @@ def test_the_stored_calibration_of_the_chip_is_loaded_once(made):
     assert active.value is meter.calibration
     assert active.value.accel_offset[0] == 0.125
     assert (active.value.scales()[0][1], active.value.scales()[1]) == (1 / 4096, 1 / 65.5)
+    assert active.changed == active.REPLACED
+    active.changed = None
     assert not active.chip_started(Chip())
-    assert (meter.used, changes) == (1, [True])
+    assert (meter.used, active.changed) == (1, None)
     assert active.chip_started(Chip(0x70))
     assert not active.aligned
-    assert changes == [True, True]
+    assert active.changed == active.REPLACED
 
 
 def test_save_replaces_and_refine_corrects(made):
-    active, meter, changes = made
+    active, meter = made
     active.chip_started(Chip())
     for offset, posed in (0.25, True), (0.5 - 1 / 64, False):
         if posed:
@@ -79,22 +81,22 @@ def test_save_replaces_and_refine_corrects(made):
             active.refine(aligned(offset))
         assert stored().accel_offset[0] == meter.calibration.accel_offset[0] == offset
         assert meter.posed is posed
-    assert changes == [True, True, False]
+        assert active.changed == (active.REPLACED if posed else active.REFINED)
 
 
 def test_a_restart_saves_the_trim_and_uses_the_stored_values(made):
-    active, meter, changes = made
+    active, meter = made
     active.chip_started(Chip())
     active.save(aligned())
-    used, changed = meter.used, len(changes)
+    used, active.changed = meter.used, None
     meter.new_trim = 1.25
     active.restart()
     assert stored().trim_deg == active.value.trim_deg == 1.25
-    assert (meter.used, len(changes)) == (used + 1, changed)
+    assert (meter.used, active.changed) == (used + 1, None)
 
 
 def test_an_unwritable_flash_is_reported_and_retried_later(made, tmp_path, capsys):
-    active, meter, _ = made
+    active, meter = made
     for name in FILES:
         (tmp_path / name).mkdir()
     active.chip_started(Chip())

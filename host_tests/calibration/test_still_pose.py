@@ -1,10 +1,8 @@
-"""Which motions spoil a still pose, and how the device waits for one. The sensor has 8192 counts per g and 65.5 counts
-per deg/s."""
+"""Which motions spoil a still pose. The sensor has 8192 counts per g and 65.5 counts per deg/s."""
 
 import math
 
 import pytest
-from kickstand.calibration.pose_taker import AVERAGING, DONE, SETTLED, SETTLING, PoseTaker
 from kickstand.calibration.still_pose import StillPose
 from kickstand.errors import CaptureError
 
@@ -76,47 +74,3 @@ def test_a_noisy_gyro_spoils_the_pose_and_a_sway_does_not(axis):
     assert changed(lambda k: 0.5 * (-1, 1, 1, -1)[k % 4]) is None
     assert changed(lambda k: 0.7 * (-1, 1, 1, -1)[k % 4]) == "noisy-gyro"
     assert changed(lambda k: 2.0 * math.sin(2 * math.pi * k / 300)) is None
-
-
-class Chip:
-    accel_lsb_per_g, gyro_lsb_per_dps, SATURATED = 8192, 65.5, 32700
-
-
-def taker():
-    """Return a PoseTaker for 100 samples per second. It needs 50 still samples, then averages 300 samples, and gives up
-    after 1000 samples."""
-    return PoseTaker(Chip, 100, 3.0)
-
-
-def states_of(taking, rows):
-    """Return the result of step() for each sample, or the code of its CaptureError."""
-    states = []
-    for row in rows:
-        try:
-            states.append(taking.step(row))
-        except CaptureError as refusal:
-            states.append(refusal.code)
-    return states
-
-
-def test_half_a_second_of_stillness_then_three_seconds_are_taken():
-    taking = taker()
-    assert taking.progress() == (0, 300)
-    assert states_of(taking, samples(61)) == [SETTLING] * 49 + [SETTLED] + [AVERAGING] * 11
-    assert taking.progress() == (11, 300)
-    assert states_of(taking, samples(289)) == [AVERAGING] * 288 + [DONE]
-    assert not taking.restless
-    assert taking.settled == pytest.approx([value / 8192 for value in LEVEL[:3]], abs=2e-4)
-    assert taking.pose.count == 300
-    assert taking.pose.gyro == pytest.approx([value / 65.5 for value in LEVEL[4:]], abs=0.02)
-
-
-def test_a_pose_spoilt_by_a_knock_can_be_repeated():
-    taking = taker()
-    rows = samples(100)
-    rows[80][1] += 1000
-    assert states_of(taking, rows)[79:81] == [AVERAGING, "moved"]
-    assert taking.progress() == (0, 300)
-    taking.restart()
-    assert taking.settled is None
-    assert states_of(taking, samples(350))[-1] == DONE

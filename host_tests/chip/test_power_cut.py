@@ -37,7 +37,7 @@ _SAVE_ZERO = _STORE + "save(0)\nsave(0)\n"
 _FEED = """
 import random
 from kickstand.rides.recorder import Recorder
-from kickstand.rides.flash_ring import RideRing
+from kickstand.rides.ride_files import RideFiles
 from kickstand.calibration.parameters import Calibration
 class Settings:
     SD_SPI = None
@@ -47,7 +47,7 @@ class Chip:
     counts = [0] * 7
     def temperature_c(self, counts):
         return 25.0
-recorder = Recorder(RideRing(Settings), 200)
+recorder = Recorder(RideFiles(Settings), 200, [])
 def feed(samples):
     sums = [0] * 7
     for _ in range(samples):
@@ -252,7 +252,7 @@ def on_lean(lean_deg, trusted, meter):
 
 @pytest.mark.long
 def test_recording_loses_no_sample_and_marks_the_display(at_prompt):
-    from kickstand_workshop.bench.sample_count import SampleCount
+    from kickstand_workshop.bench.bench import SampleCount
 
     begin_s, world = at_prompt.time_s, PART.world(RIDE.motion)
     at_prompt.board.sensor.world = lambda t_s: world(t_s - begin_s)

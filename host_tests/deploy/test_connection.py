@@ -150,29 +150,28 @@ def test_only_answers_of_the_expected_shape_are_accepted(text, shapes, fits):
         assert "makes no sense" in words(connection.literal, text, *shapes)
 
 
-@pytest.mark.parametrize(("wirings", "call"), [(False, b"kickstand.status()"), (True, b"kickstand.status(True)")])
-def test_status_is_printed_and_the_board_restarts(port, wirings, call):
+@pytest.mark.parametrize(("wirings", "end"), [(False, b""), (True, connection.WIRINGS.encode())])
+def test_status_is_printed_and_the_board_restarts(port, wirings, end):
     port.answers = [NOTHING, (PICO_NAME, b""), (b"a \xc2\xb0\r\nb\r\n\r\n", b""), (b"", b"")]
     assert connection.status("P", wirings) == "a \u00b0\nb"
-    assert port.programs[2] == b"import kickstand\n" + call and b"machine.reset()" in port.programs[3]
+    assert port.programs[2] == b"import kickstand\nkickstand.status()" + end and b"machine.reset()" in port.programs[3]
     assert port.now_s == pytest.approx(2.0, abs=0.2) and port.closed == 1  # until the board's port is back
 
 
 @pytest.mark.parametrize(
-    ("answer", "noticed"),
+    ("answer", "labels"),
     [
-        ((b"((9000, 30, ((4, 5, 6), 0.25)), 'odd-up')", b""), b"((9000, 30, ((4, 5, 6), 0.25)), 'odd-up')"),
-        ((b"(None, 'odd-up')", b""), b"(None, 'odd-up')"),
-        ((b"rubbish", b""), None),
-        ((b"", b"MemoryError: "), None),
+        ((b"((9000, 30, ((4, 5, 6), 0.25)), 'odd-up')", b""), ["Sensor odd", "Since start", "Vibration"]),
+        ((b"(None, 'odd-up')", b""), ["Sensor odd"]),
+        ((b"rubbish", b""), []),
+        ((b"", b"MemoryError: "), []),
     ],
 )
-def test_status_keeps_what_the_firmware_has_noticed(port, answer, noticed):
+def test_status_keeps_what_the_firmware_has_noticed(port, answer, labels):
     """A soft reset removes the firmware's modules, so the command asks before it. An older firmware has nothing."""
-    port.answers = [answer, (PICO_NAME, b""), (b"a", b""), (b"", b"")]
-    assert connection.status("P") == "a"
-    assert noticed is None or b"status_report.noticed = " + noticed + b"\n" in port.programs[2]
-    assert (b"noticed" in port.programs[2]) is (noticed is not None)
+    port.answers = [answer, (PICO_NAME, b""), (b"noticed (None, None)\r\nSensor none", b""), (b"", b"")]
+    *lines, last = connection.status("P").splitlines()
+    assert [line[:12].strip() for line in lines] == labels and last == "Sensor none"
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,14 @@
 import errno
 import functools
 import re
+import sys
 from typing import Any
 
 import pytest
 from kickstand_tools.common import firmware_path
 from kickstand_tools.deploy import bytecode, firmware_files
 from support import command, fake_board
+from support.watched_stderr import Watched
 
 WEATHER = b"# my weather station\nimport machine\nwhile True: pass\n"
 WIFI = b'SSID = "home"\nPASSWORD = "secret"\n'
@@ -191,6 +193,20 @@ def test_other_projects_files_are_renamed(files, renamed, board):
     for name in files.keys() - {"main", *renamed}:
         assert new_files[f"{name}.py"] == files[name]
     assert "another project's" not in command.works("flash").out and root_files(board) == new_files
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [("", "run kickstand flash --yes for that"), ("n", "nothing was changed on the board"), ("y", "Install Kickstand")],
+)
+def test_they_are_renamed_only_after_a_yes(answer, words, board, monkeypatch):
+    """Without a terminal nobody can answer."""
+    put(board, {"main.py": WEATHER})
+    files = root_files(board)
+    if answer:
+        monkeypatch.setattr(sys, "stdin", Watched(f"{answer}\n"))
+    assert words in command.run("flash").err and board.resets == 1
+    assert (root_files(board) == files) == (answer != "y")
 
 
 FAULTS = [

@@ -5,7 +5,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 import pytest
-from kickstand.rides import flash_ring
+from kickstand.rides import ride_files
 from kickstand_tools.deploy import bytecode, firmware_files, flash, update
 from kickstand_tools.deploy.board_files import BoardFiles, fingerprint
 from kickstand_tools.deploy.update import needed_blocks, plan, refuse_without_room
@@ -139,14 +139,14 @@ def listed(files, free_blocks=0):
 def test_board_full_of_rides_has_room_for_an_update(version):
     """The recorder always keeps RESERVE bytes of flash free, so no ride must be pulled before an update."""
     board = listed(earlier(version))
-    assert needed_blocks(plan(contents(".mpy"), board, True), board) * BLOCK <= flash_ring.RESERVE
+    assert needed_blocks(plan(contents(".mpy"), board, True), board) * BLOCK <= ride_files.RESERVE
 
 
 def test_ring_of_rides_knows_the_size_of_the_firmware():
     """FIRMWARE is the space that the firmware takes in littlefs, with the two blocks of the file system itself. The
     ring treats the rest of the flash as space for rides."""
     used = board_with(contents(".mpy")).system.used_block_count * BLOCK
-    assert used <= flash_ring.FIRMWARE <= used + 10 * BLOCK
+    assert used <= ride_files.FIRMWARE <= used + 10 * BLOCK
 
 
 @pytest.mark.parametrize(

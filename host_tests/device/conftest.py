@@ -4,6 +4,8 @@ import io
 from contextlib import redirect_stdout
 
 import pytest
+from kickstand_tools.deploy import status_words
+from kickstand_tools.deploy.connection import WIRINGS
 from kickstand_tools.simulated_board.simulator import Board
 from support import device_plans, device_runs
 from support.board_access import rough
@@ -37,13 +39,13 @@ def ctrl_c():
 
 @pytest.fixture
 def status(tmp_path):
-    """Return status(config, fit, world, *arguments, **fitted), which returns the lines of kickstand.status(*arguments).
+    """Return status(config, fit, world, **fitted), which returns the lines of `kickstand status`.
 
-    fit(board): changes the board before power-on. ride_s: time for which the firmware runs before. fitted: arguments of
-    Board.
+    fit(board): changes the board before power-on. wirings: True to also show the wirings of a display. ride_s: time for
+    which the firmware runs before. fitted: arguments of Board.
     """
 
-    def lines(config=None, fit=None, world=rough, arguments=(), ride_s=0, **fitted):
+    def lines(config=None, fit=None, world=rough, wirings=False, ride_s=0, **fitted):
         with (
             device_runs.FreshFirmware(),  # so that an earlier run of the app is forgotten
             device_plans.on_flash(tmp_path),
@@ -59,8 +61,10 @@ def status(tmp_path):
             if ride_s:
                 board.at(ride_s, ctrl_c)
                 assert board.run(start.main, ride_s + 1) == "returned"
-            assert board.run(lambda: kickstand.status(*arguments), ride_s + 60.0) == "returned"
-        return out.getvalue().splitlines()
+            assert board.run(kickstand.status, ride_s + 60.0) == "returned"
+            if wirings:
+                assert board.run(lambda: exec(WIRINGS), ride_s + 120.0) == "returned"
+        return status_words.words(out.getvalue()).splitlines()
 
     return lines
 

@@ -100,8 +100,8 @@ def test_too_little_memory_for_the_settings_is_shown_before_a_restart(without, r
 @pytest.mark.parametrize(
     ("module", "entry", "error"),
     [
-        ("ui.align_wizard", 0, ImportError),
-        ("calibration.pose_taker", 1, MemoryError),
+        ("ui.wizard", 0, ImportError),
+        ("calibration.still_pose", 1, MemoryError),
     ],
 )
 def test_failed_import_of_a_menu_entry_is_shown_each_time(module, entry, error, without, run):
@@ -127,7 +127,7 @@ CARD = {"SD_SPI": 0, "SD_SCK": 18, "SD_MOSI": 19, "SD_MISO": 16, "SD_CS": 17}
     ("module", "error", "config", "lines"),
     [
         ("rides.recorder", MemoryError, {"RECORD": True}, NO_MEMORY),
-        ("rides.card_trial", ImportError, {"RECORD": True, **CARD}, INCOMPLETE),
+        ("rides.ride_files", ImportError, {"RECORD": True, **CARD}, INCOMPLETE),
         ("live.radio", ImportError, {"LIVE": True}, INCOMPLETE),
         ("live.live", MemoryError, {"LIVE": True}, ["No Bluetooth:   ", "no memory       "]),
     ],

@@ -119,19 +119,18 @@ def test_without_a_user_py_its_module_is_not_loaded(run, aligned):
 
 @pytest.fixture
 def with_user(tmp_path, with_app):
-    """Return with_user(source, use), which returns use(the UserCode of this user.py)."""
+    """Return with_user(source, use), which returns use(an App with this user.py)."""
 
     def with_user(source, use, **fitted):
         (tmp_path / "user.py").write_text(source)
-        return with_app(lambda board, app: use(app.user), **fitted)
+        return with_app(lambda board, app: use(app), **fitted)
 
     return with_user
 
 
-def problems(user):
+def problems(app):
     """Return the code and the values of each notice that was not shown yet."""
-    notices = iter(user.take_problem, None)
-    return [(notice.code, *notice.values) for notice in notices]
+    return [(notice.code, *notice.values) for notice in app.notices]
 
 
 @pytest.mark.parametrize(
@@ -149,10 +148,10 @@ def test_slow_calls_are_reported_once_and_too_many_disable(calls_ms, notices, wi
     """A call over 50 ms is slow. Five slow calls in a row, or one over 300 ms, disable the function. The import and
     setup() may take any time."""
 
-    def use(user):
+    def use(app):
         for ms in calls_ms:
-            user.press(ms)
-        return problems(user)
+            app.user.call("on_press", ms)
+        return problems(app)
 
     source = "import time\ntime.sleep_ms(900)\ndef setup(app):\n    time.sleep_ms(900)\n"
     source += "def on_press(ms):\n    time.sleep_ms(ms)\n"

@@ -48,7 +48,7 @@ class Vehicle:
         self.leans, self.scale, self.now_ms = leans, scale, 0
         self.receiver = Receiver()
         self.meter = LeanMeter(Calibration(), leans)
-        self.active = ActiveCalibration(self.meter, lambda replaced: None)
+        self.active = ActiveCalibration(self.meter)
         self.active.chip_started(Chip())
         if yaw_deg is not None:
             c, s = np.cos(np.radians(yaw_deg)), np.sin(np.radians(yaw_deg))

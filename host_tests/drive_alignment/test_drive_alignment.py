@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from kickstand.drive_alignment import alignment, verdict
+from kickstand.drive_alignment import alignment
 from kickstand.drive_alignment.quality import PITCH_DEG, ROLL_DEG
 from kickstand_tools.signals import rotation_vector
 from support import driving_runs, engines
@@ -194,32 +194,32 @@ def test_a_drive_is_ready_after_five_brakings(brakings, state):
 @pytest.mark.parametrize(
     ("yaw_deg", "up_deg", "brakings", "expected"),
     [
-        (0.0, 0.0, 6, verdict.SAME),
-        (-0.7, 0.0, 6, verdict.SAME),
-        (1.8, 0.0, 6, verdict.REFINED),
-        (-11.4, 0.0, 6, verdict.REFINED),  # 2 degrees of pitch between two poses that are 10 degrees apart
-        (29.5, 0.0, 6, verdict.REFINED),
-        (30.5, 0.0, 6, verdict.MOVED),
-        (134.5, 0.0, 6, verdict.MOVED),
-        (-135.5, 0.0, 6, verdict.REVERSED),
-        (180.0, 0.0, 2, verdict.REVERSED),
-        (180.0, 0.0, 1, verdict.UNKNOWN),
-        (11.4, 0.0, 2, verdict.UNKNOWN),
-        (0.0, 7.8, 6, verdict.SAME),
-        (0.0, -8.2, 6, verdict.MOVED),
-        (0.0, 8.2, 4, verdict.UNKNOWN),
+        (0.0, 0.0, 6, alignment.SAME),
+        (-0.7, 0.0, 6, alignment.SAME),
+        (1.8, 0.0, 6, alignment.REFINED),
+        (-11.4, 0.0, 6, alignment.REFINED),  # 2 degrees of pitch between two poses that are 10 degrees apart
+        (29.5, 0.0, 6, alignment.REFINED),
+        (30.5, 0.0, 6, alignment.MOVED),
+        (134.5, 0.0, 6, alignment.MOVED),
+        (-135.5, 0.0, 6, alignment.REVERSED),
+        (180.0, 0.0, 2, alignment.REVERSED),
+        (180.0, 0.0, 1, alignment.UNKNOWN),
+        (11.4, 0.0, 2, alignment.UNKNOWN),
+        (0.0, 7.8, 6, alignment.SAME),
+        (0.0, -8.2, 6, alignment.MOVED),
+        (0.0, 8.2, 4, alignment.UNKNOWN),
     ],
 )
 def test_an_alignment_is_compared_with_driving(yaw_deg, up_deg, brakings, expected):
     earlier = turned(turned(PLAIN, 1, yaw_deg), 2, up_deg)
     bike = straight_drive(brakings)
-    assert verdict.compare(bike, earlier) == expected
+    assert alignment.compare(bike, earlier) == expected
     if up_deg == 0.0:
-        off = verdict.yaw_deg(bike.quality.fit, earlier) + yaw_deg
+        off = alignment.yaw_deg(bike.quality.fit, earlier) + yaw_deg
         assert (off + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=0.5)
 
 
 def test_turning_round_reverses_left_and_forward():
     matrix = [float(k) for k in range(1, 10)]
-    verdict.turn_round(matrix)
+    alignment.turn_round(matrix)
     assert matrix == [-1.0, -2.0, -3.0, 4.0, 5.0, 6.0, -7.0, -8.0, -9.0]

@@ -2,11 +2,18 @@
 
 import numpy as np
 import pytest
-from kickstand.drive_alignment import parts
-from kickstand.drive_alignment.events import DrivingEvents, EventFinder
-from kickstand.drive_alignment.history import BIN_US, MASK, SIZE, ForceHistory, difference
+from kickstand.drive_alignment import quality as limits
+from kickstand.drive_alignment.events import (
+    BIN_US,
+    MASK,
+    SIZE,
+    DrivingEvents,
+    EventFinder,
+    Fit,
+    ForceHistory,
+    difference,
+)
 from kickstand.drive_alignment.quality import DrivingQuality
-from kickstand.drive_alignment.regression import Fit
 from kickstand.drive_alignment.vertical import StandingVertical, Vertical
 from support.engines import ENGINES, run
 
@@ -143,9 +150,9 @@ def test_parts_of_a_drive(engine):
     split = slice(0, 5), slice(5, 8)
     means = [np.average(angles[part], weights=weights[part]) for part in split]
     scatter = sum((weights[p] * (angles[p] - m) ** 2).sum() for p, m in zip(split, means, strict=True))
-    unit = (scatter + parts.PRIOR_FREEDOM * parts.PRIOR_DEG**2) / (6 + parts.PRIOR_FREEDOM)
+    unit = (scatter + limits.PRIOR_FREEDOM * limits.PRIOR_DEG**2) / (6 + limits.PRIOR_FREEDOM)
     variance = sum(
-        unit / weights[p].sum() + parts.STRETCH_DEG**2 * (weights[p] ** 2).sum() / weights[p].sum() ** 2 for p in split
+        unit / weights[p].sum() + limits.STRETCH_DEG**2 * (weights[p] ** 2).sum() / weights[p].sum() ** 2 for p in split
     )
     calls = []
     for forward in (0.0, 175.0):

@@ -4,7 +4,7 @@ import functools
 
 import numpy as np
 import pytest
-from kickstand.drive_alignment import verdict
+from kickstand.drive_alignment import alignment
 from kickstand.drive_alignment.alignment import DriveAlignment
 from kickstand.rotation import matrix
 from kickstand_tools.calibration.drive import fit_drive, fit_logs
@@ -88,7 +88,7 @@ def test_a_gyro_that_was_calibrated_has_its_bias_as_a_reading():
 
 
 @pytest.mark.parametrize(
-    ("yaw_deg", "expected", "error_deg"), [(10.0, verdict.REFINED, -10.0), (180.0, verdict.REVERSED, 180.0)]
+    ("yaw_deg", "expected", "error_deg"), [(10.0, alignment.REFINED, -10.0), (180.0, alignment.REVERSED, 180.0)]
 )
 def test_two_poses_are_compared_with_the_drive(yaw_deg, expected, error_deg):
     """The alignment from the poses is turned to the left about the vertical by yaw_deg."""

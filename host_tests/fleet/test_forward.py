@@ -5,7 +5,7 @@ import pytest
 from exact import MOUNT, drive_intervals
 from fleet_drives import yaw_deg
 from kickstand_fleet import evidence
-from kickstand_fleet.forward import Forward, find_forward
+from kickstand_fleet.evidence import Forward, find_forward
 from kickstand_tools.calibration.drive import UP_DEG, DriveFit, fit_logs, usable
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.reader import read_log
@@ -74,7 +74,7 @@ REFERENCES = {
 
 @pytest.mark.parametrize("name", REFERENCES)
 def test_forward_of_recorded_drives(shared_data, name):
-    log = usable(read_log(shared_data / f"car-urban-{name}.csv.gz", axes=False), False)
+    log = usable(read_log(shared_data / f"car-urban-{name}.csv.gz"), False)
     fit = fit_logs([log], None, "car")
     driven = [evidence.intervals(log, "car", fit.lag_s or 0.0, fit.bias_dps)]
     alone, mean = forward_of(*driven), forward_of(*driven, device=fit)

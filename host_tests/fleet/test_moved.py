@@ -7,13 +7,13 @@ import pytest
 from exact import FORWARD, LEFT, UP, block_group, drive_intervals
 from fleet_drives import turn_of
 from kickstand_fleet import evidence
-from kickstand_fleet.moved import LEAST_DEG, Move, compare, find_moves
+from kickstand_fleet.moved import LEAST_DEG, Move, find_moves, turn_between
 from kickstand_tools.calibration.drive import fit_logs, usable
 from kickstand_tools.logs.reader import read_log
 
 
 def compared(before, after):
-    result = compare(before, after)
+    result = turn_between(before, after)
     assert result
     return result
 
@@ -81,7 +81,7 @@ def driven(log, lag_s=0.3, bias_dps=(0.0, 0.0, 0.0)):
 
 
 def test_turns_of_five_degrees_in_a_recorded_drive(shared_data):
-    log = usable(read_log(shared_data / "car-urban-medium-turn-loop-nominal-001.csv.gz", axes=False), False)
+    log = usable(read_log(shared_data / "car-urban-medium-turn-loop-nominal-001.csv.gz"), False)
     fit = fit_logs([log], None, "car")
     frame, lag_s = fit.calibration.vehicle_from_sensor, fit.lag_s or 0.0
     assert find_moves([driven(log, lag_s, fit.bias_dps)]) == []

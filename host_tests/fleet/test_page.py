@@ -72,6 +72,13 @@ def test_the_page_has_the_numbers_of_the_fleet():
     assert order == ["v3", "v4", "v1", "v2"]  # first those that need attention
 
 
+def test_the_bars_of_a_histogram_stand_on_its_axis():
+    html = summary_of(*(result(quality_deg=degrees) for degrees in (0.4, 0.6, 0.61))).page(3)
+    pattern = r'<rect x="[\d.]+" y="([\d.]+)" width="[\d.]+" height="([\d.]+)" fill="var'
+    (low_y, low), (high_y, high) = ((float(y), float(height)) for y, height in re.findall(pattern, html))
+    assert high == pytest.approx(2.0 * low, abs=0.02) and high_y + high == pytest.approx(low_y + low, abs=0.02)
+
+
 def texts(svg):
     return re.findall(r"<text[^>]*>([^<]*)</text>", str(svg))
 

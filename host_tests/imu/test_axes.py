@@ -5,7 +5,7 @@ from array import array
 
 import numpy as np
 import pytest
-from kickstand.imu.fifo_frames import DUE, LOOK_MS, AxisWatch, add_up
+from kickstand.imu.axes import DUE, LOOK_MS, AxisWatch, add_up
 
 RATE_HZ = 200
 LOOK = RATE_HZ * LOOK_MS // 1000  # samples

@@ -20,20 +20,15 @@ def noise(count, seed=0):
 
 
 def added(engine, *runs):
-    """Add up the batches of each run. Return per run and batch [number of good frames, sums, good frames, notes].
-
-    Also test that add_up_python() has the same results."""
-    results = engines.run(engine, [("add_up", ([frames(batch) for batch in run], LIMIT)) for run in runs])
-    assert all(chosen == python for chosen, python in results)
-    return [chosen for chosen, _ in results]
+    """Add up the batches of each run. Return per run and batch [number of good frames, sums, good frames, notes]."""
+    return engines.run(engine, [("add_up", ([frames(batch) for batch in run], LIMIT)) for run in runs])
 
 
 def test_frames_are_seven_big_endian_numbers_and_their_sums(engine):
     """The values are random, at the ends of the range, and where the bytes change."""
     edges = [[value] * 7 for value in (-32768, -32767, -1, 0, 1, 255, 256, 16383, 16384, 32766, 32767)]
     samples = np.vstack((noise(5), edges))
-    chosen, python = engines.run(engine, [("decode", (frames(samples),))])[0]
-    assert chosen == python == samples.tolist()
+    assert engines.run(engine, [("decode", (frames(samples),))]) == [samples.tolist()]
     batches = [noise(0), noise(1), noise(8), np.array([[-32699] * 7, [32699] * 7, [-32699] * 7, [32697] * 7])]
     (answers,) = added(engine, batches)
     assert [answer[:2] for answer in answers] == [[len(batch), batch.sum(axis=0).tolist()] for batch in batches]

@@ -14,9 +14,9 @@ PCF8523 = [0, 0, 0, 0x37, 0x59, 0x23, 0x26, 0x04, 0x11, 0x26]  # after the time:
 @pytest.fixture
 def chips():
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):  # the driver needs the clock of a board
-        from kickstand.imu import other_chips
+        from kickstand import diagnosis
 
-        yield other_chips
+        yield diagnosis
 
 
 class Wires:

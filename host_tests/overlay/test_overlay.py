@@ -145,8 +145,6 @@ def test_a_part_outside_the_ride_is_refused(ffmpeg, tmp_path, parked, seconds, o
         ("a.mov", ["--offset", 3], "an offset needs a video"),
         ("a.mov", ["--video", "film.mp4"], "over a video the name must end in .mp4"),
         ("a.mp4", ["--video", "film.mp4", "--height", 720], "over a video the gauge follows the video's height"),
-        ("film.mp4", ["--video", "film.mp4"], "is also an input"),
-        ("a.mp4", ["--video", "no.mp4"], "there is no such file"),
     ],
 )
 def test_names_and_options_that_do_not_fit_are_refused(ffmpeg, tmp_path, ride, monkeypatch, out, options, words):

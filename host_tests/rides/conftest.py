@@ -3,7 +3,7 @@
 import types
 
 import pytest
-from kickstand.rides import ride_paths
+from kickstand.rides import ride_files
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.fakes import fake_os, fake_time
 from rings import KB_4, opened
@@ -31,7 +31,7 @@ def root(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("os.statvfs", statvfs, raising=False)
     monkeypatch.setattr("os.ilistdir", fake_os.ilistdir, raising=False)
-    monkeypatch.setattr(ride_paths, "directory", lambda settings: "rides")
+    monkeypatch.setattr(ride_files, "directory", lambda settings: "rides")
     yield space
     while opened:
         opened.pop().abandon()

@@ -5,7 +5,7 @@ import signal
 import time
 import types
 
-from kickstand.rides import ride_paths
+from kickstand.rides import ride_files
 from support import fake_board
 from support.recordings import ride_writer
 
@@ -18,7 +18,7 @@ class RideBoard(fake_board.FakeBoard):
         root.mkdir(exist_ok=True)
         self.settings = types.SimpleNamespace(VEHICLE="motorcycle", SD_SPI=None)
         self.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: self.settings))
-        self.modules["kickstand.rides"] = types.SimpleNamespace(ride_paths=ride_paths)
+        self.modules["kickstand.rides"] = types.SimpleNamespace(ride_files=ride_files)
 
     def plug_in(self, monkeypatch):
         monkeypatch.setattr("os.ilistdir", self.modules["os"].ilistdir, raising=False)

@@ -2,16 +2,16 @@
 
 import types
 
-from kickstand.rides import ride_paths
-from kickstand.rides.flash_ring import RideRing
+from kickstand.rides import ride_files
+from kickstand.rides.ride_files import RideFiles
 
 FLASH = types.SimpleNamespace(SD_SPI=None)
 KB_4 = 4096
-opened: list[RideRing] = []  # the rings of this test, whose files are closed at its end
+opened: list[RideFiles] = []  # the rings of this test, whose files are closed at its end
 
 
 def ride_ring(settings):
-    opened.append(RideRing(settings))
+    opened.append(RideFiles(settings))
     return opened[-1]
 
 
@@ -26,8 +26,8 @@ def write_block(ring, size=100):
 
 
 def old_ride(root, ride, parts=1, size=KB_4):
-    directory = root.path / ride_paths.ride_path("rides", ride)
+    directory = root.path / ride_files.ride_path("rides", ride)
     directory.mkdir(parents=True, exist_ok=True)
     for part in range(parts):
-        (root.path / ride_paths.part_path("rides", ride, part)).write_bytes(bytes(size))
+        (root.path / ride_files.part_path("rides", ride, part)).write_bytes(bytes(size))
     return directory

@@ -5,8 +5,8 @@ from support.mpy import run_mpy
 # A card of 32 GB. Only the card's sectors that are not zero are kept in RAM. The card's clusters have the usual 32 KB.
 _CARD = """
 import os
-from kickstand.rides import ride_paths
-from kickstand.rides.flash_ring import RideRing
+from kickstand.rides import ride_files
+from kickstand.rides.ride_files import RideFiles
 
 class Card:
     def __init__(self):
@@ -29,7 +29,7 @@ class Card:
 class Settings:
     SD_SPI = 0
 
-ride_paths.directory = lambda _settings: "/sd/rides"
+ride_files.directory = lambda _settings: "/sd/rides"
 card = Card()
 os.VfsFat.mkfs(card)
 os.mount(os.VfsFat(card), "/sd")
@@ -43,7 +43,7 @@ safe = {}  # blocks of each ride
 card.on_write = lambda: states.append((card.sectors.copy(), safe.copy()))
 
 def record(blocks):
-    ring = RideRing(Settings)
+    ring = RideFiles(Settings)
     ring._part_blocks, ring.needed = 2, 4 * 4096
     ride = ring.begin()
     if ride == 4 and card.on_write:
@@ -61,8 +61,8 @@ def record(blocks):
 
 def held():
     blocks = {}
-    for ride, part, size in ride_paths.parts("/sd/rides"):
-        with open(ride_paths.part_path("/sd/rides", ride, part), "rb") as file:
+    for ride, part, size in ride_files.parts("/sd/rides"):
+        with open(ride_files.part_path("/sd/rides", ride, part), "rb") as file:
             data = file.read()
         assert data == bytes([ride]) * size
         blocks[ride] = blocks.get(ride, 0) + size // 4096

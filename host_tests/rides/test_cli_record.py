@@ -8,9 +8,9 @@ import signal
 
 import pytest
 from kickstand_tools.logs.reader import read_log
+from kickstand_tools.rides.record import record
 from ride_boards import Clocks, Stream, Streaming as Streaming, half_seconds, plug_in, streamed
 from support import command
-from support.recordings import ride_writer
 from support.watched_stderr import Watched, watched
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals are of Unix")
@@ -102,15 +102,19 @@ BRAKING_LEFT = steady(-851, 1324, 4096, 0, 98, 0)  # 0.2 g backward and 0.3 g to
     ],
 )
 def test_lean_or_force_is_shown_live(vehicle, aligned, turns, words, absent, stream, tmp_path, monkeypatch):
-    calibration = ride_writer.calibration()
-    calibration.aligned = aligned
-    monkeypatch.setattr(ride_writer, "calibration", lambda _trim_deg: calibration)
-    monkeypatch.setattr(ride_writer, "turns", turns)
-    stream(half_seconds(3)[0], CTRL_C, first=vehicle)
+    stream(half_seconds(3, aligned=aligned, passes=turns)[0], CTRL_C, first=vehicle)
     line = re.sub("\x1b\\[[0-9;?]*[a-zA-Z]", "", watched(monkeypatch, Watched(), "record", "--out", tmp_path / "r.csv"))
     assert re.search(words, line) and absent not in line and "readings/s" in line
     car = json.loads((tmp_path / "r.cal.json").read_text()).get("vehicle")
     assert car == ("car" if b"car" in vehicle else None) and readings(tmp_path / "r.csv") > 100
+
+
+@pytest.mark.parametrize(("aligned", "brake_g"), [(True, 0.2), (False, 0.0)])
+def test_a_live_reading_has_the_maxima_of_an_aligned_board(aligned, brake_g, stream, tmp_path):
+    stream(half_seconds(9, aligned=aligned, passes=BRAKING_LEFT)[0], CTRL_C, first=b"vehicle car\r\n")
+    live = []
+    record(None, tmp_path / "r.csv", live=live.append)
+    assert (live[-1].max_accel_g, live[-1].max_brake_g) == pytest.approx((0.0, brake_g), abs=0.01)
 
 
 # The end of a stream

@@ -10,6 +10,7 @@ import math
 import os
 import sys
 
+from kickstand_tools.rides.stream_guest import stream
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted import script, sensor_errors
 
@@ -170,7 +171,7 @@ class Device:
             self.board.clock.advance(int(1e6 * prompt_s))
 
         for until_s in off_s:
-            self._run_until(until_s, config, _stream if streams else main)
+            self._run_until(until_s, config, stream if streams else main)
 
     def _run_app(self, app):
         self.app = app
@@ -220,15 +221,6 @@ def _config(settings):
     """Return a module config.py with these settings. Convert lists to tuples, because JSON has no tuples."""
     values = {name: tuple(value) if isinstance(value, list) else value for name, value in settings.items()}
     return type("Config", (), values)
-
-
-def _stream():
-    from kickstand import devices, settings
-    from kickstand.app import App
-    from kickstand.rides.usb_stream import RideStream
-
-    chosen = settings.load()
-    App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen), RideStream()).run()
 
 
 class FreshFirmware:

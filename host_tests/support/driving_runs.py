@@ -7,8 +7,8 @@ road is level.
 import math
 
 from kickstand.drive_alignment.alignment import DriveAlignment
-from kickstand.drive_alignment.parts import DriveParts
-from kickstand.drive_alignment.regression import Fit, ForwardRegression
+from kickstand.drive_alignment.events import Fit, ForwardRegression
+from kickstand.drive_alignment.quality import DriveParts
 from kickstand.errors import Refusal
 from kickstand.rotation import matrix
 from kickstand.ui import messages

@@ -14,7 +14,7 @@ from kickstand.calibration.parameters import Calibration
 from kickstand.calibration.still_pose import StillPose
 from kickstand.calibration.transform import Transform
 from kickstand.errors import Refusal
-from kickstand.imu import fifo_frames
+from kickstand.imu import axes
 from kickstand.lean import formula
 from kickstand.ui import messages
 
@@ -75,39 +75,29 @@ def transform(offset, slope, matrix, sums, n):
 
 
 def add_up(batches, limit):
-    """Add up batches of frames, by the board's machine code and by Python. Each frame has 14 bytes.
-
-    Returns two lists, one per version. Per batch they contain [number of good frames, sums, good frames, notes of the
-    AxisWatch].
-    """
-    out = []
-    for function in (fifo_frames.add_up, fifo_frames.add_up_python):
-        watch = fifo_frames.AxisWatch(200, 3, 1, 3, limit).notes
-        sums = array("i", [99] * 7)  # the buffer's earlier content must not matter
-        answers = []
-        for batch in batches:
-            data = bytearray()
-            for frame in batch:
-                data.extend(bytes(frame))
-            good = function(data, len(batch), sums, watch)
-            answers.append([good, list(sums), list(data[: 14 * good]), list(watch)])
-        out.append(answers)
-    return out
+    """Add up batches of frames of 14 bytes. Return per batch [number of good frames, sums, good frames, notes of the
+    AxisWatch]."""
+    watch = axes.AxisWatch(200, 3, 1, 3, limit).notes
+    sums = array("i", [99] * 7)  # the buffer's earlier content must not matter
+    answers = []
+    for batch in batches:
+        data = bytearray()
+        for frame in batch:
+            data.extend(bytes(frame))
+        good = axes.add_up(data, len(batch), sums, watch)
+        answers.append([good, list(sums), list(data[: 14 * good]), list(watch)])
+    return answers
 
 
 def decode(batch):
-    """Decode frames of 14 bytes, by the board's machine code and by Python. Return two lists, one per version, with the
-    counts of each frame."""
+    """Decode frames of 14 bytes. Return the counts of each frame."""
     data = b"".join([bytes(frame) for frame in batch])
-    out = []
-    for function in (fifo_frames.decode, fifo_frames.decode_python):
-        counts = array("h", [0] * 7)
-        answers = []
-        for k in range(len(batch)):
-            function(data, 14 * k, counts)
-            answers.append(list(counts))
-        out.append(answers)
-    return out
+    counts = array("h", [0] * 7)
+    answers = []
+    for k in range(len(batch)):
+        axes.decode(data, 14 * k, counts)
+        answers.append(list(counts))
+    return answers
 
 
 def capture(samples):

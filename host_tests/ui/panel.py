@@ -61,10 +61,15 @@ class Panel:
         self.screen.press(event, self.now_ms)
         return self.lines()
 
+    def content(self):
+        """Return what the App would pass to the display now."""
+        self.screen.tick(self.now_ms)
+        return self.screen.lines(self.now_ms)
+
     def lines(self, at_ms=None):
         """Return the two lines, with a degree sign and # for a full cell."""
         self.now_ms = self.now_ms if at_ms is None else at_ms
-        line1, line2 = self.screen.lines(self.now_ms)[:2]
+        line1, line2 = self.content()[:2]
         return line1.replace("\xdf", "°"), line2.replace("\xdf", "°").replace("\xff", "#") if isinstance(
             line2, str
         ) else line2
@@ -72,7 +77,7 @@ class Panel:
     def choose(self, entry):
         """Open the menu and choose an entry. Return the lines after it."""
         self.press(LONG)
-        while self.screen.menu.entry != entry:
+        while self.screen.entry != entry:
             self.press(SHORT)
         return self.press(LONG)
 
@@ -86,7 +91,7 @@ class Panel:
         values = [*(G_LSB * up), 0, *(DPS_LSB * (np.array(rate_dps) + self.bias_dps))]
         for i, value in enumerate(np.round(values + self.noise.normal(0, 2, 7))):
             chip.counts[i] = chip.sums[i] = max(-32768, min(32767, int(value)))
-        wizard.sample(chip.counts, self.now_ms)
+        wizard.sample(chip.counts)
         wizard.follow(chip.sums, 1, 1_000_000 // RATE_HZ, self.now_ms)
 
     def hold(self, seconds, **motion):
@@ -109,7 +114,7 @@ class Panel:
         names = []
         for _ in range(count):
             self.lines()
-            names.append(self.screen.pages.name)
+            names.append(self.screen.view)
             self.press(SHORT)
         return names
 

@@ -69,8 +69,8 @@ def test_a_pose_that_is_not_still_is_taken_again():
             panel.hold(0.05)
         assert panel.lines() == lines
     panel.hold(1.0)
-    assert panel.hold(0.2, **shaken) == ("Moved!", "Hold it still") and panel.screen.wizard.problem.code == "moved"
-    assert panel.press(SHORT) == ("Stand: hold", "") and panel.screen.wizard.problem is None
+    assert panel.hold(0.2, **shaken) == ("Moved!", "Hold it still") and panel.screen.wizard.notice.code == "moved"
+    assert panel.press(SHORT) == ("Stand: hold", "") and panel.screen.wizard.notice is None
     assert panel.hold(3.6) == UPRIGHT
 
 
@@ -82,7 +82,7 @@ def test_an_alignment_ends_by_a_long_press_or_a_fault():
     assert panel.screen.wizard is None and panel.lines()[0].startswith("Raw")
     panel.choose("Align the bike")
     panel.sensor.fault = Notice("clips", "Gyro")
-    panel.screen.interrupt(panel.now_ms)
+    panel.screen.interrupt()
     assert panel.lines() == ("Calibration", "stopped: fault") and panel.screen.wizard is None
 
 

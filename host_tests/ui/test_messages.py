@@ -6,7 +6,7 @@ import re
 
 from kickstand import console, errors
 from kickstand.errors import Notice, Refusal, SettingsError
-from kickstand.ui import messages
+from kickstand.ui import messages, pages
 from kickstand_tools.common import firmware_path
 
 CLASSES = {name for name in vars(errors) if name[0].isupper()}
@@ -68,7 +68,7 @@ def test_words_fit_into_sixteen_characters():
     for code in worded(messages._LINES):
         lines = messages.lines(Refusal(code, *VALUES.get(code, (99.94, 60.0, 1.0, 1.0))))
         assert len(lines) == 2 and max(map(len, lines)) <= 16, code
-    assert all(len(words) <= 16 for words in messages.NO_LEAN.values())
+    assert all(len(words) <= 16 for words in pages.NO_LEAN.values())
 
 
 def test_a_refusal_of_the_board_has_a_console_sentence():

@@ -138,11 +138,9 @@ BRAKE, SPEED = {"state": alignment.WAITING_FOR_BRAKING}, {"state": alignment.WAI
     ],
 )
 def test_each_state_of_a_drive_has_its_lines(values, result, fault, lines):
-    from kickstand.ui import drive_page
-
     state = {"counted": 2, "problem": None, "ready": False, "quality_deg": 1.2} | values
     drive: Any = Panel(SPEED="wheel").app.drive
     drive.drive = type("Drive", (alignment.DriveAlignment,), state)(alignment.MOTORCYCLE)
     drive.result = result
     drive.speed.source.fault = lambda now_ms: fault
-    assert drive_page.lines(drive, 0) == lines
+    assert pages.drive(drive, 0) == lines

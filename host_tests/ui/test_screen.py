@@ -26,8 +26,15 @@ class Live:
     def lines(self):
         return "live", ""
 
-    def stop(self, now_ms):
+    def stop(self):
         pass
+
+
+class User:
+    """The owner's pages."""
+
+    def __init__(self, count=1):
+        self.pages = [lambda: ("own", "")] * count
 
 
 @pytest.mark.parametrize(
@@ -41,8 +48,7 @@ class Live:
 def test_the_entries_of_the_menu_and_their_order(config, names):
     panel = Panel(**config)
     assert entries(panel) == names
-    panel.screen.pages.own.append(lambda: ("", ""))
-    panel.screen.pages.live = Live()
+    panel.app.user, panel.app.live = User(), Live()
     panel.choose("Record ride")
     assert entries(panel)[-4:] == ["Stop recording", "Own pages", "Stop Bluetooth", "Leave menu"]
 
@@ -52,7 +58,7 @@ def test_the_menu_resets_maxima_and_records():
     panel.meter.max_left_deg = 30.0
     assert panel.choose("Reset maxima") == ("Maxima reset", "") == panel.lines(1999)
     assert panel.lines(2000)[0].startswith("Lean") and panel.meter.max_left_deg == 0.0
-    assert panel.choose("Record ride")[0] == "Rec         0:00" and panel.screen.front.name == "notice"
+    assert panel.choose("Record ride")[0] == "Rec         0:00" and panel.screen.view == "notice"
     panel.stand()
     assert panel.lines(4000)[0] == "Lean   0°      *"  # only the first page shows that a ride is recorded
     assert not panel.press(SHORT)[0].endswith("*")
@@ -68,14 +74,14 @@ def test_a_recording_that_is_refused_says_why(monkeypatch):
 
 def test_a_press_is_for_what_a_notice_covers():
     panel = Panel(**WHEEL)
-    panel.screen.notify(Notice("out-of-room", "28"), 0)
+    panel.app.notices.append(Notice("out-of-room", "28"))
     assert panel.lines() == ("Rec. stopped", "no room")
     assert panel.press(SHORT, 100)[0].startswith("Max left")
-    panel.screen.notify(Notice("out-of-room", "28"), 200)
+    panel.app.notices.append(Notice("out-of-room", "28"))
     panel.app.drive.message = Notice("aligned", 0.4)
     assert panel.lines(200)[0] == "Rec. stopped"
     assert panel.press(LONG, 300) == ("Aligned by drive", "error about 0.4°")  # unread, so it is not answered
-    assert panel.screen.menu is None and panel.press(LONG)[0].startswith("Lean") and panel.app.drive.message is None
+    assert panel.screen.entry is None and panel.press(LONG)[0].startswith("Lean") and panel.app.drive.message is None
 
 
 @pytest.mark.parametrize(("event", "lines"), [(SHORT, "Lean"), (LONG, "Side corrected")])
@@ -96,7 +102,7 @@ def test_a_fault_hides_the_pages_and_the_menu_the_fault():
     assert panel.lines() == lost == panel.press(SHORT)
     for entry in ("Align the bike", "Six positions", "Record ride"):
         assert panel.choose(entry) == lost and panel.screen.wizard is None
-        assert panel.screen.front.name == "notice" and panel.lines(panel.now_ms + 2000) == lost
+        assert panel.screen.view == "notice" and panel.lines(panel.now_ms + 2000) == lost
     assert panel.now_ms == 6000 and panel.choose("Sensor info") == ("On its I2C bus:", "nothing")
     assert panel.lines(8000) == lost
     panel.press(SHORT)
@@ -117,8 +123,7 @@ def test_short_presses_show_each_page_once(config, recording, live, own, names):
     panel = Panel(**config)
     if recording:
         panel.app.rides.start()
-    panel.screen.pages.live = Live() if live else None
-    panel.screen.pages.own += [lambda: ("own", "")] * own
+    panel.app.live, panel.app.user = Live() if live else None, User(own)
     assert panel.walk(2 * len(names)) == 2 * names
     if own:
         assert panel.choose("Own pages") == ("own", "")
@@ -126,13 +131,13 @@ def test_short_presses_show_each_page_once(config, recording, live, own, names):
 
 def test_the_page_of_the_drive_follows_the_others_or_is_first():
     panel = Panel(**WHEEL)
-    assert panel.choose("Align by drive")[0] == "Brakings   0/6" or panel.screen.pages.name == "drive"
+    assert panel.choose("Align by drive")[0] == "Brakings   0/6" or panel.screen.view == "drive"
     assert panel.walk(2 * 6) == ["drive", *PAGES] * 2
 
 
 def test_without_an_alignment_a_press_begins_it_and_own_pages_are_in_the_menu():
     panel = Panel(aligned=False)
-    panel.screen.pages.own += [lambda: ("own", "")]
+    panel.app.user = User()
     assert panel.choose("Own pages") == ("own", "") and panel.press(SHORT)[1] == "Not aligned"
     assert panel.press(SHORT) == ("Stand: hold", "")
 
@@ -151,17 +156,17 @@ def test_a_lean_is_shown_only_if_it_is_trusted(meter, lines):
     panel = Panel()
     vars(panel.meter).update({"lean_deg": 12.0} | meter)
     assert panel.lines() == lines or (panel.lines()[0], len(panel.lines()[1])) == (lines[0], 16)
-    panel.screen.pages.draws = True
-    assert len(panel.screen.lines(0)) == (2 if "fallen" in meter else 3)
-    panel.screen.pages.late = True
+    panel.app.lcd.draws = True
+    assert len(panel.content()) == (2 if "fallen" in meter else 3)
+    panel.app.late = True
     assert panel.lines()[0] == ("Fallen over?" if "fallen" in meter else "Lean  --")
 
 
 def test_a_display_that_draws_gets_pictures_of_three_pages():
     panel = Panel()
-    panel.screen.pages.draws = True
+    panel.app.lcd.draws = True
     counts = []
     for _ in PAGES:
-        counts.append(len(panel.screen.lines(0)))
+        counts.append(len(panel.content()))
         panel.press(SHORT)
     assert counts == [3, 3, 3, 2, 2]

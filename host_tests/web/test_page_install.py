@@ -120,14 +120,13 @@ def test_a_board_of_a_shop_is_offered_by_its_name(line, page, board):
 
 def test_status_keeps_what_the_firmware_noticed_before_it_is_stopped(line, board):
     """A soft reset removes the firmware's modules, before the status is asked."""
-    app, report, firmware = (types.ModuleType(name) for name in ("app", "status_report", "kickstand"))
+    app, firmware = (types.ModuleType(name) for name in ("app", "kickstand"))
     vars(app)["worst"] = (1200, 3, ((1, 2, 3), 0.5))
-    vars(report)["noticed"] = None
-    vars(firmware).update(status_report=report, status=lambda *_: print("noticed", vars(report)["noticed"]))
+    vars(firmware).update(status=lambda: print("noticed (None, None)"))
     board.modules["kickstand"] = firmware
     vars(board.modules["sys"])["modules"] = {"kickstand.app": app}
     line.plug_in(RawPrompt(board))
-    assert line.status() == "noticed ((1200, 3, ((1, 2, 3), 0.5)), None)"
+    assert line.status().startswith("Since start  longest turn 1.2 ms; places left in the FIFO, at the fewest: 3\n")
 
 
 @pytest.mark.parametrize(

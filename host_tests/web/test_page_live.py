@@ -110,13 +110,13 @@ def has_firmware(board, monkeypatch):
     """Make the modules that list the rides read this board's flash."""
     import types
 
-    from kickstand.rides import ride_paths
+    from kickstand.rides import ride_files
 
-    monkeypatch.setattr(ride_paths, "directory", lambda _settings: "rides")
-    monkeypatch.setattr(ride_paths, "os", board.modules["os"])
+    monkeypatch.setattr(ride_files, "directory", lambda _settings: "rides")
+    monkeypatch.setattr(ride_files, "os", board.modules["os"])
     settings = types.SimpleNamespace(VEHICLE="motorcycle")
     board.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: settings))
-    board.modules["kickstand.rides"] = types.SimpleNamespace(ride_paths=ride_paths)
+    board.modules["kickstand.rides"] = types.SimpleNamespace(ride_files=ride_files)
 
 
 def test_simulated_board_is_watched_without_a_real_one(chromium, address):

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from kickstand.drive_alignment.quality import AGREE_DEG
-from kickstand.drive_alignment.speed_check import fit_problem
+from kickstand.drive_alignment.quality import AGREE_DEG, fit_problem
 from kickstand_tools.analysis.brake_tests import brake_tests
 from kickstand_tools.analysis.stops.brake_test import Stop
 from kickstand_tools.calibration.drive import DriveFit, fit_logs, usable
@@ -24,7 +23,7 @@ from kickstand_tools.logs.reader import CutLine
 from kickstand_tools.logs.source import CutGzip, NulEnd
 
 from . import evidence, files, signals
-from .forward import Forward, find_forward
+from .evidence import Forward, find_forward
 from .manifest import Period
 from .moved import Move, find_moves
 

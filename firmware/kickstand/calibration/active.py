@@ -12,27 +12,26 @@ _TRIM_MS = const(60_000)  # shortest time between two saves of the trim, because
 class ActiveCalibration:
     """The Calibration in use, and its store.
 
-    The trim is the correction of the roll misalignment, in degrees. The trim is estimated while riding: see
-    Calibration.
+    The trim is the correction of the roll misalignment, in degrees. The trim and the gyro's errors are estimated while
+    riding, and saved together: see LeanMeter.keep_trim().
 
     Args:
         meter: the LeanMeter that uses the Calibration.
-        changed: a function that is called as changed(replaced) after each change. `replaced` is True after a new
-            alignment, which makes maxima and the results of driving invalid. `replaced` is False after a small
-            correction.
+
+    Attributes:
+        value: the Calibration in use. Until the first chip has started, this is the Calibration of the new meter.
+        changed: REPLACED after a new calibration, which makes maxima and the results of driving invalid. REFINED after
+            a small correction. The app sets changed to None.
     """
 
-    def __init__(self, meter, changed):
+    REFINED, REPLACED = 1, 2
+
+    def __init__(self, meter):
         self._meter = meter
-        self._changed = changed
+        self.value = meter.calibration
+        self.changed = None
         self._store = None  # None until a chip runs, because a stored calibration belongs to one chip
         self._trim_due_ms = ticks_add(ticks_ms(), _TRIM_MS)
-
-    @property
-    def value(self):
-        """The Calibration in use. Until the first chip has started, this is the Calibration that the meter was created
-        with."""
-        return self._meter.calibration
 
     @property
     def aligned(self):
@@ -49,7 +48,7 @@ class ActiveCalibration:
             return False
         self._chip = chip
         self._store = Store(chip.who_am_i, chip.accel_range_g)
-        self._use(self._store.load(), True)
+        self._use(self._store.load(), self.REPLACED)
         return True
 
     def save(self, calibration, posed=False):
@@ -60,13 +59,13 @@ class ActiveCalibration:
             posed: as for LeanMeter.use().
         """
         self._store.save(calibration)
-        self._use(calibration, True, posed)
+        self._use(calibration, self.REPLACED, posed)
 
     def refine(self, calibration):
         """Save and use an alignment from driving. Unlike save(), keep the maxima and the results of driving. Raises
         StoreError."""
         self._store.save(calibration)
-        self._use(calibration, False)
+        self._use(calibration, self.REFINED)
 
     def restart(self):
         """Save the current trim, then restart the meter with the calibration in flash. So a replay of the ride can
@@ -79,7 +78,7 @@ class ActiveCalibration:
 
         Call this method about every 100 ms."""
         if ticks_diff(now_ms, self._trim_due_ms) >= 0:
-            saved = self.value.aligned and self._save_trim()
+            saved = self.aligned and self._save_trim()
             self._trim_due_ms = ticks_add(now_ms, _TRIM_MS if saved else 0)
 
     def _save_trim(self):
@@ -92,7 +91,7 @@ class ActiveCalibration:
             report(error)
         return True
 
-    def _use(self, calibration, replaced, posed=False):
+    def _use(self, calibration, changed, posed=False):
         calibration.set_scale(self._chip.accel_lsb_per_g, self._chip.gyro_lsb_per_dps)
+        self.value, self.changed = calibration, changed
         self._meter.use(calibration, posed)
-        self._changed(replaced)

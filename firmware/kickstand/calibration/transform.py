@@ -4,14 +4,14 @@
     rate  = R G (counts / lsb - bias)
 
 R is vehicle_from_sensor, A is accel_matrix, and G is gyro_matrix. The combined step takes 18 products per sample
-instead of 27. On the board a product of floats takes 12 us and 32 bytes of heap. So the board's machine code multiplies
-integers. The rounding causes an error of at most 0.03 degrees of lean.
+instead of 27. On the board a product of floats takes 12 us and 32 bytes of heap. So products() of quick_viper.py
+multiplies integers. The rounding causes an error of at most 0.03 degrees of lean.
 """
 
 from array import array
 from math import radians
 
-from ..errors import NO_MACHINE_CODE, checked
+from ..quick import load
 from ..units import const
 
 # The integer that represents the largest scale. The product of this integer and the sum of eight samples still fits in
@@ -19,31 +19,13 @@ from ..units import const
 _ONE = const(2048)
 
 
-def products_python(matrices, sums, n, out):
-    """Compute out[0:3] = A (sums[0:3], n) and out[3:6] = B (sums[4:7], n). The last column of A and B has the offsets.
-
-    On the board, products() is the machine code of transform_viper.py. On a computer, products() is this function.
-
-    Args:
-        matrices: the 3x4 matrices A and B, row by row, array('i', 24).
-        sums: sums of counts in the chip's order, array('i', 7).
-        n: number of samples in the sums.
-        out: array('i', 6) for the result.
-    """
-    for i in range(6):
-        first = 0 if i < 3 else 4
-        out[i] = n * matrices[4 * i + 3]
-        for k in range(3):
-            out[i] += matrices[4 * i + k] * sums[first + k]
+def _multiplying():
+    arguments = array("i", range(2047, -2047, -171)), array("i", range(-260000, 260000, 74300)), 8, array("i", range(6))
+    return arguments, 0xFFFD0C53
 
 
-try:
-    from .transform_viper import products
-except NO_MACHINE_CODE:
-    products = products_python
-else:
-    _SUMS = array("i", range(-260000, 260000, 74300))
-    products = checked(products, products_python, array("i", range(2047, -2047, -171)), _SUMS, 8, array("i", range(6)))
+(products,) = load("quick_viper", ("products", _multiplying))
+del _multiplying
 
 
 class Transform:

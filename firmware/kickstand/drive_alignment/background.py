@@ -10,8 +10,19 @@ from time import ticks_add, ticks_diff
 from ..errors import Notice, StoreError
 from ..rotation import matrix
 from ..units import const
-from .alignment import BRAKING, CAR, MOTORCYCLE, TURNING, DriveAlignment
-from .verdict import MOVED, REFINED, REVERSED, SAME, compare, turn_round
+from .alignment import (
+    BRAKING,
+    CAR,
+    MOTORCYCLE,
+    MOVED,
+    REFINED,
+    REVERSED,
+    SAME,
+    TURNING,
+    DriveAlignment,
+    compare,
+    turn_round,
+)
 
 # Number of passes of the loop whose counts are added up before they are converted to floats, to save time
 _FEED_TURNS = const(2)
@@ -43,7 +54,7 @@ class BackgroundAlignment:
         speed: the Speed.
         drive: the current DriveAlignment, read-only.
         state: the state to show (see alignment.py).
-        shown: True if the progress has its own page (ui/drive_page.py).
+        shown: True if the progress has its own page (ui/pages.py).
         result: the Notice or AlignmentError at the end of the last drive, or None.
         message: an AlignmentError, StoreError or Notice to show before everything else, or None. The message is shown
             until answer() is called or the vehicle drives off.

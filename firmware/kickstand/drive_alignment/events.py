@@ -1,14 +1,268 @@
-"""Finds braking and acceleration events, and decides which of them were in a straight line.
+"""Finds braking and acceleration events, decides which of them were in a straight line, and computes forward from them.
 
-The lag of the speed is unknown. So each change of speed is compared with force and yaw rate once for each possible lag.
+ForceHistory keeps force and yaw rate of the last seconds, because a speed arrives late and must be compared with
+earlier readings. The lag of the speed is unknown. So each change of speed is compared with force and yaw rate once for
+each possible lag.
+
+ForwardRegression computes forward by a regression of the force on dv/dt while driving straight:
+
+    f = level + forward a + left c        a = dv/dt / g, c = v (yaw rate) / g
+
+All vectors are in the sensor's own axes, and each interval is weighted by its length. The intercept, `level`, is the
+vertical of straight driving. `level` is fitted together with `forward`, so an error of the vertical does not affect
+`forward`. The term of c absorbs the lateral force of slight bends. A motorcycle leans into bends, so its coefficient of
+c is about zero. The length of `forward` is 1 if the speed source sends m/s, and 1/3.6 if it sends km/h. With the right
+lag the regression explains the largest part of the force.
+
+A regression block has the sums of a few events (braking or acceleration), so that parts of the drive can be compared.
+When all blocks are in use, they are joined in pairs, so memory is fixed. From then on at least half of the blocks are
+always in use.
 """
 
+from array import array
 from math import pi
 
 from ..rotation import norm
 from ..units import STANDARD_GRAVITY, const
-from .history import COLUMNS, difference
-from .regression import LAG_STEP_US, LAGS, Fit, ForwardRegression
+
+BIN_US = 100_000
+SIZE = 64  # number of bins, enough for the lag of a speed, the interval before the speed, and the time to process them
+MASK = 0x1FFFFFFF
+_HALF = 0x10000000
+COLUMNS = 4  # three integrals of the force in 1e-6 g s, and one integral of the yaw rate in 1e-5 degrees
+
+
+def difference(a, b):
+    """Return a - b for values that wrap."""
+    return ((a - b + _HALF) & MASK) - _HALF
+
+
+class ForceHistory:
+    """A ring of running integrals of force and yaw rate, with one entry for the end of each bin.
+
+    The integrals are integers that wrap. The difference of two integers stays exact in a long drive, while float32 sums
+    lose digits as they grow. Integers also need no heap.
+
+    Attributes:
+        now: the time at the end of the newest bin in us. This time is the sum of all bins' lengths, and wraps at MASK.
+    """
+
+    def __init__(self):
+        self._times = array("i", [0] * SIZE)
+        self._columns = [array("i", [0] * SIZE) for _ in range(COLUMNS)]
+        self._total = [0] * COLUMNS
+        self._newest = 0
+        self._count = 1  # number of entries that can be looked up
+        self.now = 0
+
+    def clear(self):
+        """Drop all entries, because samples are missing. A difference of integrals must not span the gap."""
+        self._count = 1
+
+    def add(self, force_us, yaw, dt_us):
+        """Add a bin.
+
+        Args:
+            force_us: integral of the force over the bin, 3 values in g us.
+            yaw: integral of the yaw rate over the bin, in 1e-5 degrees.
+            dt_us: length of the bin.
+        """
+        self.now = (self.now + dt_us) & MASK
+        total = self._total
+        total[0] = (total[0] + round(force_us[0])) & MASK
+        total[1] = (total[1] + round(force_us[1])) & MASK
+        total[2] = (total[2] + round(force_us[2])) & MASK
+        total[3] = (total[3] + round(yaw)) & MASK
+        self._newest = newest = (self._newest + 1) % SIZE
+        self._times[newest] = self.now
+        for k in range(COLUMNS):
+            self._columns[k][newest] = total[k]
+        self._count = min(SIZE, self._count + 1)
+
+    def at(self, out, time_us):
+        """Look up the integrals at a time, interpolated within its bin.
+
+        Args:
+            out: list of COLUMNS integers for the integrals.
+            time_us: the time on the clock of `now`.
+
+        Returns:
+            False if the time is not in the history.
+        """
+        behind = difference(self.now, time_us)
+        if behind < 0 or behind >= difference(self.now, self._times[(self._newest - self._count + 1) % SIZE]):
+            return False
+        # A bin may be longer than BIN_US, but hardly twice as long. So start the search half as many bins back as bins
+        # of BIN_US would need.
+        i = self._newest
+        step = behind // (2 * BIN_US)
+        if step < self._count:
+            i = (i - step) % SIZE
+            if difference(self._times[i], time_us) < 0:
+                i = self._newest
+        previous = (i - 1) % SIZE
+        while difference(self._times[previous], time_us) > 0:
+            i = previous
+            previous = (i - 1) % SIZE
+        begin = self._times[previous]
+        share = difference(time_us, begin) / difference(self._times[i], begin)
+        for k in range(COLUMNS):
+            column = self._columns[k]
+            start = column[previous]
+            out[k] = (start + round(share * difference(column[i], start))) & MASK
+        return True
+
+
+BLOCKS = 8
+LAG_STEP_US = 250_000  # difference between two successive lags
+LAGS = 11  # number of lags, from 0 to 2.5 s
+# Indices of the sums of one regression block: the time in s, and the integrals of a, c, a a, a c, c c, f, a f and c f
+# over this time. The last three integrals have 3 values each.
+_TERMS = const(15)
+SECONDS, A, C, AA, AC, CC, F, AF, CF = 0, 1, 2, 3, 4, 5, 6, 9, 12
+_RIDGE = const(1e-6)  # ridge term in g^2, which keeps the coefficient of c at zero if the drive had no bend
+
+
+class Fit:
+    """A result of the regression.
+
+    Attributes:
+        forward: 3 values in g per g.
+        level: 3 values in g.
+        weight: variation of the change of speed in g^2 s. The weight measures the information about forward.
+        seconds: duration of the straight driving.
+        explained: the part of the force's variation that forward explains, in g^2 s.
+        found: False if there was nothing to fit.
+    """
+
+    def __init__(self):
+        self.forward = [0.0] * 3
+        self.level = [0.0] * 3
+        self.weight = self.seconds = self.explained = 0.0
+        self.found = False
+        self.total = [0.0] * _TERMS  # each Fit has its own sums, because two Fits may be computed at the same time
+
+
+class ForwardRegression:
+    """The regression of a drive.
+
+    Attributes:
+        blocks: number of regression blocks in use. The last block is still being filled.
+    """
+
+    def __init__(self):
+        self._sums = [array("f", [0.0] * (BLOCKS * _TERMS)) for _ in range(LAGS)]
+        self._events_per_block = 1
+        self._events_in_last = 0
+        self.blocks = 1
+
+    def add(self, lag, seconds, change_g, curve_g, force):
+        """Add one interval for one lag.
+
+        Args:
+            lag: index of the lag.
+            seconds: length of the interval.
+            change_g: change of speed in the interval, in g s.
+            curve_g: mean of c in the interval, in g.
+            force: integral of the force over the interval, 3 values in g s.
+        """
+        sums = self._sums[lag]
+        k = (self.blocks - 1) * _TERMS
+        a = change_g / seconds
+        sums[k] += seconds
+        sums[k + A] += change_g
+        sums[k + C] += curve_g * seconds
+        sums[k + AA] += a * change_g
+        sums[k + AC] += change_g * curve_g
+        sums[k + CC] += curve_g * curve_g * seconds
+        for i in range(3):
+            f = force[i]
+            sums[k + F + i] += f
+            sums[k + AF + i] += a * f
+            sums[k + CF + i] += curve_g * f
+
+    def end_event(self):
+        """After an event, begin the next block if the current block is full. A generator of short steps."""
+        self._events_in_last += 1
+        if self._events_in_last < self._events_per_block:
+            return
+        self._events_in_last = 0
+        if self.blocks < BLOCKS:
+            self.blocks += 1
+            return
+        for sums in self._sums:
+            for block in range(BLOCKS):
+                to, source = block * _TERMS, 2 * block * _TERMS
+                for k in range(_TERMS):
+                    sums[to + k] = sums[source + k] + sums[source + _TERMS + k] if 2 * block < BLOCKS else 0.0
+                yield
+        self._events_per_block *= 2
+        self.blocks = BLOCKS // 2 + 1
+
+    @property
+    def filled(self):
+        """The number of blocks with at least one complete event."""
+        return self.blocks if self._events_in_last else self.blocks - 1
+
+    def fit(self, out, lag, first=0, last=BLOCKS):
+        """Fit the blocks from first to last - 1 at once. Return False if there is nothing to fit.
+
+        Args:
+            out: the Fit for the result.
+            lag: index of the lag.
+            first, last: the range of the blocks.
+        """
+        for _ in self.fitting(out, lag, first, last):
+            pass
+        return out.found
+
+    def fitting(self, out, lag, first=0, last=BLOCKS, without=-1):
+        """Do the same as fit(), as a generator of short steps. The generator returns True or False.
+
+        Args:
+            without: index of a block to leave out, or -1.
+        """
+        sums, total = self._sums[lag], out.total
+        out.found = False
+        for k in range(_TERMS):
+            total[k] = 0.0
+        gathered = 0
+        for block in range(first, min(last, self.blocks)):
+            if block != without:
+                start = block * _TERMS
+                for k in range(_TERMS):
+                    total[k] += sums[start + k]
+                gathered += 1
+                if gathered % 3 == 0:
+                    yield
+        if gathered % 3:
+            yield
+        n = total[SECONDS]
+        if n <= 0.0:
+            return False
+        # the normal equations, with the means of a and c removed
+        a, c = total[A] / n, total[C] / n
+        aa = total[AA] - n * a * a
+        cc = total[CC] - n * c * c + _RIDGE * n
+        ac = total[AC] - n * a * c
+        determinant = aa * cc - ac * ac
+        if determinant <= 1e-6 * aa * cc:
+            return False
+        out.seconds = n
+        out.weight = aa - ac * ac / cc
+        out.explained = 0.0
+        for i in range(3):
+            f = total[F + i]
+            af = total[AF + i] - a * f
+            cf = total[CF + i] - c * f
+            forward = (af * cc - cf * ac) / determinant
+            left = (cf * aa - af * ac) / determinant
+            out.forward[i] = forward
+            out.level[i] = f / n - a * forward - c * left
+            out.explained += forward * forward * out.weight
+        out.found = True
+        return True
+
 
 # An event begins when the absolute acceleration exceeds BEGIN_MPS2, and ends when it falls below END_MPS2. An event
 # must change the speed by at least _CHANGE_MPS.

@@ -11,7 +11,7 @@ from micropython import const
 from ..errors import Notice
 from ..units import AXES
 
-# Indices in the notes of add_up(), as in fifo_frames.py. Imported names would take heap.
+# Indices and bits in the notes of add_up(), as in axes.py, which imports this module
 _ENDS = const(5)
 _CLIPPED = const(6)
 _GYRO_CLIPPED = const(7)
@@ -20,6 +20,7 @@ _SHAKEN = const(11)
 _SEEN = const(19)
 _HIGH_BYTE = const(0x10000)
 _WRAPPED = const(0x20000)
+_COLUMNS = (0, 1, 2, 4, 5, 6)  # the axes' columns in a frame
 
 # The number of successive quiet looks that make an axis faulty. A look is quiet if the counts had at most two values,
 # or if their lowest bit did not change. The columns are for dlpf 1 to 6. The gyro has one row per range, from 250 to
@@ -33,7 +34,6 @@ _GYRO_LOOKS = (
     (1, 1, 2, 10, 62, 0),
     (1, 2, 14, 0, 0, 0),
 )
-_COLUMNS = (0, 1, 2, 4, 5, 6)  # the axes' columns in a frame
 _WRAP_LOOKS = const(2)  # number of looks with a wrap that prove a stuck high byte
 _WELL_LOOKS = const(2)  # number of successive looks without a fault that clear the fault
 # Number of successive looks with half of the samples at the end of the range that make an axis faulty

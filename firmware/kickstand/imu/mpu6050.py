@@ -22,7 +22,7 @@ from time import sleep_ms
 
 from micropython import const
 
-from .fifo_frames import FRAME, SATURATED, AxisWatch, add_up, decode
+from .axes import FRAME, SATURATED, AxisWatch, add_up, decode
 
 # The registers that setup() writes follow one another: SMPLRT_DIV (p. 11), CONFIG with DLPF_CFG (p. 13), GYRO_CONFIG
 # (p. 14), ACCEL_CONFIG (p. 15) and, if the chip has it, ACCEL_CONFIG2. ACCEL_CONFIG2 sets the low-pass of the
@@ -125,7 +125,7 @@ class Mpu6050:
         axes: an AxisWatch, which judges each axis.
     """
 
-    SATURATED = SATURATED
+    saturated = SATURATED
 
     def __init__(self, i2c, address=0x68, accel_range_g=16, gyro_range_dps=500, dlpf=3, rate_hz=200, accept=None):
         self._i2c = i2c

@@ -5,7 +5,7 @@ from time import ticks_add, ticks_diff, ticks_ms
 
 from ..errors import Notice
 from ..units import const
-from .fifo_frames import DUE, LOST
+from .axes import DUE, LOST
 from .mpu6050 import UnknownChip
 
 _RETRY_MS = const(50)  # time between two attempts to set the chip up

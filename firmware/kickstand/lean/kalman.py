@@ -8,7 +8,7 @@ work may be interrupted. Rows of Jacobians are written as ((state, value), ...),
 from array import array
 from math import sqrt
 
-from ..errors import NO_MACHINE_CODE, checked
+from ..quick import NO_MACHINE_CODE, passes
 from ..units import const
 
 # Lower bound of a variance, because rounding in 32-bit floats could make a variance negative
@@ -39,14 +39,16 @@ def add_products_python(out, factors, source, n, rows):
 
 try:
     from .kalman_viper import add_products
-except NO_MACHINE_CODE:
-    add_products = add_products_python
-else:
-    # Values for the comparison. Some of the sums grow, vanish, change their sign or are rounded. All products are exact
-    # in 32 bits.
+
+    # Some of the sums grow, vanish, change their sign or are rounded
     _TRIAL = array("f", (0.65625, 0, 0, -0.75, 8388609, 0, 1e-9, 3e9, -0.984))
     _FACTORS, _SOURCE = array("f", (1.5, -2.6875, 0.75)), array("f", (-0.4375, 98304.5, 1.3125))
-    add_products = checked(add_products, add_products_python, _TRIAL, _FACTORS, _SOURCE, 3, 3)
+    _PASSES = passes("add_products", add_products, (_TRIAL, _FACTORS, _SOURCE, 3, 3), 0x6E921598)
+    del _TRIAL, _FACTORS, _SOURCE
+except NO_MACHINE_CODE:
+    _PASSES = False
+if not _PASSES:
+    add_products = add_products_python
 _KIND = "d" if add_products is add_products_python else "f"  # type of the arrays' elements
 
 

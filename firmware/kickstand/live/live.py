@@ -16,18 +16,12 @@ _IDLE_S = const(60)
 _SAMPLES = 8  # largest number of samples that Transform takes
 
 
-def attach(radio, app):
-    """Connect an App with a Radio, so that the app sends to phones."""
-    app.live = app.screen.pages.live = Live(radio, app, app.settings.leans)
-
-
 class Live:
     """Sends packets to one phone.
 
     Args:
         radio: a Radio.
-        app: the App, whose meter, drive, rides, screen, sensor and clock are read.
-        leans: False for a car.
+        app: the App, whose lean, meter, drive, rides and clock are read.
 
     Attributes:
         asked: the kind of packets that the phone has requested, "RaceChrono" or "browser", or None.
@@ -35,10 +29,9 @@ class Live:
         period_ms: shortest interval between packets that the phone has requested, or 0 without a request.
     """
 
-    def __init__(self, radio, app, leans):
+    def __init__(self, radio, app):
         self.radio = radio
         self._app = app
-        self._leans = leans
         self._intervals = [0] * 4
         self._dues = [ticks_ms()] * 4
         self._sums, self._n = [0] * 7, 0
@@ -123,7 +116,7 @@ class Live:
         if radio.phone is None:
             self._advertised = self._advertised or radio.advertise()
             return
-        size = packets.ride(self._buffer, self._state(self._lean()), app.meter, app.clock.lost)
+        size = packets.ride(self._buffer, self._state(self._app.lean_deg), app.meter, app.clock.lost)
         radio.keep(radio.ride, self._views[size])
         if self._intervals[OWN]:
             self._put(radio.ride, size)
@@ -135,17 +128,13 @@ class Live:
     def _put(self, handle, size):
         self._sent += self.radio.send(handle, self._views[size])
 
-    def _lean(self):
-        """Return the lean in degrees, or None while the display would not show a lean."""
-        app = self._app
-        shown = self._leans and app.sensor.fault is None and app.screen.pages.trusted
-        return app.meter.lean_deg if shown else None
-
     def _state(self, lean):
-        meter = self._app.meter
+        app, meter = self._app, self._app.meter
         state = packets.ALIGNED * meter.calibration.aligned + packets.TRUSTED * (lean is not None)
-        state += packets.AT_REST * meter.at_rest + packets.FALLEN * meter.fallen + packets.CAR * (not self._leans)
-        return state + packets.RECORDING * self._app.recording + packets.NO_READINGS * bool(self._app.sensor.fault)
+        state += (
+            packets.AT_REST * meter.at_rest + packets.FALLEN * meter.fallen + packets.CAR * (not app.settings.leans)
+        )
+        return state + packets.RECORDING * app.recording + packets.NO_READINGS * bool(app.sensor.fault)
 
     def _send(self, now_ms):
         """Send the packets whose time has come, with the means of the samples since the last call. Without new samples
@@ -158,7 +147,7 @@ class Live:
         if not self._n:
             return
         self._mean()
-        lean, drive = self._lean(), self._app.drive
+        lean, drive = self._app.lean_deg, self._app.drive
         self._sigma = degrees(sqrt(self._app.meter.filter.variance)) if lean is not None else None
         self._speed = drive.fresh_speed(now_ms) if drive else None
         intervals, dues = self._intervals, self._dues
@@ -202,7 +191,7 @@ class Live:
         who = self.asked or ("a phone" if self.radio.phone is not None else "no phone")
         return "BLE %12s" % who, "%4d packets/s" % self.per_second
 
-    def stop(self, now_ms=0):
+    def stop(self):
         """Switch Live off until the next power-on. The menu also calls this method."""
         self.radio.stop()
-        self._app.live = self._app.screen.pages.live = None
+        self._app.live = None

@@ -39,7 +39,7 @@ from array import array
 from binascii import crc32
 
 from ..calibration.store import BODY_LENGTH, WHOLE_BODY_LENGTH
-from ..errors import NO_MACHINE_CODE, checked
+from ..quick import load
 from ..units import __version__, const
 
 MAGIC = b"KRID"
@@ -89,64 +89,15 @@ def block_length(index):
     return length
 
 
-def encode_python(entry, state, out):
-    """Append an entry to a buffer.
-
-    On the board, encode() is the machine code of block_viper.py. On a computer, encode() is this function. Both
-    functions write the same bytes.
-
-    Args:
-        entry: array('i', FIELDS).
-        state: the state of the coder, array('i', 22), which is updated.
-        out: the buffer.
-    """
-    n, before = entry[0], state[0]
-    for i in range(_SPEED) if n else (0, _SPEED):
-        value, guess = entry[i], state[i]
-        if i == 1:
-            guess = n * state[_PERIOD]
-        elif 1 < i < _SPEED and n != before:
-            guess = guess * n // before
-        difference = value - guess
-        size = (difference << 1) ^ (difference >> 31)
-        mean = state[_MEANS + i]
-        k = 0
-        while mean >> (k + MEAN_SHIFT + 1):
-            k += 1
-        ones = size >> k
-        if ones < LIMIT:
-            _append(state, out, (1 << (ones + 1)) - 2, ones + 1)
-            _append(state, out, size & ((1 << k) - 1), k)
-        else:
-            _append(state, out, (1 << LIMIT) - 1, LIMIT)
-            _append(state, out, size, RAW_BITS)
-        state[_MEANS + i] = mean + min(size, MAX_SIZE) - (mean >> MEAN_SHIFT)
-        if i or n:  # an entry with a speed (n = 0) does not replace the n of the previous samples
-            state[i] = value
+def _encoding():
+    entry = array("i", (2, 9999, -30000, 30000, -1, 0, 255, -256, 0))
+    # The state has a previous entry, small and large means, and three pending bits
+    state = array("i", (3, 1, -1, 29000, 70, -7, 254, 77, 0) + tuple(range(16, 160, 16)) + (5, 3, 0, 5000))
+    return (entry, state, bytearray(40)), 0x72657E63
 
 
-def _append(state, out, code, length):
-    """Append the `length` bits of code to the buffer out."""
-    pending = state[_PENDING] << length | code
-    bits = state[_BITS] + length
-    while bits >= 8:
-        bits -= 8
-        out[state[_AT]] = pending >> bits
-        state[_AT] += 1
-        pending &= (1 << bits) - 1
-    state[_PENDING], state[_BITS] = pending, bits
-
-
-try:
-    from .block_viper import encode
-except NO_MACHINE_CODE:
-    encode = encode_python
-else:
-    _ENTRY = array("i", (2, 9999, -30000, 30000, -1, 0, 255, -256, 0))
-    # A state to compare encode() with encode_python(). The state has a previous entry, small and large means, and three
-    # pending bits.
-    _STATE = array("i", (3, 1, -1, 29000, 70, -7, 254, 77, 0) + tuple(range(16, 160, 16)) + (5, 3, 0, 5000))
-    encode = checked(encode, encode_python, _ENTRY, _STATE, bytearray(40))
+(encode,) = load("rides/block_viper", ("encode", _encoding))
+del _encoding
 
 
 class RideBlock:

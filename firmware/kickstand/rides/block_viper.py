@@ -1,7 +1,4 @@
-"""The function encode_python() of block.py as machine code. The machine code takes 0.1 ms instead of 1.2 ms.
-
-Both functions must write the same bytes. host_tests/rides/test_block.py compares them.
-"""
+"""Encodes the entries of a ride block, as machine code, which takes 0.1 ms. As plain Python encode() takes 1.2 ms."""
 
 import micropython
 from micropython import const
@@ -26,6 +23,13 @@ _LOW_BITS = const(16)
 
 @micropython.viper
 def encode(entry: ptr32, state: ptr32, out: ptr8):  # noqa: F821 the names are viper's
+    """Append an entry to a buffer.
+
+    Args:
+        entry: array('i', FIELDS) of block.py.
+        state: the state of the coder, array('i', 22), which is updated.
+        out: the buffer.
+    """
     n = int(entry[0])
     before = int(state[0])
     pending = int(state[_PENDING])

@@ -21,27 +21,27 @@ class Recorder:
     """Records rides.
 
     Args:
-        keeper: the writer of the blocks, a RideRing (flash or SD card) or a RideStream (USB).
+        writer: the writer of the blocks, a RideFiles (flash or SD card) or a RideStream (USB).
         sample_hz: samples per second of the chip.
+        notices: list to which the reason is appended if a recording stops.
 
     Attributes:
         active: True while a ride is being recorded.
-        problem: None, or the reason why the recording stopped, a CardError or Notice. take_problem() clears it.
         stalled: True if interrupts were off for longer than _STALL_MS. During such a stall GPS bytes or wheel pulses
             may be lost. The caller calls the speed source's after_stall() and resets stalled to False.
     """
 
-    def __init__(self, keeper, sample_hz):
-        self.keeper = keeper
+    def __init__(self, writer, sample_hz, notices):
+        self._writer = writer
+        self._notices = notices
         self.active = False
-        self.problem = None
         self.stalled = False
         self._sample_hz = sample_hz
         self._block = self._spare = None  # two RideBlocks, which take 8 KB of heap; the first start() creates them
 
     def start(self, chip, calibration):
-        """End the current ride and begin a new one. Raises nothing. Afterwards `active` and `problem` show if a ride is
-        being recorded.
+        """End the current ride and begin a new one. Raises nothing. Afterwards `active` shows if a ride is being
+        recorded.
 
         A replay begins with a new filter. So the caller must restart the meter's filter too, or the replay's lean will
         differ.
@@ -56,11 +56,8 @@ class Recorder:
             if not self._spare:
                 period_us = 1_000_000 // self._sample_hz
                 self._block, self._spare = RideBlock(period_us), RideBlock(period_us)
-            self._ride = self.keeper.begin()
-        except CardError as error:
-            self._end(error)
-            return
-        except (OSError, MemoryError) as error:
+            self._ride = self._writer.begin()
+        except (CardError, OSError, MemoryError) as error:
             self._fail(error)
             return
         finally:
@@ -91,16 +88,11 @@ class Recorder:
             self.tick()
         if self.active:
             self.active = False
-            self.stalled = self.keeper.stops_interrupts
+            self.stalled = self._writer.stops_interrupts
             try:
-                self.keeper.end()
+                self._writer.end()
             except (OSError, MemoryError) as error:
                 self._fail(error)
-
-    def take_problem(self):
-        """Return problem and clear it."""
-        problem, self.problem = self.problem, None
-        return problem
 
     def mark_gap(self):
         """Mark a gap before the next samples, because the chip was set up again."""
@@ -160,20 +152,20 @@ class Recorder:
 
     def _note_stall(self, begun_ms):
         """Set stalled if the write since begun_ms was long enough to include an erase of the flash."""
-        if ticks_diff(ticks_ms(), begun_ms) > _STALL_MS and self.keeper.stops_interrupts:
+        if ticks_diff(ticks_ms(), begun_ms) > _STALL_MS and self._writer.stops_interrupts:
             self.stalled = True
 
     def _write(self, waiting):
         """Do one step of writing the block `waiting`."""
         try:
-            if not self.keeper.ready():
+            if not self._writer.ready():
                 return
             if self._at < waiting.length:
                 end = min(self._at + _PAGE, waiting.length)
-                self.keeper.write(memoryview(waiting.buffer)[self._at : end])
+                self._writer.write(memoryview(waiting.buffer)[self._at : end])
                 self._at = end
             else:
-                self.keeper.end_block()
+                self._writer.end_block()
                 self._bytes += waiting.length
                 self._waiting = None
         except (OSError, MemoryError) as error:
@@ -185,7 +177,7 @@ class Recorder:
 
     def room_s(self):
         """Return the number of seconds that can still be recorded, or None without a limit."""
-        room = self.keeper.room()
+        room = self._writer.room()
         if room is None:
             return None
         if not self._bytes:
@@ -194,7 +186,7 @@ class Recorder:
 
     def _begin_block(self):
         """Begin an empty block. The next passes of the app's loop fill the block."""
-        length, number = self.keeper.next_length(), (self._ride, self._sequence)
+        length, number = self._writer.next_length(), (self._ride, self._sequence)
         time_us = 1_000_000 * self._time_s + self._time_us
         self._block.begin(length, *number, time_us, self._chip, self._sample_hz, self._body)
         self._sequence += 1
@@ -209,11 +201,8 @@ class Recorder:
         self._waiting, self._at = self._spare, 0
 
     def _fail(self, error):
-        """End the ride after an error, which becomes `problem`. Unwritten blocks are lost."""
+        """End the ride after an error, and report it. Unwritten blocks are lost."""
         self.active = False
-        self.keeper.abandon()
-        self._end(Notice(self.keeper.fault_code(error), str(error)))
-
-    def _end(self, problem):
-        self.problem = problem
-        report(problem)
+        self._writer.abandon()
+        is_card = isinstance(error, CardError)
+        report(error if is_card else Notice(self._writer.fault_code(error), str(error)), self._notices)

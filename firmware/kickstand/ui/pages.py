@@ -1,12 +1,11 @@
 """The pages as two lines of 16 characters. A page is a function of the meter that returns two lines.
 
-page_ring.py lists the pages in the order of short presses.
+screen.py has the order of the pages.
 """
 
 from ..rotation import vector
-from . import messages
-from .messages import DEGREE
 
+DEGREE = "\xdf"  # code of the degree sign in the display's character ROM
 ARROW = "\x7e"  # code of an arrow in the display's character ROM
 RECORDING = "*"
 _BLOCK = 0xFF  # code of a full cell in the display's character ROM
@@ -15,7 +14,28 @@ _DEG_PER_COLUMN = 1.5  # degrees of lean per dot column; the bar ends at 60 degr
 
 FALLEN = ("Fallen over?", "Lean over 65" + DEGREE)
 
+# The words that are shown instead of the lean. The keys are values of LeanMeter.suppressed_reason while the alignment
+# is in doubt, and of LeanMeter.odd.
+NO_LEAN = {
+    "other-side": "side was wrong?",
+    "mount-moved": "mount has moved",
+    "turned": "SIDE or presses?",
+    "odd-left": "sensor odd: left",
+    "odd-up": "sensor odd: up",
+    "odd-pitch": "sensor odd: tilt",
+}
+
 _bar = bytearray(16)
+
+
+def words(notice):
+    """Return the two lines for a Notice or a Refusal. Without memory for the words, return its code."""
+    try:
+        from .messages import lines  # imported at the first notice, because it takes 4 KB of heap
+
+        return lines(notice)
+    except (ImportError, MemoryError):
+        return notice.code, ""
 
 
 def unsure(reason):
@@ -24,7 +44,7 @@ def unsure(reason):
     Args:
         reason: the code of the reason, or None.
     """
-    return "Lean  --", messages.NO_LEAN.get(reason, "not sure yet")
+    return "Lean  --", NO_LEAN.get(reason, "not sure yet")
 
 
 def lean_bar(lean_deg):
@@ -117,7 +137,7 @@ def raw(meter):
     return "%5.2f%5.2f%5.2fg" % tuple(force), rates
 
 
-def not_aligned(meter, seconds, todo="On stand: press"):
+def not_aligned(meter, seconds, todo):
     """The page before the alignment, with tilt and g in the sensor's own axes (Nicolae's figure 3).
 
     Args:
@@ -129,6 +149,41 @@ def not_aligned(meter, seconds, todo="On stand: press"):
     tilt = static_lean_deg(meter.smooth_force)
     hint = "Not aligned" if seconds % 4 < 2 else todo
     return "Raw %4d%s %+.2fg" % (round(tilt), DEGREE, meter.smooth_force[2]), hint
+
+
+def live(phone):
+    """The page with the receiver of the packets to a phone. phone: the Live."""
+    return phone.lines()
+
+
+def drive(background, now_ms):
+    """The page with the state, the progress and the result of alignment by driving.
+
+    Args:
+        background: a BackgroundAlignment.
+        now_ms: ticks_ms().
+    """
+    from ..drive_alignment import alignment
+
+    drive, state = background.drive, background.state
+    if drive.problem is not None:
+        return words(drive.problem)
+    if background.result and (drive.ready or not drive.counted):
+        return words(background.result)
+    if state == alignment.READY:
+        return "Ready:", "stop to save it"
+    if state == alignment.WAITING_FOR_SPEED:
+        fault = background.speed.source.fault(now_ms)
+        return words(fault) if fault else ("Align by drive", "waiting: speed")
+    waits = {
+        alignment.WAITING_FOR_STOP: "stop needed",
+        alignment.WAITING_FOR_BRAKING: "brake straight",
+        alignment.BRAKING: "braking...",
+        alignment.TURNING: "turn not counted",
+    }
+    if drive.counted < drive.needed:
+        return "Brakings %3d/%d" % (drive.counted, drive.needed), waits[state]
+    return "Brake%3d +-%4.1f%s" % (drive.counted, min(drive.quality_deg, 99.9), DEGREE), waits[state]
 
 
 def sensor_info(sensor, lost, meter, seconds):
@@ -150,7 +205,7 @@ def sensor_info(sensor, lost, meter, seconds):
     """
     if sensor.fault is not None:
         if seconds // 2 % 2 == 0:
-            return messages.lines(sensor.fault)
+            return words(sensor.fault)
         return "On its I2C bus:", " ".join(["%02x" % address for address in sensor.found]) or "nothing"
     chip, calibration = sensor.chip, meter.calibration
     line1 = "%-9s%5.1f%sC" % (chip.name[:9], chip.temperature_c(meter.reading[3]), DEGREE)

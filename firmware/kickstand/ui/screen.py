@@ -1,112 +1,166 @@
-"""A stack of views. The display shows the front view, and the front view gets the presses of the button.
+"""What the display shows, and what a press of the button does.
 
-A view has these attributes:
-* lines(now_ms) returns two lines of 16 characters, or None while the view has nothing to show.
-* press(event, now_ms) returns True if the view used the press.
-* name is the view's name for programs.
+The display shows the view in front. A notice is before all other views. Then follow a guided calibration, the menu, the
+information about the sensor, a fault of the sensor, a message of the alignment by driving, and the page.
+
+A page is a function in pages.py. To add a page called load, write pages.load, and add it to MOTORCYCLE or CAR.
+CONTRIBUTING.md has the other steps.
 """
 
 import gc
 from time import ticks_add, ticks_diff
 
 from ..board.button import LONG, SHORT
-from ..errors import attempt
+from ..errors import Notice, attempt
 from ..units import const
-from . import messages, pages
-from .page_ring import PageRing
+from . import pages
 
+MOTORCYCLE = (pages.lean, pages.maxima, pages.acceleration, pages.formula, pages.raw)
+CAR = (pages.acceleration, pages.cornering, pages.raw)
 _NOTICE_MS = const(2000)
-
-
-class NoticeView:
-    """Shows two lines for two seconds. A press ends the notice early and is passed to the view below.
-
-    Attributes:
-        code: the code of the Notice, or None.
-    """
-
-    name = "notice"
-
-    def __init__(self):
-        self._lines = self.code = None
-        self._until_ms = 0
-
-    def show(self, lines, now_ms, code=None):
-        """Show two lines for _NOTICE_MS."""
-        self._lines = lines
-        self.code = code
-        self._until_ms = ticks_add(now_ms, _NOTICE_MS)
-
-    def lines(self, now_ms):
-        if self._lines and ticks_diff(now_ms, self._until_ms) >= 0:
-            self._lines = None
-        return self._lines
-
-    def press(self, event, now_ms):
-        self._lines = None
-        return False
-
-
-class View:
-    """A view that consists of a name and two functions, lines and press."""
-
-    def __init__(self, name, lines, press):
-        self.name = name
-        self.lines = lines
-        self.press = press
+_MENU_MS = const(20_000)  # time without a press after which the menu closes
 
 
 class Screen:
-    """The views of the device.
+    """The views of an App.
 
-    Args:
-        settings: a Settings.
-        sensor: the Sensor.
-        clock: the SampleClock.
-        meter: the LeanMeter.
-        calibration: the ActiveCalibration.
-        drive: the BackgroundAlignment, or None.
-        rides: the Recording, which the menu can start and stop.
+    tick() follows what has happened, lines() reads what to show.
 
     Attributes:
+        view: the name of the view in front: "notice", "align", "six", "menu", "info", "fault", "question", or the name
+            of a page, which is "own" for a page of the board's owner.
+        notice: the Notice that is shown, or None. It disappears after two seconds, or with a press.
         wizard: the current AlignWizard or SixWizard, which takes every sample, or None.
-        menu: the open Menu, or None.
-        pages: the PageRing.
-        front: the view that the display shows.
+        entry: the name of the menu's entry that is shown, or None.
     """
 
-    def __init__(self, settings, sensor, clock, meter, calibration, drive, rides):
-        self._settings = settings
-        self._sensor = sensor
-        self._meter = meter
-        self._calibration = calibration
-        self._drive = drive
-        self._rides = rides
-        self.wizard = None
-        self.menu = None
-        self._notice = NoticeView()
-        # the view with the reason why readings are missing
-        self._fault = View(
-            "fault", lambda now_ms: sensor.fault and messages.lines(sensor.fault), lambda event, now_ms: False
-        )
-        self._clock = clock
-        self._info_open = False
-        self._info = View("info", self._info_lines, self._press_info)
-        # the view with a report of alignment by driving, or a question to the rider
-        self._question = View(
-            "question", lambda now_ms: drive and drive.message and messages.lines(drive.message), self._press_question
-        )
-        self.pages = PageRing(settings.leans, meter, calibration, drive, rides, self._align_now)
-        self.front = self.pages
+    def __init__(self, app):
+        self._app = app
+        self._pages = MOTORCYCLE if app.settings.leans else CAR
+        self._at = 0  # index of the page in the ring
+        self._menu = None  # the entries of the open menu, the shown entry first
+        self._info = False  # True while the information about the sensor is open
+        self.notice = self.wizard = None
+        self._glance = None  # the module glance, or False if it cannot be loaded
+        self._update()
+
+    @property
+    def entry(self):
+        return self._menu[0][0] if self._menu else None
+
+    def tick(self, now_ms):
+        """Drop what has ended, and take the next notice. Call this method about every 100 ms, before lines()."""
+        app = self._app
+        if self.notice and ticks_diff(now_ms, self._notice_ms) >= 0:
+            self.notice = None
+        if app.notices and not self.notice:
+            self.notice, self._notice_ms = app.notices.pop(0), ticks_add(now_ms, _NOTICE_MS)
+        if self.wizard:
+            self.wizard.tick(now_ms)
+            if self.wizard.ended:
+                self.wizard = None
+        if self._menu and ticks_diff(now_ms, self._menu_ms) >= 0:
+            self._menu = None
+        self._update()
+        if self.view == "question":
+            self._at = 0  # the page that is shown after the rider's answer
+
+    def _update(self):
+        """Find the view in front."""
+        app = self._app
+        ring = self._ring()
+        self._at %= len(ring)
+        self._page = page = ring[self._at]
+        if self.notice:
+            self.view = "notice"
+        elif self.wizard:
+            self.view = self.wizard.name
+        elif self._menu:
+            self.view = "menu"
+        elif self._info:
+            self.view = "info"
+        elif app.sensor.fault is not None:
+            self.view = "fault"
+        elif app.drive and app.drive.message:
+            self.view = "question"
+        else:
+            self.view = "own" if app.user and page in app.user.pages else page.__name__
+
+    def _ring(self):
+        """Return the pages in the order of short presses: functions of pages.py, then the owner's functions."""
+        app = self._app
+        ring = (pages.drive,) if app.drive and app.drive.shown else ()
+        if app.calibration.aligned:
+            ring = self._pages + ring
+            if app.live:
+                ring += (pages.live,)
+            if app.rides.recorder.active:
+                ring += (pages.recording,)
+        else:
+            ring += (pages.not_aligned,)
+        return ring + tuple(app.user.pages) if app.user else ring
 
     def lines(self, now_ms):
-        """Return the content of the display: two lines and, for a display that draws, a picture. Call this method about
-        every 100 ms."""
-        self.front, lines = self._update_front(now_ms)
-        return lines
+        """Return the content of the display: two lines and, for a display that draws, a picture."""
+        app, view = self._app, self.view
+        if view == "notice":
+            return pages.words(self.notice)
+        if self.wizard:
+            return self.wizard.lines
+        if view == "menu":
+            count = len(self._menu)
+            return pages.ARROW + self.entry, "next %d/%d hold=ok" % (count - self._menu.index(_LEAVE), count)
+        if view == "info":
+            return pages.sensor_info(app.sensor, app.clock.lost, app.meter, now_ms // 1000)
+        if view == "fault":
+            return pages.words(app.sensor.fault)
+        if view == "question":
+            return pages.words(app.drive.message)
+        page = self._page
+        if view == "own":
+            return page()
+        if page is pages.drive:
+            return page(app.drive, now_ms)
+        if page is pages.live:
+            return page(app.live)
+        if page is pages.recording:
+            return page(app.rides.recorder)
+        if page is pages.not_aligned:
+            return page(
+                app.meter, now_ms // 1000, "drive and brake" if pages.drive in self._ring() else "On stand: press"
+            )
+        return self._readings(page)
+
+    def _readings(self, page):
+        """Return the lines of a page with readings, and its picture."""
+        app, meter, glance = self._app, self._app.meter, self._pictures()
+        if meter.fallen:
+            return pages.FALLEN
+        if meter.shown_deg(app.late) is None:
+            lines = pages.unsure(meter.suppressed_reason or meter.odd)
+            return lines + (glance.unsure(*lines),) if glance else lines
+        line1, line2 = page(meter)
+        recording = page is self._pages[0] and app.rides.recorder.active
+        if recording:
+            line1 = pages.recorded(line1)
+        if glance and page in glance.PICTURES:
+            return line1, line2, glance.PICTURES[page](meter, recording)
+        return line1, line2
+
+    def _pictures(self):
+        """Return the module glance if the display draws and the module can be loaded, else None."""
+        if self._app.lcd.draws and self._glance is None:
+            self._glance = False
+            attempt(self._load)
+        return self._app.lcd.draws and self._glance
+
+    def _load(self):
+        from . import glance
+
+        self._glance = glance
 
     def press(self, event, now_ms):
-        """React to a press. A long press that the front view does not use opens the menu.
+        """React to a press.
 
         If the press needs missing modules or too much memory, the rider gets a notice and the ride continues.
 
@@ -114,141 +168,115 @@ class Screen:
             event: SHORT or LONG.
             now_ms: ticks_ms().
         """
-        problem = attempt(self._press, event, now_ms)
-        if problem:
-            self.notify(problem, now_ms)
-
-    def notify(self, notice, now_ms):
-        """Show a Notice for two seconds."""
-        self._notice.show(messages.lines(notice), now_ms, notice.code)
+        self.tick(now_ms)
+        notice = attempt(self._press, event, now_ms)
+        if notice:
+            self._app.notices.append(notice)
+        self.tick(now_ms)
 
     def _press(self, event, now_ms):
-        view = self._update_front(now_ms)[0]
-        if view is self._notice:  # the press ends the notice and is passed to the view below
-            self._notice.press(event, now_ms)
-            view = self._update_front(now_ms)[0]
-            if view is self._question:  # the rider has not seen the question yet, so the press is not its answer
+        if self.notice:  # the press ends the notice and is for the view below
+            self.notice = None
+            self._update()
+            if self.view == "question":  # the rider has not seen the question yet, so the press is not its answer
                 return
-        if not view.press(event, now_ms) and event == LONG:
-            self._open_menu(now_ms)
-        self._drop_ended()
+        if self.wizard:
+            self.wizard.press(event)
+        elif self._menu:
+            self._press_menu(event, now_ms)
+        elif self.view == "question":
+            self._app.drive.answer(event == LONG)
+        elif event == LONG:
+            self._menu, self._menu_ms = self._entries(), ticks_add(now_ms, _MENU_MS)
+        elif self._info:
+            self._info = False
+        elif self.view == "not_aligned" and not self._at:
+            self._align(True)  # the press means that the bike is on its kickstand
+        elif self.view != "fault":
+            self._at += 1
 
-    def _info_lines(self, now_ms):
-        """Return the lines about the sensor until a short press closes them."""
-        if not self._info_open:
-            return None
-        return pages.sensor_info(self._sensor, self._clock.lost, self._meter, now_ms // 1000)
-
-    def _show_info(self, now_ms):
-        self._info_open = True
-
-    def _press_info(self, event, now_ms):
-        self._info_open = event != SHORT
-        return event == SHORT
-
-    def _press_question(self, event, now_ms):
-        self._drive.answer(event == LONG)
-        return True
-
-    def interrupt(self, now_ms):
-        """Cancel the current calibration because the sensor has failed, unless the wizard can continue."""
-        if self.wizard and not self.wizard.bears(self._sensor.fault, now_ms):
-            self.wizard = None
-            self._notice.show(("Calibration", "stopped: fault"), now_ms, "stopped")
-
-    def _update_front(self, now_ms):
-        """Find the front view, the first view in this method's order that has something to show.
-
-        Also drop a wizard or menu that has ended, and go back to the first page when a question is shown.
-
-        Returns:
-            view: the front view.
-            lines: its lines.
-        """
-        for view in (self._notice, self.wizard, self.menu, self._info, self._fault, self._question, self.pages):
-            lines = view.lines(now_ms) if view else None
-            if lines:
-                break
-        self._drop_ended()
-        if view is self._question:
-            self.pages.first()  # go to the first page, which is shown after the rider's answer
-        return view, lines
-
-    def _drop_ended(self):
-        """Drop a wizard or a menu that has ended."""
-        if self.wizard and self.wizard.ended:
-            self.wizard = None
-        if self.menu and self.menu.ended:
-            self.menu = None
-
-    def _open_menu(self, now_ms):
-        from .menu import Menu  # imported at the first long press
-
-        self.menu = Menu(self._entries(), now_ms)
+    def _press_menu(self, event, now_ms):
+        if event == SHORT:
+            self._menu = self._menu[1:] + self._menu[:1]
+            self._menu_ms = ticks_add(now_ms, _MENU_MS)
+            return
+        _, function, needs_readings = self._menu[0]
+        self._menu = None
+        fault = self._app.sensor.fault
+        if needs_readings and fault is not None:
+            self._app.notices.append(fault)
+        elif function:
+            function()
 
     def _entries(self):
-        """Return the entries of the menu as a tuple of (name, function), see Menu."""
-        align = (("Align the bike", self._align),)
-        drive = (("Align by drive", self._align_by_drive),) if self._drive else ()
-        rest = (("Six positions", self._six), ("Reset maxima", self._reset), ("Sensor info", self._show_info))
-        record = ("Stop recording", self._stop) if self._rides.recorder.active else ("Record ride", self._record)
-        last = (record,) + ((("Own pages", self.pages.show_own),) if self.pages.own else ())
-        last += (("Stop Bluetooth", self.pages.live.stop),) if self.pages.live else ()
-        if self._settings.leans:
-            return align + rest + drive + last
-        return drive + rest + last
+        """Return the entries of the menu as a tuple of (name, function, True if it needs readings). A name has at most
+        15 characters."""
+        app = self._app
+        entries = (("Align the bike", self._align, True),) if app.settings.leans else ()
+        drive = (("Align by drive", self._align_by_drive, True),) if app.drive else ()
+        rest = (
+            ("Six positions", self._six, True),
+            ("Reset maxima", self._reset, False),
+            ("Sensor info", self._show_info, False),
+        )
+        entries += rest + drive if app.settings.leans else drive + rest
+        active = app.rides.recorder.active
+        entries += (("Stop recording", self._stop, False) if active else ("Record ride", self._record, True),)
+        if app.user and app.user.pages:
+            entries += (("Own pages", self._show_own, False),)
+        if app.live:
+            entries += (("Stop Bluetooth", app.live.stop, False),)
+        return entries + (_LEAVE,)
 
-    def _ready(self, now_ms):
-        """Return True if there are readings. If not, show a notice with the reason."""
-        fault = self._sensor.fault
-        if fault is not None:
-            self.notify(fault, now_ms)
-        return fault is None
-
-    def _align(self, now_ms):
-        if self._ready(now_ms):
-            self._begin_align(False)
-
-    def _align_now(self):
-        """Start the AlignWizard with the kickstand pose, because the rider has just pressed the button for it."""
-        self._begin_align(True)
+    def interrupt(self):
+        """Cancel the guided calibration because the sensor has failed, unless the wizard can continue."""
+        if self.wizard and not self.wizard.bears(self._app.sensor.fault):
+            self.wizard = None
+            self._app.notices.append(Notice("stopped"))
 
     # The wizards are imported only when needed, because with their own imports they take 12 KB of heap. Garbage is
     # collected before the import. Without this collection the new modules, which stay loaded, would be placed at the
     # far end of the heap and make each later collection longer.
 
-    def _begin_align(self, pressed):
+    def _align(self, pressed=False):
         gc.collect()
-        from .align_wizard import AlignWizard
+        from .wizard import AlignWizard
 
-        self.pages.first()
-        settings = self._settings
-        self.wizard = AlignWizard(self._sensor.chip, settings.SAMPLE_HZ, self._calibration, settings.SIDE, pressed)
+        self._at = 0
+        settings, calibration = self._app.settings, self._app.calibration
+        chip, rate_hz = self._app.sensor.chip, settings.SAMPLE_HZ
+        self.wizard = AlignWizard(chip, rate_hz, calibration, settings.SIDE, pressed)
 
-    def _six(self, now_ms):
-        if self._ready(now_ms):
-            gc.collect()
-            from .six_wizard import SixWizard
+    def _six(self):
+        gc.collect()
+        from .six_wizard import SixWizard
 
-            self.wizard = SixWizard(self._sensor.chip, self._settings.SAMPLE_HZ, self._calibration)
+        app = self._app
+        self.wizard = SixWizard(app.sensor.chip, app.settings.SAMPLE_HZ, app.calibration)
 
-    def _reset(self, now_ms):
-        self._meter.reset_maxima()
-        self._notice.show(("Maxima reset", ""), now_ms)
+    def _reset(self):
+        self._app.meter.reset_maxima()
+        self._app.notices.append(Notice("maxima-reset"))
 
-    def _align_by_drive(self, now_ms):
-        if self._ready(now_ms):
-            self._drive.ask()
-            self.pages.drive()
+    def _show_info(self):
+        self._info = True
 
-    def _record(self, now_ms):
-        if self._ready(now_ms):
-            problem = self._rides.start()
-            if problem:
-                self.notify(problem, now_ms)
-            elif self._rides.recorder.active:
-                self._notice.show(pages.recording(self._rides.recorder), now_ms)
+    def _show_own(self):
+        self._at = self._ring().index(self._app.user.pages[0])
 
-    def _stop(self, now_ms):
-        self._rides.stop()
-        self._notice.show(("Recording ended", ""), now_ms)
+    def _align_by_drive(self):
+        self._app.drive.ask()
+        self._at = self._ring().index(pages.drive)
+
+    def _record(self):
+        rides = self._app.rides
+        rides.start()
+        if rides.recorder.active:
+            self._app.notices.append(Notice("recording", *pages.recording(rides.recorder)))
+
+    def _stop(self):
+        self._app.rides.stop()
+        self._app.notices.append(Notice("recording-ended"))
+
+
+_LEAVE = ("Leave menu", None, False)

@@ -1,73 +1,70 @@
-"""The base of both wizards, a view that takes one pose after another.
+"""The guided calibrations: takes one pose after another, and computes and saves the result.
+
+The flow of a guided calibration is a generator. The generator waits by `yield`, and is continued with an event: the
+counts of a sample while a pose is taken, True for a press, and None in each pass of the app's loop.
 
 Between two poses the wizard integrates the gyro's rates. The result must agree with the turn that gravity shows between
-the two poses."""
+the two poses.
+"""
 
-from time import ticks_add, ticks_diff
+from time import ticks_add, ticks_diff, ticks_ms
 
 from ..board.button import LONG
-from ..calibration.pose_taker import DONE, SETTLED, PoseTaker
+from ..calibration.still_pose import StillPose
 from ..calibration.turn import Turn
 from ..errors import CaptureError, GyroError, Refusal, SickSensor, report
 from ..units import const
-from . import messages
+from .messages import lines
+from .pages import DEGREE, progress_bar
 
-# The states of a wizard
-ASKING = 0  # waiting for the press that begins a pose
-TAKING = 1  # each sample goes to the PoseTaker
-NOTICE = 2  # shows a notice for a moment, then asks for the next pose
-_REFUSED = const(3)  # shows the reason until a press, then starts again
-RESULT = 4  # shows the result for some seconds, then ends
-_ENDED = const(5)
-COMPUTING = 6  # computes one step in each pass of the main loop
+_SETTLE_MS = const(500)  # time for which the sensor must be still before a pose
+_GIVE_UP_MS = const(10_000)  # longest time to wait until the sensor is still
+_RESULT_MS = const(4000)
+# time after the kickstand pose for which the gyro's bias from this pose is valid; later the bias may drift
+_FRESH_MS = const(90_000)
+
+# The steps of a wizard
+ASK = "ask"  # waits for the press that begins a pose
+TAKE = "take"  # gets each sample
+NOTICE = "notice"  # shows a notice for a moment, then asks for the next pose
+REFUSED = "refused"  # shows the reason until a press, then starts again
+RESULT = "result"  # shows the result for some seconds, then ends
+COMPUTE = "compute"  # computes one step in each pass of the loop
 
 
 class Wizard:
-    """A view (see screen.py) that also takes each sample until it has ended.
+    """A guided calibration, a view of Screen.
 
-    A subclass defines which poses it asks for and how it uses them. A subclass may also set POSE_SECONDS, the duration
-    of a pose.
+    A subclass has the flow, the generator _flow(). It may raise a Refusal, which is shown until a press.
 
     Args:
-        chip, rate_hz: as for PoseTaker.
+        chip: an Mpu6050.
+        rate_hz: samples per second.
         calibration: the ActiveCalibration.
 
     Attributes:
-        state: one of the states above.
-        problem: the Refusal that is shown, or None.
+        lines: the two lines to show.
+        step: one of the steps above.
+        notice: the Refusal that is shown, or None.
+        ended: True after the end of the wizard.
     """
 
-    POSE_SECONDS = 2
+    SECONDS = 2  # duration of a pose
 
     def __init__(self, chip, rate_hz, calibration):
-        self._taker = PoseTaker(chip, rate_hz, self.POSE_SECONDS)
-        self._turn = Turn(chip.gyro_lsb_per_dps, 1_000_000 // rate_hz)
+        self._chip = chip
+        self._rate_hz = rate_hz
         self._calibration = calibration
-        self._start()
+        self._turn = Turn(chip.gyro_lsb_per_dps, 1_000_000 // rate_hz)
+        self._averaging = self.ended = False
+        self._now_ms = ticks_ms()
+        self._flows = self._repeat()
+        self._go()
 
-    @property
-    def ended(self):
-        """True after the end of the wizard."""
-        return self.state == _ENDED
-
-    def sample(self, counts, now_ms):
+    def sample(self, counts):
         """Take one sample of 7 counts, in the chip's order."""
-        if self.state != TAKING:
-            return
-        try:
-            step = self._taker.step(counts)
-            if step == SETTLED:
-                self._settled(self._taker.settled, now_ms)
-            elif step == DONE:
-                self._pose_done(self._taker.pose, now_ms)
-            else:
-                self._progress(*self._taker.progress())
-        except CaptureError as problem:
-            if isinstance(problem, SickSensor):
-                report(problem)
-            self._spoilt(problem, now_ms)
-        except Refusal as problem:
-            self._refuse(problem)
+        if self.step == TAKE:
+            self._go(counts)
 
     def follow(self, sums, n, dt_us, now_ms):
         """Take the sums of the samples that sample() has just taken.
@@ -78,91 +75,171 @@ class Wizard:
             dt_us: microseconds since the previous samples.
             now_ms: ticks_ms().
         """
-        self._turn.add(sums, n, dt_us, self.state == TAKING and self._taker.averaging)
+        self._turn.add(sums, n, dt_us, self._averaging)
+        self.tick(now_ms)
+
+    def tick(self, now_ms):
+        """Continue after some time. now_ms: ticks_ms()."""
+        self._now_ms = now_ms
+        self._go()
+
+    def press(self, event):
+        """React to a press. A long press cancels the wizard."""
+        if event == LONG or self.step == RESULT:
+            self.ended = True
+        elif self.step in (ASK, REFUSED):
+            self._go(True)
+
+    def bears(self, fault):
+        """Return True if the wizard continues despite a fault of the sensor. fault: a Notice."""
+        return False
+
+    def _go(self, event=None):
+        if not self.ended:
+            try:
+                self._flows.send(event)
+            except StopIteration:
+                self.ended = True
+
+    def _repeat(self):
+        """Run the flow, again after each refusal."""
+        while True:
+            try:
+                yield from self._flow()
+                return
+            except Refusal as error:
+                refusal = error
+            self._turn.running = False
+            yield from self._ask(words(refusal), REFUSED, refusal)
+
+    def _show(self, step, lines, notice=None):
+        self.step, self.lines, self.notice = step, lines, notice
+
+    def _ask(self, lines, step=ASK, notice=None):
+        """Show two lines until a press."""
+        self._show(step, lines, notice)
+        while not (yield):
+            pass
+
+    def _show_for(self, ms, step, lines):
+        """Show two lines for the given time."""
+        self._show(step, lines)
+        until_ms = ticks_add(self._now_ms, ms)
+        while ticks_diff(self._now_ms, until_ms) < 0:
+            yield
+
+    def _settle(self, lines, restless):
+        """Wait until the sensor is still.
+
+        Args:
+            lines: the two lines to show.
+            restless: the second line after more time than a sensor at rest would need.
+
+        Returns:
+            The mean reading of the accelerometer in _SETTLE_MS, 3 values in g.
+
+        Raises:
+            CaptureError: the sensor is not still within _GIVE_UP_MS.
+        """
+        self._show(TAKE, lines)
+        expected, waited = self._rate_hz * _SETTLE_MS // 1000, 0
+        pose = self._pose(expected)
+        while True:
+            counts = yield
+            if counts is None:
+                continue
+            waited += 1
+            if waited > 2 * expected:
+                self.lines = lines[0], restless
+            try:
+                pose.add(counts)
+                if pose.count == expected:
+                    pose.finish()
+                    return pose.accel
+            except CaptureError:
+                if waited >= self._rate_hz * _GIVE_UP_MS // 1000:
+                    raise
+                pose = self._pose(expected)
+
+    def _average(self, title):
+        """Take a pose while the sensor is still. Return the StillPose. Raises CaptureError.
+
+        title: the first line. The second line has a bar."""
+        total = self._rate_hz * self.SECONDS
+        pose = self._pose(total)
+        self._averaging = True
         try:
-            self._followed(now_ms)
-        except Refusal as problem:
-            self._refuse(problem)
+            while pose.count < total:
+                counts = yield
+                if counts is not None:
+                    pose.add(counts)
+                    self.lines = title, progress_bar(pose.count, total)
+            pose.finish()
+            return pose
+        finally:
+            self._averaging = False
 
-    def bears(self, fault, now_ms):
-        """Return True if the wizard continues despite a fault of the sensor.
+    def _pose(self, expected):
+        chip = self._chip
+        return StillPose(chip.accel_lsb_per_g, chip.gyro_lsb_per_dps, chip.saturated, expected)
 
-        By default the wizard continues only without a fault.
 
-        Args:
-            fault: a Notice, or None without a fault.
-            now_ms: ticks_ms().
-        """
-        return fault is None
+def words(refusal):
+    """Return the lines for a Refusal. A fault of the sensor is also printed, because its remedy is too long for the
+    display."""
+    if isinstance(refusal, (GyroError, SickSensor)):
+        report(refusal)
+    return lines(refusal)
 
-    def _refuse(self, problem):
-        """Show the reason of a refusal until a press. A fault of the gyro is also printed, because its remedy is too
-        long for the display."""
-        if isinstance(problem, GyroError):
-            report(problem)
-        self._turn.running = False
-        self._show(_REFUSED, messages.lines(problem), problem)
 
-    def _followed(self, now_ms):
-        """Do the work of one pass of the main loop. May raise a Refusal, which is shown."""
+class AlignWizard(Wizard):
+    """Aligns the sensor by two poses. The first pose is on the kickstand, the second is upright.
 
-    def _start(self):
-        """Ask for the first pose."""
+    Args:
+        chip, rate_hz, calibration: as for Wizard.
+        side: "left" or "right", the side to which the kickstand leans the bike.
+        pressed: True if the rider has already pressed the button for the kickstand pose.
 
-    def _next_pose(self):
-        """Begin the next pose."""
+    Attributes:
+        upright: True after the kickstand pose, when the upright pose is next.
+    """
 
-    def _settled(self, accel, now_ms):
-        """React when the sensor has been still for half a second.
+    name = "align"
+    SECONDS = 3
 
-        Args:
-            accel: mean reading of the accelerometer in this time, 3 values in g.
-            now_ms: ticks_ms().
-        """
+    def __init__(self, chip, rate_hz, calibration, side, pressed=False):
+        self._side = side
+        self._pressed = pressed
+        super().__init__(chip, rate_hz, calibration)
 
-    def _progress(self, done, total):
-        """Show that `done` of `total` samples of the pose are taken."""
+    def _flow(self):
+        from ..calibration.two_position import WARN_TILT_DEG, align, check_turn
 
-    def _spoilt(self, problem, now_ms):
-        """React when the pose was rejected.
+        self.upright = False
+        if not self._pressed:
+            yield from self._ask(("On the stand,", "press button"))
+        self._pressed = False
+        stand = yield from self._take("Stand: hold")
+        stand_ms = self._now_ms
+        self._turn.start(stand.gyro)
+        self.upright = True
+        yield from self._ask(("Now upright:", "hold it, press"))
+        upright = yield from self._take("Upright: hold")
+        current = self._calibration.value
+        new, tilt = align(current, stand, upright, self._side)
+        self._turn.end()
+        check_turn(current, stand, upright, self._turn)
+        self._calibration.save(new, 0 <= ticks_diff(self._now_ms, stand_ms) < _FRESH_MS)
+        advice = "Little, 8%s best" % DEGREE if tilt < WARN_TILT_DEG else "Ride safely"
+        yield from self._show_for(_RESULT_MS, RESULT, ("Aligned! %5.1f%s" % (tilt, DEGREE), advice))
 
-        Args:
-            problem: a CaptureError.
-            now_ms: ticks_ms().
-        """
-
-    def _pose_done(self, pose, now_ms):
-        """Use a complete StillPose. May raise a Refusal, which is shown."""
-
-    def lines(self, now_ms):
-        if self.state in (NOTICE, RESULT) and ticks_diff(now_ms, self._until_ms) >= 0:
-            if self.state == NOTICE:
-                self._next_pose()
-            else:
-                self.state = _ENDED
-        return None if self.ended else self._lines
-
-    def press(self, event, now_ms):
-        if event == LONG or self.state == RESULT:
-            self.state = _ENDED
-        elif self.state == ASKING:
-            self._next_pose()
-        elif self.state == _REFUSED:
-            self._start()
-        return True
-
-    def _show(self, state, lines, problem=None):
-        """Enter a state and show two lines."""
-        self.problem = problem
-        self.state = state
-        self._lines = lines
-
-    def _show_for(self, ms, state, now_ms, *lines):
-        """Enter NOTICE or RESULT for the given time, and show two lines."""
-        self._until_ms = ticks_add(now_ms, ms)
-        self._show(state, lines)
-
-    def _begin_pose(self, *lines):
-        """Wait until the sensor is still, then take a pose."""
-        self._taker.restart()
-        self._show(TAKING, lines)
+    def _take(self, title):
+        """Take a pose. If it is refused, take it again after a press. Return the StillPose."""
+        while True:
+            try:
+                yield from self._settle((title, ""), "not still yet")
+                self.lines = title, ""
+                return (yield from self._average(title))
+            except CaptureError as error:
+                refusal = error
+            yield from self._ask(words(refusal), ASK, refusal)

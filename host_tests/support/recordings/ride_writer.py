@@ -21,14 +21,14 @@ CHIP = types.SimpleNamespace(
 )
 
 
-def calibration(trim_deg=0.0):
+def calibration(trim_deg=0.0, aligned=True):
     """Return a plausible calibration in which no value is the default."""
     new = Calibration()
     new.set_accel((0.01, -0.02, 0.03), (1.01, 0.99, 1.0))
     new.gyro_bias[1] = 1.5
     for i, value in enumerate((0, 1, 0, 0, 0, 1, 1, 0, 0)):
         new.vehicle_from_sensor[i] = value
-    new.six_done = new.aligned = True
+    new.six_done, new.aligned = True, aligned
     new.trim_deg = trim_deg
     return new
 
@@ -59,16 +59,16 @@ def place(k):
     return array("i", (date, day_ms, -203_212_345 + 7 * k, -1_079_999_999 + 11 * k))
 
 
-def blocks(count, ride=1, length=block_length, trim_deg=0.0, speed=False, places_every=0):
+def blocks(count, ride=1, length=block_length, speed=False, places_every=0, passes=turns, **calibrated):
     """Return `count` full blocks, and the passes of the loop that they contain, each as (six sums, n, dt_us).
 
     speed: True for a speed in every hundredth pass. places_every: number of passes between two positions, 0 for no
-    positions.
+    positions. passes(count, seed): the passes, see turns(). calibrated: arguments of calibration().
     """
     block = RideBlock(5000)
-    body = pack(CHIP.who_am_i, CHIP.accel_range_g, calibration(trim_deg))
+    body = pack(CHIP.who_am_i, CHIP.accel_range_g, calibration(**calibrated))
     written, pending = [], []
-    source, time_us = turns(1_000_000, seed=ride), 2_000_000
+    source, time_us = passes(1_000_000, seed=ride), 2_000_000
     for index in range(count):
         block.begin(length(index), ride, index, time_us, CHIP, 200, body)
         while not block.full():

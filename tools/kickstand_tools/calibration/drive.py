@@ -6,8 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from kickstand.drive_alignment import verdict
-from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE, DriveAlignment
+from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE, DriveAlignment, compare, yaw_deg
 from kickstand.errors import AlignmentError
 
 from ..checks.log import read_with_notices
@@ -35,7 +34,7 @@ UP_DEG = 1.1
 class PoseCheck:
     """The alignment from two poses, compared with the drive.
 
-    verdict: a constant of kickstand.drive_alignment.verdict.
+    verdict: a constant of kickstand.drive_alignment.alignment.
     yaw_deg: yaw error of the alignment from the poses.
     """
 
@@ -175,7 +174,7 @@ def fit_logs(
     pose_check = None
     if improved and up is not None and not refusal:
         posed = earlier.vehicle_from_sensor.ravel().tolist()
-        pose_check = PoseCheck(verdict.compare(improved, posed), verdict.yaw_deg(improved.quality.fit, posed))
+        pose_check = PoseCheck(compare(improved, posed), yaw_deg(improved.quality.fit, posed))
     return DriveFit(
         result,
         kind,

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 from kickstand.drive_alignment.alignment import STALE_US, DriveAlignment
-from kickstand.drive_alignment.history import BIN_US
+from kickstand.drive_alignment.events import BIN_US
 from kickstand.drive_alignment.vertical import MOVED_MPS, StandingVertical
 from kickstand.units import GAP_US
 

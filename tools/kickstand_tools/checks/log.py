@@ -10,7 +10,7 @@ force only. These effects can make the change of speed seem too small, but never
 from dataclasses import dataclass, field
 
 import numpy as np
-from kickstand.drive_alignment.speed_check import speed_unit_problem
+from kickstand.drive_alignment.quality import speed_unit_problem
 from kickstand.units import STANDARD_GRAVITY
 
 from ..common.errors import InputError, RefusedInput

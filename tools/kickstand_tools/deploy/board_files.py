@@ -38,7 +38,7 @@ if any("/" + entry[0] == "{RIDES}" for entry in os.ilistdir("/")) and list(os.il
 s = os.statvfs("/")
 print((s[0], s[3]))
 """
-_RIDES = "/rides"  # folder of the rides in flash, see kickstand.rides.flash_ring.directory()
+_RIDES = "/rides"  # folder of the rides in flash, see kickstand.rides.ride_files.directory()
 
 Fingerprint = tuple[int, bytes]
 

@@ -57,17 +57,13 @@ def board(parts):
     """
     import sys
 
-    from kickstand.calibration.transform import products, products_python
-    from kickstand.imu.fifo_frames import add_up, add_up_python, decode, decode_python
-    from kickstand.rides.block import encode, encode_python
+    from kickstand import facts
 
-    pairs = (decode, decode_python), (add_up, add_up_python), (products, products_python), (encode, encode_python)
     has_it = sys.platform in ("rp2", "esp32")  # the firmware uses machine code only on these boards
-    slow = ", ".join([plain.__name__ for used, plain in pairs if has_it and used is plain])
     chosen = parts.settings
     words = f"{chosen.SAMPLE_HZ} Hz, {chosen.ACCEL_RANGE_G} g, {chosen.GYRO_RANGE_DPS} deg/s, low-pass {chosen.DLPF}"
-    release = ".".join([str(n) for n in sys.implementation.version[:3]])
-    return parts.version, getattr(sys.implementation, "_machine", sys.platform), release, words, slow
+    version, name, release = facts.board()
+    return version, name, release, words, facts.slow_functions() if has_it else ""
 
 
 def button(parts, wait_ms):
@@ -366,9 +362,7 @@ def display(parts, rounds):
     """
     from time import sleep_ms
 
-    from kickstand.console import sentence
-    from kickstand.devices import open_bus
-    from kickstand.diagnosis import scan
+    from kickstand import facts
 
     lcd, chosen = parts.lcd, parts.settings
     there, address, draws = 0, 0, False
@@ -378,36 +372,22 @@ def display(parts, rounds):
             there += 1
             address, draws = lcd.address, lcd.draws
         sleep_ms(20)
-    words = ""
-    if not there:
-        hz = chosen.LCD_BUS_HZ or 100_000
-        notice, _ = scan(chosen.LCD_SDA, chosen.LCD_SCL, lambda: open_bus(chosen, "LCD", hz), chosen.LCD_ADDRESSES)
-        words = sentence(notice) if notice else ""
+    words = "" if there else facts.bus(chosen, "LCD", chosen.LCD_ADDRESSES)[3]
     return address, draws, there, rounds, words
 
 
 def speed(parts):
-    """Listen to the speed source for four seconds.
+    """Listen to the speed source.
 
     Returns:
         The setting SPEED, or an empty text.
         The fault in words, or an empty text.
         The speed in m/s, or -1 without a speed.
     """
-    from time import sleep_ms, ticks_ms
+    from kickstand import facts
 
-    if parts.settings.SPEED is None:
-        return "", "", -1
-    from kickstand.speed.source import open_speed
-    from kickstand.ui.messages import lines
-
-    source, heard = open_speed(parts.settings), -1
-    for _ in range(400):
-        new = source.poll(ticks_ms())
-        heard = heard if new is None else new
-        sleep_ms(10)
-    fault = source.source.fault(ticks_ms())
-    return parts.settings.SPEED, ", ".join(lines(fault)) if fault else "", heard
+    source, fault, mps = facts.speed(parts.settings)
+    return source, ", ".join(fault), mps
 
 
 def loop(parts, seconds):

@@ -16,6 +16,7 @@ from serial.tools import list_ports
 
 from ..common.errors import InputError, cause
 from ..common.messages import Message, Remedy
+from . import status_words
 
 # A function that is called with the current action, the number of finished bytes and the number of all bytes
 Progress = Callable[[str, int, int], None]
@@ -144,7 +145,7 @@ class _EmulatedBoard(ConnectedBoard):
     slower = _SLOWER
 
 
-# Prints what the running app noticed, which a soft reset removes: see kickstand.status_report.noticed
+# Prints what the running app noticed, which a soft reset removes: see App and lean/consistency.py of the firmware
 _NOTICED = """
 import sys
 app, judge = [sys.modules.get("kickstand." + name) for name in ("app", "lean.consistency")]
@@ -152,6 +153,22 @@ worst = app and app.worst
 if worst:
     worst = worst[0], worst[1], (tuple(worst[2][0]), worst[2][1])
 print(repr((worst, judge and judge.last_odd)))
+"""
+# Shows the number of each wiring on a character display. Each number is sent with its own wiring, so the user can read
+# only the number of the display's real wiring.
+WIRINGS = """
+from time import sleep_ms
+from kickstand.devices import open_lcd
+from kickstand.settings import load
+for number in range(1, 5):
+    lcd = open_lcd(load(), number)
+    lcd.show("This is readable", "LCD_WIRING = %d" % number)
+    lcd.flush()
+    print("%13sLCD_WIRING = %d is shown for 4 s" % ("", number))
+    sleep_ms(4000)
+    lcd.show("", "")  # blank the display now, because it may not react to the next wiring
+    lcd.flush()
+print("%13sput the line that it has shown into config.py; if it has shown none: its contrast, or 5 V" % "")
 """
 _WORST = (int, int, ((int, int, int), float))
 
@@ -335,13 +352,13 @@ def printed(transport: SerialTransport, name: str, code: str, what: str) -> byte
 
 
 def status(port: Port, wirings: bool = False) -> str:
-    """Run kickstand.status() on the board, restart the board, and return the output.
+    """Run kickstand.status() on the board, restart the board, and return the report in words.
 
     wirings: True to also try each wiring of an LCD backpack on the display.
 
     Raises InputError if the board returns no status.
     """
-    noticed: list[Any] = []
+    noticed: list[Any] = [None, None]
 
     def ask_first(transport: ConnectedBoard) -> None:
         worst, odd = literal(transport.exec(_NOTICED), *((a, b) for a in (_WORST, None) for b in (str, None)))
@@ -349,15 +366,12 @@ def status(port: Port, wirings: bool = False) -> str:
 
     with connected(port, ask_first) as (transport, name):
         describe(transport, name)
-        keep = (
-            f"from kickstand import status_report\nstatus_report.noticed = {tuple(noticed)}\n" if any(noticed) else ""
-        )
         try:
-            code = f"{keep}import kickstand\nkickstand.status({wirings or ''})"
-            text = printed(transport, name, code, "its status")
+            code = "import kickstand\nkickstand.status()"
+            text = printed(transport, name, code + WIRINGS * wirings, "its status").decode(errors="replace")
         finally:
             restart(transport)
-    return text.decode(errors="replace").replace("\r\n", "\n").rstrip()
+    return status_words.words(text, (noticed[0], noticed[1]))
 
 
 def refuse_unfit_firmware(reason: str, name: str) -> None:

@@ -177,7 +177,7 @@ def _places(data: bytes) -> Iterator[tuple[int, Place]]:
 
 
 def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]) -> Iterator[StoredTurn]:
-    """Decode the entries that block_format.encode_python writes.
+    """Decode the entries that block_format.encode() writes.
 
     data: the bytes of the entries.
     count: number of entries.

@@ -25,17 +25,20 @@ _SILENT_S = 60  # longest wait for an answer in s; an emulated board is slow
 _LIST = """
 import os
 from kickstand import settings
-from kickstand.rides import ride_paths
+try:
+    from kickstand.rides import ride_files
+except ImportError:  # firmware up to version 0.5.0
+    from kickstand.rides import ride_paths as ride_files
 chosen = settings.load()
-directory = ride_paths.directory(chosen)
+directory = ride_files.directory(chosen)
 print((directory, chosen.VEHICLE))
 try:
     os.stat(directory)
 except OSError:
     pass
 else:
-    for ride, part, size in ride_paths.parts(directory):
-        print((ride, part, size, ride_paths.part_path(directory, ride, part)))
+    for ride, part, size in ride_files.parts(directory):
+        print((ride, part, size, ride_files.part_path(directory, ride, part)))
 """
 # Prints a file in base64, then the length and the CRC-32 that the board computed
 _READ = """

@@ -2,12 +2,11 @@
 
 import binascii
 import contextlib
+import inspect
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from io import TextIOBase
-
-from kickstand.lean.meter import FALLEN_DEG
 
 from ..calibration.file import CalibrationFile
 from ..common.errors import InputError, cause
@@ -15,23 +14,11 @@ from ..deploy.board_console import BrokenOff, lines
 from ..deploy.connection import ConnectedBoard, refuse_unfit_firmware
 from ..logs.cells import TRACK
 from ..replay.replay_engine import NO_SPEED, Replay
-from . import ride_log
+from . import ride_log, stream_guest
 from .block_reader import BadBlock, StoredBlock, missing_note, parse
 
-# Runs the app with display and button, and sends its turns over USB. Ctrl-C ends it.
-_START = """
-from kickstand import devices, settings
-from kickstand.app import App
-from kickstand.board import port
-from kickstand.rides.usb_stream import RideStream
-chosen = settings.load()
-print("vehicle", chosen.VEHICLE)
-try:
-    App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen), RideStream()).run()
-except KeyboardInterrupt:
-    port.rest_watchdog()
-"""
-_VEHICLE = b"vehicle "  # start of the line that _START prints; base64 has no space
+_START = inspect.getsource(stream_guest.stream) + "\nstream()\n"
+_VEHICLE = b"vehicle "  # start of the first line that the board prints; base64 has no space
 # Longest wait for data. An emulated board starts slowly, and a board without its sensor sends nothing
 _SILENT_S = 60.0
 CHANGED = "the board's calibration has changed: the log ends here"
@@ -128,8 +115,7 @@ class StreamLog:
                 force, rate = ([float(cell) for cell in cells] for cells in (row[1:4], row[4:7]))
                 speed = NO_SPEED if turn.speed_mps is None else turn.speed_mps
                 meter = replay.take(turn.time_us, (*force, 0.0, *rate), speed)
-                trusted = meter.trusted and not meter.fallen and abs(meter.lean_deg) <= FALLEN_DEG
-                lean_deg = meter.lean_deg if aligned and trusted and not car else None
+                lean_deg = None if car else meter.shown_deg()
                 forward_g = meter.smooth_force[2] if aligned else None
                 left_g = meter.smooth_force[0] if aligned and car else None
                 moments.append(((turn.time_us - self.first.time_us) / 1e6, lean_deg, forward_g, left_g))

@@ -1,9 +1,7 @@
-"""Decodes frames of the chip's FIFO, adds them up, and watches the counts of each axis.
+"""Watches the counts of each axis.
 
 A frame is one sample of 14 bytes: seven big-endian int16 in the order ax ay az temperature gx gy gz (register map
-RM-MPU-6000A rev 4.2, pp. 29 to 31). On the board, decode() and add_up() are the machine code of fifo_frames_viper.py.
-On a computer, decode() and add_up() are decode_python() and add_up_python(). The machine code and the Python functions
-give the same results.
+RM-MPU-6000A rev 4.2, pp. 29 to 31). add_up() of quick_viper.py adds frames up and takes the notes that are judged here.
 """
 
 import gc
@@ -11,13 +9,14 @@ from array import array
 
 from micropython import const
 
-from ..errors import NO_MACHINE_CODE, Notice, checked, tried
+from ..errors import Notice, tried
+from ..quick import load
 
 FRAME = const(14)  # bytes
 SATURATED = const(32700)  # a reading of this absolute value or more is at the end of its range
 LOOK_MS = const(400)  # time between two looks
 
-# Indices in the notes of add_up(), an array('i', 33). The machine code repeats these numbers.
+# Indices in the notes of add_up(), an array('i', 33). add_up() repeats these numbers.
 _HASH = const(0)  # hash of the last frame
 _REPEATS = const(1)  # number of successive repetitions of the last frame
 _LIMIT = const(2)  # number of repetitions that make a frame dead
@@ -36,8 +35,7 @@ _LAST = const(12)  # counts of the last frame
 _SEEN = const(19)  # bits 0 to 15; bit n is set if the lowest four bits of the counts have been n since the last look
 _PEAK = const(26)  # largest absolute counts since power-on
 _HIGH_BYTE = const(0x10000)  # bit in _SEEN that is set when the high byte changes
-_WRAPPED = const(0x20000)  # bit in _SEEN that is set when the counts jump by _JUMP or more within one high byte
-_JUMP = const(192)
+_WRAPPED = const(0x20000)  # bit in _SEEN that is set when the counts jump by 192 or more within one high byte
 
 # Half of the range of 8 g or 16 g. The low-pass hides most of a vibration. If half of the range is left after the
 # low-pass, the vibration was clipped before the low-pass. After clipping the mean is wrong, because the readings are
@@ -45,93 +43,27 @@ _JUMP = const(192)
 _HARD_COUNTS = const(16384)
 _COLUMNS = (0, 1, 2, 4, 5, 6)  # the axes' columns in a frame
 _ALL_DIFFER = const(0x77)
+_TRIAL = const(
+    b"\x7f\x00\x80\xff\xff\xff\x80\x00\x80\xff\x01\x00\xab\xcd"
+)  # a frame for the trials of the machine code
 
 
-def decode_python(frames, at, counts):
-    """Decode the frame that begins at byte `at` of frames into counts, an array('h', 7)."""
-    for i in range(7):
-        counts[i] = _int16(frames, at + 2 * i)
+def _decoding():
+    return (b"\xab\xcd" + _TRIAL, 2, array("h", range(7))), 0x0DB12905
 
 
-def add_up_python(frames, n, sums, watch):
-    """Add up the counts of n frames, and update the notes of the AxisWatch.
-
-    A frame with an axis at the end of its range is skipped and counted in watch[LOST]. The good frames move to the
-    beginning of `frames`. The function stops at the first dead frame. A frame is dead if the six bytes of its force are
-    all 0x00 or all 0xFF, or if it repeats the previous frame too often.
-
-    Args:
-        frames: bytearray of FRAME bytes per frame.
-        n: number of frames.
-        sums: array('i', 7) for the result, in the order of a frame.
-        watch: AxisWatch.notes.
-
-    Returns:
-        The number of frames added. After a dead frame this number plus watch[LOST] is less than n.
-    """
-    for i in range(7):
-        sums[i] = 0
-    watch[LOST] = good = 0
-    watch[DUE] -= n
-    for k in range(n):
-        at = k * FRAME
-        first = frames[at]
-        same = 0  # number of bytes of the force that equal its first byte
-        mark = 0  # hash of the frame
-        for i in range(FRAME):
-            byte = frames[at + i]
-            if i < 6 and byte == first:
-                same += 1
-            if i < 6 or i > 7:  # all bytes but the temperature, which a working chip may repeat
-                mark = (mark * 31 + byte) & 0xFFFFFF
-        if same == 6 and (first == 0 or first == 255):
-            return good
-        watch[_REPEATS] = watch[_REPEATS] + 1 if mark == watch[_HASH] else 0
-        watch[_HASH] = mark
-        if watch[_REPEATS] >= watch[_LIMIT]:
-            return good
-        ends = shaken = 0  # ends has a bit for each column at the end of its range
-        for i in range(7):
-            value, last = _int16(frames, at + 2 * i), watch[_LAST + i]
-            watch[_LAST + i] = value
-            watch[_SEEN + i] |= 1 << (value & 15)
-            if value >> 8 != last >> 8:
-                watch[_SEEN + i] |= _HIGH_BYTE
-            elif not -_JUMP < value - last < _JUMP:
-                watch[_SEEN + i] |= _WRAPPED
-            if i & 3 and value != watch[_LAST - 1 + i]:
-                watch[_DIFFER] |= 1 << i
-            if i & 3 == 2 and value != watch[_LAST - 2 + i]:
-                watch[_DIFFER] |= 1 << i - 2
-            size = abs(value)
-            if size > watch[_PEAK + i]:
-                watch[_PEAK + i] = size
-            if size >= SATURATED and i != 3:
-                ends |= 1 << i
-            if size >= watch[_HARD] and i < 3:
-                shaken = 1
-        watch[_SHAKEN] += shaken
-        if ends:
-            watch[_ENDS] |= ends
-            watch[LOST] += 1
-            watch[_ROW] += 1
-            watch[_CLIPPED] += 1
-            watch[_GYRO_CLIPPED] += ends > 7
-            continue
-        watch[_ROW] = 0
-        for i in range(7):
-            sums[i] += watch[_LAST + i]
-        if good < k:
-            for i in range(FRAME):
-                frames[good * FRAME + i] = frames[at + i]
-        good += 1
-    return good
+def _adding():
+    """Return eight frames and the mark. Frames 2 and 4 are at the ends of the range. The last frame repeats the frame
+    before it."""
+    frames = bytearray(_TRIAL * 8)
+    for k in range(7):
+        frames[14 * k + 1] = frames[14 * k + 9] = 250 - 40 * k
+    frames[28], frames[29], frames[66], frames[67] = 0x7F, 0xFF, 0x80, 0x00
+    return (frames, 8, array("i", range(7)), array("i", range(33))), 0x1D5CFE7C
 
 
-def _int16(frames, at):
-    """Return the big-endian int16 at byte `at`. struct.unpack_from() would allocate a tuple for each frame."""
-    value = frames[at] << 8 | frames[at + 1]
-    return value - 65536 if value > 32767 else value
+decode, add_up = load("quick_viper", ("decode", _decoding), ("add_up", _adding))
+del _decoding, _adding
 
 
 class AxisWatch:
@@ -204,7 +136,7 @@ class AxisWatch:
             if self._well():
                 self.fault = None
                 return False
-            self.fault = tried(self._load)
+            self.fault = tried(self._load)[1]
             if self.fault:  # the judge could not be imported: memory is short, or the firmware is incomplete
                 return False
         return self._judge.look(self, samples)
@@ -229,19 +161,3 @@ class AxisWatch:
         from .axis_judge import AxisJudge
 
         self._judge = AxisJudge(*self._settings)
-
-
-try:
-    from .fifo_frames_viper import add_up, decode
-except NO_MACHINE_CODE:
-    add_up, decode = add_up_python, decode_python
-else:
-    _FRAME = b"\x7f\x00\x80\xff\xff\xff\x80\x00\x80\xff\x01\x00\xab\xcd"
-    decode = checked(decode, decode_python, _FRAME, 0, array("h", range(7)))
-    # Eight frames. Frames 2 and 4 are at the ends of the range, and the last frame repeats the frame before it.
-    _TRIAL = bytearray(_FRAME * 8)
-    for _k in range(7):
-        _TRIAL[14 * _k + 1] = _TRIAL[14 * _k + 9] = 250 - 40 * _k
-    _TRIAL[28], _TRIAL[29], _TRIAL[66], _TRIAL[67] = 0x7F, 0xFF, 0x80, 0x00
-    add_up = checked(add_up, add_up_python, _TRIAL, 8, array("i", range(7)), AxisWatch(20, 2, 1, 3, 2).notes)
-    del _TRIAL

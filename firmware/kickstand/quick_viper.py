@@ -1,7 +1,6 @@
-"""The functions decode_python() and add_up_python() of fifo_frames.py as machine code.
+"""The functions that process each sample, as machine code. quick.py loads them.
 
-As machine code decode() takes 7 us, in Python 140 us. Both versions must give the same results.
-host_tests/imu/test_batches.py compares them.
+As machine code decode() takes 7 us, in Python 140 us. A frame is one sample of 14 bytes, see axes.py.
 """
 
 import micropython
@@ -9,13 +8,34 @@ import micropython
 
 @micropython.viper
 def decode(frames: ptr8, at: int, counts: ptr16):  # noqa: F821 the names are viper's
+    """Decode a frame of the chip's FIFO.
+
+    Args:
+        frames: bytes; the frame begins at byte `at`.
+        counts: array('h', 7) for the result.
+    """
     for i in range(7):
-        counts[i] = frames[at] << 8 | frames[at + 1]
+        value = frames[at] << 8 | frames[at + 1]
+        counts[i] = value - 65536 if value > 32767 else value
         at += 2
 
 
 @micropython.viper
 def add_up(frames: ptr8, n: int, sums: ptr32, watch: ptr32) -> int:  # noqa: F821
+    """Add up the counts of n frames, and update the notes of the AxisWatch.
+
+    A frame with an axis at the end of its range is skipped and counted in watch[3]. The good frames move to the
+    beginning of `frames`. The function stops at the first dead frame. A frame is dead if the six bytes of its force are
+    all 0x00 or all 0xFF, or if it repeats the previous frame too often.
+
+    Args:
+        frames: bytearray of 14 bytes per frame.
+        sums: array('i', 7) for the result, in the order of a frame.
+        watch: AxisWatch.notes. axes.py explains its indices.
+
+    Returns:
+        The number of frames added. After a dead frame this number plus watch[3] is less than n.
+    """
     for i in range(7):
         sums[i] = 0
     watch[3] = 0
@@ -24,8 +44,8 @@ def add_up(frames: ptr8, n: int, sums: ptr32, watch: ptr32) -> int:  # noqa: F82
     at = 0
     for k in range(n):
         first = frames[at]
-        same = 0
-        mark = 0
+        same = 0  # number of bytes of the force that equal its first byte
+        mark = 0  # hash of all bytes but the temperature, which a working chip may repeat
         for i in range(14):
             byte = frames[at + i]
             if i < 6 and byte == first:
@@ -38,7 +58,7 @@ def add_up(frames: ptr8, n: int, sums: ptr32, watch: ptr32) -> int:  # noqa: F82
         watch[0] = mark
         if watch[1] >= watch[2]:
             return good
-        ends = 0
+        ends = 0  # has a bit for each column at the end of its range
         shaken = 0
         for i in range(7):
             value = frames[at] << 8 | frames[at + 1]
@@ -86,3 +106,22 @@ def add_up(frames: ptr8, n: int, sums: ptr32, watch: ptr32) -> int:  # noqa: F82
                 frames[i - last] = frames[i]
         good += 1
     return good
+
+
+@micropython.viper
+def products(matrices: ptr32, sums: ptr32, n: int, out: ptr32):  # noqa: F821
+    """Compute out[0:3] = A (sums[0:3], n) and out[3:6] = B (sums[4:7], n). The last column of A and B has the offsets.
+
+    Args:
+        matrices: the 3x4 matrices A and B, row by row, array('i', 24).
+        sums: sums of counts in the chip's order, array('i', 7).
+        n: number of samples in the sums.
+        out: array('i', 6) for the result.
+    """
+    x, y, z = sums[0], sums[1], sums[2]
+    at = 0
+    for i in range(6):
+        if i == 3:
+            x, y, z = sums[4], sums[5], sums[6]
+        out[i] = matrices[at] * x + matrices[at + 1] * y + matrices[at + 2] * z + matrices[at + 3] * n
+        at += 4

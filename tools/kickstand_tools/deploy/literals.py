@@ -1,0 +1,210 @@
+"""Replaces the names of the firmware's constants by their values, before a module is compiled.
+
+On a board each name of a module takes 8 to 16 bytes of heap, and each use of the name a search in a table. Only
+MicroPython's const() has no such cost, but it applies to private names in the module that defines them. The constants
+here are the names in capitals that a module of the package binds once, at its top level, to a value that is known
+before the firmware runs. Modules on a board do not have these names, except KEPT.
+"""
+
+import ast
+import functools
+import math
+import operator
+import re
+import struct
+from pathlib import Path
+from typing import Any
+
+from ..common import firmware_path
+
+# Names that programs outside the package use on a board: `kickstand bench`, the replay on a Pico, and tests
+KEPT = {"app.SINGLE_GAPS", "drive_alignment.alignment.STEP_US", "lean.lean_filter.DELAY_S"}
+_CAPITALS = re.compile("_?[A-Z][A-Z0-9_]*")
+_LONGEST = 10  # characters of a string that MicroPython stores once for all modules
+_BINARY = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.Pow: operator.pow, ast.LShift: operator.lshift,
+    ast.RShift: operator.rshift, ast.BitOr: operator.or_, ast.BitAnd: operator.and_,
+}  # fmt: skip
+_UNARY = {ast.USub: operator.neg, ast.Invert: operator.invert}
+_CALLS = {"const": lambda value: value, "radians": math.radians, "calcsize": struct.calcsize, "len": len}
+
+
+class _Variable(Exception):
+    """The value of an expression is not known before the firmware runs."""
+
+
+def text(source: Path, package: Path = firmware_path.PACKAGE) -> str:
+    """Return the text of a module. In a module of the package, values replace the names of constants."""
+    if package not in source.parents:
+        return source.read_text(encoding="utf-8")
+    files = sorted(package.rglob("*.py"))
+    return _texts(package, tuple((path, path.stat().st_mtime_ns) for path in files))[source]
+
+
+def without_words(source: Path) -> str:
+    """Return the text of a module without comments and docstrings."""
+    tree = ast.parse(source.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.FunctionDef) and ast.get_docstring(node):
+            del node.body[0]
+    return ast.unparse(tree)
+
+
+@functools.lru_cache(maxsize=2)
+def _texts(package: Path, files: tuple[tuple[Path, int], ...]) -> dict[Path, str]:
+    """Return the text of each module. files: The modules' paths, and the times when they were written."""
+    sources = {path: path.read_text(encoding="utf-8") for path, _ in files}
+    modules = {path: _Module(package, path, source) for path, source in sources.items()}
+    by_name = {module.name: module for module in modules.values()}
+    for module in modules.values():
+        module.find(by_name)
+    # The machine code's own constants are private and numbers, so MicroPython's compiler replaces them
+    return {
+        path: sources[path] if path.stem.endswith("_viper") else ast.unparse(module.replaced())
+        for path, module in modules.items()
+    }
+
+
+class _Module(ast.NodeTransformer):
+    """A module of the package.
+
+    Attributes:
+        name: Name of the module in the package, with dots.
+        values: Values of the module's own constants, by name.
+    """
+
+    def __init__(self, package: Path, path: Path, source: str) -> None:
+        parts = path.relative_to(package).with_suffix("").parts
+        self.name = ".".join(parts)
+        self.values: dict[str, Any] = {}
+        self._folder = parts[:-1]
+        self._tree = ast.parse(source)
+        self._imported: dict[str, Any] = {}  # values of constants of other modules, by their names here
+        self._modules: dict[str, _Module] = {}  # modules of the package, by their names here
+        self._found = False
+
+    @property
+    def known(self) -> dict[str, Any]:
+        """The values of the module's own and imported constants, by name."""
+        return self._imported | self.values
+
+    def find(self, modules: dict[str, "_Module"]) -> None:
+        """Find the module's constants, and those of the modules that it imports. modules: All modules, by name."""
+        if self._found:
+            return
+        self._found = True
+        for node in ast.walk(self._tree):
+            if isinstance(node, ast.ImportFrom) and node.level:
+                for alias in node.names:
+                    self._find_imported(node, alias, modules)
+        bound = [node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name) and _binds(node)]
+        if twice := set(bound) & self._imported.keys():
+            raise ValueError(f"{self.name} binds names that it imports: {', '.join(sorted(twice))}")
+        for statement in self._tree.body:
+            for name, value in _assigned(statement):
+                if _CAPITALS.fullmatch(name) and bound.count(name) == 1:
+                    self._add(name, value)
+
+    def _find_imported(self, node: ast.ImportFrom, alias: ast.alias, modules: dict[str, "_Module"]) -> None:
+        origin = ".".join([*self._folder[: len(self._folder) - node.level + 1], *filter(None, [node.module])])
+        name = alias.asname or alias.name
+        module = modules.get(f"{origin}.{alias.name}".lstrip("."))
+        if module:
+            module.find(modules)
+            self._modules[name] = module
+        elif origin in modules:
+            modules[origin].find(modules)
+            values = modules[origin].known
+            if alias.name in values:
+                self._imported[name] = values[alias.name]
+
+    def _add(self, name: str, expression: ast.expr) -> None:
+        try:
+            value = self._value(expression)
+        except _Variable:
+            return
+        private = name.startswith("_") and isinstance(value, str | bytes | tuple)
+        short = isinstance(value, str) and len(value) <= _LONGEST
+        if (private or short or isinstance(value, int | float)) and f"{self.name}.{name}" not in KEPT:
+            self.values[name] = value
+
+    def _value(self, node: ast.expr) -> Any:
+        """Return the value of an expression. Raises _Variable if the value is not known yet."""
+        if isinstance(node, ast.Constant):
+            return node.value
+        if isinstance(node, ast.Tuple):
+            return tuple(map(self._value, node.elts))
+        if isinstance(node, ast.Name) and node.id in self.known:
+            return self.known[node.id]
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in self._modules:
+            values = self._modules[node.value.id].known
+            if node.attr in values:
+                return values[node.attr]
+        if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
+            return _BINARY[type(node.op)](self._value(node.left), self._value(node.right))
+        if isinstance(node, ast.UnaryOp) and type(node.op) in _UNARY:
+            return _UNARY[type(node.op)](self._value(node.operand))
+        if isinstance(node, ast.Call) and not node.keywords:
+            call = getattr(node.func, "attr", getattr(node.func, "id", None))
+            if call in _CALLS:
+                return _CALLS[call](*map(self._value, node.args))
+        raise _Variable
+
+    def replaced(self) -> ast.Module:
+        """Return the module with values in the place of names, without imports that were only used for constants."""
+        before = self._used()
+        self._tree.body = [part for statement in self._tree.body for part in self._without_constants(statement)]
+        self.visit(self._tree)
+        self._gone = before - self._used() | self._imported.keys()
+        for node in list(ast.walk(self._tree)):
+            for _, block in ast.iter_fields(node):
+                if isinstance(block, list) and any(isinstance(one, ast.ImportFrom) for one in block):
+                    block[:] = [one for one in block if not self._is_gone(one)] or [ast.Pass()]
+        return ast.fix_missing_locations(self._tree)
+
+    def _used(self) -> set[str]:
+        return {node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name)}
+
+    def _without_constants(self, statement: ast.stmt) -> list[ast.stmt]:
+        pairs = _assigned(statement)
+        rest = [(name, value) for name, value in pairs if name not in self.values]
+        if len(rest) == len(pairs):
+            return [statement]
+        return [ast.Assign([ast.Name(name, ast.Store())], value, lineno=statement.lineno) for name, value in rest]
+
+    def _is_gone(self, node: ast.AST) -> bool:
+        """Remove the names from an import that nothing uses any more. Return True if no name is left."""
+        if not isinstance(node, ast.ImportFrom):
+            return False
+        node.names = [alias for alias in node.names if (alias.asname or alias.name) not in self._gone]
+        return not node.names
+
+    def generic_visit(self, node: ast.AST) -> ast.AST:
+        """Replace an expression by its value, if the value is known."""
+        node = super().generic_visit(node)
+        if not isinstance(node, ast.Name | ast.Attribute | ast.BinOp | ast.UnaryOp | ast.Call) or _binds(node):
+            return node
+        try:
+            value = self._value(node)
+        except _Variable:
+            return node
+        # the product of two texts of a module can be much longer than its expression
+        if isinstance(node, ast.BinOp | ast.Call) and not isinstance(value, int | float):
+            return node
+        return ast.parse(repr(value), mode="eval").body
+
+
+def _binds(node: ast.AST) -> bool:
+    return isinstance(getattr(node, "ctx", None), ast.Store | ast.Del)
+
+
+def _assigned(statement: ast.stmt) -> list[tuple[str, ast.expr]]:
+    """Return the names that an assignment binds, each with its expression. Other statements give no names."""
+    if not isinstance(statement, ast.Assign) or len(statement.targets) != 1:
+        return []
+    target, value = statement.targets[0], statement.value
+    pairs: list[tuple[ast.expr, ast.expr]] = [(target, value)]
+    if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+        pairs = list(zip(target.elts, value.elts)) if len(target.elts) == len(value.elts) else []
+    return [(name.id, expression) for name, expression in pairs if isinstance(name, ast.Name)]
