@@ -87,7 +87,7 @@ def test_a_calibration_is_given_or_refused(tmp_path):
     for arguments, words in refused:
         with pytest.raises(InputError, match=words):
             api.open_ride(*arguments)
-    (tmp_path / "RIDE.csv").write_text(LOG)
+    (tmp_path / "RIDE.csv").write_text(LOG + "1,0,1,0,0,0,0\n")
     api.write_calibration(tmp_path / "RIDE.cal.json", ALIGNED)
     assert api.open_ride(tmp_path / "RIDE.csv").calibration == ALIGNED
 

@@ -34,6 +34,7 @@ LEANED_SHARE = 0.001
 # TIMING_S times the roll rate is also added to this standard deviation, to cover the delay of the gyro's low-pass
 # filter and errors of the samples' times.
 TIMING_S = 0.002
+CHUNK = 8192  # number of samples whose rates are corrected at once
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps", "doubtful")
 DIGITS = 3, 3, 3, 3, 0
 DOUBTFUL = 0.2  # a larger share of doubtful riding gets a remark
@@ -280,7 +281,12 @@ def at_samples(windows: Windows, rate: Array, estimate: Estimate, lean_sigma: Ar
     share = since / seconds
     first, second = estimate.states[number], estimate.states[number + 1]
     lean, pitch, speed = (first + share[:, None] * (second - first))[:, [LEAN, PITCH, FORWARD]].T
-    wx, wy, wz = corrected_rates(rate.T, estimate.unknowns(number, 0.5 * (first + second)), windows.warm[number])
+    middle, corrected = 0.5 * (first + second), np.empty((3, len(number)))
+    for start in range(0, len(number), CHUNK):  # each sample has 45 unknowns, which would need much memory
+        rows = slice(start, start + CHUNK)
+        x = estimate.unknowns(number[rows], middle[rows])
+        corrected[:, rows] = corrected_rates(rate[rows].T, x, windows.warm[number[rows]])
+    wx, wy, wz = corrected
     roll_rate = wz - np.tan(pitch) * (wx * np.sin(lean) + wy * np.cos(lean))
     rolled, window_roll = integral(roll_rate)
     lean = first[:, LEAN] + rolled + share * ((second - first)[:, LEAN] - window_roll)
