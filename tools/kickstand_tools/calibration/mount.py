@@ -80,9 +80,9 @@ def _exchanged_remedy(message) -> Remedy:
     elif message.roll_deg is not None and abs(message.roll_deg) > SWAPPED_DEG:
         remedy = Remedy("were the poses swapped?")
     else:
-        other = {"left": "--side right", "right": "--side left"}.get(message.side, "with the other --side")
+        option = {"left": "--side right", "right": "--side left"}.get(message.side, "with the other --side")
         remedy = Remedy(
-            f"calibrate two {other}?",
+            f"calibrate two {option}?",
             "does the kickstand lean the bike to the other side than SIDE in config.py says?",
         )
         remedy = remedy if message.roll_deg is not None else remedy.followed(" Or were the poses swapped?")

@@ -138,8 +138,8 @@ def _may_stand(time_s: Array, axes: list[Array], steps: Array, begin: int, end: 
     last = int(np.searchsorted(time_s, time_s[end - 1] + BESIDE_S))
     for rows in slice(first, begin), slice(end, last):
         if rows.start < rows.stop:
-            off = [abs(float(np.mean(values[rows])) - values[begin]) for values in axes]
-            if np.all(np.array(off) <= near):
+            distances = [abs(float(np.mean(values[rows])) - values[begin]) for values in axes]
+            if np.all(np.array(distances) <= near):
                 return True
     return False
 

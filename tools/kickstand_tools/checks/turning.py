@@ -128,11 +128,11 @@ class Turning:
         fit, share = model.along_fit(force), 1.0
         for _ in range(STEPS):
             change = share * np.clip(model.bias_change(force, fit), -MOST_DPS, MOST_DPS)
-            other = _Model(sign, self._rate, model.bias + change, self._cell_s)
-            better = other.along_fit(force)
+            trial = _Model(sign, self._rate, model.bias + change, self._cell_s)
+            better = trial.along_fit(force)
             if better.cost < fit.cost:
                 settled = better.cost > (1.0 - SETTLED) * fit.cost
-                model, fit, share = other, better, 1.0
+                model, fit, share = trial, better, 1.0
                 if settled:
                     break
             else:
@@ -277,13 +277,13 @@ def _turn(rate: Array, bin_s: float) -> Array:
     (w, n, 3, 3).
     """
     half = rotation_matrix(rate * (bin_s / 2.0))
-    after = half @ half  # the rotation over each bin
+    turns = half @ half  # the rotation over each bin
     reach = 1
     # Before each pass, after[:, k] is the rotation over the last `reach` bins up to bin k. A pass doubles `reach`
     while reach < rate.shape[1]:
-        after[:, reach:] = after[:, :-reach] @ after[:, reach:]
+        turns[:, reach:] = turns[:, :-reach] @ turns[:, reach:]
         reach *= 2
-    return np.concatenate((half[:, :1], after[:, :-1] @ half[:, 1:]), axis=1)
+    return np.concatenate((half[:, :1], turns[:, :-1] @ half[:, 1:]), axis=1)
 
 
 def _knots(bins: int, bin_s: float) -> tuple[Array, Array]:

@@ -30,9 +30,9 @@ def config() -> Path:
     is config.py in the current directory, if there is one. Without such a file, it is the config.py that belongs to
     these tools.
     """
-    here = Path("firmware").resolve()
-    if (here / "kickstand").is_dir() and (here / "config.py").is_file():
-        return here / "config.py"
+    folder = Path("firmware").resolve()
+    if (folder / "kickstand").is_dir() and (folder / "config.py").is_file():
+        return folder / "config.py"
     own = Path("config.py").resolve()
     return own if installed() and own.is_file() else directory() / "config.py"
 

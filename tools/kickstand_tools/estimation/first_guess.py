@@ -99,18 +99,18 @@ def in_hand(w: Windows) -> tuple[Bools, Bools]:
         surely: True where a hand certainly moves the sensor, or the bike has fallen, shape (n).
         perhaps: the same, but also True in the seconds around these windows, because the bike may not be riding there.
     """
-    there = ~w.gap
-    mean = averaged(w.force * there[:, None], MOUNTED_S)
-    off = there & (mean[:, 1] < np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(mean, axis=1))
-    places = np.flatnonzero(off)
+    valid = ~w.gap
+    mean = averaged(w.force * valid[:, None], MOUNTED_S)
+    tilted = valid & (mean[:, 1] < np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(mean, axis=1))
+    moved = np.flatnonzero(tilted)
     # If the time between two movements in a hand is short, the sensor was perhaps in the hand all this time. The same
     # holds for the time from the beginning of the log to the first movement, and from the last movement to the end.
-    if len(places):
-        ends = np.concatenate(([0], places, [len(w) - 1]))
+    if len(moved):
+        ends = np.concatenate(([0], moved, [len(w) - 1]))
         for begin, end in itertools.pairwise(ends):
             if w.edges[end + 1] - w.edges[begin] < BETWEEN_S:
-                off[begin : end + 1] = True
-    share = off.astype(float)
+                tilted[begin : end + 1] = True
+    share = tilted.astype(float)
     return averaged(share, SURELY_S) > 0.99, averaged(share, MOUNTED_S) > 0.01
 
 
@@ -125,13 +125,13 @@ def lean_and_speed(w: Windows, still: Bools) -> tuple[Array, Array]:
         lean: shape (n), in rad.
         speed: shape (n), in m/s.
     """
-    known, yaw = w.known_speed, w.rate[:, 1]
+    log_speed, yaw = w.known_speed, w.rate[:, 1]
     force = averaged(np.linalg.norm(w.force[:, :2], axis=1), 2.0)
     steep = np.tan(np.arccos(np.clip(1.0 / np.maximum(force, 0.1), 0.3, 1.0)))
     turning = np.abs(averaged(yaw, 1.0))
-    both = averaged(steep * turning, TURNS_S) * STANDARD_GRAVITY + USUAL_RADPS**2 * USUAL_MPS
-    speed = np.clip(both / (averaged(turning**2, TURNS_S) + USUAL_RADPS**2), 3.0, 50.0)
-    speed = np.where(still, 0.0, np.where(np.isnan(known), speed, known))
+    weighted = averaged(steep * turning, TURNS_S) * STANDARD_GRAVITY + USUAL_RADPS**2 * USUAL_MPS
+    speed = np.clip(weighted / (averaged(turning**2, TURNS_S) + USUAL_RADPS**2), 3.0, 50.0)
+    speed = np.where(still, 0.0, np.where(np.isnan(log_speed), speed, log_speed))
     slow = np.arctan(-speed * yaw / STANDARD_GRAVITY)
     slow = np.where(still, np.arctan2(w.force[:, 0], w.force[:, 1]), slow)
     rolled = np.cumsum(w.rate[:, 2] * w.seconds)
@@ -165,11 +165,11 @@ def axes(w: Windows) -> Axes:
     seconds = float(np.sum(w.seconds[riding]))
     if seconds < MIN_RIDING_S:
         raise RefusedInput(RideShort(seconds, MIN_RIDING_S))
-    found = leaning_of(w.rate, w.force, riding)
-    _refuse_no_motorcycle(found, without_drift(w.force @ found.matrix[0]), _tilt(w, riding), riding)
-    pushed = without_drift(np.cumsum(w.force @ found.matrix[2]) * WINDOW_S * STANDARD_GRAVITY)
-    _refuse_wrong_speed(w.known_speed[riding], found.rolled[riding], found.turned[riding], pushed[riding])
-    return Axes(found.matrix, bias)
+    leaning = leaning_of(w.rate, w.force, riding)
+    _refuse_no_motorcycle(leaning, without_drift(w.force @ leaning.matrix[0]), _tilt(w, riding), riding)
+    pushed = without_drift(np.cumsum(w.force @ leaning.matrix[2]) * WINDOW_S * STANDARD_GRAVITY)
+    _refuse_wrong_speed(w.known_speed[riding], leaning.rolled[riding], leaning.turned[riding], pushed[riding])
+    return Axes(leaning.matrix, bias)
 
 
 def _bias(w: Windows) -> Array:
@@ -178,11 +178,11 @@ def _bias(w: Windows) -> Array:
     Without a standstill it is the bias with which the rates explain the forces best. The median rate may be that of a
     long bend, so it is used for short rides only.
     """
-    places = _calm(w, STILL_S)
-    if np.any(places):
-        return np.median(w.rate[places], axis=0)
-    found = bias_dps(w.force, np.degrees(w.rate), ~w.gap, WINDOW_S)
-    return np.median(w.rate[~w.gap], axis=0) if found is None else np.radians(found)
+    calm = _calm(w, STILL_S)
+    if np.any(calm):
+        return np.median(w.rate[calm], axis=0)
+    fitted = bias_dps(w.force, np.degrees(w.rate), ~w.gap, WINDOW_S)
+    return np.median(w.rate[~w.gap], axis=0) if fitted is None else np.radians(fitted)
 
 
 def _tilt(w: Windows, riding: Bools) -> float:
@@ -231,7 +231,7 @@ def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array, pushed: Arra
     if np.ptp(known) < STUCK_MPS and np.std(pushed) > PUSHED_MPS:
         raise RefusedInput(SpeedStuck(float(known[0])))
     expected = known * turned
-    both = -float(expected @ rolled) * STANDARD_GRAVITY
-    factor = float(expected @ expected) / both if both > 0.0 else 0.0
+    balance = -float(expected @ rolled) * STANDARD_GRAVITY
+    factor = float(expected @ expected) / balance if balance > 0.0 else 0.0
     if not 1.0 / MAX_SPEED_FACTOR < factor < MAX_SPEED_FACTOR:
         raise RefusedInput(SpeedUnit(factor))

@@ -208,8 +208,8 @@ class Noise:
         self.unbalance = 1.0
         if np.count_nonzero(complete) < LEAST_WINDOWS:
             return
-        off = force - averaged(np.where(counted, force, 0.0), LASTS_S) / np.maximum(share, 1e-9)
-        mean = averaged(np.where(counted, off / self._of_balance(), 0.0), over_s)[complete]
+        deviation = force - averaged(np.where(counted, force, 0.0), LASTS_S) / np.maximum(share, 1e-9)
+        mean = averaged(np.where(counted, deviation / self._of_balance(), 0.0), over_s)[complete]
         # An error that lasts for BALANCE_S keeps this share of its variance in a mean over over_s.
         ratio = over_s / BALANCE_S
         remaining = 2.0 * (ratio - 1.0 + np.exp(-ratio)) / ratio**2

@@ -183,13 +183,13 @@ class Smoother:
             end = min(k + TOGETHER, len(edges) - 1)
             # The rest of a ride may be short, so up to TOGETHER earlier segments are estimated with it
             lead = 1 if end < len(edges) - 1 else max(1, TOGETHER - (end - k))
-            whole = slice(edges[max(0, k - lead)], edges[min(end + 1, len(edges) - 1)])
+            extended = slice(edges[max(0, k - lead)], edges[min(end + 1, len(edges) - 1)])
             span = slice(edges[k], edges[end])
             measured = self._ride.measured
-            begin = int(np.count_nonzero(measured[whole.start : span.start]))
+            begin = int(np.count_nonzero(measured[extended.start : span.start]))
             own = slice(begin, begin + int(np.count_nonzero(measured[span])))
-            part = log.part(whole)
-            values = self._estimated(part if np.all(measured[whole]) else part.part(measured[whole]), own)
+            part = log.part(extended)
+            values = self._estimated(part if np.all(measured[extended]) else part.part(measured[extended]), own)
             yield span, None if values is None else values[own]
             if progress:
                 progress(span.stop, len(log.t_s))

@@ -140,24 +140,24 @@ def words(found: Agreement) -> Iterator[str]:
         f"of the rates {of.correlation:.2f}, B's clock {abs(of.drift) * 1e6:.0f} ppm "
         f"{'slow' if of.drift > 0.0 else 'fast'})"
     )
-    for name, one in (("live", found.live), ("smoothed", found.smoothed)):
-        if one is None:
+    for name, part in (("live", found.live), ("smoothed", found.smoothed)):
+        if part is None:
             yield f"{name}: hardly anywhere is a lean shown by both"
             continue
         yield (
-            f"{name}: they differ by {one.rms_deg:.2f} degrees rms over {one.seconds / 60.0:.1f} minutes of riding: B "
-            f"leans {abs(one.constant_deg):.2f} more to the {'right' if one.constant_deg > 0.0 else 'left'} all the "
-            f"time, and the rest moves by {one.moving_deg:.2f} rms (95 % under {one.p95_deg:.1f}, worst "
-            f"{one.worst_deg:.1f})"
+            f"{name}: they differ by {part.rms_deg:.2f} degrees rms over {part.seconds / 60.0:.1f} minutes of riding: "
+            f"B leans {abs(part.constant_deg):.2f} more to the {'right' if part.constant_deg > 0.0 else 'left'} all "
+            f"the time, and the rest moves by {part.moving_deg:.2f} rms (95 % under {part.p95_deg:.1f}, worst "
+            f"{part.worst_deg:.1f})"
         )
-        if one.slope is not None and one.delay_s is not None:
+        if part.slope is not None and part.delay_s is not None:
             yield (
-                f"    B's lean is {one.slope:.3f} times A's, and {abs(one.delay_s) * 1e3:.0f} ms "
-                f"{'later' if one.delay_s >= 0.0 else 'earlier'}"
+                f"    B's lean is {part.slope:.3f} times A's, and {abs(part.delay_s) * 1e3:.0f} ms "
+                f"{'later' if part.delay_s >= 0.0 else 'earlier'}"
             )
-        shares = f"{100.0 * one.within_1:.0f} % of the differences are within one of it, {100.0 * one.within_2:.0f} %"
+        shares = f"{100.0 * part.within_1:.0f} % of the differences are within one of it, {100.0 * part.within_2:.0f} %"
         yield (
-            f"    both expect {one.expected_deg:.2f} rms by their own standard deviations: {shares} within two (if "
+            f"    both expect {part.expected_deg:.2f} rms by their own standard deviations: {shares} within two (if "
             "both are right: 68 and 95 %)"
         )
     yield (
@@ -200,8 +200,8 @@ def draw(path: Path, found: Agreement) -> None:
 
 def _interpolated(t_s: Array, values: Array, at_s: Array) -> Array:
     """Interpolate values at other times. NaN outside the known times, in gaps, and beside values that are NaN."""
-    after = np.clip(np.searchsorted(t_s, at_s), 1, len(t_s) - 1)
-    near = (at_s >= t_s[0]) & (at_s <= t_s[-1]) & (t_s[after] - t_s[after - 1] < _GAP_S)
+    following = np.clip(np.searchsorted(t_s, at_s), 1, len(t_s) - 1)
+    near = (at_s >= t_s[0]) & (at_s <= t_s[-1]) & (t_s[following] - t_s[following - 1] < _GAP_S)
     return np.where(near, np.interp(at_s, t_s, values), np.nan)
 
 
@@ -209,23 +209,23 @@ def _lean_while_riding(ride: SmoothedRide | LeanTable, at_s: Array, riding: Bool
     """Return the lean and its standard deviation in degrees, both of shape (n). Both are NaN if the lean or the
     standard deviation is unknown, or the bike is not riding."""
     lean, sigma = (_interpolated(ride.t_s, values, at_s) for values in (ride.lean_deg, ride.lean_sigma_deg))
-    known = riding & ~np.isnan(sigma)
-    return np.where(known, lean, np.nan), np.where(known, sigma, np.nan)
+    valid = riding & ~np.isnan(sigma)
+    return np.where(valid, lean, np.nan), np.where(valid, sigma, np.nan)
 
 
 def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | None:
     """The Difference of two leans with their standard deviations; None if they have under _LEAST_S in common."""
-    both = ~np.isnan(a[0]) & ~np.isnan(b[0])
-    if np.count_nonzero(both) * STEP_S < _LEAST_S:
+    valid = ~np.isnan(a[0]) & ~np.isnan(b[0])
+    if np.count_nonzero(valid) * STEP_S < _LEAST_S:
         return None
-    one, other = a[0][both], b[0][both]
-    off, expected = other - one, np.hypot(a[1][both], b[1][both])
-    constant = float(off.mean())
-    rest, share = off - constant, np.abs(off) / np.maximum(expected, 1e-9)
-    slope, delay_s = _slope_and_delay(a[0], b[0], both)
+    lean_a, lean_b = a[0][valid], b[0][valid]
+    difference, expected = lean_b - lean_a, np.hypot(a[1][valid], b[1][valid])
+    constant = float(difference.mean())
+    rest, share = difference - constant, np.abs(difference) / np.maximum(expected, 1e-9)
+    slope, delay_s = _slope_and_delay(a[0], b[0], valid)
     return Difference(
-        float(len(off) * STEP_S),
-        _rms(off),
+        float(len(difference) * STEP_S),
+        _rms(difference),
         constant,
         _rms(rest),
         float(np.percentile(np.abs(rest), 95.0)),
@@ -241,14 +241,16 @@ def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | 
 def _slope_and_delay(a: Array, b: Array, both: Bools) -> tuple[float | None, float | None]:
     """Slope and delay of B's lean relative to A's. Both leans are treated as equally exact: the slope is the slope of
     the principal axis, and the delay is fitted to the mean of both roll rates."""
-    one, other = a[both] - a[both].mean(), b[both] - b[both].mean()
-    if _rms(one) < _LEANED_DEG or _rms(other) < _LEANED_DEG:
+    lean_a, lean_b = a[both] - a[both].mean(), b[both] - b[both].mean()
+    if _rms(lean_a) < _LEANED_DEG or _rms(lean_b) < _LEANED_DEG:
         return None, None
-    axis = np.linalg.eigh(np.cov(one, other))[1][:, -1]
+    axis = np.linalg.eigh(np.cov(lean_a, lean_b))[1][:, -1]
     rate = np.gradient(0.5 * (a + b), STEP_S)
-    known = both & ~np.isnan(rate)
-    off = b - a - np.mean((b - a)[both])
-    return float(axis[1] / axis[0]), float(-(rate[known] @ off[known]) / max(float(rate[known] @ rate[known]), 1e-9))
+    valid = both & ~np.isnan(rate)
+    difference = b - a - np.mean((b - a)[both])
+    return float(axis[1] / axis[0]), float(
+        -(rate[valid] @ difference[valid]) / max(float(rate[valid] @ rate[valid]), 1e-9)
+    )
 
 
 def _rms(values: Array) -> float:

@@ -21,7 +21,9 @@ class Comparison:
         begin_s, end_s = segments.begin_s[:, 0] - shift_s, segments.end_s[:, -1] - shift_s
         within = (begin_s > margin_s) & (end_s < motion.seconds - margin_s)
         missing = np.append(0, np.cumsum(~motion.valid))
-        first, last = (np.clip(np.rint(at / STEP_S).astype(int), 0, len(motion.valid)) for at in (begin_s, end_s))
+        first, last = (
+            np.clip(np.rint(limit_s / STEP_S).astype(int), 0, len(motion.valid)) for limit_s in (begin_s, end_s)
+        )
         within &= missing[last] - missing[first] <= 0.05 * (last - first)
         self.given = segments.part(within)
         self.middle_s = float(self.given.middle_s.mean()) if np.any(within) else 0.0
@@ -41,14 +43,14 @@ class Comparison:
         return self._means(range(3, 6), shift_s, drift, self.given.speed_weight)
 
     def _means(self, columns: range, shift_s: float, drift: float, weight: Array) -> Array:
-        given = self.given
-        shift = shift_s + drift * (given.middle_s - self.middle_s)
-        begin_s, end_s = given.begin_s - shift, given.end_s - shift
+        track = self.given
+        shift = shift_s + drift * (track.middle_s - self.middle_s)
+        begin_s, end_s = track.begin_s - shift, track.end_s - shift
         means = []
         for column in columns:
             sums = self._sums[:, column]
             mean = np.interp(end_s, self._edges_s, sums) - np.interp(begin_s, self._edges_s, sums)
-            means.append(without_trend(mean / (end_s - begin_s), weight, given.middle_s))
+            means.append(without_trend(mean / (end_s - begin_s), weight, track.middle_s))
         return np.array(means)
 
 

@@ -131,10 +131,10 @@ def _lines(
 def _nearest(time_us: Ints, at_us: Ints) -> tuple[Ints, Ints]:
     """Rows, and the index of the point for each. Only points within the log's time, and not in a gap, are used."""
     points = np.flatnonzero((at_us >= time_us[0]) & (at_us <= time_us[-1]))
-    after = np.clip(np.searchsorted(time_us, at_us[points]), 1, max(len(time_us) - 1, 1))
+    following = np.clip(np.searchsorted(time_us, at_us[points]), 1, max(len(time_us) - 1, 1))
     if len(time_us) < 2:
         return np.zeros(len(points), dtype=int), points
-    rows = after - (at_us[points] - time_us[after - 1] < time_us[after] - at_us[points])
+    rows = following - (at_us[points] - time_us[following - 1] < time_us[following] - at_us[points])
     near = np.abs(time_us[rows] - at_us[points]) <= LOST_US
     rows, last = np.unique(rows[near][::-1], return_index=True)  # if a row has two points, use the later point
     return rows, points[near][::-1][last]

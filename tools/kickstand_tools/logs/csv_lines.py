@@ -57,13 +57,13 @@ def number_cells(values: Array, digits: int, nan: str = "nan") -> Letters:
     scaled = np.where(missing, 0.0, scaled)
     if not np.all(scaled < _MOST):  # also for infinity
         return text_cells([nan if value != value else f"{value:.{digits}f}" for value in values.tolist()])
-    whole = np.rint(scaled)
+    integers = np.rint(scaled)
     # Rounding of the product can put a value that is almost halfway between two texts on the wrong side. Python's
     # format() decides these values.
-    for k in np.flatnonzero(np.abs(np.abs(scaled - whole) - 0.5) <= scaled * 2.0**-52).tolist():
-        whole[k] = int(f"{abs(values[k]):.{digits}f}".replace(".", ""))
-    most = int(np.max(whole, initial=0.0))
-    letters = _letters(whole.astype(np.uint32 if most < 2**32 else np.uint64), digits, len(str(most)), len(nan))
+    for k in np.flatnonzero(np.abs(np.abs(scaled - integers) - 0.5) <= scaled * 2.0**-52).tolist():
+        integers[k] = int(f"{abs(values[k]):.{digits}f}".replace(".", ""))
+    most = int(np.max(integers, initial=0.0))
+    letters = _letters(integers.astype(np.uint32 if most < 2**32 else np.uint64), digits, len(str(most)), len(nan))
     letters[0] = np.where(np.signbit(values), _MINUS, 0)
     if np.any(missing):
         letters[:, missing] = np.array([*nan.encode(), *bytes(len(letters) - len(nan))], dtype=np.uint8)[:, None]
@@ -78,16 +78,16 @@ def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, least_
 
     The first row of the result stays empty, because it is for the sign.
     """
-    places = max(most, digits + 1)
-    letters = np.zeros((max(places + 2, least_rows), len(number)), dtype=np.uint8)
+    rows_needed = max(most, digits + 1)
+    letters = np.zeros((max(rows_needed + 2, least_rows), len(number)), dtype=np.uint8)
     row = len(letters) - 1
-    for place in range(places):
-        if place == digits > 0:
+    for power in range(rows_needed):
+        if power == digits > 0:
             letters[row] = _POINT
             row -= 1
         rest = number // 10
         letter = (number - 10 * rest).astype(np.uint8) + np.uint8(_ZERO)
-        letters[row] = letter if place <= digits else np.where(number > 0, letter, 0)  # no leading zeros
+        letters[row] = letter if power <= digits else np.where(number > 0, letter, 0)  # no leading zeros
         number, row = rest, row - 1
     return letters
 

@@ -127,13 +127,13 @@ def _smooth(recorded: Array, times: Array, tick_s: float, period_s: float) -> Ar
     """
     half = max(AROUND, round(TICKS * tick_s / period_s)) // 2
     cuts = np.flatnonzero(np.diff(recorded) > GAP * period_s + tick_s) + 1
-    found = times.copy()
+    result = times.copy()
     for begin, end in zip([0, *cuts], [*cuts, len(times)]):
         part = recorded[begin:end]
         if len(part) > 1:
             mean = _mean(_mean(part, half), half)
-            found[begin:end] = np.clip(mean, part - ALLOWED * tick_s, part + ALLOWED * tick_s)
-    return found
+            result[begin:end] = np.clip(mean, part - ALLOWED * tick_s, part + ALLOWED * tick_s)
+    return result
 
 
 def _mean(values: Array, half: int) -> Array:
@@ -144,9 +144,9 @@ def _mean(values: Array, half: int) -> Array:
     first, last = _line(k[:span], values[:span]), _line(k[-span:], values[-span:])
     if n <= 2 * half:
         return first(k)
-    before, after = first(np.arange(-half, 0.0)), last(np.arange(n, n + half, dtype=float))
+    head, tail = first(np.arange(-half, 0.0)), last(np.arange(n, n + half, dtype=float))
     base = values[0]  # subtracted before summing, because sums of small numbers have smaller rounding errors
-    return base + window_means(np.concatenate((before, values, after)) - base, 2 * half + 1)
+    return base + window_means(np.concatenate((head, values, tail)) - base, 2 * half + 1)
 
 
 def _line(k: Array, values: Array) -> Callable[[Array], Array]:

@@ -125,29 +125,29 @@ def _pieces(name: str, file: Any, packed: Any, size: int, remarks: list[Message]
             if cut:
                 yield _with_line_feeds(pending[:cut]), read if packed is file else packed.tell()
                 pending = pending[cut:]
-    kept = pending.rstrip(b"\0")
-    if remarks is not None and len(kept) < len(pending):
-        remarks.append(NulEnd(len(pending) - len(kept)))
-        pending = kept
+    stripped = pending.rstrip(b"\0")
+    if remarks is not None and len(stripped) < len(pending):
+        remarks.append(NulEnd(len(pending) - len(stripped)))
+        pending = stripped
     if pending:
         yield _with_line_feeds(pending), read if packed is file else packed.tell()
 
 
 def _data(file: Any, size: int, remarks: list[Message] | None) -> Iterator[bytes]:
     """Yield the content of the file. A cut gzip file ends at the cut, if anything could be unpacked."""
-    packed, there = isinstance(file, gzip.GzipFile), False
+    packed, has_data = isinstance(file, gzip.GzipFile), False
     while True:
         try:
             # read1() returns the data before a cut. read() would raise EOFError and lose that data.
             data = file.read1(size) if packed else file.read(size)
         except EOFError:
-            if remarks is None or not there:
+            if remarks is None or not has_data:
                 raise
             remarks.append(CutGzip())
             return
         if not data:
             return
-        there = True
+        has_data = True
         yield data.encode() if isinstance(data, str) else data
 
 

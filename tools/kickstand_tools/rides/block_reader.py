@@ -102,13 +102,13 @@ class StoredBlock:
 
         The samples of a turn should fill the time since the turn before it. The rest of this time is a gap.
         """
-        period_us, before_us, found = 1_000_000 // self.sample_hz, self.time_us, []
+        period_us, before_us, gaps_s = 1_000_000 // self.sample_hz, self.time_us, []
         for turn in self.turns:
             late_us = turn.time_us - before_us - turn.n * period_us
             if late_us > _LATE_PERIODS * period_us:
-                found.append(late_us / 1e6)
+                gaps_s.append(late_us / 1e6)
             before_us = turn.time_us
-        return found
+        return gaps_s
 
 
 def read(content: bytes) -> tuple[list[StoredBlock], list[str]]:
@@ -120,17 +120,17 @@ def read(content: bytes) -> tuple[list[StoredBlock], list[str]]:
             damage.
     """
     blocks, problems = [], []
-    at = 0
-    while at < len(content):
-        length = int.from_bytes(content[at + 6 : at + 8], "little")
+    position = 0
+    while position < len(content):
+        length = int.from_bytes(content[position + 6 : position + 8], "little")
         try:
-            blocks.append(parse(content[at : at + length]))
-            at += length
+            blocks.append(parse(content[position : position + length]))
+            position += length
         except BadBlock as problem:
-            following = content.find(block_format.MAGIC, at + 1)
+            following = content.find(block_format.MAGIC, position + 1)
             last = following < 0 and str(problem) == CUT_SHORT
-            problems.append(CUT_SHORT if last else f"{problem} at byte {at}")
-            at = following if following > 0 else len(content)
+            problems.append(CUT_SHORT if last else f"{problem} at byte {position}")
+            position = following if following > 0 else len(content)
     return blocks, problems
 
 
@@ -140,7 +140,7 @@ def parse(data: bytes) -> StoredBlock:
         raise BadBlock("not of a ride")
     if len(data) < _START + _TAIL_LENGTH:
         raise BadBlock(CUT_SHORT)
-    _, version, length, *rest, firmware, places, delay = struct.unpack_from(block_format.HEAD, data)
+    _, version, length, *rest, firmware, place_count, delay = struct.unpack_from(block_format.HEAD, data)
     if version not in block_format.BODY_LENGTHS:
         raise BadBlock(f"format {version}, this program reads {max(block_format.BODY_LENGTHS)}")
     start = _HEAD_LENGTH + block_format.BODY_LENGTHS[version]
@@ -156,9 +156,9 @@ def parse(data: bytes) -> StoredBlock:
         units = block.accel_lsb_per_g, block.gyro_lsb_tenths, block.sample_hz
         if not all(units) or not all(abs(value) <= _MOST for value in block.numbers()):
             raise ValueError  # "not <=" also refuses NaN
-        end = len(data) - _TAIL_LENGTH - places * _PLACE_LENGTH
-        found = dict(_places(data[end : len(data) - _TAIL_LENGTH]))
-        block.turns = list(_turns(block, data[start:end], count, found))
+        end = len(data) - _TAIL_LENGTH - place_count * _PLACE_LENGTH
+        positions = dict(_places(data[end : len(data) - _TAIL_LENGTH]))
+        block.turns = list(_turns(block, data[start:end], count, positions))
     except (ValueError, ZeroDivisionError) as error:  # the check sum is right, so the board wrote invalid values
         raise BadBlock("not decodable") from error
     return block
@@ -184,42 +184,42 @@ def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]
     places: {number of the entry: its position}.
     """
     bits = bin(int.from_bytes(b"\x01" + data, "big"))[3:]
-    before = [1] + [0] * (block_format.FIELDS - 1)
+    previous = [1] + [0] * (block_format.FIELDS - 1)
     means = [block_format.START_MEAN] * block_format.FIELDS
     period_us = 1_000_000 // block.sample_hz
-    now, at, speed = block.time_us, 0, None
+    now, position, speed = block.time_us, 0, None
 
     def difference(i: int) -> int:
-        nonlocal at
+        nonlocal position
         mean = means[i]
-        zero = bits.index("0", at)
-        ones = zero - at
+        zero = bits.index("0", position)
+        ones = zero - position
         if ones < block_format.LIMIT:
             k = max(0, mean.bit_length() - block_format.MEAN_SHIFT - 1)
-            at = zero + 1 + k
-            size = ones << k | (int(bits[zero + 1 : at], 2) if k else 0)
+            position = zero + 1 + k
+            size = ones << k | (int(bits[zero + 1 : position], 2) if k else 0)
         else:
-            start = at + block_format.LIMIT
-            at = start + block_format.RAW_BITS
-            size = int(bits[start:at], 2)
+            start = position + block_format.LIMIT
+            position = start + block_format.RAW_BITS
+            size = int(bits[start:position], 2)
         means[i] = mean + min(size, block_format.MAX_SIZE) - (mean >> block_format.MEAN_SHIFT)
         return size >> 1 ^ -(size & 1)
 
     for entry in range(count):
-        n_before = before[0]
+        n_before = previous[0]
         n = n_before + difference(0)
         if n == 0:
-            before[8] += difference(8)
-            speed = before[8] / 100
+            previous[8] += difference(8)
+            speed = previous[8] / 100
             continue
         dt_us = n * period_us + difference(1)
         for i in range(2, 8):
-            before[i] = (before[i] if n == n_before else before[i] * n // n_before) + difference(i)
-        if n < 0 or dt_us < 0 or max(map(abs, before[2:8])) > n << 15:
+            previous[i] = (previous[i] if n == n_before else previous[i] * n // n_before) + difference(i)
+        if n < 0 or dt_us < 0 or max(map(abs, previous[2:8])) > n << 15:
             raise ValueError  # the time must increase, and counts have 16 bits
         now += dt_us
-        before[0] = n
-        yield StoredTurn(now, n, tuple(before[2:8]), speed, places.get(entry))
+        previous[0] = n
+        yield StoredTurn(now, n, tuple(previous[2:8]), speed, places.get(entry))
         speed = None
 
 

@@ -72,8 +72,8 @@ def record(
             # Write the calibration before the log, because the log may fill the disk
             with whole_file(out) as temporary, whole_file(beside) as calibration, _signals(stopped):
                 with _GrowingFile(temporary, out.suffix == ".gz") as file:
-                    made = _save_first_calibration(blocks(transport, name, notes, stopped), calibration)
-                    recorded.write(file, made, notes)
+                    stream = _save_first_calibration(blocks(transport, name, notes, stopped), calibration)
+                    recorded.write(file, stream, notes)
         finally:
             with contextlib.suppress(Exception):  # the cable may be unplugged
                 restart(transport)
@@ -101,10 +101,10 @@ class _GrowingFile(io.TextIOBase):
     def write(self, text: str) -> int:
         """Write all of the text, or nothing. Raises OSError if the write fails."""
         data = memoryview(gzip.compress(text.encode("ascii"), mtime=0) if self._packed else text.encode("ascii"))
-        at = 0
+        position = 0
         try:
-            while at < len(data):
-                at += self._file.write(data[at:])
+            while position < len(data):
+                position += self._file.write(data[position:])
         except OSError:
             self._file.truncate(self._length)
             self._file.seek(self._length)
@@ -141,11 +141,11 @@ def live_line() -> Iterator[Callable[[str], None]]:
 @contextlib.contextmanager
 def _signals(stopped: threading.Event) -> Iterator[None]:
     """A context in which signals that would end this program only set `stopped`."""
-    before = {number: signal.signal(number, lambda *_: stopped.set()) for number in _ending_signals()}
+    handlers = {number: signal.signal(number, lambda *_: stopped.set()) for number in _ending_signals()}
     try:
         yield
     finally:
-        for number, handler in before.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)
 
 

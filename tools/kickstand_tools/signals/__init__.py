@@ -86,8 +86,8 @@ def integral(time_s: Array, values: Array) -> Array:
 
 
 def _padded(values: Array, n: int) -> Array:
-    before, after = np.repeat(values[:1], n // 2, 0), np.repeat(values[-1:], n - 1 - n // 2, 0)
-    return np.concatenate((before, values, after))
+    head, tail = np.repeat(values[:1], n // 2, 0), np.repeat(values[-1:], n - 1 - n // 2, 0)
+    return np.concatenate((head, values, tail))
 
 
 # Means of samples over bins of time. Such means remove vibration and need little memory.
@@ -208,8 +208,8 @@ def correlation(effect: Array, cause: Array, whole: bool = False) -> Correlation
         `direction`. The value is then smaller if the cause also varies in other directions.
     """
     effect, cause = effect - np.mean(effect), cause - np.mean(cause, axis=0)
-    both = effect @ cause
-    direction = both / max(float(np.linalg.norm(both)), 1e-12)
+    covariance = effect @ cause
+    direction = covariance / max(float(np.linalg.norm(covariance)), 1e-12)
     along = cause @ direction
     size = float(np.sqrt((effect @ effect) * (np.sum(cause * cause) if whole else along @ along)))
     return Correlation(float(effect @ along) / size if size > 0.0 else 0.0, direction)
@@ -241,16 +241,16 @@ def best_lag(
     Returns None if pair_at returns None for all lags.
     """
     tried = [(lag_s, pair_at(lag_s)) for lag_s in lags_s]
-    found = [(lag_s, correlation(*pair, whole)) for lag_s, pair in tried if pair is not None]
-    if not found:
+    candidates = [(lag_s, correlation(*pair, whole)) for lag_s, pair in tried if pair is not None]
+    if not candidates:
         return None
-    values = np.array([each.value for _, each in found])
+    values = np.array([each.value for _, each in candidates])
     best = int(np.argmax(values))
-    lag_s, at = found[best]
-    inside = 0 < best < len(found) - 1
+    lag_s, peak = candidates[best]
+    inside = 0 < best < len(candidates) - 1
     if inside:
-        lag_s += peak_offset(values[best - 1 : best + 2] ** 2) * (found[best + 1][0] - lag_s)
-    return Lag(at.value, at.direction, float(lag_s), inside)
+        lag_s += peak_offset(values[best - 1 : best + 2] ** 2) * (candidates[best + 1][0] - lag_s)
+    return Lag(peak.value, peak.direction, float(lag_s), inside)
 
 
 def peak_offset(three: Array) -> float:
@@ -258,9 +258,9 @@ def peak_offset(three: Array) -> float:
 
     Returns its distance from the middle value, in steps, from -0.5 to 0.5.
     """
-    before, here, after = three
-    bend = before - 2.0 * here + after
-    return float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
+    first, middle, last = three
+    bend = first - 2.0 * middle + last
+    return float(np.clip(0.5 * (first - last) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
 
 
 def correlations(first: Array, first_good: Bools, second: Array, second_good: Bools) -> tuple[Array, Array]:
@@ -280,14 +280,14 @@ def correlations(first: Array, first_good: Bools, second: Array, second_good: Bo
     a, b = np.where(first_good, first, 0.0), np.where(second_good, second, 0.0)
 
     def crossed(x: Array, y: Array) -> Array:
-        whole = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
-        return np.concatenate((whole[size - len(second) + 1 :], whole[: len(first)]))
+        products = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
+        return np.concatenate((products[size - len(second) + 1 :], products[: len(first)]))
 
-    there, other = first_good.astype(float), second_good.astype(float)
-    count = np.maximum(np.rint(crossed(there, other)), 0.0)
+    mask, second_mask = first_good.astype(float), second_good.astype(float)
+    count = np.maximum(np.rint(crossed(mask, second_mask)), 0.0)
     # The transforms have rounding errors, about 1e-9 of the total sum of squares or less. A sum below this is only
     # rounding error, so it is replaced by the limit.
-    square = np.maximum(crossed(a * a, other), 1e-9 * (a @ a)) * np.maximum(crossed(there, b * b), 1e-9 * (b @ b))
+    square = np.maximum(crossed(a * a, second_mask), 1e-9 * (a @ a)) * np.maximum(crossed(mask, b * b), 1e-9 * (b @ b))
     return crossed(a, b) / np.sqrt(np.maximum(square, 1e-30)), count
 
 
@@ -309,12 +309,12 @@ def peaks(values: Array, apart: int, most: int) -> list[int]:
 
     Returns their indices, the largest maximum first.
     """
-    left, found = values.copy(), []
-    while len(found) < most and np.max(left) > 0.0:
-        place = int(np.argmax(left))
-        found.append(place)
-        left[max(0, place - apart) : place + apart + 1] = 0.0
-    return found
+    remaining, indices = values.copy(), []
+    while len(indices) < most and np.max(remaining) > 0.0:
+        index = int(np.argmax(remaining))
+        indices.append(index)
+        remaining[max(0, index - apart) : index + apart + 1] = 0.0
+    return indices
 
 
 # Rotation vectors and rotation matrices. A rotation vector is the axis times the angle in rad. The functions convert

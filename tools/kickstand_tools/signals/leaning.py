@@ -63,8 +63,8 @@ def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
     left = np.cross(up, forward)
     rolled, yaw = without_drift(np.cumsum(rate @ forward) * WINDOW_S), rate @ up
     turned = without_drift(yaw)
-    both, squared = -float(rolled[riding] @ turned[riding]), float(turned[riding] @ turned[riding])
-    speed = both / max(squared, 1e-30) * STANDARD_GRAVITY
+    covariance, squared = -float(rolled[riding] @ turned[riding]), float(turned[riding] @ turned[riding])
+    speed = covariance / max(squared, 1e-30) * STANDARD_GRAVITY
     expected = (yaw * np.sin(leaned(rolled, yaw, speed)))[riding]
     expected -= expected.mean()
     about_left = (rate @ left)[riding]
@@ -76,7 +76,7 @@ def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
         np.array([left, up, forward]),
         rolled,
         turned,
-        both / float(np.sqrt(max(float(rolled[riding] @ rolled[riding]) * squared, 1e-30))),
+        covariance / float(np.sqrt(max(float(rolled[riding] @ rolled[riding]) * squared, 1e-30))),
         speed,
         share,
         abs(share) / max(float(noise), 1e-12),

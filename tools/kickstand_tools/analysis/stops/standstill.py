@@ -72,8 +72,8 @@ def _rests_of_filter(ride: Channels) -> Bools:
     forward = smoothed(ride.forward_g, ride.t_s, ENGINE_S)
     for start, _ in intervals(still):
         weight = np.median(forward[start : start + 10])
-        off = np.flatnonzero(np.abs(forward[:start] - weight) > 2 * STILL_G)
-        still[(int(off[-1]) + 1 if len(off) else 0) : start] = True
+        moving = np.flatnonzero(np.abs(forward[:start] - weight) > 2 * STILL_G)
+        still[(int(moving[-1]) + 1 if len(moving) else 0) : start] = True
     return still
 
 
