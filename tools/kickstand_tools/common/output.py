@@ -45,13 +45,13 @@ def _is_open_here(path: Path) -> bool:
             with contextlib.suppress(OSError):
                 if os.path.samestat(os.fstat(number), status) and path.is_file():
                     return True
-    link = Path(os.path.abspath(path))
+    target = Path(os.path.abspath(path))
     for _ in range(_MOST_LINKS):  # /dev/stdout is a link to /proc/self/fd/1
-        if link.is_relative_to("/dev/fd") or (link.is_relative_to("/proc") and link.parent.name == "fd"):
+        if target.is_relative_to("/dev/fd") or (target.is_relative_to("/proc") and target.parent.name == "fd"):
             return True
-        if not link.is_symlink():
+        if not target.is_symlink():
             return False
-        link = Path(os.path.abspath(link.parent / os.readlink(link)))
+        target = Path(os.path.abspath(target.parent / os.readlink(target)))
     return False
 
 
@@ -65,18 +65,18 @@ def check_directory(path: Path) -> None:
 @contextlib.contextmanager
 def new_directory(path: Path) -> Iterator[None]:
     """Make a directory and its parents. At the end of the `with`, new directories that are still empty are removed."""
-    new: list[Path] = []
+    created: list[Path] = []
     try:
         try:
-            new = [directory for directory in (path, *path.parents) if not directory.exists()]
+            created = [folder for folder in (path, *path.parents) if not folder.exists()]
             path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"{path} cannot be made: {cause(error)}") from error
         yield
     finally:
         with contextlib.suppress(OSError):  # not empty
-            for directory in new:
-                directory.rmdir()
+            for folder in created:
+                folder.rmdir()
 
 
 def make_directory(path: Path) -> None:

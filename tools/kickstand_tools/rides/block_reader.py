@@ -102,13 +102,13 @@ class StoredBlock:
 
         The samples of a turn should fill the time since the turn before it. The rest of this time is a gap.
         """
-        period_us, before_us, gaps_s = 1_000_000 // self.sample_hz, self.time_us, []
+        period_us, before_us, gaps = 1_000_000 // self.sample_hz, self.time_us, []
         for turn in self.turns:
             late_us = turn.time_us - before_us - turn.n * period_us
             if late_us > _LATE_PERIODS * period_us:
-                gaps_s.append(late_us / 1e6)
+                gaps.append(late_us / 1e6)
             before_us = turn.time_us
-        return gaps_s
+        return gaps
 
 
 def read(content: bytes) -> tuple[list[StoredBlock], list[str]]:
@@ -120,17 +120,17 @@ def read(content: bytes) -> tuple[list[StoredBlock], list[str]]:
             damage.
     """
     blocks, problems = [], []
-    position = 0
-    while position < len(content):
-        length = int.from_bytes(content[position + 6 : position + 8], "little")
+    offset = 0
+    while offset < len(content):
+        length = int.from_bytes(content[offset + 6 : offset + 8], "little")
         try:
-            blocks.append(parse(content[position : position + length]))
-            position += length
+            blocks.append(parse(content[offset : offset + length]))
+            offset += length
         except BadBlock as problem:
-            following = content.find(block_format.MAGIC, position + 1)
+            following = content.find(block_format.MAGIC, offset + 1)
             last = following < 0 and str(problem) == CUT_SHORT
-            problems.append(CUT_SHORT if last else f"{problem} at byte {position}")
-            position = following if following > 0 else len(content)
+            problems.append(CUT_SHORT if last else f"{problem} at byte {offset}")
+            offset = following if following > 0 else len(content)
     return blocks, problems
 
 
@@ -140,7 +140,7 @@ def parse(data: bytes) -> StoredBlock:
         raise BadBlock("not of a ride")
     if len(data) < _START + _TAIL_LENGTH:
         raise BadBlock(CUT_SHORT)
-    _, version, length, *rest, firmware, place_count, delay = struct.unpack_from(block_format.HEAD, data)
+    _, version, length, *rest, firmware, places, delay = struct.unpack_from(block_format.HEAD, data)
     if version not in block_format.BODY_LENGTHS:
         raise BadBlock(f"format {version}, this program reads {max(block_format.BODY_LENGTHS)}")
     start = _HEAD_LENGTH + block_format.BODY_LENGTHS[version]
@@ -156,7 +156,7 @@ def parse(data: bytes) -> StoredBlock:
         units = block.accel_lsb_per_g, block.gyro_lsb_tenths, block.sample_hz
         if not all(units) or not all(abs(value) <= _MOST for value in block.numbers()):
             raise ValueError  # "not <=" also refuses NaN
-        end = len(data) - _TAIL_LENGTH - place_count * _PLACE_LENGTH
+        end = len(data) - _TAIL_LENGTH - places * _PLACE_LENGTH
         positions = dict(_places(data[end : len(data) - _TAIL_LENGTH]))
         block.turns = list(_turns(block, data[start:end], count, positions))
     except (ValueError, ZeroDivisionError) as error:  # the check sum is right, so the board wrote invalid values
@@ -187,21 +187,21 @@ def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]
     previous = [1] + [0] * (block_format.FIELDS - 1)
     means = [block_format.START_MEAN] * block_format.FIELDS
     period_us = 1_000_000 // block.sample_hz
-    now, position, speed = block.time_us, 0, None
+    time_us, bit, speed = block.time_us, 0, None
 
     def difference(i: int) -> int:
-        nonlocal position
+        nonlocal bit
         mean = means[i]
-        zero = bits.index("0", position)
-        ones = zero - position
+        zero = bits.index("0", bit)
+        ones = zero - bit
         if ones < block_format.LIMIT:
             k = max(0, mean.bit_length() - block_format.MEAN_SHIFT - 1)
-            position = zero + 1 + k
-            size = ones << k | (int(bits[zero + 1 : position], 2) if k else 0)
+            bit = zero + 1 + k
+            size = ones << k | (int(bits[zero + 1 : bit], 2) if k else 0)
         else:
-            start = position + block_format.LIMIT
-            position = start + block_format.RAW_BITS
-            size = int(bits[start:position], 2)
+            start = bit + block_format.LIMIT
+            bit = start + block_format.RAW_BITS
+            size = int(bits[start:bit], 2)
         means[i] = mean + min(size, block_format.MAX_SIZE) - (mean >> block_format.MEAN_SHIFT)
         return size >> 1 ^ -(size & 1)
 
@@ -217,9 +217,9 @@ def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]
             previous[i] = (previous[i] if n == n_before else previous[i] * n // n_before) + difference(i)
         if n < 0 or dt_us < 0 or max(map(abs, previous[2:8])) > n << 15:
             raise ValueError  # the time must increase, and counts have 16 bits
-        now += dt_us
+        time_us += dt_us
         previous[0] = n
-        yield StoredTurn(now, n, tuple(previous[2:8]), speed, places.get(entry))
+        yield StoredTurn(time_us, n, tuple(previous[2:8]), speed, places.get(entry))
         speed = None
 
 
