@@ -24,8 +24,8 @@ def _line_of(error):
     # the stubs for the type checker do not accept a StringIO here
     sys.print_exception(error, text)  # type: ignore[arg-type]
     traceback = text.getvalue()  # type: ignore[attr-defined]
-    _, found, rest = traceback.rpartition('config.py", line ')
-    return "line %s: " % rest.split("\n")[0].split(",")[0].strip() if found else ""
+    _, separator, tail = traceback.rpartition('config.py", line ')
+    return "line %s: " % tail.split("\n")[0].split(",")[0].strip() if separator else ""
 
 
 class Settings:

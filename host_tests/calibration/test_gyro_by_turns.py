@@ -9,7 +9,7 @@ from kickstand.calibration.turn import Turn
 from kickstand_tools.calibration.procedure import fit_procedure
 from kickstand_tools.common.errors import InputError, RefusedInput
 from kickstand_tools.logs.log import Log
-from kickstand_tools.simulation import hands, poses
+from kickstand_tools.simulation import hands
 from kickstand_tools.simulation.physics.chip import Chip
 from support.mpy import run_mpy
 
@@ -22,7 +22,7 @@ def handled(seed, hand=None):
     turned between the positions."""
     chance = np.random.default_rng([seed, 38])
     chip = Chip.random(chance)
-    return chip, hands.procedure(chance, chip, np.array(list(poses.ups(chance))), 22.0, hand)
+    return chip, hands.procedure(chance, chip, np.array(list(hands.ups(chance))), 22.0, hand)
 
 
 def errors_left(seed, hand=None):

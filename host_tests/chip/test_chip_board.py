@@ -10,7 +10,7 @@ import pytest
 from kickstand_tools.simulated_board.lcd import shown_lean
 from kickstand_tools.simulation.scripted.script import Ride, kickstand, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
-from kickstand_workshop.bench.sample_count import SampleCount
+from kickstand_workshop.bench.bench import SampleCount
 from support import device_runs
 from support.emulated import CHIPS, calibrated, firmware, leaning, reset_in_a_read, shows
 

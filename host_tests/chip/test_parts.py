@@ -6,7 +6,7 @@ import socket
 
 import pytest
 from kickstand_emulator import image
-from kickstand_emulator.console_server import ConsoleServer
+from kickstand_emulator.emulate import ConsoleServer
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.i2c import Bus
@@ -116,7 +116,7 @@ def chip():
 
 def nor_flash(chip):
     """Return the flash interface of a new chip, and a function that sends a command to the flash."""
-    from kickstand_emulator.flash_memory import TimedFlash
+    from kickstand_emulator.chip import TimedFlash
     from rp2040py.gpio_pin import GPIOPinState
 
     flash = TimedFlash(chip, "SSI")
@@ -133,7 +133,7 @@ def nor_flash(chip):
 
 def test_flash_takes_time_and_is_torn_where_power_is_cut(chip):
     """A W25Q16JV typically takes 45 ms to erase 4 KB, 150 ms for 64 KB, and 0.5 ms to program 256 bytes."""
-    from kickstand_emulator.flash_memory import PowerCut
+    from kickstand_emulator.chip import PowerCut
 
     flash, send = nor_flash(chip)
     operations = []

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from kickstand_tools.common import unix_port
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.demo import user_program
+from kickstand_tools.demo import demo
 from kickstand_tools.demo.score import Score, State, table
 from kickstand_tools.demo.screen import bike, oled_lines, screen
 from rich.console import Console
@@ -114,7 +114,7 @@ def test_a_users_program_is_checked_before_the_ride(engine, program, tmp_path):
         pytest.skip("no MicroPython for this system")
     path = tmp_path / "my.py"
     path.write_text("def page(meter):\n    return 'a', 'b'\n")
-    user_program.check(path, engine)
+    demo.check_program(path, engine)
     path.write_bytes(program)
     with pytest.raises(InputError, match=rf"my\.py.*: {engine} cannot run this file: correct it"):
-        user_program.check(path, engine)
+        demo.check_program(path, engine)

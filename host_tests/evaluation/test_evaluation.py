@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.simulation.ride import ride
-from kickstand_workshop.evaluation import estimators, faults, integrity, real_ride, runs
+from kickstand_workshop.evaluation import estimators, faults, integrity, runs
 from kickstand_workshop.evaluation.estimators import Samples
 from kickstand_workshop.evaluation.integrity import FaultJob
 from support.command import refused, works
@@ -89,7 +89,7 @@ def test_a_refused_calibration_is_reported_not_scored(monkeypatch):
 def test_recorded_motorcycle_has_its_known_scores(shared_data):
     """The slope is the share of the true lean that a filter shows. The reference is computed from speed and yaw
     rate."""
-    compared = real_ride.compare(shared_data / "motorcycle-ride.csv.gz")
+    compared = runs.score_recording(shared_data / "motorcycle-ride.csv.gz")
     scores = compared.scores
     assert scores["complementary"].slope == pytest.approx(0.40, abs=0.06)
     assert 15.0 < np.abs(compared.traces["reference"]).max() < 25.0

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from kickstand_tools.replay.replay_engine import COLUMNS, Replay
 from kickstand_tools.simulation import ride as rides
-from kickstand_tools.simulation.physics import engine
+from kickstand_tools.simulation.physics import road
 from kickstand_tools.simulation.physics.chip import Chip
 from kickstand_workshop.evaluation.runs import as_log, calibrated_by_poses
 
@@ -25,12 +25,12 @@ def shaken(monkeypatch, profile, seed, factor, range_g, seconds):
     rms = []
 
     def harder(*arguments):
-        monkeypatch.setattr(engine, "_MAX_G", 0.5 * factor)
+        monkeypatch.setattr(road, "_MAX_G", 0.5 * factor)
         force, rates = vibration(*arguments)
         rms.append(float(np.sqrt((force**2).mean())) * factor / 9.80665)
         return factor * force, min(factor, 4) * rates
 
-    vibration, random = engine.vibration, Chip.random
+    vibration, random = road.vibration, Chip.random
     with monkeypatch.context() as patch:
         patch.setattr(rides, "vibration", harder)
         patch.setattr(Chip, "random", lambda *a: dataclasses.replace(random(*a), accel_range_g=range_g), raising=False)

@@ -7,8 +7,8 @@ import pytest
 from kickstand_workshop.evaluation import faults, integrity
 from kickstand_workshop.evaluation.faults import FAULTS
 from kickstand_workshop.evaluation.integrity import FaultJob, Trace
-from kickstand_workshop.evaluation.metrics import LeanScore, lag_ms, score
 from kickstand_workshop.evaluation.report import pooled
+from kickstand_workshop.evaluation.runs import LeanScore, lag_ms, score
 
 RATE, N = 200.0, 40_000
 TIME = np.arange(N) / RATE

@@ -5,7 +5,7 @@ import pytest
 from exact import MOUNT, drive_intervals
 from fleet_drives import yaw_deg
 from kickstand_fleet import evidence
-from kickstand_fleet.forward import Forward, find_forward
+from kickstand_fleet.evidence import Forward, find_forward
 from kickstand_tools.calibration.drive import UP_DEG, DriveFit, fit_logs, usable
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.reader import read_log

@@ -7,13 +7,13 @@ import pytest
 from exact import FORWARD, LEFT, UP, block_group, drive_intervals
 from fleet_drives import turn_of
 from kickstand_fleet import evidence
-from kickstand_fleet.moved import LEAST_DEG, Move, compare, find_moves
+from kickstand_fleet.moved import LEAST_DEG, Move, find_moves, turn_between
 from kickstand_tools.calibration.drive import fit_logs, usable
 from kickstand_tools.logs.reader import read_log
 
 
 def compared(before, after):
-    result = compare(before, after)
+    result = turn_between(before, after)
     assert result
     return result
 

@@ -5,7 +5,7 @@ import pytest
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.joining.motion import STEP_S, CellMotion
 from kickstand_tools.overlay.camera_match import camera_offset_s
-from kickstand_tools.overlay.gpmf import Telemetry
+from kickstand_tools.overlay.video import Telemetry
 
 RIDE_S = 60.0
 NOWHERE = "at no time does the camera turn like the bike"

@@ -7,7 +7,7 @@ import pytest
 from kickstand.units import STANDARD_GRAVITY as G
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.signals import rotation_matrix
-from kickstand_tools.simulation import poses
+from kickstand_tools.simulation import hands
 from kickstand_tools.simulation.commands import Leg, commands
 from kickstand_tools.simulation.files import simulate
 from kickstand_tools.simulation.plan import Plan, lean_for
@@ -169,14 +169,14 @@ def test_poses_have_six_sides_up_and_one_slanted():
     """A hand tilts the sensor by up to 4 degrees."""
     tilts = []
     for seed in range(50):
-        ups = np.array(list(poses.ups(np.random.default_rng(seed))))
+        ups = np.array(list(hands.ups(np.random.default_rng(seed))))
         assert np.linalg.norm(ups, axis=1) == pytest.approx(np.ones(7)) and np.min(np.abs(ups[6])) > 0.3
         axes = np.argmax(np.abs(ups[:6]), axis=1)
         assert len({(int(axis), bool(up[axis] > 0.0)) for axis, up in zip(axes, ups)}) == 6
         tilts.append(np.degrees(np.arccos(np.abs(ups[:6]).max(axis=1))))
     assert 3.9 < np.max(tilts) <= 4.0 and np.min(tilts) < 0.1
-    assert poses.up_seen(30.0, 0.0) == pytest.approx([0.5, np.cos(np.radians(30)), 0.0])
-    assert poses.up_seen(0.0, 30.0) == pytest.approx([0.0, np.cos(np.radians(30)), 0.5])
+    assert hands.up_seen(30.0, 0.0) == pytest.approx([0.5, np.cos(np.radians(30)), 0.0])
+    assert hands.up_seen(0.0, 30.0) == pytest.approx([0.0, np.cos(np.radians(30)), 0.5])
 
 
 def test_the_rates_of_a_hand_turn_gravity_to_each_pose():

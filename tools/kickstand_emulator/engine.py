@@ -31,8 +31,7 @@ def rp2040(records: Iterator[bytes], progress: Progress | None) -> Iterator[IO[b
     image.find()  # called before the imports below: raises InputError if something is not installed
     native.build()
     from . import flash_image
-    from .host_link import GUEST, HostLink
-    from .pico import Pico
+    from .pico import GUEST, HostLink, Pico
 
     content = b"".join(records)
     results, total = io.BytesIO(), len(content) // struct.calcsize(replay_engine.RECORD)

@@ -206,10 +206,10 @@ class Machine:
             self._stale.append(pin)
             wires[0].driven(self._driven[wires[1]], self._driven[wires[2]])
 
-    def _sync(self, number: int, what: int) -> None:
+    def _sync(self, number: int, write_out: int) -> None:
         """Correct the inputs of stale pins. QEMU calls this function before it reads the inputs, and when it sets up a
         pin."""
-        if what == -1 and self._stale:
+        if write_out == -1 and self._stale:
             for pin in self._stale:
                 self._qemu.qemu_picsimlab_set_pin(pin + 1, self._inputs[pin])
             self._stale = []

@@ -1,7 +1,7 @@
 """Alignment, moved mounts and brake tests of many vehicles.
 
 manifest.py groups the logs by vehicle and mount. period.py processes the logs of one mount, with the mathematics in
-evidence.py, forward.py and moved.py. cluster.py runs period.py with Dask for all mounts. journal.py saves each result
+evidence.py and moved.py. cluster.py runs period.py with Dask for all mounts. journal.py saves each result
 at once. tables.py and the modules in show/ write the results.
 """
 

@@ -160,11 +160,9 @@ def listed(parent: str) -> dict[str, str]:
 
 @contextlib.contextmanager
 def _in_store(path: str, action: str) -> Iterator[tuple[Any, str]]:
-    """A context that yields the file system of a remote path, and the path within that file system.
+    """A context with the file system of a remote path, and the path within it. Any error becomes an InputError.
 
-    The context turns any error of the libraries into an InputError.
-
-    path: the remote path. action: the past participle of the attempted action, for the message.
+    action: the past participle of the attempted action, for the message.
     """
     try:
         yield _system(path)

@@ -97,7 +97,7 @@ def _search(logs: list[Intervals], driving: Blocks, share: float) -> list[Move]:
     best: tuple[float, int, Move] | None = None
     for index in range(LEAST_BLOCKS, count - LEAST_BLOCKS + 1):
         between = driving.log[index] != driving.log[index - 1]
-        turned = compare(*_sides(driving, index, between))
+        turned = turn_between(*_sides(driving, index, between))
         if turned is None:
             continue
         turn, sigma = turned
@@ -125,10 +125,7 @@ def _search(logs: list[Intervals], driving: Blocks, share: float) -> list[Move]:
 
 
 def _sides(driving: Blocks, index: int, between: bool) -> tuple[Blocks, Blocks]:
-    """Return the blocks before and after block number `at`.
-
-    between: True if the block is the first of a log. True uses blocks of all logs, False only blocks of the same log.
-    """
+    """Return the blocks before and after block number `index`: of all logs if `between` logs, else of one log."""
     if between:
         return driving.part(slice(max(0, index - REACH), index)), driving.part(slice(index, index + REACH))
     first, last = np.searchsorted(driving.log, [driving.log[index], driving.log[index] + 1])
@@ -137,7 +134,7 @@ def _sides(driving: Blocks, index: int, between: bool) -> tuple[Blocks, Blocks]:
     return driving.part(earlier), driving.part(slice(index + 1, min(last, index + 1 + REACH)))
 
 
-def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
+def turn_between(first: Blocks, second: Blocks) -> tuple[Array, Array] | None:
     """Measure by how much the mount rotated between two groups of blocks.
 
     Returns:
@@ -146,13 +143,13 @@ def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
 
     Returns None if one of the groups does not determine an alignment.
     """
-    if min(len(before.log), len(after.log)) < LEAST_BLOCKS:
+    if min(len(first.log), len(second.log)) < LEAST_BLOCKS:
         return None
-    earlier, later = _align_part(before), _align_part(after)
+    earlier, later = _align_part(first), _align_part(second)
     if earlier is None or later is None:
         return None
     turn = np.degrees(rotation_vector(later.frame @ earlier.frame.T))
-    road = ROAD_DEG if before.log[-1] == after.log[0] else OTHER_ROAD_DEG
+    road = ROAD_DEG if first.log[-1] == second.log[0] else OTHER_ROAD_DEG
     variance = earlier.variance + later.variance + 2.0 * road**2
     # The direction of the sway measures the yaw in another way than the frame. An error between the yaws of the two
     # frames makes the sway seem to turn by the same angle
@@ -175,10 +172,7 @@ class _PartAlignment:
 
 
 def _align_part(part: Blocks) -> _PartAlignment | None:
-    """Compute the alignment from some blocks, with its variance from the jackknife.
-
-    Returns None if the blocks do not determine an alignment.
-    """
+    """Compute the alignment from some blocks, with its variance from the jackknife. None if undetermined."""
     square, product = np.sum(part.square, axis=0), np.sum(part.product, axis=0)
     coefficients, varied = fits(square, product)
     if np.sum(varied) < LEAST_VARIED:

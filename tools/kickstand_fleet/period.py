@@ -24,7 +24,7 @@ from kickstand_tools.logs.reader import CutLine
 from kickstand_tools.logs.source import CutGzip, NulEnd
 
 from . import evidence, files, signals
-from .forward import Forward, find_forward
+from .evidence import Forward, find_forward
 from .manifest import Period
 from .moved import Move, find_moves
 

@@ -98,7 +98,7 @@ def schema(table: str) -> "pyarrow.Schema":
     )
 
 
-def check() -> None:
+def require_pyarrow() -> None:
     """Raise InputError if Parquet cannot be written."""
     try:
         import pyarrow.parquet  # noqa: F401

@@ -143,8 +143,8 @@ class Lcd:
         else:
             quarter = (step - len(_NIBBLES) - 1) * _COLUMNS
             self._send(_CGRAM_ADDRESS + quarter, memoryview(self._glyphs)[quarter : quarter + _COLUMNS])
-            for shown in self._shown:  # write both lines again
-                shown[:] = _NEVER
+            for line in self._shown:  # write both lines again
+                line[:] = _NEVER
             self._changed = True
 
     def _kept_power(self):
@@ -158,23 +158,23 @@ class Lcd:
     def _refresh(self):
         """Send the changed part of one line. Return False if no line has changed."""
         for i in (0, 1):
-            wanted, shown = self._wanted[i], self._shown[i]
-            if shown != wanted:
+            target, sent = self._wanted[i], self._shown[i]
+            if sent != target:
                 if not self._kept_power():
                     self._step = _POWER_UP
                     return True
                 first, last = 0, _COLUMNS - 1
-                while shown[first] == wanted[first]:
+                while sent[first] == target[first]:
                     first += 1
-                while shown[last] == wanted[last]:
+                while sent[last] == target[last]:
                     last -= 1
-                at = _LINE_ADDRESSES[i] + first
+                address = _LINE_ADDRESSES[i] + first
                 # Send dashes first, because an interrupted transfer must not leave half a number or the wrong word for
                 # the side
                 if last > first:
-                    self._send(at, memoryview(_DASHES)[first : last + 1])
-                self._send(at, memoryview(wanted)[first : last + 1])
-                shown[:] = wanted
+                    self._send(address, memoryview(_DASHES)[first : last + 1])
+                self._send(address, memoryview(target)[first : last + 1])
+                sent[:] = target
                 return True
         self._changed = False
         return False

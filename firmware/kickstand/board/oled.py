@@ -60,10 +60,10 @@ class Canvas(framebuf.FrameBuffer):
             character(self, line[i] if isinstance(line[i], int) else ord(line[i]), 8 * i, 8 * page)
         pixels = self._pixels
         invert = 0xFF if inverted else 0
-        for at in range(page * WIDTH, (page + 1) * WIDTH):
-            column = pixels[at]
-            pixels[at] = _SPREAD[column & 15] ^ invert
-            pixels[at + WIDTH] = _SPREAD[column >> 4] ^ invert
+        for index in range(page * WIDTH, (page + 1) * WIDTH):
+            column = pixels[index]
+            pixels[index] = _SPREAD[column & 15] ^ invert
+            pixels[index + WIDTH] = _SPREAD[column >> 4] ^ invert
 
 
 class Oled:
@@ -91,7 +91,7 @@ class Oled:
         self._pages = HEIGHT // 8 if self.draws else HEIGHT // 16
         starts = [page * WIDTH + x for x in range(0, WIDTH, _PART) for page in range(self._pages)]
         self._new, self._old = [
-            [memoryview(pixels)[at : at + _PART] for at in starts] for pixels in (self._pixels, self._sent)
+            [memoryview(pixels)[start : start + _PART] for start in starts] for pixels in (self._pixels, self._sent)
         ]
         # A transfer consists of three commands, each after a control byte, and the data
         self._packet = bytearray(b"\x80\xb0\x80\x00\x80\x10\x40") + bytearray(_PART)
@@ -123,11 +123,11 @@ class Oled:
     def show(self, line1, line2, picture=None):
         """Set what tick() shows: the picture or, without a picture, the two lines in letters of double height. The
         lines have the character codes of hd44780.py."""
-        wanted = (self.draws and picture) or tuple(
+        target = (self.draws and picture) or tuple(
             [line if isinstance(line, str) else bytes(line) for line in (line1, line2)]
         )
-        if wanted != self._wanted:
-            self._wanted = wanted
+        if target != self._wanted:
+            self._wanted = target
 
     def tick(self, now_ms):
         """Do one step: draw, send some changed parts, or check the display's power.
@@ -174,7 +174,7 @@ class Oled:
 
     def _send(self):
         """Send the first parts that have changed or must be sent anyway."""
-        packet, left = self._packet, self._most
+        packet, remaining = self._packet, self._most
         for k in range(len(self._new)):
             new, old = self._new[k], self._old[k]
             if k >= len(self._new) - self._unsent or new != old:
@@ -186,8 +186,8 @@ class Oled:
                 self._i2c.writeto(self._address, packet)
                 old[:] = new
                 self._unsent = min(self._unsent, len(self._new) - 1 - k)
-                left -= 1
-                if not left:
+                remaining -= 1
+                if not remaining:
                     return
         self._changed = False
 

@@ -131,10 +131,10 @@ class SensorFit:
         for a in range(3):
             for m in range(9):
                 turned[a] -= turn[9 + 9 * a + m] * x[m]
-        before, after = rotated(turned, self.force(k)), self.force(k + 1)
+        earlier, later = rotated(turned, self.force(k)), self.force(k + 1)
         for a in range(3):
-            turned[a] = before[a] - turn[3 * a] * after[0] - turn[3 * a + 1] * after[1] - turn[3 * a + 2] * after[2]
-        return turned, before
+            turned[a] = earlier[a] - turn[3 * a] * later[0] - turn[3 * a + 1] * later[1] - turn[3 * a + 2] * later[2]
+        return turned, earlier
 
     def _accumulate(self):
         h, g, p = self._h, self._g, self._p
@@ -178,22 +178,22 @@ class SensorFit:
         x, y, z = [p[3 + i] * a[i] + p[i] for i in range(3)]
         out = []
         for i in range(3):
-            one = m[3 * i : 3 * i + 3]
-            out += one
-            out += [one[j] * a[j] for j in range(3)]
+            row = m[3 * i : 3 * i + 3]
+            out += row
+            out += [row[j] * a[j] for j in range(3)]
             out += ((0.0, z, y), (z, 0.0, x), (y, x, 0.0))[i]
         return out
 
     def _add(self, row, n, residual, weight):
         """Add the equation `residual = row . change` to the normal equations. The row has n entries."""
         h, g = self._h, self._g
-        at = 0
+        index = 0
         for i in range(n):
             value = weight * row[i]
             g[i] += value * residual
             for j in range(i + 1):
-                h[at] += value * row[j]
-                at += 1
+                h[index] += value * row[j]
+                index += 1
 
     def _factorise(self):
         """Factorise h = L L^T in place."""
@@ -251,7 +251,7 @@ class SensorFit:
         """Return the GyroError for turns that do not fit. The error names an axis if that axis alone explains the
         misfits."""
         x = [0.0] * 9
-        best, found = self._cost(x)[0] / 4, None
+        best, fault = self._cost(x)[0] / 4, None
         for axis in range(3):
             if self._turned(axis) < _DEAD_RAD:
                 return GyroError("dead-gyro", AXES[axis])
@@ -259,34 +259,34 @@ class SensorFit:
                 x[4 * axis] = 1.0 / reads - 1.0
                 cost = self._cost(x)[0]
                 if cost < best:
-                    best, found = cost, (axis, reads)
+                    best, fault = cost, (axis, reads)
             x[4 * axis] = 0.0
-        if found is None:
+        if fault is None:
             return GyroError("gyro-misfit", degrees(worst**0.5))
-        axis, reads = found
+        axis, reads = fault
         if reads < 0.0:
             return GyroError("gyro-reversed", AXES[axis])
         return GyroError("gyro-scale", AXES[axis], 100.0 * (reads - 1.0))
 
     def _turned(self, axis):
         """Return the largest rotation about an axis that the gyro measured in any turn, in rad."""
-        most = 0.0
+        largest = 0.0
         for turn in self._turns:
             if turn is not None:
                 for a in range(3):
-                    most = max(most, abs(turn[0][9 + 9 * a + 4 * axis]))
-        return most
+                    largest = max(largest, abs(turn[0][9 + 9 * a + 4 * axis]))
+        return largest
 
     def _cost(self, x):
         """Return the sum and the maximum of the squared misfits of all turns."""
-        total = most = 0.0
+        total = largest = 0.0
         for k in range(len(self._turns)):
             if self._turns[k] is not None:
                 misfit = self._misfit(k, x)[0]
                 square = misfit[0] * misfit[0] + misfit[1] * misfit[1] + misfit[2] * misfit[2]
                 total += square
-                most = max(most, square)
-        return total, most
+                largest = max(largest, square)
+        return total, largest
 
     def _check(self):
         """Raise GyroError if the gyro's errors exceed those of a working chip, or a turn does not fit."""

@@ -113,11 +113,11 @@ class Store:
                 if error.args[0] != ENOENT:  # a missing file is no problem, because save() creates it
                     problems.append("%s unreadable" % name)
                 continue
-            sequence, found, problem = self._unpack(record)
+            sequence, values, problem = self._unpack(record)
             if problem:
                 problems.append("%s %s" % (name, problem))
             if sequence > newest:
-                newest, calibration = sequence, found
+                newest, calibration = sequence, values
         return newest, calibration, problems
 
     def _path(self, name):
@@ -137,8 +137,8 @@ class Store:
             problem: None, or the fault in words if it is invalid.
         """
         if len(record) not in _LENGTHS.values():
-            whole = len(record) >= 6 and record[4] == _WHOLE_VERSION
-            length = _LENGTHS[_WHOLE_VERSION if whole else _VERSION]
+            complete = len(record) >= 6 and record[4] == _WHOLE_VERSION
+            length = _LENGTHS[_WHOLE_VERSION if complete else _VERSION]
             return 0, None, "empty" if not record else "cut short" if len(record) < length else "too long"
         magic, version, length, sequence = struct.unpack_from(_HEAD, record, 0)
         if struct.unpack_from("<I", record, len(record) - 4)[0] != crc32(record[:-4]):
@@ -164,8 +164,8 @@ def pack(who_am_i, accel_range_g, calibration):
     Returns:
         BODY_LENGTH bytes, or WHOLE_BODY_LENGTH bytes with matrices.
     """
-    how = (_BY_DRIVE if calibration.by_drive else _BY_POSES) if calibration.aligned else _NOT_ALIGNED
-    body = struct.pack(_BODY, who_am_i, accel_range_g, calibration.six_done, how, *calibration.parameters())
+    method = (_BY_DRIVE if calibration.by_drive else _BY_POSES) if calibration.aligned else _NOT_ALIGNED
+    body = struct.pack(_BODY, who_am_i, accel_range_g, calibration.six_done, method, *calibration.parameters())
     return body + struct.pack(_WHOLE, *calibration.matrices()) if calibration.whole else body
 
 
@@ -191,9 +191,9 @@ def plausible(calibration):
         if not abs(calibration.gyro_bias[i]) < MAX_BIAS_DPS:
             return False
     for i in range(9):
-        one = 1.0 if i % 4 == 0 else 0.0
+        expected = 1.0 if i % 4 == 0 else 0.0
         for values in (calibration.accel_matrix, calibration.gyro_matrix):
-            if not abs(values[i] - one) <= MAX_MATRIX_ERROR:
+            if not abs(values[i] - expected) <= MAX_MATRIX_ERROR:
                 return False
         if not 0.0 <= calibration.gyro_sigma[i] <= MAX_GYRO_SIGMA:
             return False

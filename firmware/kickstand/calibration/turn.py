@@ -78,14 +78,14 @@ class Turn:
         self._held = hold
         if dt_us > (n + 3) * self._period_us:
             self.lost = True
-        quick, own = n * self._quick, self._sums
+        quick, sums_of_turn = n * self._quick, self._sums
         step = False
         for i in range(3):
             total = sums[4 + i]
             if not -quick < total < quick:
                 self.quick = True
-            own[i] += total
-            if not -self._step_counts < own[i] < self._step_counts:
+            sums_of_turn[i] += total
+            if not -self._step_counts < sums_of_turn[i] < self._step_counts:
                 step = True
         self._n += n
         self._us += dt_us
@@ -144,11 +144,11 @@ class Turn:
 
         [w] is the cross-product matrix of the rotation w. A row of R times [w] is the cross product of the row and w.
         The half step makes the integration second-order."""
-        share, own, bias, n = self._rad * self._us / self._n, self._sums, self._bias, self._n
-        x, y, z = [share * (own[i] - n * bias[i]) for i in range(3)]
+        share, total, bias, n = self._rad * self._us / self._n, self._sums, self._bias, self._n
+        x, y, z = [share * (total[i] - n * bias[i]) for i in range(3)]
         seconds = self._us * 1e-6
         self.seconds += seconds
-        own[0] = own[1] = own[2] = 0
+        total[0] = total[1] = total[2] = 0
         self._n = self._us = 0
         steps = (x, y, z, seconds)
         small = 1.0 - (x * x + y * y + z * z) / 6  # with this factor the angle is correct to the fifth order
@@ -160,11 +160,11 @@ class Turn:
             r[3 * a] = p + half[1] * z - half[2] * y
             r[3 * a + 1] = q + half[2] * x - half[0] * z
             r[3 * a + 2] = t + half[0] * y - half[1] * x
-            at = 12 * a
+            index = 12 * a
             for value in half:
                 for step in steps:
-                    s[at] += value * step
-                    at += 1
+                    s[index] += value * step
+                    index += 1
 
 
 def rotated(turned, vector):

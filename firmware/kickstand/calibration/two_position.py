@@ -116,7 +116,7 @@ def check_turn(calibration, kickstand, upright, turn):
     u, v = calibration.correct(kickstand.accel), calibration.correct(upright.accel)
     normalize(u)
     normalize(v)
-    axis, back, claimed = vector(), vector(), vector()
+    axis, inverse, claimed = vector(), vector(), vector()
     cross(axis, u, v)
     tilt = atan2(norm(axis), dot(u, v))
     misfit = 9.9
@@ -124,13 +124,13 @@ def check_turn(calibration, kickstand, upright, turn):
     # The mean bias of both poses is better if the bias has drifted.
     for share in (0.0, 0.5):
         r = turn.attitude(upright.gyro, share)
-        rotate(back, r, v)
-        misfit = min(misfit, norm([u[i] - back[i] for i in range(3)]))
+        rotate(inverse, r, v)
+        misfit = min(misfit, norm([u[i] - inverse[i] for i in range(3)]))
     seconds = turn.seconds
     tolerance = GYRO_RAD + GYRO_TILT_SHARE * tilt + GYRO_TURN_SHARE * turn.angle()
     tolerance += GYRO_DRIFT * seconds + GYRO_WALK * (seconds**3 / 3) ** 0.5
     if misfit > tolerance:
         rotate(claimed, (r[0], r[3], r[6], r[1], r[4], r[7], r[2], r[5], r[8]), u)
         normalize(axis)
-        cross(back, u, claimed)
-        raise GyroError("gyro-tilt", degrees(tilt), degrees(atan2(dot(back, axis), dot(u, claimed))))
+        cross(inverse, u, claimed)
+        raise GyroError("gyro-tilt", degrees(tilt), degrees(atan2(dot(inverse, axis), dot(u, claimed))))

@@ -21,7 +21,7 @@ def add_products(out: ptr32, factors: ptr32, source: ptr32, n: int, rows: int): 
         # the mantissa is split into halves of 12 bits, because a product must fit in 31 bits
         a_high = ((a >> 12) & 0x7FF) | 0x800
         a_low = a & 0xFFF
-        at = i * n
+        index = i * n
         for k in range(i + 1 if rows > 1 else n):
             b = source[k]
             exponent = (b >> 23) & 255
@@ -36,7 +36,7 @@ def add_products(out: ptr32, factors: ptr32, source: ptr32, n: int, rows: int): 
                 value = (a_high * high << 6) + ((a_high * low + a_low * high + (a_low * low >> 12)) >> 6)
                 if (a ^ b) >> 31:
                     value = 0 - value
-                c = out[at]
+                c = out[index]
                 shift = ((c >> 23) & 255) - exponent
                 if shift > 0:
                     exponent += shift
@@ -62,7 +62,7 @@ def add_products(out: ptr32, factors: ptr32, source: ptr32, n: int, rows: int): 
                         value = sign << 31 | (exponent << 23) + ((value + 32) >> 6) - 0x800000
                     else:
                         value = 0
-                out[at] = value
+                out[index] = value
                 if rows > 1:
                     out[k * n + i] = value
-            at += 1
+            index += 1

@@ -19,9 +19,9 @@ class Bonds:
         self._changed = False
         try:
             with open(PATH) as file:
-                kept = json.load(file)
-            if kept["pin"] == pin:
-                self._keys = {(kind, unhexlify(key)): unhexlify(value) for kind, key, value in kept["keys"]}
+                saved = json.load(file)
+            if saved["pin"] == pin:
+                self._keys = {(kind, unhexlify(key)): unhexlify(value) for kind, key, value in saved["keys"]}
         except (OSError, ValueError, KeyError, TypeError):  # without a valid file all phones must pair again
             pass
 
@@ -35,18 +35,18 @@ class Bonds:
         """
         if key is not None:
             return self._keys.get((kind, bytes(key)))
-        found = [value for place, value in self._keys.items() if place[0] == kind]
-        return found[index] if index < len(found) else None
+        values = [value for address, value in self._keys.items() if address[0] == kind]
+        return values[index] if index < len(values) else None
 
     def put(self, kind, key, value):
         """Store a value. The value None deletes the stored value. Return True on success."""
-        place = kind, bytes(key)
-        if value is None and place not in self._keys:
+        address = kind, bytes(key)
+        if value is None and address not in self._keys:
             return False
         if value is None:
-            del self._keys[place]
+            del self._keys[address]
         else:
-            self._keys[place] = bytes(value)
+            self._keys[address] = bytes(value)
         self._changed = True
         return True
 

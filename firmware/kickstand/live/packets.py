@@ -63,8 +63,8 @@ def now(buffer, ms, lean_deg, sigma_deg, force, rate_dps, speed_mps, state):
         speed_mps: the speed, or None.
         state: the bits ALIGNED to NO_READINGS.
     """
-    known = lean_deg is not None
-    tilt = (whole(lean_deg, 100), _sigma(sigma_deg)) if known else (UNKNOWN, UNKNOWN_SIGMA)
+    is_known = lean_deg is not None
+    tilt = (whole(lean_deg, 100), _sigma(sigma_deg)) if is_known else (UNKNOWN, UNKNOWN_SIGMA)
     pack_into("<HhB", buffer, 0, ms & 0xFFFF, *tilt)
     for i in range(3):
         pack_into("<h", buffer, 5 + 2 * i, UNKNOWN if force is None else whole(force[i], 2048))

@@ -69,9 +69,9 @@ class Radio:
         ble, paired = self._ble, self._pin is not None
         read, write = _READ | _READ_PAIRED * paired, _WRITE | _WRITE_PAIRED * paired
         flags = read, write, _NOTIFY, read | _NOTIFY
-        own = tuple((uuid(SERVICE.replace("0000", "000%d" % (i + 1), 1)), flags[i]) for i in range(4))
+        characteristics = tuple((uuid(SERVICE.replace("0000", "000%d" % (i + 1), 1)), flags[i]) for i in range(4))
         chrono = (uuid(0x0001), read | _NOTIFY), (uuid(0x0002), write)
-        handles = ble.gatts_register_services(((uuid(0x1FF8), chrono), (uuid(SERVICE), own)))
+        handles = ble.gatts_register_services(((uuid(0x1FF8), chrono), (uuid(SERVICE), characteristics)))
         (self.chrono, self.filter), (board, self.rate, self.now, self.ride) = handles
         for handle in self.filter, self.rate:
             ble.gatts_set_buffer(handle, _WRITES_BYTES, True)

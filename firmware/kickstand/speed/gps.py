@@ -153,12 +153,12 @@ class Gps:
         lat, lon = _minutes(fields[3], 90, fields[4] == b"S"), _minutes(fields[5], 180, fields[6] == b"W")
         if lat is None or lon is None:
             return None
-        place = self._place
-        place[0] = _date(fields[9]) if len(fields) > 9 else 0
-        place[1] = self._day_ms
-        place[2] = lat
-        place[3] = lon
-        return place
+        position = self._place
+        position[0] = _date(fields[9]) if len(fields) > 9 else 0
+        position[1] = self._day_ms
+        position[2] = lat
+        position[3] = lon
+        return position
 
     def after_stall(self, now_ms):
         """Do nothing. If bytes were lost while interrupts were off, the checksum of their sentence is wrong."""
@@ -304,8 +304,8 @@ def _date(field):
 
 def _has_ubx(data):
     """Return True if a message of u-blox's binary protocol begins in these bytes."""
-    at = data.find(_UBX)
-    return 0 <= at <= len(data) - 6 and data[at + 2] in _UBX_CLASSES and data[at + 5] < 4
+    start = data.find(_UBX)
+    return 0 <= start <= len(data) - 6 and data[start + 2] in _UBX_CLASSES and data[start + 5] < 4
 
 
 def _checksum(line, start, end):

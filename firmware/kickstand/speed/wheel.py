@@ -86,18 +86,20 @@ class Wheel:
         self._pin.irq(self._soft_edge if self._soft else self._edge, Pin.IRQ_FALLING | Pin.IRQ_RISING, **self._irq)
 
     def _edge(self, pin):
-        now = ticks_us()
+        time_us = ticks_us()
         self._edges -= 1
         if not self._edges:
             self._edges = STORM_EDGES
-            if (now - self._edges_us) & _TICKS < STORM_US:
+            if (time_us - self._edges_us) & _TICKS < STORM_US:
                 self._off = True
                 pin.irq(None)  # turned off here, because in a storm the loop may get no time; irq(None) takes no heap
-            self._edges_us = now
+            self._edges_us = time_us
         if pin.value():
-            self._opened_us = now
-        elif (now - self._opened_us) & _TICKS >= self._open_us and (now - self._pulse_us) & _TICKS >= self._shortest_us:
-            self._pulse_us = now
+            self._opened_us = time_us
+        elif (time_us - self._opened_us) & _TICKS >= self._open_us and (
+            time_us - self._pulse_us
+        ) & _TICKS >= self._shortest_us:
+            self._pulse_us = time_us
             self.count = (self.count + 1) & _COUNT
 
     def _soft_edge(self, pin):

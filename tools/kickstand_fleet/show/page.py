@@ -15,7 +15,7 @@ from kickstand_tools.common.templates import filled, source_hash
 from markupsafe import Markup
 
 from ..period import MOVED, PeriodResult, Row
-from .panel import Panel, date_text
+from .plot import Panel, date_text
 
 _WORST, _MOST_MOVED, _MOST_ROWS, _MOST_DOTS, _NAMED_ERRORS = 25, 200, 2000, 3000, 3
 _WORDS = {
@@ -143,10 +143,7 @@ def _quality(values: Sequence[float]) -> Markup:
 
 
 def _braking(utc_s: Sequence[float], values: Sequence[float]) -> list[Markup]:
-    """Draw a histogram of the decelerations. If the times are known, also draw the decelerations over time.
-
-    Returns the pictures. Without decelerations the list of drawings is empty.
-    """
+    """Draw a histogram of the decelerations, and the decelerations over time if the times are known."""
     if not values:
         return []
     hardest = min(12.0, max(values) * 1.05)

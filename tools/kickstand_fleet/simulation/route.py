@@ -68,11 +68,7 @@ def random_route(
 
 
 class _Legs:
-    """Collects the legs of a route.
-
-    knots: One tuple per leg. The tuple contains the time and the speed at the end of the leg, and the lateral
-        acceleration during the leg.
-    """
+    """Collects the legs of a route. knots: time and speed at the end of each leg, and its lateral acceleration."""
 
     def __init__(self, chance: np.random.Generator, handling: Handling) -> None:
         self.chance, self._handling = chance, handling

@@ -113,13 +113,8 @@ def _readings(chance: np.random.Generator, kind: str, route: Route) -> tuple[Arr
 
 
 def _mount_rates(time: Array, at_s: float, turn: Array, seconds: float = 0.3) -> Array:
-    """Compute the rates about the vehicle's axes while the mount rotates.
-
-    at_s: time of the middle of the rotation, in s.
-    turn: the rotation, shape (3, 3).
-    seconds: duration of the rotation.
-
-    Returns the rates, shape (n, 3), in rad/s.
+    """Compute the rates about the vehicle's axes while the mount rotates by `turn` around the time at_s, shape (n, 3),
+    in rad/s.
     """
     turning = (time >= at_s - seconds / 2) & (time < at_s + seconds / 2)
     return np.outer(turning, rotation_vector(turn) / seconds)

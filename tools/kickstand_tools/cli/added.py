@@ -104,6 +104,7 @@ def _package(entry_point: EntryPoint) -> str:
     return entry_point.dist.name if entry_point.dist else entry_point.value
 
 
-def _refusal(entry_point: EntryPoint, why: str) -> InputError:
+def _refusal(entry_point: EntryPoint, reason: str) -> InputError:
     name, package = entry_point.name, _package(entry_point)
-    return InputError(f"the command {name} of the package {package} cannot be loaded ({why}): update or uninstall it")
+    command_text = f"the command {name} of the package {package}"
+    return InputError(f"{command_text} cannot be loaded ({reason}): update or uninstall it")

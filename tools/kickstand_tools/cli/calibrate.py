@@ -118,44 +118,44 @@ def _write(out: Path, calibration: CalibrationFile) -> None:
     echo(f"written: {out}")
 
 
-def _six_lines(found: SixPositions) -> Iterable[str]:
-    for side, pose, tilt in zip(SIDES, found.sides, found.tilt_deg, strict=True):
+def _six_lines(fit: SixPositions) -> Iterable[str]:
+    for side, pose, tilt in zip(SIDES, fit.sides, fit.tilt_deg, strict=True):
         yield f"{side} up: {pose.name}, {pose.samples} samples, {tilt:.1f} degrees off its axis"
-    if found.free_pose and found.free_pose_error_g is not None:
-        good = "good" if abs(found.free_pose_error_g) <= GOOD_FREE_POSE_G else "usable; under 10 mg would be good"
+    if fit.free_pose and fit.free_pose_error_g is not None:
+        good = "good" if abs(fit.free_pose_error_g) <= GOOD_FREE_POSE_G else "usable; under 10 mg would be good"
         yield (
-            f"free pose: {found.free_pose.name}, {found.free_pose.samples} samples, "
-            f"{found.free_pose_error_g * 1000:+.1f} mg from 1 g: {good}"
+            f"free pose: {fit.free_pose.name}, {fit.free_pose.samples} samples, "
+            f"{fit.free_pose_error_g * 1000:+.1f} mg from 1 g: {good}"
         )
-    yield "offset     " + _along_axes(found.calibration.accel_offset_g, "%+.4f g")
-    yield "slope      " + _along_axes(found.calibration.accel_slope, "%.4f")
-    yield "gyro bias  " + _along_axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
-    if found.turns:
-        matrix, sigma = found.calibration.gyro_matrix, found.calibration.gyro_sigma
+    yield "offset     " + _along_axes(fit.calibration.accel_offset_g, "%+.4f g")
+    yield "slope      " + _along_axes(fit.calibration.accel_slope, "%.4f")
+    yield "gyro bias  " + _along_axes(fit.calibration.gyro_bias_dps, "%+.2f deg/s")
+    if fit.turns:
+        matrix, sigma = fit.calibration.gyro_matrix, fit.calibration.gyro_sigma
         scales, errors = 100.0 * (1.0 / matrix.diagonal() - 1.0), 100.0 * sigma.diagonal()
-        yield f"gyro scale  {_along_axes(scales, '%+.2f %%')}, by {found.turns} turns, known to {max(errors):.1f} %"
-        if found.turns < found.all_turns:
-            left_out = found.all_turns - found.turns
-            yield f"warning: {left_out} of {found.all_turns} turns left out, too quick or with a gap: turn more slowly"
-    if found.beyond_sheet:
-        axes = ", ".join(found.beyond_sheet)
+        yield f"gyro scale  {_along_axes(scales, '%+.2f %%')}, by {fit.turns} turns, known to {max(errors):.1f} %"
+        if fit.turns < fit.all_turns:
+            left_out = fit.all_turns - fit.turns
+            yield f"warning: {left_out} of {fit.all_turns} turns left out, too quick or with a gap: turn more slowly"
+    if fit.beyond_sheet:
+        axes = ", ".join(fit.beyond_sheet)
         yield f"warning: {axes} is beyond the data sheet (50 mg, z 80 mg, slope 3 %): used anyway"
-    if found.free_pose is None:
+    if fit.free_pose is None:
         yield "warning: no free pose: any six poses fit exactly, only a seventh pose can show an error"
     yield "not aligned yet: next run kickstand calibrate two"
 
 
-def _two_lines(found: TwoPositions) -> Iterable[str]:
-    calibration, first, second = found.calibration, found.kickstand, found.upright
+def _two_lines(fit: TwoPositions) -> Iterable[str]:
+    calibration, first, second = fit.calibration, fit.kickstand, fit.upright
     side = calibration.kickstand_side
     yield f"kickstand: {first.name}, {first.samples} samples"
     yield (
         f"upright:   {second.name}, {second.samples} samples, "
-        f"{found.tilt_deg:.1f} degrees from the kickstand on the {side}"
+        f"{fit.tilt_deg:.1f} degrees from the kickstand on the {side}"
     )
     yield "gyro bias  " + _along_axes(calibration.gyro_bias_dps, "%+.2f deg/s")
     yield from _matrix_lines(calibration.vehicle_from_sensor)
-    if found.tilt_deg < WARN_TILT_DEG:
+    if fit.tilt_deg < WARN_TILT_DEG:
         cost_deg = alignment_quality.yaw_cost_deg(7.0)
         yield (
             f"warning: under {WARN_TILT_DEG:.0f} degrees, 1 degree of pitch turns forward by over 7, which usually "
@@ -165,36 +165,36 @@ def _two_lines(found: TwoPositions) -> Iterable[str]:
         yield "warning: no six-position calibration: an offset of 50 mg is 3 degrees of lean: calibrate six first"
 
 
-def _drive_lines(found: DriveFit, several: bool) -> Iterable[str]:
-    yield f"{found.vehicle}, method {found.method}: {found.used} used, {found.turned} in turns not used"
-    yield f"stops: {found.stops}"
-    ready = f"ready after {found.ready_s:.0f} s" + (" of all logs" if several else "")
-    yield f"quality: {found.quality_deg:.1f} degrees about the vertical, {found.attitude_deg:.1f} in all; {ready}"
-    if found.lag_s is not None:
-        yield f"speed: {found.lag_s:.1f} s late; two halves of the drive differ by {found.halves_deg:.1f} degrees"
-    if found.poses:
-        yaw_deg = abs(found.poses.yaw_deg)
-        if found.poses.verdict == alignment.REVERSED:
+def _drive_lines(fit: DriveFit, has_several_logs: bool) -> Iterable[str]:
+    yield f"{fit.vehicle}, method {fit.method}: {fit.used} used, {fit.turned} in turns not used"
+    yield f"stops: {fit.stops}"
+    ready = f"ready after {fit.ready_s:.0f} s" + (" of all logs" if has_several_logs else "")
+    yield f"quality: {fit.quality_deg:.1f} degrees about the vertical, {fit.attitude_deg:.1f} in all; {ready}"
+    if fit.lag_s is not None:
+        yield f"speed: {fit.lag_s:.1f} s late; two halves of the drive differ by {fit.halves_deg:.1f} degrees"
+    if fit.poses:
+        yaw_deg = abs(fit.poses.yaw_deg)
+        if fit.poses.verdict == alignment.REVERSED:
             yield (
                 "warning: the two poses had forward and backward exchanged: the kickstand is on the other side, "
                 f"or, if no board wrote this log, {OPPOSITE_SIGN}"
             )
-        elif found.poses.verdict == alignment.MOVED:
+        elif fit.poses.verdict == alignment.MOVED:
             yield f"warning: the mount is {yaw_deg:.0f} degrees off its place in the two poses: was it moved since?"
         else:
             cost_deg = alignment_quality.yaw_cost_deg(yaw_deg)
             costs = f", which usually costs about {cost_deg:.1f} degrees of lean" if cost_deg >= 0.05 else ""
             yield f"the two poses had forward {yaw_deg:.1f} degrees off{costs}: now corrected"
-    yield from _matrix_lines(found.calibration.vehicle_from_sensor)
-    if not found.calibration.six_done:
+    yield from _matrix_lines(fit.calibration.vehicle_from_sensor)
+    if not fit.calibration.six_done:
         warning = "warning: no six-position calibration: an offset of 50 mg tilts the vertical by 3 degrees"
         yield f"{warning}: calibrate six first"
 
 
-def _event_lines(event: events.DriveEvent, several: bool) -> Iterable[str]:
+def _event_lines(event: events.DriveEvent, has_several_logs: bool) -> Iterable[str]:
     """Describe an event in a line of text. With several logs, also name each log before its first event."""
     if event.what in (events.LOG_BEGINS, events.LOG_WITHOUT_EVENTS):
-        if several:
+        if has_several_logs:
             yield f"{event.log}:" if event.what == events.LOG_BEGINS else "           no braking in it"
         return
     words = {
@@ -208,21 +208,21 @@ def _event_lines(event: events.DriveEvent, several: bool) -> Iterable[str]:
     yield f"{event.t_s:7.1f} s  {words[event.what]}"
 
 
-def _ride_lines(found: RideFit) -> Iterable[str]:
-    begin, end = found.used_s
-    stood = f"{found.standing_s:.0f} s of these certainly standing"
-    leaning = f"otherwise leaning {found.lean_deg:.0f} degrees rms"
+def _ride_lines(fit: RideFit) -> Iterable[str]:
+    begin, end = fit.used_s
+    stood = f"{fit.standing_s:.0f} s of these certainly standing"
+    leaning = f"otherwise leaning {fit.lean_deg:.0f} degrees rms"
     yield f"used: {max(begin, 0.0):.0f} to {end:.0f} s of the log, {stood}, {leaning}"
-    yield known_to(found)
-    roll, pitch, yaw = (abs(angle) for angle in found.halves_deg)
+    yield known_to(fit)
+    roll, pitch, yaw = (abs(angle) for angle in fit.halves_deg)
     yield f"two halves of the ride differ by: roll {roll:.1f}, pitch {pitch:.1f}, yaw {yaw:.1f} degrees"
-    if found.lag_s is not None:
-        yield f"speed: {max(0.0, found.lag_s):.1f} s late"
-    if found.phone_deg is not None:
-        yield f"phone: mounted as --phone says, within {found.phone_deg:.0f} degrees"
-    yield "gyro bias  " + _along_axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
-    yield "offset     " + _along_axes(found.calibration.accel_offset_g, "%+.4f g")
-    yield from _matrix_lines(found.calibration.vehicle_from_sensor)
+    if fit.lag_s is not None:
+        yield f"speed: {max(0.0, fit.lag_s):.1f} s late"
+    if fit.phone_deg is not None:
+        yield f"phone: mounted as --phone says, within {fit.phone_deg:.0f} degrees"
+    yield "gyro bias  " + _along_axes(fit.calibration.gyro_bias_dps, "%+.2f deg/s")
+    yield "offset     " + _along_axes(fit.calibration.accel_offset_g, "%+.4f g")
+    yield from _matrix_lines(fit.calibration.vehicle_from_sensor)
     yield "upright means balanced on straights; a ride does not show the accelerometer's slopes"
 
 

@@ -114,9 +114,9 @@ def live(command: Command) -> Command:
     return option(help_adds(words)(command))
 
 
-def known_to(found: "RideFit") -> str:
+def known_to(fit: "RideFit") -> str:
     """Return the standard errors of an alignment by a ride, in words."""
-    return f"known to: roll {found.roll_deg:.1f}, pitch {found.pitch_deg:.1f}, yaw {found.yaw_deg:.1f} degrees"
+    return f"known to: roll {fit.roll_deg:.1f}, pitch {fit.pitch_deg:.1f}, yaw {fit.yaw_deg:.1f} degrees"
 
 
 def warn(log: Path | str, notices: Iterable[Message]) -> None:

@@ -395,11 +395,11 @@ def _pairs(text: str, option: str) -> dict[str, str]:
     return pairs
 
 
-def _import_table(found: Imported) -> Table:
-    table = Table(title=found.app, title_justify="left", box=None, pad_edge=False)
+def _import_table(imported: Imported) -> Table:
+    table = Table(title=imported.app, title_justify="left", box=None, pad_edge=False)
     for title in ("quantity", "from", "unit", "rate", "axes and sign"):
         table.add_column(title, overflow="fold")
-    for column in found.taken:
+    for column in imported.taken:
         rate = f"{column.rate_hz:{'.0f' if column.rate_hz >= 10.0 else '.2g'}} Hz" if column.rate_hz else ""
         table.add_row(column.quantity, column.source, column.unit, rate, column.sign)
     return table

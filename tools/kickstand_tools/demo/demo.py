@@ -2,7 +2,9 @@
 
 import contextlib
 import io
+import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 from rich.console import Console
@@ -10,11 +12,54 @@ from rich.live import Live
 
 from ..common import unix_port
 from ..common.errors import InputError
-from . import user_program
 from .device_process import DeviceProcess
 from .keyboard import BIKE_KEYS, keyboard
 from .score import Score, table
 from .screen import lcd_lines, lean_text, oled_lines, screen
+
+# MicroPython runs this code to check the user's program, because MicroPython accepts less syntax than CPython. The code
+# prints nothing if the program is right, otherwise "line:fault"
+_COMPILE = """
+import io, sys
+try:
+    compile(open(sys.argv[1]).read(), "user.py", "exec")
+except Exception as error:
+    said = io.StringIO()
+    sys.print_exception(error, said)
+    lines = said.getvalue().strip().split("\\n")
+    line = lines[-2].split("line ")[-1].split(",")[0] if "user.py" in lines[-2] else ""
+    print(line + ":" + (str(error) or type(error).__name__))
+"""
+
+
+def check_program(program: Path, engine: str) -> None:
+    """Raise InputError if a file is not a program for this engine, "CPython" or "MicroPython".
+
+    Raises OSError if the file cannot be read.
+    """
+    source = program.read_bytes()
+    wrong = _by_micropython(program) if engine == "MicroPython" else _by_cpython(source)
+    if wrong:
+        line, _, problem = wrong.partition(":")
+        location = f"{program}, line {line}" if line else f"{program}"
+        raise InputError(f"{location}: {problem}: {engine} cannot run this file: correct it, or give your program")
+
+
+def _by_micropython(program: Path) -> str:
+    command = unix_port.command("-c", _COMPILE, str(program.resolve()))
+    return subprocess.run(command, capture_output=True, text=True, errors="replace", check=False).stdout.strip()
+
+
+def _by_cpython(source: bytes) -> str:
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            compile(source, "user.py", "exec", dont_inherit=True)
+    except SyntaxError as error:
+        return f"{error.lineno or ''}:{error.msg}"
+    except ValueError as error:  # compile() raises it for characters that are not allowed in a source file
+        return f":{error}"
+    return ""
+
 
 SCRIPT_SPEED, HAND_SPEED = 1.5, 1.0  # simulated seconds per second while the display is drawn in a terminal
 FRAME_S = 0.25  # least time between two printed frames of the same page
@@ -88,7 +133,7 @@ def demo(hand: bool = False, cpython: bool = False, display: str = "lcd", user: 
     if not cpython and engine == "CPython":
         print("No MicroPython package for this system: the same firmware runs on CPython instead.")
     if user:
-        user_program.check(user, engine)
+        check_program(user, engine)
     score = Score()
     speed = HAND_SPEED if hand else SCRIPT_SPEED if watched else 0.0
     with DeviceProcess(engine.lower(), "hand" if hand else "script", speed, display, user) as device:

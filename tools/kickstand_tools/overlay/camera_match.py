@@ -8,7 +8,7 @@ import numpy as np
 from ..common.errors import InputError
 from ..joining.motion import STEP_S, CellMotion
 from ..signals import Array, correlations, log_likelihood_ratio, moving_mean, peak_offset, peaks
-from .gpmf import Telemetry
+from .video import Telemetry
 
 _SLOW_S = 5.0  # changes of rate that take longer are removed, because they may come from the gyros' bias
 _QUICK_S = 0.2  # changes of rate that take less time are removed as vibration, which is different at each place

@@ -159,13 +159,13 @@ class Gauge:
             words = f"max {value:.0f}°" if value > UPRIGHT_DEG else "max --"
             self._text(picture, words, 7.0, WHITE, (_MIDDLE + sign * 44.0, 70.0))
 
-    def _number(self, picture: Image.Image, lean_deg: float, known: bool) -> None:
-        self._text(picture, f"{abs(lean_deg):.0f}" if known else "--", 27.0, WHITE, (_MIDDLE, 84.0))
-        if known:
+    def _number(self, picture: Image.Image, lean_deg: float, is_known: bool) -> None:
+        self._text(picture, f"{abs(lean_deg):.0f}" if is_known else "--", 27.0, WHITE, (_MIDDLE, 84.0))
+        if is_known:
             digits = len(f"{abs(lean_deg):.0f}")
             self._text(picture, "°", 27.0, WHITE, (_MIDDLE + 2.5 + 7.8 * digits, 84.0))
         for sign, word in ((-1.0, "LEFT"), (1.0, "RIGHT")):
-            on = known and sign * lean_deg > UPRIGHT_DEG
+            on = is_known and sign * lean_deg > UPRIGHT_DEG
             self._text(picture, word, 7.5, ACCENT if on else DIM, (_MIDDLE + sign * 37.5, 84.5))
             if on:
                 mark = parts.arrow(8.0 * self._unit, sign > 0.0, ACCENT)

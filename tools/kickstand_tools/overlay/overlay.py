@@ -15,9 +15,8 @@ from ..joining.motion import motion
 from ..logs.reader import Source, read_twice
 from ..logs.source import File, Progress, name_of
 from .camera_match import camera_offset_s
-from .gpmf import telemetry
 from .shown import Shown, shown
-from .video import Video, ffmpeg, input_of, open_video, write_video
+from .video import Video, ffmpeg, input_of, open_video, telemetry, write_video
 
 MARGIN = 0.03  # distance from the video's edges to the gauge, as a share of the video's height
 _BEYOND_S = 1.0  # longest time by which a video may begin before the ride or end after the ride
@@ -157,13 +156,10 @@ def _found_offset(log: Source, video: Video, progress: Progress | None) -> tuple
 
 
 def _part(
-    seen: Shown, video: Video | None, offset_s: float | None, from_s: float | None, to_s: float | None, name: str
+    values: Shown, video: Video | None, offset_s: float | None, from_s: float | None, to_s: float | None, name: str
 ) -> tuple[float, float]:
-    """Compute start and end of the part to draw, in s since the ride's first sample.
-
-    Raises InputError if the part is not in the ride.
-    """
-    last_s = float(seen.t_s[-1])
+    """Compute start and end of the part to draw, in s since the ride's first sample. Raises InputError."""
+    last_s = float(values.t_s[-1])
     begin_s, end_s = (s if s is None or s >= 0.0 else max(0.0, last_s + s) for s in (from_s, to_s))
     if video is not None and offset_s is not None:
         first, last = offset_s, offset_s + video.seconds

@@ -86,16 +86,13 @@ def _maximum(t_s: Array, lean: Array) -> Array:
     return np.maximum(np.maximum.accumulate(lasted), 0.0)
 
 
-def _along_lines(at_s: Array, values: Array, before: Ints, t_s: Array, gap_s: float) -> Array:
-    """Interpolate linearly. The result is NaN outside the values, and between values further apart than gap_s.
-
-    at_s: times of the values.
-    before: for each result, index of the last value before its time.
-    t_s: times of the results.
+def _along_lines(at_s: Array, values: Array, index: Ints, t_s: Array, gap_s: float) -> Array:
+    """Interpolate linearly. NaN outside the values, and between values further apart than gap_s. index: the value
+    before.
     """
-    step_s = at_s[before + 1] - at_s[before]
-    share = (t_s - at_s[before]) / step_s
-    result = values[before] * (1.0 - share) + values[before + 1] * share
+    step_s = at_s[index + 1] - at_s[index]
+    share = (t_s - at_s[index]) / step_s
+    result = values[index] * (1.0 - share) + values[index + 1] * share
     margin = gap_s / step_s
     inside = (share >= -np.minimum(margin, 0.5)) & (share <= 1.0 + np.minimum(margin, 0.5)) & (step_s <= gap_s)
     return np.where(inside, result, np.nan)

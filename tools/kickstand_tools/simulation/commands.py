@@ -101,14 +101,7 @@ def _fill_in(legs: list[Leg], name: str) -> list[float]:
 
 
 def _slope(distance: Signal, ends: Signal, percent: list[float]) -> Signal:
-    """Compute the road's slope at each sample, in rad. The slope changes smoothly between the ends of legs.
-
-    The slope depends on the distance, so it stays constant while the bike stands.
-
-    distance: Distance at each sample, in m.
-    ends: Distance at the end of each leg, in m.
-    percent: Slope at the end of each leg.
-    """
+    """Compute the road's slope at each sample, in rad. It changes smoothly between the ends of legs."""
     knots, values = [0.0], [percent[0]]
     for end, value in zip(ends, percent):
         if end > knots[-1] + 1.0:

@@ -86,12 +86,8 @@ def _write_readings(path: Path, readings: NDArray, rate_hz: float) -> None:
 
 
 def positions(simulated: SimulatedRide) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Compute the position of each reading by integrating the true speed and yaw rate.
-
-    Returns:
-        latitude: in degrees north, shape (n).
-        longitude: in degrees east, shape (n).
-        time: Universal Time in s since 1970, shape (n).
+    """Integrate the true speed and yaw rate. Returns latitude and longitude in degrees, and Universal Time, shape (n)
+    each.
     """
     course = (
         np.cumsum(np.radians(simulated.truth["yaw_rate_dps"])) / simulated.rate_hz

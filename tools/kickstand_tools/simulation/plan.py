@@ -119,15 +119,9 @@ class Plan:
         phase: str = "turn",
         **more: float | None,
     ) -> None:
-        """Roll to lean_deg, and hold this lean.
+        """Roll to lean_deg, and hold this lean for `seconds`, or until the heading has changed by about heading_deg.
 
-        lean_deg: Lean, positive to the right.
-        speed_mps: Speed at the end.
-        heading_deg: Approximate change of heading. It is used if `seconds` is None.
-        seconds: Time for which the lean is held.
-        roll_s: Time for the change of lean. It is longer if the roll rate would exceed roll_dps.
-        phase: Name of the leg.
-        more: Other fields of Leg.
+        roll_s: time for the change of lean. It is longer if the roll rate would exceed roll_dps.
         """
         roll_s = max(roll_s, abs(lean_deg - self._lean_now()) / self.roll_dps)
         if seconds is None:

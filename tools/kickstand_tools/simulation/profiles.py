@@ -205,11 +205,7 @@ def crosswind(plan: Plan) -> Conditions:
 
 
 def weight(plan: Plan) -> Conditions:
-    """A rider who hangs off in turns, and luggage on one side.
-
-    The rider moves the centre of mass by up to 5 cm, which is 5 degrees of lean. The luggage moves the centre of mass
-    by 1 to 2 cm.
-    """
+    """A rider who hangs off by up to 5 cm in turns (5 degrees of lean), and luggage that moves it by 1 to 2 cm."""
     conditions = street(plan)
     offset_m = plan.side() * plan.uniform(0.01, 0.02)
     for leg in plan.legs:

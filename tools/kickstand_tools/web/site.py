@@ -14,7 +14,6 @@ from ..common.output import check_directory, new_directory, whole_file
 from ..common.templates import filled, source_hash
 from . import archives, npm_packages, sample_ride
 from .documents import documents
-from .lcd_font import ROM
 
 PAGE = Path(__file__).resolve().parent / "page"
 # Large files that only visitors with a board or a ride need. The browser fetches them on demand.
@@ -55,7 +54,6 @@ def site_files() -> dict[str, bytes]:
     files["rides.zip"] = archives.rides_archive()
     (package,) = (name for name in files if name.startswith("numpy/"))
     files["numpy/numpy.zip"], files["numpy/licence.txt"] = archives.numpy_archive(files.pop(package))
-    files["font.json"] = json.dumps({code: list(rows) for code, rows in ROM.items()}).encode()
     files["boards.json"] = json.dumps(shop_boards()).encode()
     sizes = {name: len(data) for name, data in files.items() if name.startswith(LATER)}
     files["sizes.json"] = json.dumps(sizes).encode()

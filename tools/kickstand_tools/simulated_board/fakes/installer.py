@@ -88,7 +88,7 @@ def _posing(port, machine):
     return _filled(_filled(module, real), {"platform": port, "implementation": implementation})
 
 
-def _filled(made, attributes):
+def _filled(module, attributes):
     for name, value in attributes.items():
-        setattr(made, name, value)
-    return made
+        setattr(module, name, value)
+    return module

@@ -83,13 +83,11 @@ class Roll:
 
 
 def chassis_lean(balance: Signal, bike: Bike, bank: Signal | float = 0.0, hang: Signal | float = 0.0) -> Signal:
-    """Compute the lean of the chassis from the lean of the centre of mass, in rad.
+    """Compute the lean of the chassis from the lean of the centre of mass, in rad: Cossalter's (4.4), with road and
+    rider.
 
-    This is Cossalter's equation (4.4), with road and rider added.
-
-    balance: Lean of the centre of mass, in rad.
-    bank: Tilt of the road to the right, in rad.
-    hang: Distance of the centre of mass to the right of the bike's plane, in m.
+    bank: tilt of the road to the right, in rad. hang: distance of the centre of mass to the right of the bike's plane,
+        in m.
     """
     arm = bike.mass_height - bike.tyre_radius
     flank = np.arcsin(bike.tyre_radius * np.sin(balance - bank) / np.hypot(arm, hang))

@@ -87,14 +87,10 @@ class Chip:
         rates: NDArray[np.float64],
         temp_c: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Simulate the readings of a motion. Every fifth row of the motion is read, beginning with the first.
+        """Simulate the readings of a motion at 1 kHz, every fifth row from the first on.
 
-        chance: Source of random numbers.
-        force: True force along the sensor's axes at 1 kHz, shape (n, 3), in g.
-        rates: True rates about the sensor's axes at 1 kHz, shape (n, 3), in deg/s.
-        temp_c: Temperature, shape (n).
-
-        Returns the readings at 200 Hz in the chip's order, in g, C and deg/s. Their shape is (n / 5, 7).
+        force, rates: true values along and about the sensor's axes, shape (n, 3), in g and deg/s.
+        Returns the readings at 200 Hz in the chip's order, in g, C and deg/s, shape (n / 5, 7).
         """
         n = len(force)
         warm = (temp_c - CALIBRATED_C)[:, None]
@@ -121,10 +117,7 @@ class Chip:
         return np.column_stack((accel, temp, rate))
 
     def _sampled(self, values: NDArray[np.float64], limit: float, lsb: float) -> NDArray[np.float64]:
-        """Clip values at the range, filter them, take every fifth value, and round it to whole counts.
-
-        limit: end of the range. lsb: counts per unit of the values.
-        """
+        """Clip values at the range, filter them, take every fifth value, and round it to whole counts."""
         columns = []
         for column in values.T:
             column = np.clip(column, -limit, limit)

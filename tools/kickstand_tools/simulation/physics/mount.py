@@ -34,16 +34,8 @@ class Holder:
     def shaken(
         self, force: NDArray[np.float64], rates: NDArray[np.float64], rate_hz: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Compute the motion of the sensor in its holder from the motion of the bike, along left, up and forward.
-
-        Args:
-            force: Force of the bike, shape (n, 3), in g.
-            rates: Rates of the bike, shape (n, 3), in deg/s.
-            rate_hz: Number of samples per second.
-
-        Returns:
-            force: force of the sensor, shape (n, 3), in g.
-            rates: rates of the sensor, shape (n, 3), in deg/s.
+        """Compute the motion of the sensor in its holder from force and rates of the bike, shape (n, 3) each, in g and
+        deg/s.
         """
         sprung = np.column_stack([self._by_spring(column, k, rate_hz) for k, column in enumerate(force.T)])
         turned = np.zeros_like(sprung)

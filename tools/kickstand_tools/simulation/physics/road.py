@@ -8,10 +8,11 @@ simulated by a quarter-car model: the wheel moves on its tyre, and the chassis o
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from .bike import Bike
-from .signals import Signal, band_noise, smoothed, through
+from .signals import Signal, band_noise, integral, smoothed, through
 
 # Roughness in the middle of each class of ISO 8608, as the PSD of the displacement at 0.1 cycles/m, in m3
 CLASSES = {"A": 16e-6, "B": 64e-6, "C": 256e-6, "D": 1024e-6}
@@ -68,15 +69,7 @@ def add_bumps(slope: Signal, places_m: list[float], height_m: float, length_m: f
 def shaking(
     chance: np.random.Generator, distance: Signal, speed: Signal, slope: Signal, bike: Bike, rate_hz: float
 ) -> Shaking:
-    """Simulate driving over a profile.
-
-    chance: Source of random numbers.
-    distance: Distance of the rear wheel at each sample, in m.
-    speed: Speed at each sample, in m/s.
-    slope: Slope of the profile, see profile_slope().
-    bike: The bike.
-    rate_hz: Number of samples per second.
-    """
+    """Simulate driving over a profile (see profile_slope()). distance: of the rear wheel at each sample, in m."""
     height = np.cumsum(slope) * _STEP_M
     at = np.arange(len(slope)) * _STEP_M
     front = distance + bike.wheelbase
@@ -98,3 +91,54 @@ def shaking(
     for axis in (1, 2):
         rates[:, axis] = np.radians(_RATE_DPS[axis]) * size / 9.8 * band_noise(chance, n, 4.0, 20.0, rate_hz)
     return Shaking(heave, pitch, force, rates)
+
+
+_RPM_PER_MPS = (370.0, 260.0, 205.0, 170.0, 150.0, 135.0)  # engine speed per road speed in each gear
+# Frequencies of a four-stroke twin's vibration as multiples of the crankshaft's speed: firing, primary and secondary
+_ORDERS = (0.5, 1.0, 2.0)
+_IDLE_SHARE = 0.25  # vibration at idle, divided by the vibration at _FULL_RPM
+_IDLE_RPM, _FULL_RPM = 1250.0, 6000.0
+_MAX_G = 0.5
+_BLOCK = 100_000  # number of rows that are computed at a time, to limit memory
+_DPS_PER_G = 15.0  # rms of the vibration's rates, divided by the rms of its force
+
+
+def crank_rpm(speed: Signal, shift_rpm: float, rate_hz: float) -> Signal:
+    """Compute the speed of the crankshaft at each sample, in 1/min.
+
+    The rider uses the lowest gear with an engine speed under shift_rpm. Below idle speed the clutch slips.
+    """
+    rpm = speed * _RPM_PER_MPS[-1]
+    for ratio in reversed(_RPM_PER_MPS[:-1]):
+        rpm = np.where(speed * ratio < shift_rpm, speed * ratio, rpm)
+    return smoothed(np.maximum(rpm, _IDLE_RPM), 0.15, rate_hz)
+
+
+def vibration(
+    chance: np.random.Generator, speed: Signal, running: Signal, rms_g: float, shift_rpm: float, rate_hz: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Simulate the engine's vibration along left, up and forward: force in m/s2 and rates in rad/s, shape (n, 3) each.
+
+    running: 1 while the engine runs, otherwise 0, shape (n). rms_g: along each axis at 6000/min, before the chip's
+        filter.
+    shift_rpm: engine speed at which the rider changes up.
+    """
+    rpm = crank_rpm(speed, shift_rpm, rate_hz)
+    turns = integral(rpm / 60.0, rate_hz)
+    growth = _IDLE_SHARE + (1.0 - _IDLE_SHARE) * (rpm / _FULL_RPM) ** 2
+    size = np.minimum(rms_g * growth, _MAX_G) * running
+    weights = chance.dirichlet(np.full(len(_ORDERS), 2.0), size=6) ** 0.5
+    phases = chance.uniform(0.0, 2.0 * np.pi, size=(6, len(_ORDERS)))
+    shaken = np.zeros((len(speed), 6))
+    for start in range(0, len(speed), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        for k, order in enumerate(_ORDERS):
+            angle = 2.0 * np.pi * order * turns[part]
+            sine, cosine = np.sin(angle), np.cos(angle)
+            for axis in range(6):
+                phase = phases[axis, k]
+                shaken[part, axis] += weights[axis, k] * (sine * np.cos(phase) + cosine * np.sin(phase))
+    shaken *= np.sqrt(2.0) * size[:, None]
+    shaken[:, :3] *= STANDARD_GRAVITY
+    shaken[:, 3:] *= np.radians(_DPS_PER_G)
+    return shaken[:, :3], shaken[:, 3:]

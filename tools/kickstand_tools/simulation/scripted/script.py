@@ -85,10 +85,7 @@ def brake(speed_mps, seconds):
 
 
 def _glide(start, end, u, seconds):
-    """Compute a smooth change from start to end, at 0 <= u <= 1. Its first two derivatives have no jumps.
-
-    Returns the value and its derivative per second.
-    """
+    """Return the value of a smooth change from start to end at 0 <= u <= 1, and its derivative per second."""
     change = end - start
     if change == 0.0:
         return start, 0.0
@@ -210,10 +207,7 @@ class Ride:
         return degrees(state[1]), state[3], degrees(state[5]), state[0]
 
     def motion(self, t_s):
-        """Return what a perfect sensor measures at t_s, with vibration.
-
-        These are six numbers: specific force along left, up, forward in g, then the rates about these axes in deg/s.
-        """
+        """Return what a perfect sensor measures at t_s, with vibration, in the form of body_motion()."""
         state = self.state(t_s)
         speed, distance, engine = state[3], state[8], state[9]
         return shaken(body_motion(*state[1:8]), t_s, self.vibration_g, speed, distance, engine)

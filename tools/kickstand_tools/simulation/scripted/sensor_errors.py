@@ -133,12 +133,9 @@ def resting(sensor, up):
 
 
 def turning(sensor, first, last, begin_s, end_s):
-    """Return the function world(t_s) of a sensor that a hand turns from one pose to the next.
+    """Return the function world(t_s) of a sensor that a hand turns by the shortest way, slowly at both ends.
 
-    The hand takes the shortest rotation, and turns slowly at both ends.
-
-    first, last: Vertical vectors of any length in the sensor's axes, in the two poses.
-    begin_s, end_s: Times at which the turn begins and ends.
+    first, last: vertical vectors of any length in the sensor's axes, before and after the turn.
     """
     m = sensor.vehicle_from_sensor
     a, b = _unit(first), _unit(last)

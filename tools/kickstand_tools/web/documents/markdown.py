@@ -76,7 +76,7 @@ def converted(text: str, link: Link, picture: Callable[[str], str], deeper: int 
     html = str(markdown.renderer.render(tokens, markdown.options, {}))
     named = "".join(f' {key}="{value}"' for key, value in _SCROLLED.items())
 
-    def framed(found: re.Match[str]) -> str:
+    def framed(match: re.Match[str]) -> str:
         nonlocal table
         table += 1
         return f'<div class="wide"{named} aria-label="{escape(title.text)}, table {table}"><table>'

@@ -4,25 +4,113 @@ bench() measures, and tables() formats the result.
 """
 
 import ast
-from dataclasses import asdict
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from kickstand.calibration.parameters import Calibration
 from kickstand_emulator import flash_image
-from kickstand_emulator.emulate import device_class
+from kickstand_emulator.emulate import Kind, device_class
 from kickstand_tools.deploy.bytecode import architecture, cross_compiled
+from kickstand_tools.simulated_board.mpu6050 import ACCEL_XOUT_H, Mpu6050
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
-from rich.console import Group
 from rich.table import Table
 
-from . import boot
-from .sample_count import SampleCount
+_LIMIT_S = 10.0
+
+
+@dataclass(frozen=True)
+class Boot:
+    """The parts of a start. All times count from power-on."""
+
+    micropython_s: float  # time at which main.py begins
+    starting_s: float  # time at which the display says that Kickstand starts
+    sampling_s: float  # time at which the sensor is set up and samples
+    lean_s: float  # time at which the display shows the first lean
+
+
+def boot(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes], compiled: bool = True) -> Boot:
+    """Measure the parts of the start.
+
+    kind: Class of the emulated board.
+    world: Motion of the board, as for EmulatedDevice. The board must be upright and at rest.
+    files: Calibration files of the board.
+    compiled: True to install the firmware as .mpy files.
+
+    Raises NotReached if one of these parts takes over 10 s.
+    """
+    board_files = flash_image.firmware(compiled, kind.MPY) | files
+    with kind(world, board_files) as device:
+        device.run_until(lambda: device.lcd()[1].startswith("starting"), _LIMIT_S, 0.001)
+        starting_s = device.time_s
+        device.run_until(lambda: device.board.sensor.fifo.count, _LIMIT_S, 0.001)
+        sampling_s = device.time_s
+        device.run_until(lambda: device.lcd()[0].startswith("Lean") and "°" in device.lcd()[0], _LIMIT_S, 0.001)
+        lean_s = device.time_s
+    return Boot(_micropython_s(kind, board_files), starting_s, sampling_s, lean_s)
+
+
+def _micropython_s(kind: Kind, files: dict[str, bytes]) -> float:
+    """Measure the time until MicroPython runs main.py, in s."""
+    begun: list[bytes] = []
+    with kind(files={**files, "/main.py": f"{kind.SINK}Sink().write(b'main')\n".encode()}) as device:
+        device.listen(begun.append)  # on a Pico, Sink does not use USB, which starts later than main.py
+        device.run_until(lambda: begun, _LIMIT_S, 0.001)
+        return device.time_s
+
+
+class SampleCount:
+    """Counts the samples of one sensor. The board may read the data registers or the FIFO."""
+
+    def __init__(self, sensor: Mpu6050) -> None:
+        self._sensor: Any = sensor
+        self._start, self._pop = sensor.start, sensor.fifo.pop
+        sensor.start = self._on_start  # type: ignore[method-assign]
+        sensor.fifo.pop = self._on_pop  # type: ignore[method-assign]
+        self._first = self._waiting = self._popped = 0
+        self._read: set[int] = set()
+
+    def begin(self) -> None:
+        """Begin to count."""
+        self._sensor._update()
+        self._first, self._waiting = self._sensor._next, self._sensor.fifo.count
+        self._popped = 0
+        self._read = set()
+
+    def taken(self) -> int:
+        """Return the number of samples that the sensor has taken."""
+        self._sensor._update()
+        return self._sensor._next - self._first
+
+    def delivered(self) -> int:
+        """Return the number of samples that the board has read."""
+        return self._popped // (len(self._sensor._fifo_registers) or 1) or len(self._read)
+
+    def lost(self) -> int:
+        """Return the number of samples that are lost: overwritten, or removed from the FIFO before they were read."""
+        samples = self.taken()  # taken() is called first, because it updates the FIFO
+        frame = len(self._sensor._fifo_registers)
+        if frame:
+            accounted = self._popped + self._sensor.fifo.count - self._waiting
+            return samples - accounted // frame
+        return max(0, samples - 1 - len(self._read))  # the latest sample can still be read
+
+    def _on_start(self, address: int, read: bool) -> bool:
+        acknowledged = self._start(address, read)
+        if read and self._sensor._pointer == ACCEL_XOUT_H:
+            self._read.add(self._sensor._next)
+        return acknowledged
+
+    def _on_pop(self, count: int = 1) -> bytes:
+        self._popped += min(count, self._sensor.fifo.count)
+        return self._pop(count)
+
 
 SAMPLE_HZ = 200  # samples per second, as in bench_guest.py
-_GUEST = ("bench_guest", "stages_guest", "bluetooth_guest")  # modules of this folder that run on the board
+_GUEST = ("bench_guest", "bluetooth_guest")  # modules of this folder that run on the board
 _SENSOR = Sensor(seed=1, share=0.0)  # a sensor without errors, mounted at some angle
 _SPEED_MPS = 15.0
 _RIDE = [accelerate(_SPEED_MPS, 1.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 20
@@ -37,7 +125,7 @@ _MODES: dict[str, dict[str, Any]] = {
 def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
     """Measure all costs. This takes minutes.
 
-    seconds: emulated time of each run. A Pico needs six runs, and an ESP32 five, because its stages are not measured.
+    seconds: emulated time of each run. A board needs five runs.
     chip: "rp2040" or "esp32".
 
     Returns the figures by name. A name ends with the figure's unit. Raises GuestError if the program on the board
@@ -51,28 +139,20 @@ def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
         "sample_hz": SAMPLE_HZ,
         **plain,
         "chip": chip,
-        "stage_us": {name: _spread(us) for name, us in _stages(_run(chip, seconds, detail=True)).items()}
-        if chip == "rp2040"  # on an ESP32, recording the time of a stage takes longer than the stage
-        else {},
         "modes": modes,
         "boot": {form: asdict(start(chip, form == "mpy")) for form in ("py", "mpy")},
         "flash_bytes": {form: _size(form == "mpy", device_class(chip).MPY) for form in ("py", "mpy")},
     }
 
 
-def tables(result: dict[str, Any]) -> Group:
+def tables(result: dict[str, Any]) -> Table:
     """Format the result of bench() for a terminal."""
-    title = f"A turn of the loop at {result['sample_hz']} samples per second: emulated us, {result['chip']}"
-    times = Table(title=title)
-    times.add_column("stage")
-    for name in ("median", "p99", "max"):
-        times.add_column(name, justify="right")
-    for name, spread in (*result["stage_us"].items(), ("whole turn", result["turn_us"])):
-        times.add_row(name, *(f"{spread[key]:.0f}" for key in ("median", "p99", "max")))
-    figures = Table(show_header=False)
+    figures = Table(title=f"{result['sample_hz']} samples per second, {result['chip']}", show_header=False)
+    turn = result["turn_us"]
     pause = result["collection_pause_us"]
     starts, size = result["boot"], result["flash_bytes"]
     for name, text in (
+        ("a turn of the loop", ", ".join(f"{name} {turn[name]:.0f} us" for name in ("median", "p99", "max"))),
         ("CPU share", f"{100 * result['cpu_share']:.0f} %"),
         ("samples taken / lost", f"{result['samples_taken']} / {result['samples_lost']} in {result['seconds']:.1f} s"),
         ("heap taken by a sample", f"{result['heap_bytes_per_sample']} bytes"),
@@ -87,7 +167,7 @@ def tables(result: dict[str, Any]) -> Group:
         ("size on flash", f"{size['py'] / 1000:.1f} kB as .py, {size['mpy'] / 1000:.1f} kB as .mpy"),
     ):
         figures.add_row(name, text)
-    return Group(times, boot.table(starts["mpy"]), figures)
+    return figures
 
 
 def _mode_text(mode: dict[str, Any]) -> str:
@@ -97,12 +177,12 @@ def _mode_text(mode: dict[str, Any]) -> str:
     )
 
 
-def start(chip: str, compiled: bool = True) -> boot.Boot:
+def start(chip: str, compiled: bool = True) -> Boot:
     """Measure the time from power-on to the first lean. The bike is upright and at rest.
 
     compiled: True to install the firmware as .mpy files.
     """
-    return boot.boot(device_class(chip), _SENSOR.world(Ride([upright(100.0)]).motion), _calibration(), compiled)
+    return boot(device_class(chip), _SENSOR.world(Ride([upright(100.0)]).motion), _calibration(), compiled)
 
 
 def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = None) -> dict[str, Any]:
@@ -130,11 +210,10 @@ def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = Non
     }
 
 
-def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
+def _run(chip: str, seconds: int, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
     """Run the app's loop on the emulated board.
 
-    seconds: emulated time. detail: True to measure the stages of a pass of the loop too. chosen: values of settings, by
-        name.
+    seconds: emulated time. chosen: values of settings, by name.
 
     Returns the figures and arrays of bench_guest.py, and the numbers of samples that were taken and lost.
     """
@@ -145,7 +224,6 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
     folder = Path(__file__).parent
     files |= {f"{name}.mpy": cross_compiled(folder / f"{name}.py", architecture(mpy)) for name in _GUEST}
     arrays: list[np.ndarray] = []
-    stages: list[np.ndarray] = []
     result: dict[str, Any] = {}
     with device_class(chip)(_SENSOR.world(Ride(_RIDE).motion), files, display=chosen.get("DISPLAY", "lcd")) as device:
         samples = SampleCount(device.board.sensor)
@@ -157,15 +235,13 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
                 result["heap_samples"] = samples.delivered()
             elif data == b"end":
                 result.update(taken=samples.taken(), lost=samples.lost())
-            elif "taken" not in result:
-                stages.append(np.frombuffer(data, np.uint32))
             else:
                 arrays.append(np.frombuffer(data, np.uint16))
 
         device.listen(take)
         if chosen.get("SPEED") == "wheel":
             device.fit_wheel(lambda t_s: _SPEED_MPS)
-        code = f"{device.SINK}import bench_guest\nbench_guest.run({detail}, {seconds}, Sink(), {chosen})\n"
+        code = f"{device.SINK}import bench_guest\nbench_guest.run({seconds}, Sink(), {chosen})\n"
         output = device.exec(code, limit_s=2.0 * seconds + 30.0)
         # The figures follow the output of a Sink
         result["figures"] = ast.literal_eval(output.rpartition("\x02")[2].strip())
@@ -173,32 +249,7 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
     result["took"] = arrays[0][:turns]
     asked_for = arrays[1][: result["figures"]["collections_by_app"]]
     result["pauses"] = asked_for if len(asked_for) else np.array([result["figures"]["collect_us"]])
-    if detail:
-        result["stages"] = np.array(stages).astype(int)
     return result
-
-
-def _stages(run: dict[str, Any]) -> dict[str, np.ndarray]:
-    """Return the times of each stage in us, one for each pass of the loop in which the stage ran."""
-    columns = dict(zip(run["figures"]["stages"], run["stages"].T, strict=True))
-    sampled = columns["decode and sum"] > 0
-    watch = run["figures"]["stopwatch_us"]
-    # The stage of the sensor contains three timed calls: two transfers and add_up()
-    fetch = columns["fetch"] - 3 * watch
-    meter = columns["meter"] - 2 * watch
-    stages = {
-        "read": columns["read"],
-        "decode and sum": columns["decode and sum"],
-        "check": fetch - columns["read"] - columns["decode and sum"],
-        "calibrate and rotate": columns["calibrate and rotate"],
-        "filter": columns["filter"],
-        "rest of the meter": meter - columns["calibrate and rotate"] - columns["filter"],
-        "sample path": fetch + meter,
-    }
-    stages = {name: us[sampled] for name, us in stages.items()}
-    stages["page"] = columns["page"][columns["page"] > 0]
-    stages["display"] = columns["display"]
-    return stages
 
 
 def _spread(us: np.ndarray) -> dict[str, float]:

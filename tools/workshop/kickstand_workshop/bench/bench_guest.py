@@ -73,19 +73,18 @@ class TimedGc:
 class MeasuredApp(app_module.App):
     """The app, which records the costs of the passes of its loop, and stops after a given time."""
 
-    def prepare(self, seconds, out, spent):
+    def prepare(self, seconds, out):
         """Prepare the recording.
 
-        seconds: recording time. out: a Sink to the host. spent: array for the us of each stage in a pass, or None.
+        seconds: recording time. out: a Sink to the host.
         """
         # Without a collection here, the arrays would be behind garbage in the heap, and lengthen each later collection
         gc.collect()
         turns = seconds * MAX_TURNS_HZ
-        self._out, self._spent, self._turns = out, spent, turns
+        self._out, self._turns = out, turns
         self._until_us = seconds * 1_000_000
         self.count = -SETTLE_TURNS
         self.took = array("H", bytes(2 * turns))
-        self._spent_bytes = bytearray_at(addressof(spent), 4 * len(spent)) if spent else None
         self.pauses = array("H", bytes(2 * MAX_PAUSES))  # us of each collection that the app started
         self.n_pauses = 0
         self.automatic = 0  # number of collections that the app did not start
@@ -111,7 +110,6 @@ class MeasuredApp(app_module.App):
         self._out.write(b"begin")
         self.slept_us = 0
         self._begun = ticks_us()
-        self._clear()
 
     def _note(self, turn, took):
         elapsed_us = ticks_diff(ticks_us(), self._begun)
@@ -121,9 +119,6 @@ class MeasuredApp(app_module.App):
             self._out.write(b"end")
             raise Done
         self.took[turn] = took
-        if self._spent:
-            self._out.write(self._spent_bytes)  # sent at once, because a stored time would add to the measured heap use
-            self._clear()
         if self.count == HEAP_TURNS:
             self.heap_bytes = gc.mem_alloc() - self._allocated
             self._out.write(b"heap")
@@ -134,11 +129,6 @@ class MeasuredApp(app_module.App):
         elif self.count > HEAP_TURNS and self.canary.died():
             self.automatic += 1
             self.canary.arm()
-
-    def _clear(self):
-        if self._spent:
-            for i in range(len(self._spent)):
-                self._spent[i] = 0
 
 
 def _attach(app):
@@ -154,10 +144,9 @@ def _attach(app):
     app.live.radio._ble.connect()
 
 
-def run(detail, seconds, out, chosen):
+def run(seconds, out, chosen):
     """Run the app, and print one line, a dictionary of figures.
 
-    detail: True to write the us of each stage to out after each pass, as 32-bit numbers.
     seconds: recording time.
     out: a Sink to the host. out receives b"begin", then b"heap" after HEAP_TURNS, and b"end". Two arrays of 16-bit
         numbers follow: us of each pass, and us of each collection that the app started.
@@ -169,16 +158,7 @@ def run(detail, seconds, out, chosen):
     app = MeasuredApp(settings, open_lcd(settings), open_sensor(settings))
     if settings.LIVE:
         _attach(app)
-    spent = None
-    if detail:
-        import stages_guest
-
-        spent = array("I", bytes(4 * stages_guest.COLUMNS))
-    app.prepare(seconds, out, spent)
-    if detail:
-        stages_guest.time_stages(spent)
-        reopen = app.sensor.reopen
-        app.sensor.reopen = lambda: stages_guest.TimedBus(reopen(), spent)
+    app.prepare(seconds, out)
     assert app_module.gc is gc
     app_module.gc = TimedGc(app)
 
@@ -210,9 +190,6 @@ def run(detail, seconds, out, chosen):
     }
     if app.live:
         figures["sent"] = app.live.radio._ble.sent
-    if detail:
-        figures["stopwatch_us"] = stages_guest.stopwatch_us(spent)
-        figures["stages"] = [stage[0] for stage in stages_guest.STAGES] + ["read"]
     for data in (app.took, app.pauses):
         out.write(bytearray_at(addressof(data), 2 * len(data)))
     print(figures)

@@ -80,8 +80,8 @@ def of_simulated(profile: str, seed: int, seconds: float, road: str | None, moun
     return bands_of_log(Log.from_readings(simulated.readings, simulated.rate_hz, "RIDE.csv"), calibration)
 
 
-def table(found: dict[str, Figures]) -> Table:
-    """Return a table with a block of lines for each quantity. found: the rms in each band, by the name of the ride."""
+def table(rides: dict[str, Figures]) -> Table:
+    """Return a table with a block of lines for each quantity. rides: the rms in each band, by the name of the ride."""
     report = Table(title="rms by band of frequency, Hz", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     report.add_column("ride", overflow="fold")
     for low, high in BANDS_HZ:
@@ -89,7 +89,7 @@ def table(found: dict[str, Figures]) -> Table:
     for quantity in QUANTITIES:
         report.add_row(quantity, style="cyan")
         digits = 3 if quantity.endswith(" g") else 2
-        for k, (name, figures) in enumerate(found.items()):
+        for k, (name, figures) in enumerate(rides.items()):
             cells = [f"{value:.{digits}f}" for value in figures[quantity]]
-            report.add_row("  " + name, *cells, end_section=k == len(found) - 1)
+            report.add_row("  " + name, *cells, end_section=k == len(rides) - 1)
     return report

@@ -15,7 +15,7 @@ from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.calibration.poses import fit_two_positions
 from kickstand_tools.calibration.procedure import fit_procedure
 from kickstand_tools.logs.log import Log
-from kickstand_tools.simulation import hands, poses
+from kickstand_tools.simulation import hands
 from kickstand_tools.simulation.hands import Hand
 from kickstand_tools.simulation.physics.chip import GYRO_DPS_PER_G, Chip
 
@@ -241,11 +241,11 @@ def _of_the_sheet(chance, time, force, rates, mounting):
     """
     chip, home_c = Chip.random(chance), chance.uniform(18.0, 25.0)
     hand = Hand(detour_deg=chance.uniform(5.0, 30.0), push_g=chance.uniform(0.03, 0.2))
-    six = hands.procedure(chance, chip, np.array(list(poses.ups(chance))), home_c, hand)
+    six = hands.procedure(chance, chip, np.array(list(hands.ups(chance))), home_c, hand)
     upright, stand = 1.5 * chance.choice((-1.0, 1.0)), -chance.uniform(8.0, 15.0)
     slope, change = chance.uniform(-0.5, 0.5), chance.uniform(-1.0, 1.0)
     two = [
-        poses.standing(chance, chip, mounting, lean, pitch, home_c, is_still)
+        hands.standing(chance, chip, mounting, lean, pitch, home_c, is_still)
         for lean, pitch, is_still in ((stand, slope + change, False), (upright, slope, True))
     ]
     calibration = fit_two_positions(
@@ -340,12 +340,12 @@ def figures(seed):
 FORM = "%5d %-9s %-9s %5.2f %5.1f %4.0f%%  %5.2f %5.1f %4.0f%% %4.0f%% %5.2f"
 
 
-def main(which, count):
+def main(parity, count):
     """Print one line of figures per seed, then one line per mount.
 
-    which: "odd" or "even" seeds. count: number of seeds.
+    parity: "odd" or "even" seeds. count: number of seeds.
     """
-    seeds, rows = range(which == "odd", 2 * int(count), 2), []
+    seeds, rows = range(parity == "odd", 2 * int(count), 2), []
     print(" seed kind      mount      live worst shown  smooth worst  1 s  2 s sigma")
     for row in map(figures, seeds):
         shares = (100.0 * row[5], *row[6:8], *(100.0 * share for share in row[8:10]), row[10])

@@ -9,10 +9,8 @@ import numpy as np
 from rich import box
 from rich.table import Table
 
-from . import possible
-from .metrics import LeanScore
-from .real_ride import RealScore
-from .runs import Evaluation, Result
+from . import estimators
+from .runs import Evaluation, LeanScore, RealScore, Result
 
 CAPTION = (
     "possible: our filter with the true speed and a sensor with noise only; rms: over all rides; "
@@ -59,7 +57,7 @@ def by_profile(results: list[Result]) -> dict[str, dict[str, dict[str, float]]]:
         rides = [r for r in results if r.job.profile == profile and r.refusal is None]
         names = rides[0].scores if rides else {}
         summary[profile] = {name: pooled([r.scores[name] for r in rides]) for name in names}
-        least = summary[profile].get(possible.NAME, {}).get("rms", float("nan"))
+        least = summary[profile].get(estimators.NAME, {}).get("rms", float("nan"))
         for figures in summary[profile].values():
             figures["ratio"] = figures["rms"] / least
     return summary

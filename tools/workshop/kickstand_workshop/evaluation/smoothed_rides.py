@@ -40,9 +40,9 @@ class Known:
         live = np.where(np.isnan(replayed.lean_sigma_deg), np.nan, replayed.lean_deg - self.lean_deg)
         return live[self.riding], (smoothed.lean_deg - self.lean_deg)[self.riding], smoothed.lean_sigma_deg[self.riding]
 
-    def part(self, kept):
+    def part(self, selected):
         """Return the ride with only the samples for which `kept` is True. kept: shape (n)."""
-        return Known(self.log.part(kept), self.calibration, self.lean_deg[kept], self.riding[kept])
+        return Known(self.log.part(selected), self.calibration, self.lean_deg[selected], self.riding[selected])
 
 
 def simulated(profile, seed, seconds):

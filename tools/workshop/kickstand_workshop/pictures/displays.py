@@ -19,7 +19,7 @@ from kickstand_tools.simulated_board.oled import HEIGHT, WIDTH, Oled
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted.script import Ride
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
-from kickstand_tools.web.lcd_font import ROM
+from kickstand_tools.web import site
 
 # The demo's bike turns to the right from 32 to 39 s, brakes from 50 to 56 s, and then stands. The presses capture the
 # pose on the kickstand and the upright pose, then show the page of maxima and the page of braking
@@ -38,6 +38,8 @@ MOMENTS_S = {
 }
 UNPLUGGED_S = 44.0, 0.3  # start and duration of the fault that causes the page "unsure", an unplugged sensor
 OLED_MOMENTS_S = {"lean": 36.0, "unsure": 44.9, "maxima": 50.05, "brake": 53.07, "menu": 60.0}
+# The characters of the HD44780's ROM A00 (data sheet ADE-207-272, table 4): {code: eight rows, the left dot in bit 4}
+ROM = {int(code): rows for code, rows in json.loads((site.PAGE / "font.json").read_text()).items()}
 # Sizes in units of 0.1 mm, as on the usual module of 80 x 36 mm
 _DOT = (5, 6)  # width, height
 _PITCH = (6, 7)  # distance between dots
@@ -91,8 +93,8 @@ def draw_lcd(codes: list[list[int]], cgram: list[int]) -> str:
     )
 
 
-def _rows(code: int, cgram: list[int]) -> bytes:
-    return bytes(cgram[code % 8 * 8 : code % 8 * 8 + 8]) if code < 0x10 else ROM[code]
+def _rows(code: int, cgram: list[int]) -> list[int]:
+    return cgram[code % 8 * 8 : code % 8 * 8 + 8] if code < 0x10 else ROM[code]
 
 
 def _dot(x: int, y: int) -> str:

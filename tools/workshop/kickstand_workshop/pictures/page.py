@@ -51,10 +51,10 @@ def _ride(page: Any) -> list[tuple[float, bytes]]:
     """Press the button twice, and ride a bend to each side. Returns the screenshots, each as (time in s, PNG)."""
     shots: list[tuple[float, bytes]] = []
 
-    def film(done: Callable[[], bool]) -> None:
+    def film(is_over: Callable[[], bool]) -> None:
         due = time.monotonic()
         end = due + _WAIT_MS / 1000
-        while not done():
+        while not is_over():
             if due > end:
                 raise TimeoutError("the page does not go on")
             shots.append((time.monotonic(), page.screenshot()))

@@ -2,5 +2,5 @@
 
     python -m kickstand_workshop.soak --hours 24 --seed 1
 
-trip.py makes a random trip. watch.py checks display and bus during the trip. soak.py runs trips and keeps tallies.
+trip.py makes a random trip. soak.py runs trips, checks display and bus, and keeps tallies.
 """

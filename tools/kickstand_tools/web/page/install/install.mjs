@@ -1,6 +1,6 @@
 // Installs the firmware and its config.py on a board at the browser's serial port, as `kickstand flash` does. Also
 // shows the output of `kickstand status` and `check`. The commands run on CPython for WebAssembly
-// (web/install_guest.py).
+// (web/browser_install.py).
 
 import { ASKING, choosePort, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
@@ -10,8 +10,8 @@ import { Fields } from "./fields.mjs";
 
 const byId = (id) => document.getElementById(id);
 const fields = new Fields(byId("fields"), check);
-const guests = loadOnce(async () => (await python()).pyimport("kickstand_tools.web.install_guest"));
-let board = null; // {port, guest}: an Installation of install_guest.py
+const modules = loadOnce(async () => (await python()).pyimport("kickstand_tools.web.browser_install"));
+let board = null; // {port, module}: an Installation of browser_install.py
 let byHand = null;
 
 function tell(text, share = null) {
@@ -26,18 +26,18 @@ async function look() {
   atWork(true);
   byId("config").hidden = true;
   tell("Loading the tools, 6 MB the first time …", 0);
-  const tools = await guests(tell);
+  const tools = await modules(tell);
   if (!tools) return atWork(false);
-  const guest = tools.Installation();
+  const module = tools.Installation();
   const said = await overCable(port, tell, (line, name) => {
     tell(ASKING, NaN);
-    return guest.look.callPromising(line, name);
+    return module.look.callPromising(line, name);
   });
   atWork(false);
   if (!said) return;
   const { refused, board: name, settings, usual, by_hand, others } = JSON.parse(said);
   if (refused) return tell(`Not installed: ${refused}.`);
-  board = { port, guest };
+  board = { port, module };
   byHand = by_hand;
   byId("by-hand").textContent = byHand ? `The board’s own ${byHand}. It stays as it is.` : "";
   byId("settings").hidden = Boolean(byHand);
@@ -54,7 +54,7 @@ async function look() {
 /** Check the form by the firmware's own rules. */
 function check() {
   if (byHand) return true;
-  const { text, fault } = JSON.parse(board.guest.check(JSON.stringify(fields.values())));
+  const { text, fault } = JSON.parse(board.module.check(JSON.stringify(fields.values())));
   byId("text").textContent = text;
   fields.mark(...(fault ?? [null, ""]));
   byId("fault").textContent = fault && !fault[0] ? fault[1] : "";
@@ -64,14 +64,14 @@ function check() {
 
 async function install() {
   if (!check()) return;
-  const { port, guest } = board;
+  const { port, module } = board;
   const wanted = JSON.stringify(byHand ? {} : fields.values());
   atWork(true);
   tell(ASKING, NaN);
   const said = await overCable(
     port,
     tell,
-    (line, name) => guest.install.callPromising(line, name, wanted, (what, done, total) => tell(what, done / total)),
+    (line, name) => module.install.callPromising(line, name, wanted, (what, done, total) => tell(what, done / total)),
     true, // after the board was identified
   );
   atWork(false);
@@ -102,7 +102,7 @@ async function report(asks) {
   byId("status-shown").hidden = true;
   byId("status-text").textContent = "";
   say("Loading the tools, 6 MB the first time …");
-  const tools = await guests(say);
+  const tools = await modules(say);
   const said =
     tools &&
     (await overCable(port, say, (line, name) => {

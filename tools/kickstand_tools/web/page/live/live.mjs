@@ -1,5 +1,5 @@
 // Shows a board's stream, keeps it as a log, and fetches recorded rides from the board. It runs `kickstand record` and
-// `kickstand pull` on CPython for WebAssembly (web/cable_guest.py).
+// `kickstand pull` on CPython for WebAssembly (web/browser_cable.py).
 
 import { ASKING, choosePort, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
@@ -15,8 +15,8 @@ const byId = (id) => document.getElementById(id);
 const gauge = new Gauge(byId("gauge"));
 const chart = new Chart(byId("chart"));
 const player = new Player();
-const guests = loadOnce(async () => (await python(true)).pyimport("kickstand_tools.web.cable_guest"));
-let live; // the LiveStream of cable_guest.py, or null
+const modules = loadOnce(async () => (await python(true)).pyimport("kickstand_tools.web.browser_cable"));
+let live; // the LiveStream of browser_cable.py, or null
 let stopped = false;
 let awake = null; // a WakeLockSentinel
 let aligned = false;
@@ -33,15 +33,15 @@ async function start() {
   stopped = false;
   atWork(true);
   tell("Loading the tools, 8 MB the first time …");
-  const guest = await guests(tell);
-  if (!guest) return atWork(false);
+  const module = await modules(tell);
+  if (!module) return atWork(false);
   await stayAwake();
   let said = null;
   for (let again = false; !stopped; again = true) {
     player.restart();
     furthest = [0, 0];
     tell("The board starts …");
-    live = guest.LiveStream();
+    live = module.LiveStream();
     said = JSON.parse(await overCable(port, tell, (line, name) => live.run.callPromising(line, name, received), again));
     keep(live);
     live = null;
@@ -132,11 +132,11 @@ async function pull() {
   if (!port) return;
   atWork(true, false);
   say("Loading the tools, 8 MB the first time …", 0);
-  const guest = await guests(say);
-  if (!guest) return atWork(false);
+  const module = await modules(say);
+  if (!module) return atWork(false);
   const result = await overCable(port, say, (line, name) => {
     say(ASKING, NaN);
-    return guest.pull.callPromising(line, name, (what, done, total) => say(what, total ? done / total : 0));
+    return module.pull.callPromising(line, name, (what, done, total) => say(what, total ? done / total : 0));
   });
   atWork(false);
   if (!result) return;

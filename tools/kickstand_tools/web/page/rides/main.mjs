@@ -9,14 +9,14 @@ import { askColumns, askNothing } from "./table.mjs";
 import { Tools } from "./tools.mjs";
 
 const byId = (id) => document.getElementById(id);
-const PLOTLY = "./plotly/plotly.min.js"; // as web/rides_guest.py names it
+const PLOTLY = "./plotly/plotly.min.js"; // as web/browser_rides.py names it
 const SAMPLE = ["simulated-ride.csv.gz", "simulated-ride.cal.json"];
 const tools = new Tools((done, of, loading) => {
   if (of) byId("work-bar").value = done / of;
   if (loading) showReady(done, of);
 });
 const held = new Held(byId("held"), () => sortOut([]));
-let rides = []; // the rides from rides() of web/rides_guest.py, each with its results (see kept())
+let rides = []; // the rides from rides() of web/browser_rides.py, each with its results (see kept())
 let looked = null;
 let current = ""; // the ride that was chosen last
 let loaded = false; // true when Python and everything that the tools need are loaded

@@ -8,7 +8,7 @@ function element(name, ...inside) {
   return made;
 }
 
-/** Show a report. words, warnings: from look() in web/rides_guest.py. name: the ride's name. */
+/** Show a report. words, warnings: from look() in web/browser_rides.py. name: the ride's name. */
 export function showReport({ words, warnings, name, calibration }) {
   byId("report-title").textContent = name;
   byId("calibration").textContent = calibration;

@@ -3,7 +3,7 @@
 
 const form = document.getElementById("table");
 
-/** Ask about a table. table: from asked_for() of web/rides_guest.py. use(columns, units) is called with the answers.
+/** Ask about a table. table: from asked_for() of web/browser_rides.py. use(columns, units) is called with the answers.
  * Each is {key: name}. */
 export function askColumns(name, table, use) {
   form.querySelector("legend").textContent = `Which column of ${name} is what?`;

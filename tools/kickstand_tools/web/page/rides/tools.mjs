@@ -32,7 +32,7 @@ export class Tools {
     return begins;
   }
 
-  /** Call a function of web/rides_guest.py. Returns its result. If it made a file, `made` in the result has the bytes.
+  /** Call a function of web/browser_rides.py. Returns its result. If it made a file, `made` in the result has the bytes.
    *
    * Throws an Error with the line of a refusal. */
   call(...call) {

@@ -2,7 +2,7 @@
 //
 // Receives these messages:
 //     {files}: the files that were given to the page.
-//     {call: [name, ...arguments]}: call a function of web/rides_guest.py.
+//     {call: [name, ...arguments]}: call a function of web/browser_rides.py.
 // Sends these messages:
 //     {done, of, loading}: the progress of fetching the tools if loading is true, otherwise of a call.
 //     {ready}: the tools are fetched.
@@ -15,7 +15,7 @@ const GIVEN = "/given";
 const HERE = "/ride"; // Python's working directory
 const OFTEN_MS = 100; // time between two messages about the progress
 
-let guest;
+let module;
 let python;
 let mounted = false;
 let saidMs = 0;
@@ -31,8 +31,8 @@ async function load() {
   python = await loadPython(["numpy/numpy.zip", "rides.zip"], (done, of) => tell(done, of, true));
   for (const folder of [GIVEN, HERE]) python.FS.mkdir(folder);
   python.FS.chdir(HERE);
-  guest = python.pyimport("kickstand_tools.web.rides_guest");
-  guest.prepare();
+  module = python.pyimport("kickstand_tools.web.browser_rides");
+  module.prepare();
   postMessage({ ready: true });
 }
 
@@ -44,7 +44,7 @@ function give(files) {
 }
 
 function call([name, ...given]) {
-  const said = JSON.parse(name === "rides" ? guest.rides(GIVEN, ...given) : guest[name](...given, tell));
+  const said = JSON.parse(name === "rides" ? module.rides(GIVEN, ...given) : module[name](...given, tell));
   const made = said.path && python.FS.readFile(said.path);
   postMessage({ said, made }, made ? [made.buffer] : []);
 }

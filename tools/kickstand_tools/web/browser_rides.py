@@ -30,7 +30,7 @@ from ..imports.importing import import_recording, write_imported
 from ..joining.joined import join_track, write_joined
 from ..logs.csv_lines import write_lean
 from ..logs.reader import read_blocks
-from .rides_given import sorted_out
+from .ride_files import sorted_out
 
 PLOTLY = "./plotly/plotly.min.js"  # the page of a ride loads plotly from the site
 MADE = Path("../made")  # results are not written beside the given files, because names could collide
@@ -54,13 +54,13 @@ def in_json(function: Callable[..., Any]) -> Callable[..., str]:
 
 
 @in_json
-def rides(given, names):
+def rides(folder, names):
     """Identify the given files.
 
-    given: the folder of the files.
+    folder: the folder of the files.
     names: their names as a JSON list, in the order in which the user chose them.
     Returns:
-        rides: list of objects, sorted by name. Each has the fields of GivenRide, with "table" as from asked_for(), and
+        rides: list of objects, sorted by name. Each has the fields of FilesOfRide, "table" as from asked_for(), and
             "isLog": true if the ride is a log of Kickstand.
         kinds: {name: kind of the file}.
         why: {name: reason why the file cannot be used}.
@@ -70,7 +70,7 @@ def rides(given, names):
         shutil.rmtree(old) if old.is_dir() else old.unlink()
     names = json.loads(names)
     for name in names:
-        Path(name).symlink_to(Path(given, name))
+        Path(name).symlink_to(Path(folder, name))
     inputs = sorted_out(names)
     rides = [
         vars(ride) | {"isLog": inputs.kinds.get(ride.log) == "log", "table": ride.table and asked_for(ride.table)}

@@ -16,7 +16,7 @@ from ..logs.reader import is_log
 
 
 @dataclass
-class GivenRide:
+class FilesOfRide:
     """A ride among the given files."""
 
     log: str  # a file, or a folder with the files of one recording
@@ -28,15 +28,15 @@ class GivenRide:
 
 
 @dataclass
-class Given:
+class RideFiles:
     """The result of sorted_out()."""
 
-    rides: list[GivenRide] = field(default_factory=list)  # sorted by name
+    rides: list[FilesOfRide] = field(default_factory=list)  # sorted by name
     kinds: dict[str, str] = field(default_factory=dict)  # {name of a file: its kind}
     refused: dict[str, InputError] = field(default_factory=dict)  # {name of a file: the reason why it cannot be used}
 
 
-def sorted_out(names: list[str]) -> Given:
+def sorted_out(names: list[str]) -> RideFiles:
     """Identify files in the working directory.
 
     A calibration belongs to a ride if its name matches the ride's name. Other rides get the last calibration that
@@ -44,7 +44,7 @@ def sorted_out(names: list[str]) -> Given:
 
     names: names of the files, in the order in which the user chose them.
     """
-    inputs, loose = Given(), []
+    inputs, loose = RideFiles(), []
     track = ""
     calibrations = []
     for name in names:
@@ -57,7 +57,7 @@ def sorted_out(names: list[str]) -> Given:
                 read_track(Path(name))
                 track, inputs.kinds[name] = name, "track"
             elif is_log(Path(name)):
-                inputs.rides.append(GivenRide(name, [name]))
+                inputs.rides.append(FilesOfRide(name, [name]))
                 inputs.kinds[name] = "log"
             else:
                 files = read_files(Path(name))
@@ -109,15 +109,15 @@ def _recordings_among(files: list[RecordingFile]) -> Iterator[tuple[str, list[Re
         yield from ((file.name, [file]) for file in remaining)
 
 
-def _add(found: Given, log: str, names: list[str], files: list[RecordingFile]) -> None:
+def _add(inputs: RideFiles, log: str, names: list[str], files: list[RecordingFile]) -> None:
     """Add a ride, or the reason why the files are not a ride."""
     parts = recordings(files)
     table = None if parts else mapped.table_in(files)
     if not parts and (table is None or len(table.sheet.columns) < len(mapped.REQUIRED)):
-        found.refused |= dict.fromkeys(names, mapped.unknown(files, log))
+        inputs.refused |= dict.fromkeys(names, mapped.unknown(files, log))
         return
-    found.rides.append(GivenRide(log, names, table=table))
-    found.kinds |= dict.fromkeys(names, f"of {parts[0][0].NAME}" if parts else "table")
+    inputs.rides.append(FilesOfRide(log, names, table=table))
+    inputs.kinds |= dict.fromkeys(names, f"of {parts[0][0].NAME}" if parts else "table")
 
 
 def _by_number(name: str) -> list[tuple[int, str]]:

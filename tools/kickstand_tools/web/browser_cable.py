@@ -15,7 +15,7 @@ from ..calibration.file import calibration_path, write_calibration
 from ..common.errors import InputError
 from ..deploy.connection import connected, describe, restart
 from ..rides import pull as pulling, ride_log, stream
-from .serial_guest import BrowserBoard
+from .browser_serial import BrowserBoard
 
 
 class LiveStream:

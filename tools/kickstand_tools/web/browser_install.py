@@ -13,7 +13,7 @@ from ..common import firmware_path
 from ..common.errors import InputError
 from ..deploy import bytecode, check as board_check, config_check, config_text, connection, flash, others
 from ..deploy.firmware_files import CONFIG
-from .serial_guest import BrowserBoard
+from .browser_serial import BrowserBoard
 
 ROOT = Path("/packages")  # where page/python.mjs unpacks archives.install_archive()
 COMMON = "armv6m"  # the first of archives.ARCHITECTURES
@@ -63,7 +63,7 @@ class Installation:
         described = {"board": board, "settings": settings, "usual": usual, "by_hand": self._by_hand}
         return json.dumps(described | {"others": plan.words()})
 
-    def check(self, wanted):
+    def check(self, settings):
         """Check the config.py with new settings by the firmware's own rules.
 
         wanted: JSON of {name: value, or null for the default}.
@@ -72,7 +72,7 @@ class Installation:
             fault: [name of the setting or null, reason], or null if there is no fault.
         """
         text = self._template if self._own is None else self._own
-        values = json.loads(wanted)
+        values = json.loads(settings)
         for name, value in values.items():  # separately, because the page shows a fault beside its field
             try:
                 text = config_text.with_values(text, {name: value})

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from kickstand_tools.web import rides_guest
+from kickstand_tools.web import browser_rides
 from support.recordings import analysis_rides, app_exports
 
 RIDING = app_exports.riding().every(4)
@@ -30,7 +30,7 @@ def sorted_out(tmp_path, monkeypatch):
         for name, content in files.items():
             (tmp_path / "given" / name).write_bytes(content.encode() if isinstance(content, str) else content)
         monkeypatch.chdir(tmp_path / "here")  # the code deletes all other files in its working directory
-        return json.loads(rides_guest.rides(str(tmp_path / "given"), json.dumps(list(files))))
+        return json.loads(browser_rides.rides(str(tmp_path / "given"), json.dumps(list(files))))
 
     return give
 
@@ -132,11 +132,11 @@ def test_the_report_is_that_of_the_command(sorted_out, ride, calibration):
     from support.command import works
 
     sorted_out({path.name: path.read_bytes() for path in (ride, calibration)})
-    report = json.loads(rides_guest.look(ride.name, calibration.name, lambda done, total: None))
+    report = json.loads(browser_rides.look(ride.name, calibration.name, lambda done, total: None))
     assert report["json"] == json.loads(works("report", ride, "--json").out) | {"ride": ride.name}
     assert report["warnings"] == [] and "Plotly.newPlot" in report["page"]
-    (path,) = json.loads(rides_guest.smooth(ride.name, calibration.name, lambda done, total: None)).values()
+    (path,) = json.loads(browser_rides.smooth(ride.name, calibration.name, lambda done, total: None)).values()
     works("smooth", ride, "--out", "lean.csv")
     assert Path(path).read_text() == Path("lean.csv").read_text()
-    refusal = json.loads(rides_guest.align(ride.name, lambda done, total: None))["refused"]
+    refusal = json.loads(browser_rides.align(ride.name, lambda done, total: None))["refused"]
     assert "of riding: at least" in refusal
