@@ -29,7 +29,7 @@ def test_new_board(status):
     assert "  slope               1.0000    1.0000    1.0000" in lines
     rows = [text.split()[1:] for text in lines if text.split()[0] in ("left", "up", "forward")]
     assert rows == [["1.0000", "0.0000", "0.0000"], ["0.0000", "1.0000", "0.0000"], ["0.0000", "0.0000", "1.0000"]]
-    plain = "decode, add_up, products, add_products, encode"  # CPython has no machine code
+    plain = "decode, add_up, products, encode"  # CPython has no machine code
     assert line(lines, "Machine code") == f"not used for {plain}: slower code runs instead"
     assert not [text for text in lines if text.startswith(("Sensor odd", "Since start", "Vibration"))]
 
