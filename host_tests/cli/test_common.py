@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
-from kickstand_tools.common import errors, firmware_path, messages, output, progress, unix_port
+from kickstand_tools.common import errors, firmware_path, messages, output, progress, times, unix_port
 from kickstand_tools.common.errors import InputError, RefusedInput
 from kickstand_tools.common.messages import Message, Plain, Remedy, WrongAxes
 from support.watched_stderr import Watched
@@ -117,6 +117,11 @@ def test_file_that_the_shell_has_opened_is_not_replaced(name, tmp_path):
 
 
 # Texts
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(59.6, "1:00"), (3599, "59:59"), (3723, "1:02:03")])
+def test_time_is_written_as_on_a_clock(seconds, text):
+    assert times.clock(seconds) == text
 
 
 class Late(Message):

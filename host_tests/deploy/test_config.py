@@ -111,7 +111,11 @@ SETTINGS = ("SENSOR_SDA", "SENSOR_SCL", "LCD_SDA", "LCD_SCL", "BUTTON_PIN")
 SHOPS = {
     "Seeed XIAO RP2040, RP2350": "Seeed XIAO RP2350 with RP2350", "Waveshare RP2040-Zero": "RP2040-Zero with RP2040",
     "Seeed XIAO ESP32C3": "XIAO with ESP32-C3", "Seeed XIAO ESP32C5": "XIAO with ESP32-C5",
-    "Seeed XIAO ESP32S3": "XIAO with ESP32-S3",
+    "Seeed XIAO ESP32S3": "XIAO with ESP32-S3", "Waveshare RP2350-Zero": "RP2350-Zero with RP2350",
+    "Waveshare RP2040-Plus, RP2350-Plus": "RP2350-Plus with RP2350", "WeAct Studio RP2040": "WeAct with RP2040",
+    "SuperMini ESP32-C3": "C3 with ESP32-C3", "SuperMini ESP32-C3 with an OLED of 72x40 on 5 and 6": "C3 with ESP32C3",
+    "LOLIN (Wemos) ESP32-S2 mini": "S2 with ESP32-S2", "LILYGO T-Display (ESP32)": "Generic ESP32 module with ESP32",
+    "LILYGO T-Display-S3 (ESP32-S3)": "S3 with ESP32-S3", "Heltec WiFi Kit 32 V3 (ESP32-S3)": "S3 with ESP32-S3",
     "M5Stack Atom Lite (ESP32-PICO-D4)": "M5Stack ATOM with ESP32-PICO-D4",
 }  # fmt: skip
 

@@ -4,7 +4,6 @@ import importlib.util
 import os
 import re
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -85,13 +84,6 @@ def test_interrupted_installation_starts_again(project):
     assert project.steps("") == [UV, "pip install ."]
 
 
-def test_moved_checkout_gets_a_new_venv(project):
-    project.steps("")
-    stamp = project.root / ".venv" / "installed.txt"
-    stamp.write_text(stamp.read_text().replace(str(project.root), "/elsewhere", 1))
-    assert project.steps("") == ["venv .venv", UV, "pip install ."]
-
-
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
@@ -105,23 +97,6 @@ def test_failed_venv_is_reported_in_one_line(project, fault, words):
     with pytest.raises(project.dev.SetupStopped, match=words) as stopped:
         project.steps("")
     assert "\n" not in str(stopped.value)
-
-
-def test_failed_installation_gives_the_reason_and_the_log(project):
-    project.steps("")
-    project.python("""[ "$3" != install ] || { echo x; echo 'ERROR: No matching distribution found for x'; exit 1; }""")
-    with pytest.raises(project.dev.SetupStopped, match="No matching distribution found for x") as stopped:
-        project.steps("test")
-    assert "\n" not in str(stopped.value) and str(project.root / ".venv" / "install.log") in str(stopped.value)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [(["fly"], "dev.py: no task is named"), ([], "dev.py: no task is named")],
-)
-def test_dev_lists_its_commands(arguments, words):
-    process = subprocess.run([sys.executable, str(DEV), *arguments], capture_output=True, text=True)
-    assert process.returncode != 0 and process.stderr.startswith(words) and process.stderr.count("\n") == 1
 
 
 def test_old_python_is_refused_in_one_line(project, monkeypatch):

@@ -2,7 +2,6 @@
 
 import pytest
 from support import command, fake_board
-from support.recordings import broken_logs
 
 NONSENSE = {
     "nothing": b"",
@@ -66,10 +65,3 @@ def test_invalid_answer_gives_one_line_and_no_file(folder, monkeypatch, argument
     for content in NONSENSE.values():
         for first in (0, 1, 3):
             refused_in_one_line(monkeypatch, folder, arguments, content, first)
-
-
-@pytest.mark.parametrize("arguments", COMMANDS, ids=lambda arguments: arguments[0])
-def test_mutated_answer_gives_one_line(folder, monkeypatch, arguments):
-    good = b"('/rides', 'motorcycle')\n(1, 0, 700, '/rides/000/01/00000.rid')\n('micropython', '1.26.1', 'Pico')\n"
-    for number in range(30):
-        refused_in_one_line(monkeypatch, folder, arguments, broken_logs.broken([good], number)[1], number % 3)

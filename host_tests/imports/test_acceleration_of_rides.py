@@ -23,10 +23,3 @@ def test_a_long_bend_is_not_an_acceleration_without_gravity(tmp_path, lean_deg):
     rates = SHAKE + [20.0 * np.sin(lean), 20.0 * np.cos(lean), 0.0]
     log = imported(tmp_path, f"time_s,{AX},{GX}", force, rates).log
     assert np.mean(log.accel_g, axis=0) == pytest.approx(np.mean(force, axis=0), abs=1e-3)
-
-
-def test_gravity_and_the_acceleration_without_it_are_added(tmp_path):
-    names = ",".join(f"{group}.{axis}" for group in ("userAcceleration", "gravity") for axis in "xyz")
-    gravity = np.tile([0.0, -1.0, 0.0], (len(T_S), 1))
-    log = imported(tmp_path, f"time_s,{names},{GX}", SHAKE, gravity, 30.0 * SHAKE).log
-    assert log.accel_g == pytest.approx(SHAKE + gravity, abs=1e-4)

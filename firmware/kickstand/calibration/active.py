@@ -12,8 +12,8 @@ _TRIM_MS = const(60_000)  # shortest time between two saves of the trim, because
 class ActiveCalibration:
     """The Calibration in use, and its store.
 
-    The trim is the correction of the roll misalignment, in degrees. The trim is estimated while riding: see
-    Calibration.
+    The trim is the correction of the roll misalignment, in degrees. The trim and the gyro's errors are estimated while
+    riding, and saved together: see LeanMeter.keep_trim().
 
     Args:
         meter: the LeanMeter that uses the Calibration.

@@ -12,6 +12,9 @@ MAX_OFFSET_G = 0.5
 MIN_SLOPE, MAX_SLOPE = 0.8, 1.2
 MAX_MATRIX_ERROR = 0.15  # largest difference between an entry of accel_matrix or gyro_matrix and the identity matrix
 MAX_GYRO_SIGMA = 0.05
+# Smallest standard error of a gyro_matrix that was found while riding, because the errors change until the next ride
+# with the temperature. The data sheet allows 2 % from -40 to 85 C.
+MIN_GYRO_SIGMA = 0.006
 _UNKNOWN = (0.0,) * 9
 
 
@@ -106,6 +109,28 @@ class Calibration:
         """Set the 27 numbers, in the order of matrices()."""
         self.accel_matrix, self.gyro_matrix = matrix(values[0:9]), matrix(values[9:18])
         self.gyro_sigma = matrix(values[18:27])
+
+    def correct_gyro(self, errors, sigma):
+        """Remove errors of the gyro that were found while riding from gyro_matrix.
+
+        Args:
+            errors: reading of axis i per rate about axis j, in the vehicle's axes; 9 values, row by row.
+            sigma: their standard error. A smaller gyro_sigma, as from the six positions, stays.
+
+        Returns False, and changes nothing, if the new matrix is not plausible.
+        """
+        to_vehicle, corrected, turned = self.vehicle_from_sensor, matrix(), matrix()
+        product(turned, matrix([one - error for one, error in zip(matrix(), errors)]), to_vehicle)
+        product(corrected, matrix([to_vehicle[3 * (i % 3) + i // 3] for i in range(9)]), turned)
+        product(turned, corrected, self.gyro_matrix)
+        if max([abs(value - one) for value, one in zip(turned, matrix())]) > MAX_MATRIX_ERROR:
+            return False
+        sigma = max(MIN_GYRO_SIGMA, min(MAX_GYRO_SIGMA, sigma))
+        self.gyro_matrix, self.gyro_sigma = (
+            turned,
+            matrix([min(earlier or sigma, sigma) for earlier in self.gyro_sigma]),
+        )
+        return True
 
     def correct(self, accel):
         """Calibrate a mean reading of the accelerometer (3 values, in g). Return the force as a new array."""

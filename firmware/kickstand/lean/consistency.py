@@ -8,8 +8,7 @@ innovation's sign. Vibration and bumps cancel in the mean. A dead or mirrored ax
 and a slipped mount do not cancel. The forces to the left and up have two means each. The short mean shows large errors
 within two seconds. The long mean shows small errors after some seconds.
 
-Three more means are of quantities that never stay large for long on a real ride:
-    the force to the side, because a bike is in balance
+Two more means are of quantities that never stay large for long on a real ride:
     the pitch
     the part of the pitch that the forward force does not confirm
 On a real slope the forward force contains a part of gravity, sin(pitch). If the forward force lacks this part, the
@@ -19,8 +18,15 @@ the bike seems to brake uphill or to accelerate downhill for longer than a real 
 Each mean is compared with its own spread, as in Student's t-test. On a road rougher than the filter expects, single
 innovations are large, and their means vary more.
 
-A misfit is a mean above its limit. After a misfit the lean is doubted: it is hidden until everything has fitted for a
-while. Repeated misfits mean a faulty sensor.
+Two more quantities are summed instead of averaged, as in a CUSUM test (E. S. Page, Continuous inspection schemes,
+Biometrika 41, 1954). Both need no estimate of the lean, so they survive a restart of the filter:
+    The force to the side. A bike is in balance, so this force has a mean of 0. A mount that has slipped shifts it.
+    The sides. In a bend the nose rises, and a bike that rolls to one side begins to turn to this side. If both are the
+    other way round, the sensor is turned by 180 degrees about up, because SIDE or the order of the presses was wrong.
+
+A misfit is a mean or a sum above its limit. After a misfit the lean is doubted: it is hidden until everything has
+fitted for a while. Repeated misfits mean a faulty sensor. A slip, or exchanged sides, is one misfit as long as it
+lasts.
 
 After a doubt the lean itself is checked too. If the gyro's rate about up is wrong, a straight can look like an endless
 bend, with all forces as expected. So a lean that stays on one side for long is not shown.
@@ -41,14 +47,30 @@ _LONG_S = const(10.0)
 _MOST = const(4.0)
 # Limits of the means. Larger: fewer correct leans and fewer wrong leans are hidden. "Largest without a fault" is the
 # largest mean in rides without a fault, on good and bad roads, with good and bad mounts.
-LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations. Largest without a fault: 0.4 and 0.25
+LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations. Largest without a fault: 0.6 and 0.4
+# standard deviations: on a straight, the part of left that wind and camber explain. Both make a bike lean on a
+# straight, and the filter draws this lean towards upright. Larger: small errors of the roll rate are found later on
+# straights.
+_WIND = const(0.35)
 UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations. Largest without a fault: 0.7 and 0.25
 # ratio: factor on UP_SHORT and UP_LONG if the six positions were not done. The data sheet allows the accelerometer a
 # scale error of 3 % and an offset of 80 mg. Without the six positions, the filter notices these errors only at rest.
 # Larger: fewer leans are hidden.
 _UNMEASURED = const(2.0)
-# ratio: force to the side divided by force up, minus the trim. Largest without a fault: 0.12
-_SIDEWAYS = const(0.15)
+# ratio: force to the side divided by force up. The sum grows by what exceeds this value. A slip by 10 degrees causes
+# 0.18. Larger: smaller slips of the mount are not found.
+_UNBALANCED = const(0.12)
+# s: limit of the sum. Largest without a fault: 0.2, in crosswind and on the roughest roads. Larger: a slip is found
+# later.
+_SLIP_S = const(0.3)
+# standard deviations: limit of a single innovation of the force to the left while the sum of the roll rate is above its
+# limit. Larger: exchanged sides and wrong roll rates are hidden later. Largest without a fault: 1.1
+_WRONG_ROLL = const(1.8)
+_MOST_SLIP_S = const(0.45)  # s: largest sum, which names the slip. Larger: the slip is named, and forgotten, later.
+# Limits of the two sums that show exchanged sides. Without a fault at most a fifth of one of them is exceeded by both.
+# Larger: exchanged sides are found later.
+_NOSE_DOWN = const(0.01)  # rad^2/s: rate about left times rate about up
+_ROLL_OUT = const(0.03)  # rad^2/s: roll rate times change of the rate about up
 _STEEP = const(0.21)  # rad: pitch. Largest without a fault: 0.14
 # rad: root mean square of the pitch that the forward force does not confirm. Largest on a recorded ride without a
 # fault: 0.096
@@ -57,17 +79,15 @@ _SLOPE = const(0.12)
 # spread. The spread is the mean of half the squared change of the innovation from window to window. Larger: more leans
 # are hidden on the roughest roads.
 _SPREAD = const(0.4)
-# rad: after a doubt, a larger steady mean lean is hidden. Larger: fewer leans are hidden in bends, and on straights
-# that look like bends.
-_ONE_SIDE = const(0.13)
-# rad: a steady lean above this value is hidden only after _LONG_S, because the upward force confirms it. Smaller:
-# fewer leans are hidden.
-_SURE_LEAN = const(0.3)
-# ratio: the lean is steady if the square of its mean exceeds this share of the mean of its square. Larger: fewer leans
+# rad: after a doubt, a lean above this value is hidden if it stays on one side. Larger: fewer leans are hidden in
+# bends, and on straights that look like bends.
+_ONE_SIDE = const(0.12)
+_ONE_SIDE_S = const(2.5)  # s: time after which such a lean is hidden. Larger: fewer leans are hidden.
+# rad: a lean above this value is hidden only after _LONG_S, because the upward force confirms it. Smaller: fewer leans
 # are hidden.
-_STEADY = const(0.75)
+_SURE_LEAN = const(0.3)
 # ratio: limit to which larger forces to the side are reduced. Larger: a single blow counts for more.
-_MOST_SIDEWAYS = const(0.5)
+_MOST_SIDEWAYS = const(0.25)
 _STRICT = const(0.85)  # ratio: factor on the limits after a doubt. Larger: a lasting fault is detected later.
 # ratio: during a doubt, the means fit again when they are below this share of their limits. Larger: the lean is shown
 # again sooner.
@@ -96,7 +116,8 @@ class Consistency:
     Read-only attributes:
         doubt   True if the lean must not be shown
         doubts  number of misfits that are not forgotten
-        odd     None, or the code of repeated misfits: "odd-left", "odd-up" (the forces) or "odd-pitch"
+        odd     None, or the code of a lasting fault. "turned": the sides are exchanged. "mount-moved": a force to the
+                side. "odd-left", "odd-up" (the forces) or "odd-pitch": other repeated misfits.
     """
 
     def __init__(self, six_done=True):
@@ -107,11 +128,14 @@ class Consistency:
         self._fits_s = 0.0
         self._since_s = 0.0  # time since the last doubt
         self._in_rest = True  # True if time at rest counts as fitting
+        self._turned = False  # True if the sides are exchanged
+        self._side_s = 0.0  # sum of the force to the side
+        self._nose_down = self._roll_out = self._rate_up = 0.0
         self._forget_means()
 
     def _forget_means(self):
-        self._left = self._left_long = self._up = self._up_long = self._side = self._pitch = 0.0
-        self._lean = self._lean_square = self._mean_s = self._slope_square = 0.0
+        self._left = self._left_long = self._up = self._up_long = self._pitch = 0.0
+        self._lean = self._one_side_s = self._slope_square = 0.0
         self._left_before = self._up_before = self._left_square = self._up_square = 0.0
 
     def gap(self, in_rest=True):
@@ -124,31 +148,54 @@ class Consistency:
 
     @property
     def one_sided(self):
-        """True if a misfit is not yet forgotten, and the mean lean is steadily over _ONE_SIDE.
+        """True if a misfit is not yet forgotten, and the lean has stayed on one side for too long."""
+        least_s = _LONG_S if abs(self._lean) > _SURE_LEAN else _ONE_SIDE_S
+        return self.doubts > 0 and abs(self._one_side_s) > least_s
 
-        From _SURE_LEAN on, the lean must have been steady for _LONG_S."""
-        lean = abs(self._lean)
-        if not self.doubts or lean <= _ONE_SIDE or lean * lean <= _STEADY * self._lean_square:
-            return False
-        return lean < _SURE_LEAN or self._mean_s >= _LONG_S
+    @property
+    def _slip(self):
+        """The sum of the force to the side, divided by its limit. Exchanged sides are above the limit too."""
+        return 2.0 if self._turned else abs(self._side_s) / _SLIP_S
+
+    @property
+    def _cause(self):
+        """The code of a fault that is certain, or None."""
+        return "turned" if self._turned else "mount-moved" if abs(self._side_s) >= _MOST_SLIP_S else None
+
+    def add_rates(self, left, up, forward, seconds):
+        """Take the mean corrected rates of a window of `seconds` while riding, in rad/s."""
+        kept = 1.0 - min(1.0, seconds / _LONG_S)
+        self._nose_down = nose_down = kept * self._nose_down + left * abs(up) * seconds
+        self._roll_out = roll_out = kept * self._roll_out + forward * (up - self._rate_up)
+        self._rate_up = up
+        if nose_down > _NOSE_DOWN and roll_out > _ROLL_OUT:
+            self._turned = True
+        elif nose_down < 0.0 or roll_out < 0.0:
+            self._turned = False
 
     def add(self, left, up, sideways, pitch, push, lean, yaw_rate, seconds):
         """Take a window of `seconds` while riding. Return True if a misfit has just begun.
 
         Args:
             left, up: innovations of the forces to the left and up, in standard deviations.
-            sideways: force to the side divided by force up.
+            sideways: force to the side divided by force up that trim, tyres and rider do not explain. None if the bike
+                need not be in balance.
             pitch, lean: in rad.
             push: estimated forward acceleration in g.
             yaw_rate: in rad/s.
         """
         gain, long_gain = min(1.0, seconds / _SHORT_S), min(1.0, seconds / _LONG_S)
         left, up = max(-_MOST, min(_MOST, left)), max(-_MOST, min(_MOST, up))
+        if abs(yaw_rate) < _TURNING:
+            left -= max(-_WIND, min(_WIND, left))
         self._left += gain * (left - self._left)
         self._up += gain * (up - self._up)
         self._left_long += long_gain * (left - self._left_long)
         self._up_long += long_gain * (up - self._up_long)
-        self._side += long_gain * (max(-_MOST_SIDEWAYS, min(_MOST_SIDEWAYS, sideways)) - self._side)
+        if sideways is not None:
+            side_s = self._side_s + max(-_MOST_SIDEWAYS, min(_MOST_SIDEWAYS, sideways)) * seconds
+            side_s = max(0.0, side_s - _UNBALANCED * seconds) + min(0.0, side_s + _UNBALANCED * seconds)
+            self._side_s = max(-_MOST_SLIP_S, min(_MOST_SLIP_S, side_s))
         self._pitch += long_gain * (pitch - self._pitch)
         # `square` is pitch * pitch if the forward force confirms none of the pitch
         square = -pitch * max(-abs(pitch), min(abs(pitch), push))
@@ -158,22 +205,29 @@ class Consistency:
         change = up - self._up_before
         self._up_square += long_gain * (0.5 * change * change - self._up_square)
         self._left_before, self._up_before = left, up
-        self._mean_s = min(self._mean_s + seconds, _LONG_S)
-        gain = seconds / self._mean_s
-        self._lean += gain * (lean - self._lean)
-        self._lean_square += gain * (lean * lean - self._lean_square)
+        self._lean = lean
+        if lean * self._one_side_s < 0.0 or abs(lean) < 0.5 * _ONE_SIDE:
+            self._one_side_s = 0.0
+        elif abs(lean) > _ONE_SIDE:
+            self._one_side_s += seconds if lean > 0.0 else -seconds
+        wrong_roll = abs(left) / _WRONG_ROLL if self._roll_out > _ROLL_OUT else 0.0
         left = max(abs(self._left) / LEFT_SHORT, abs(self._left_long) / LEFT_LONG)
-        left = max(left / sqrt(max(1.0, self._left_square / _SPREAD)), abs(self._side) / _SIDEWAYS)
+        left = max(left / sqrt(max(1.0, self._left_square / _SPREAD)), wrong_roll)
         up = max(abs(self._up) / UP_SHORT, abs(self._up_long) / UP_LONG)
         up /= self._up_share * sqrt(max(1.0, self._up_square / _SPREAD))
         pitch = max(abs(self._pitch) / _STEEP, sqrt(max(0.0, self._slope_square)) / _SLOPE)
+        cause = self._cause
+        if cause:
+            self._blame(cause)
+        if not self.doubt:  # a slip is only one misfit, whose doubt lasts as long as the slip
+            left = max(left, self._slip)
         worst = max(left, up, pitch)
         self._since_s += seconds
-        if self.doubts > MILD and self._since_s < _AGAIN_S:
-            if worst > _FIT:
+        if self.doubt and (cause or (self.doubts > MILD and self._since_s < _AGAIN_S)):
+            if cause or worst > _FIT:
                 self._fits_s = 0.0
         elif not worst <= (_STRICT if self.doubts else 1.0):
-            self.fail("odd-left" if worst == left else "odd-up" if worst == up else "odd-pitch")
+            self.fail(cause or ("odd-left" if worst == left else "odd-up" if worst == up else "odd-pitch"))
             return True
         elif self.doubt and worst > _FIT:
             self._fits_s = 0.0
@@ -190,17 +244,20 @@ class Consistency:
 
     def fail(self, code):
         """Doubt because of a misfit. code: see odd."""
-        global last_odd
         self.gap()
         self._since_s = 0.0
         self.doubts = min(self.doubts + 1, len(HOLDS_S))
         if self.doubts >= MILD:
-            self.odd = last_odd = code
+            self._blame(code)
+
+    def _blame(self, code):
+        global last_odd
+        self.odd = last_odd = code
 
     def _fit(self, seconds):
         self._fits_s += seconds
         if self.doubt:
-            if self._fits_s >= (HOLDS_S[self.doubts - 1] if self.doubts else _GAP_S):
+            if self._fits_s >= (HOLDS_S[self.doubts - 1] if self.doubts else _GAP_S) and self._slip <= _FIT:
                 self.doubt, self.odd, self._fits_s = False, None, 0.0
         elif self.doubts and self._fits_s >= FORGET_S:
             self.doubts -= 1

@@ -16,6 +16,7 @@ from ..units import STANDARD_GRAVITY, const
 from . import measurements
 from .bike_model import (
     BIAS_LEFT,
+    CROSS_FORWARD_LEFT,
     LEAN,
     PITCH,
     SCALE_LEFT,
@@ -74,13 +75,15 @@ class LeanFilter:
         self.restart()
 
     def restart(self):
-        """Reset lean, pitch and speed after missing readings. Keep the sensor's errors and the bike's dive."""
+        """Reset lean and pitch after missing readings. Keep the sensor's errors, the bike's dive, and the speed of a
+        bike that still moves."""
         x = [0.0] * STATES
         self._failed = False
         self.dive.restart()
         self._kept = []  # (state, variance) of the sensor's errors
         if self._p is not None:
             self._gap = True
+            self._kept_speed = self._x[SPEED], self._p.rows[SPEED][SPEED] + measurements.SIGMA_GAP_SPEED**2
             for i in range(BIAS_LEFT, STATES):
                 x[i] = self._x[i]
                 self._kept.append((i, self._p.rows[i][i]))
@@ -156,6 +159,17 @@ class LeanFilter:
     def speed_mps(self):
         """Estimated speed."""
         return self._x[SPEED]
+
+    def gyro_errors(self):
+        """Return the gyro's errors that were found while riding.
+
+        Returns:
+            errors: the reading of axis i per rate about axis j, in the vehicle's axes; 9 values, row by row.
+            sigma: standard error of each value.
+        """
+        square = sum([self._p.rows[i][i] for i in range(SCALE_LEFT, STATES)]) / (STATES - SCALE_LEFT)
+        x = self._x
+        return x[SCALE_LEFT:CROSS_FORWARD_LEFT] + [0.0] * 4 + x[CROSS_FORWARD_LEFT:STATES], sqrt(square)
 
     @property
     def pitch_deg(self):
@@ -283,11 +297,11 @@ class LeanFilter:
             variances[BIAS_LEFT : BIAS_LEFT + 3] = [measurements.SIGMA_FRESH_BIAS**2] * 3
         if self._gyro_variances:
             variances[SCALE_LEFT:STATES] = self._gyro_variances
+        gap, self._gap = self._gap, False
         if moving:
             variances[LEAN] = measurements.SIGMA_START_LEAN_MOVING**2
-            if self._gap:
+            if gap:
                 self.consistency.gap()  # in a bend the covariance is too small just after a restart
-        self._gap = False
         self._p = Covariance(variances)
         for i, variance in self._kept:
             self._p.set_variance(i, variance)
@@ -295,10 +309,10 @@ class LeanFilter:
         x[LEAN] = atan2(fx, fy)
         x[PITCH] = 0.0
         x[SPEED] = measurements.PRIOR_SPEED if moving else 0.0  # without a movement the ride begins at rest
-        if self._kept_speed:
+        if self._kept_speed and (moving or not gap):
             x[SPEED], variance = self._kept_speed
             self._p.set_variance(SPEED, variance)
-            self._kept_speed = None
+        self._kept_speed = None
         if posed and not moving:
             self._stand(means)
 
@@ -355,9 +369,10 @@ class LeanFilter:
         yield from p.update(*left)
         misfit = p.misfit
         yield from p.update(*up)
-        sideways = (means[5] - means[7] * x[YAW_ERROR]) / max(means[6], 0.5) - self.trim.angle
-        if x[SPEED] < measurements.BALANCE_SPEED or p.rows[SPEED][SPEED] > measurements.SIGMA_BALANCE_SPEED**2:
-            sideways = 0.0
+        sideways = (means[5] - means[7] * x[YAW_ERROR]) / max(means[6], 0.5)
+        unbalanced = None
+        if x[SPEED] > measurements.BALANCE_SPEED and p.rows[SPEED][SPEED] < measurements.SIGMA_BALANCE_SPEED**2:
+            unbalanced = self.trim.unexplained(sideways, x[LEAN])
         # A larger force forward means that the sensor is not on a bike
         if abs(means[7]) < measurements.MOST_FORWARD * abs(means[6]):
             up_misfit = p.misfit
@@ -366,7 +381,8 @@ class LeanFilter:
                 misfit = up_misfit = 0.0
             lean = x[LEAN] - self._upright
             pitch, turning = x[PITCH], model.yaw_rate
-            self._failed = self.consistency.add(misfit, up_misfit, sideways, pitch, push, lean, turning, seconds)
+            self.consistency.add_rates(means[2], means[3], means[4], seconds)
+            self._failed = self.consistency.add(misfit, up_misfit, unbalanced, pitch, push, lean, turning, seconds)
         self._remember(seconds)
         yield from p.update(*measurements.level_road(model, x, seconds))
         lean, speed, measured = x[LEAN] - self._upright, x[SPEED], self._speed
@@ -386,7 +402,6 @@ class LeanFilter:
         certain = p.rows[SPEED][SPEED] < measurements.SIGMA_TRIM_SPEED**2
         certain = certain and p.rows[LEAN][LEAN] < measurements.SIGMA_TRIM_LEAN**2
         if certain and model.speed > measurements.STRAIGHT_MIN_SPEED:
-            sideways = (means[5] - means[7] * x[YAW_ERROR]) / max(means[6], 0.5)
             self.trim.update(sideways, x[LEAN], model.yaw_rate, seconds)
 
     def _inject(self, model):

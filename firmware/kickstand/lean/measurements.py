@@ -52,6 +52,9 @@ SIGMA_GOOD_BIAS = radians(0.6)
 GOOD_SHARE = 0.7
 # m/s: amount added to the standard deviation of the kept speed. Larger: the kept speed counts for less.
 SIGMA_GOOD_SPEED = 3.0
+# m/s: amount added to the standard deviation of a speed that is kept over missing readings. Larger: the lean is found
+# later in a bend after missing readings.
+SIGMA_GAP_SPEED = 5.0
 # rad/s: standard deviation of a bias about which nothing is known. Larger: a bias that has jumped is found sooner.
 SIGMA_DOUBT_BIAS = radians(2.5)
 # A lean above IMPOSSIBLE_LEAN that the force contradicts for IMPOSSIBLE_S is impossible. Larger: a wrong filter

@@ -13,7 +13,9 @@ _SMOOTH_US = const(300_000)  # time constant of smooth_force
 MAX_VARIANCE = (SIGMA_SHARE * radians(3.0)) ** 2
 DOUBTED_VARIANCE = (SIGMA_SHARE * radians(2.0)) ** 2  # after repeated misfits, a lean of larger variance is not shown
 TRIM_MAX_VARIANCE = radians(0.5) ** 2  # a trim of larger variance is not kept
-_TRIM_STEP_DEG = const(0.3)  # smaller changes of the trim are not saved, because saving wears the flash
+# Smaller changes of the trim and of the gyro's errors are not saved, because saving wears the flash
+_TRIM_STEP_DEG = const(0.3)
+_GYRO_STEP = const(0.005)
 FALLEN_DEG = 65.0  # smallest lean of a fallen bike
 _FALLEN_S = const(0.75)  # the bike has fallen if it has lain for four windows of the filter, about a second
 # Half of the time for which a lean must last to count as a maximum. The jerk of a pothole is shorter than the whole
@@ -65,6 +67,7 @@ class LeanMeter:
         self.smooth_force[0] = self.smooth_force[1] = 0.0 if self._smooth_all else float("nan")
         self._transform = Transform(calibration)
         measured = gyro_variances(calibration.gyro_sigma, calibration.vehicle_from_sensor)
+        self._kept = [0.0] * 9  # the part of the gyro's errors that keep_trim() has removed
         self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg), posed, measured, calibration.six_done)
         self.restart()
 
@@ -130,13 +133,23 @@ class LeanMeter:
         return None if hidden or abs(self.lean_deg) > FALLEN_DEG else self.lean_deg
 
     def keep_trim(self):
-        """Copy the trim to the calibration if the bike is at rest and the trim is certain and has changed. Return True
-        if it was copied."""
-        angle = self.trim_deg
-        certain = self.at_rest and self.filter.trim.variance <= TRIM_MAX_VARIANCE
-        if not certain or abs(angle - self.calibration.trim_deg) < _TRIM_STEP_DEG:
+        """Copy the trim to the calibration, and the gyro's errors that the filter has found to its gyro_matrix.
+
+        Both are kept if the bike is at rest, nothing is doubted, the trim is certain, and trim or errors have changed.
+        The conversion of readings does not change until the next use(), because a recorded ride has one calibration.
+
+        Returns True if both were copied.
+        """
+        lean, calibration = self.filter, self.calibration
+        if not self.at_rest or lean.consistency.doubts or lean.trim.variance > TRIM_MAX_VARIANCE:
             return False
-        self.calibration.trim_deg = angle
+        angle, (errors, sigma) = self.trim_deg, lean.gyro_errors()
+        new = [error - kept for error, kept in zip(errors, self._kept)]
+        if abs(angle - calibration.trim_deg) < _TRIM_STEP_DEG and max(new) < _GYRO_STEP > -min(new):
+            return False
+        if not calibration.correct_gyro(new, sigma):
+            return False
+        calibration.trim_deg, self._kept = angle, errors
         return True
 
     @property

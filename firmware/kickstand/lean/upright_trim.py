@@ -57,6 +57,12 @@ class UprightTrim:
         self._share_variance = _SIGMA_LEAN_SHARE**2
         self._covariance = 0.0
 
+    def unexplained(self, sideways, lean):
+        """Return the part of a force to the side that trim, tyres and rider do not explain.
+
+        Arguments as in update()."""
+        return sideways - self.angle - sin(lean - self.angle) * self._lean_share
+
     def update(self, sideways, lean, yaw_rate, seconds):
         """Update the angle with one measurement made while riding.
 

@@ -19,6 +19,7 @@ FALLEN = ("Fallen over?", "Lean over 65" + DEGREE)
 NO_LEAN = {
     "other-side": "side was wrong?",
     "mount-moved": "mount has moved",
+    "turned": "SIDE or presses?",
     "odd-left": "sensor odd: left",
     "odd-up": "sensor odd: up",
     "odd-pitch": "sensor odd: tilt",

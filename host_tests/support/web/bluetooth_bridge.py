@@ -104,11 +104,15 @@ class Bridge:
     def do(self, name, kind, data):
         answer = Future()
         self._requests.put((name, kind, data, answer))
-        return answer.result(30)
+        return answer.result(120)
 
     def heard(self):
         packets, self._packets = self._packets, []
         return {"lost": self._lost, "packets": packets}
+
+    def ms(self):
+        """Return the board's time in ms."""
+        return self.device.board.clock.now_us // 1000
 
     # The next methods are called by a test.
 

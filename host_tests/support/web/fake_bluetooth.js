@@ -1,4 +1,5 @@
-// Replaces navigator.bluetooth. Its radio is a bumble central, see bluetooth_bridge.py.
+// Replaces navigator.bluetooth. Its radio is a bumble central, see bluetooth_bridge.py. From the choice of the board on,
+// the page's clock is the board's, so a busy machine, which slows the board down, delays no packet.
 class Device extends EventTarget {
   name = "Kickstand 1A2B";
   gatt = {
@@ -39,6 +40,13 @@ class Device extends EventTarget {
   }
 }
 const view = (text) => new DataView(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
+const onFrame = window.requestAnimationFrame.bind(window);
+async function followBoard() {
+  let ms = await radioMs();
+  performance.now = () => ms;
+  window.requestAnimationFrame = (draw) => onFrame(() => draw(ms));
+  setInterval(async () => (ms = await radioMs()), 10);
+}
 window.asked = [];
 window.boardThere = true;
 Object.defineProperty(navigator, "bluetooth", {
@@ -47,6 +55,7 @@ Object.defineProperty(navigator, "bluetooth", {
     async requestDevice(options) {
       asked.push(options);
       if (!boardThere) throw new DOMException("User cancelled the requestDevice() chooser.", "NotFoundError");
+      await followBoard();
       return new Device();
     },
   },

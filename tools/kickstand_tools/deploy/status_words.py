@@ -5,7 +5,13 @@ from collections.abc import Iterator
 from typing import Any
 
 # For each code of the firmware's lean/consistency.py, the name of the reading that did not fit
-_MEASURED = {"odd-left": "force to the left", "odd-up": "force up", "odd-pitch": "pitch"}
+_MEASURED = {
+    "turned": "the sides",
+    "mount-moved": "the mean force to the side",
+    "odd-left": "force to the left",
+    "odd-up": "force up",
+    "odd-pitch": "pitch",
+}
 _ROWS = "offset, g", "slope", "gyro bias, deg/s", "left", "up", "forward"  # of the calibration
 _FULL_SCALE = 32768  # counts at the end of the range
 _SUPPORTED = 2  # kind of a sensor that the firmware supports, see diagnosis.py of the firmware
