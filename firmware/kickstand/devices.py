@@ -44,10 +44,10 @@ def open_sensor(settings):
 
     def explain(chip, error):
         try:
-            found = tried(look, chip, error)[0]
+            result = tried(look, chip, error)[0]
         except OSError:
-            found = None
-        return found or (error and Notice("no-sensor"), [])
+            result = None
+        return result or (error and Notice("no-sensor"), [])
 
     return Sensor(chip, reopen, explain)
 

@@ -38,39 +38,17 @@ _AS_AN_MPU = (0x40, 0x41, 0x01)  # values of PWR_MGMT_1 in chips like the MPU605
 OTHER, MOTION, SUPPORTED = 0, 1, 2  # kinds of devices; MOTION is a motion sensor without support in this firmware
 _TIME_BYTES = 10  # number of registers to read from a clock; the time is in seven of them, from register 0 or 3 on
 
-# Chips with an identification register. The columns are two addresses, the register, its content (all in hexadecimal)
-# and the name.
+# Chips with an identification register. The columns are two addresses, the register, then each content (all in
+# hexadecimal) with the chip's name.
 _MOTION = """
-68 69 75 47 ICM-42688
-68 69 75 db ICM-42688-V
-68 69 75 42 ICM-42605
-68 69 75 44 ICM-42686
-68 69 75 67 ICM-42670
-68 69 75 60 ICM-42607
-68 69 75 6f IIM-42652
-68 69 75 4e ICM-40627
-68 69 75 3b ICM-40609
-68 69 72 e9 ICM-45686
-68 69 72 e5 ICM-45605
-68 69 00 d1 BMI160
-68 69 00 24 BMI270
-68 69 00 27 BMI260
-68 69 00 0f BMI088
-68 69 00 ea ICM-20948
-68 69 00 e1 ICM-20649
-68 69 00 e0 ICM-20648
-6a 6b 0f 69 LSM6DS3
-6a 6b 0f 6a LSM6DSL
-6a 6b 0f 6b LSM6DSR
-6a 6b 0f 6c LSM6DSO
-6a 6b 0f 70 LSM6DSV
-6a 6b 0f 68 LSM9DS1
-6a 6b 0f d4 L3GD20
-6a 6b 0f d7 L3GD20H
+68 69 75 47 ICM-42688 db ICM-42688-V 42 ICM-42605 44 ICM-42686 67 ICM-42670 60 ICM-42607 6f IIM-42652
+68 69 75 4e ICM-40627 3b ICM-40609
+68 69 72 e9 ICM-45686 e5 ICM-45605
+68 69 00 d1 BMI160 24 BMI270 27 BMI260 0f BMI088 ea ICM-20948 e1 ICM-20649 e0 ICM-20648
+6a 6b 0f 69 LSM6DS3 6a LSM6DSL 6b LSM6DSR 6c LSM6DSO 70 LSM6DSV 68 LSM9DS1 d4 L3GD20 d7 L3GD20H
 6a 6b 00 05 QMI8658
 28 29 00 a0 BNO055
-18 19 00 fa BMI055
-18 19 00 1e BMI088
+18 19 00 fa BMI055 1e BMI088
 18 19 0f 33 LIS3DH
 1d 53 00 e5 ADXL345
 """
@@ -120,14 +98,14 @@ def _level(pin, pull):
 def answering(i2c, addresses=range(_FIRST, _LAST + 1)):
     """List the addresses that answer on a machine.I2C."""
     status = bytearray(1)
-    found = []
+    answers = []
     for address in addresses:
         try:
             i2c.readfrom_into(address, status)
         except OSError:
             continue
-        found.append(address)
-    return found
+        answers.append(address)
+    return answers
 
 
 def exchanged(sda, scl, addresses):
@@ -222,20 +200,20 @@ def fifo_fault(chip):
     chip.restart_fifo()
     left = chip.waiting()  # not 0 if a sample has arrived since the restart of the FIFO
     chip.write_register(_INT_ENABLE, 1)
-    before = _reading(chip)
+    reading = _reading(chip)
     sleep_ms(_PERIODS * chip.period_ms)
     waiting = chip.waiting()
-    measures = chip.read_register(_INT_STATUS) & 1 or _reading(chip) != before
+    measures = chip.read_register(_INT_STATUS) & 1 or _reading(chip) != reading
     chip.write_register(_INT_ENABLE, 0)
-    how = None
+    fault = None
     if left > FRAME * _PERIODS:
-        how = "stays full"
+        fault = "stays full"
     elif measures and waiting <= left:
-        how = "stays empty" if not left else "stands still"
+        fault = "stays empty" if not left else "stands still"
     elif measures and _repeats(chip):
-        how = "repeats"
+        fault = "repeats"
     chip.restart_fifo()
-    return Notice("sensor-fifo", how) if how else None
+    return Notice("sensor-fifo", fault) if fault else None
 
 
 def _reading(chip):
@@ -272,10 +250,10 @@ def name_of(i2c, address):
     mark = " %02x " % address
     for line in _MOTION.split("\n"):
         if mark in " %s " % line[:5]:
-            cells = line.split(" ")
-            register = int(cells[2], 16)
-            if register != skipped and _reads(i2c, address, register) == int(cells[3], 16):
-                return cells[4], MOTION
+            _, _, register, *chips = line.split(" ")
+            content = "%02x" % _reads(i2c, address, int(register, 16))
+            if int(register, 16) != skipped and content in chips:
+                return chips[chips.index(content) + 1], MOTION
     if at_mpu:
         if is_clock(i2c, address):
             return "clock", OTHER
@@ -308,9 +286,9 @@ def is_clock(i2c, address):
 def _is_time(time, at, date_at, day_at):
     limits = ((at, 0x7F, 0, 59), (at + 1, 0x7F, 0, 59), (at + 2, 0x3F, 0, 32), (date_at, 0x3F, 1, 31))
     limits += ((day_at, 0xFF, 0, 7), (at + 5, 0x1F, 1, 12), (at + 6, 0xFF, 0, 99))
-    for place, mask, least, most in limits:
-        value = time[place] & mask
-        if value & 15 > 9 or not least <= (value >> 4) * 10 + (value & 15) <= most:
+    for index, mask, least, highest in limits:
+        value = time[index] & mask
+        if value & 15 > 9 or not least <= (value >> 4) * 10 + (value & 15) <= highest:
             return False
     return True
 

@@ -78,7 +78,7 @@ def tried(function, *arguments):
 
     Returns:
         result: the function's result.
-        notice: None, or a Notice if memory is short or the firmware is incomplete.
+        notice: None, or a Notice if memory is short or the firmware is incomplete, or the LiveError of the function.
 
     After a failure, remove the modules that the function began to import, because MicroPython would keep a
     half-imported module."""
@@ -86,6 +86,8 @@ def tried(function, *arguments):
     try:
         before = tuple(sys.modules)
         return function(*arguments), None
+    except LiveError as error:
+        return None, error
     except (ImportError, MemoryError) as error:
         for name in [name for name in sys.modules if name not in before] if before else ():
             del sys.modules[name]

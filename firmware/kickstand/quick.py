@@ -27,12 +27,12 @@ def passes(name, function, arguments, mark):
         arguments: the arguments for one call.
         mark: the CRC32 of the function's result and of the arguments after the call.
     """
-    found = crc32(array("i", (function(*arguments) or 0,)))
+    checksum = crc32(array("i", (function(*arguments) or 0,)))
     for argument in arguments:
-        found = found if isinstance(argument, int) else crc32(argument, found)
-    if found != mark:
+        checksum = checksum if isinstance(argument, int) else crc32(argument, checksum)
+    if checksum != mark:
         report(Notice("wrong-code", name))
-    return found == mark
+    return checksum == mark
 
 
 def load(name, *trials):

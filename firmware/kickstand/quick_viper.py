@@ -41,18 +41,18 @@ def add_up(frames: ptr8, n: int, sums: ptr32, watch: ptr32) -> int:  # noqa: F82
     watch[3] = 0
     watch[9] -= n
     good = 0
-    at = 0
+    index = 0
     for k in range(n):
-        first = frames[at]
-        same = 0  # number of bytes of the force that equal its first byte
+        first = frames[index]
+        equal_bytes = 0  # number of bytes of the force that equal its first byte
         mark = 0  # hash of all bytes but the temperature, which a working chip may repeat
         for i in range(14):
-            byte = frames[at + i]
+            byte = frames[index + i]
             if i < 6 and byte == first:
-                same += 1
+                equal_bytes += 1
             if i < 6 or i > 7:
                 mark = (mark * 31 + byte) & 0xFFFFFF
-        if same == 6 and (first == 0 or first == 255):
+        if equal_bytes == 6 and (first == 0 or first == 255):
             return good
         watch[1] = watch[1] + 1 if mark == watch[0] else 0
         watch[0] = mark
@@ -61,7 +61,7 @@ def add_up(frames: ptr8, n: int, sums: ptr32, watch: ptr32) -> int:  # noqa: F82
         ends = 0  # has a bit for each column at the end of its range
         shaken = 0
         for i in range(7):
-            value = frames[at] << 8 | frames[at + 1]
+            value = frames[index] << 8 | frames[index + 1]
             if value > 32767:
                 value -= 65536
             last = watch[12 + i]
@@ -77,17 +77,17 @@ def add_up(frames: ptr8, n: int, sums: ptr32, watch: ptr32) -> int:  # noqa: F82
             # Read the value back from the array, as `last` was read. Read back from the array, both values are unsigned
             # on a 64-bit computer.
             value = watch[12 + i]
-            seen = 1 << (value & 15)
+            bits = 1 << (value & 15)
             if value >> 8 != last >> 8:
-                seen |= 0x10000
+                bits |= 0x10000
             elif value - last >= 192 or last - value >= 192:
-                seen |= 0x20000
-            watch[19 + i] |= seen
+                bits |= 0x20000
+            watch[19 + i] |= bits
             if i & 3 and value != watch[11 + i]:
                 watch[8] |= 1 << i
             if i & 3 == 2 and value != watch[10 + i]:
                 watch[8] |= 1 << i - 2
-            at += 2
+            index += 2
         watch[11] += shaken
         if ends:
             watch[5] |= ends
@@ -102,7 +102,7 @@ def add_up(frames: ptr8, n: int, sums: ptr32, watch: ptr32) -> int:  # noqa: F82
             sums[i] += watch[12 + i]
         if good < k:
             last = (k - good) * 14
-            for i in range(at - 14, at):
+            for i in range(index - 14, index):
                 frames[i - last] = frames[i]
         good += 1
     return good
@@ -119,12 +119,12 @@ def products(matrices: ptr32, sums: ptr32, n: int, out: ptr32):  # noqa: F821
         out: array('i', 6) for the result.
     """
     x, y, z = sums[0], sums[1], sums[2]
-    at = 0
+    index = 0
     for i in range(6):
         if i == 3:
             x, y, z = sums[4], sums[5], sums[6]
-        out[i] = matrices[at] * x + matrices[at + 1] * y + matrices[at + 2] * z + matrices[at + 3] * n
-        at += 4
+        out[i] = matrices[index] * x + matrices[index + 1] * y + matrices[index + 2] * z + matrices[index + 3] * n
+        index += 4
 
 
 @micropython.viper

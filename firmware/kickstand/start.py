@@ -20,6 +20,8 @@ from .devices import open_button, open_lcd, open_sensor  # noqa: E402
 from .errors import LiveError, SettingsError, report, tried  # noqa: E402
 from .units import __version__, const  # noqa: E402
 
+# A capacitor for debouncing between pin and ground looks like a press at power-on, until the pin's weak pull-up has
+# charged it. 1 uF through 80 kOhm takes 75 ms.
 _CHARGE_MS = const(100)
 
 # The modules that the app imports, in this order. Between two imports the set-up of display and chip advances by a
@@ -37,16 +39,6 @@ def _show(lcd, line1, line2=""):
     lcd.flush()
 
 
-def _held(button):
-    """Return True if the button is pressed now and a moment later.
-
-    A capacitor for debouncing between pin and ground would look like a press at power-on. The pin's weak pull-up must
-    charge the capacitor first. 1 uF through 80 kOhm takes 75 ms."""
-    if button.held():
-        sleep_ms(_CHARGE_MS)
-    return button.held()
-
-
 def main(loop=None, closed_ms=5000):
     """Run until Ctrl-C, power-off or a reset. An exception is reported on display and console, then the board restarts.
 
@@ -62,7 +54,9 @@ def main(loop=None, closed_ms=5000):
         lcd = open_lcd(chosen)
         if machine.reset_cause() == machine.PWRON_RESET:
             button = open_button(chosen)
-            if _held(button):
+            if button.held():
+                sleep_ms(_CHARGE_MS)
+            if button.held():
                 _safe_mode(lcd, button, chosen.BUTTON_PIN, closed_ms)
                 return
         lcd.show("Kickstand", "starting")  # replace a lean that was shown before a reset
@@ -135,10 +129,7 @@ def _attach(radio, app):
 
 def _live(notices, function, *arguments):
     """Do a step of LIVE and return its result. Report an error: the lean meter continues in any case."""
-    try:
-        result, notice = tried(function, *arguments)
-    except LiveError as error:
-        result, notice = None, error
+    result, notice = tried(function, *arguments)
     if notice:
         if notice.code == "no-memory":
             notice = LiveError("live-memory", *notice.values)

@@ -19,13 +19,12 @@ def state(app):
     screen, fault, lean_deg = app.screen, app.sensor.fault, app.lean_deg
     view = screen.view
     wizard = screen.wizard if view in ("align", "six") else None
-    notice = {"fault": fault, "question": app.drive and app.drive.message, "notice": screen.notice}.get(view)
-    notice = wizard.notice if wizard else notice
+    notice = wizard.notice if wizard else screen.shown
     return {
         "view": view,
         "code": notice.code if notice else None,
         "step": wizard.step if wizard else None,
-        "pose": ("upright" if wizard.upright else "kickstand") if view == "align" else None,
+        "pose": ("upright" if wizard.upright else "kickstand") if wizard and view == "align" else None,
         "entry": screen.entry if view == "menu" else None,
         "trusted": lean_deg is not None,
         "lean_deg": lean_deg,

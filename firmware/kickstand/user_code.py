@@ -35,13 +35,8 @@ def _functions_of(name):
     """Import a module. Return a dictionary of the functions that the firmware calls, with their names as keys. The
     module's code may raise anything."""
     module = __import__(name)
-    found = {}
-    for name in dir(module):
-        if name in _CALLED or name.startswith("page"):
-            function = getattr(module, name)
-            if callable(function):
-                found[name] = function
-    return found
+    names = [name for name in dir(module) if name in _CALLED or name.startswith("page")]
+    return {name: getattr(module, name) for name in names if callable(getattr(module, name))}
 
 
 class UserCode:
@@ -53,8 +48,7 @@ class UserCode:
 
     def __init__(self, app):
         self._app = app
-        self._functions = {}
-        self._functions["import"] = _functions_of  # call() also guards the import
+        self._functions = {"import": _functions_of}  # call() also guards the import
         self._slow = {}  # number of slow calls in a row, per function
         # Stored once, because each access to self._draw creates a new bound method. The display would then treat an
         # unchanged picture as a new picture.

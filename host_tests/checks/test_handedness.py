@@ -14,7 +14,9 @@ from kickstand_tools.simulation.ride import random_rotation
 MINUS = -np.eye(3)
 EITHER, INSTEAD = "either the accelerations", "and instead of gx, gy, gz right would be"
 WRONG_WAY = "are the axes left-handed (reverse one in both sensors) or the gyro of the opposite sign"
-UNNAMED = "axes are exchanged or reversed in one of the sensors, and this ride does not show which"
+UNNAMED = (
+    "axes are exchanged or reversed in one of the sensors, or left-handed in both, and this ride does not show which"
+)
 UNSURE = "parked", "city"  # rides that do not show the sign of all rates
 DEFAULT = "street", "sweeper"  # the other profiles take longer than the default tests may
 

@@ -23,8 +23,8 @@ assert ("add_products" in quick.plain) == (kalman.add_products is kalman.add_pro
 MISTAKES = {
     ("quick_viper.py", "decode"): ("frames[at] << 8 |", "frames[at] << 8 &"),
     ("quick_viper.py", "add_up"): ("value > 32767", "value > 32768"),
-    ("quick_viper.py", "products"): ("matrices[at + 2] * z", "matrices[at + 2] * (z & 0x1FFFF)"),
-    ("rides/block_viper.py", "encode"): ("guess * n // before", "guess // before * n"),
+    ("quick_viper.py", "products"): ("matrices[index + 2] * z", "matrices[index + 2] * (z & 0x1FFFF)"),
+    ("rides/block_viper.py", "encode"): ("guess * n // previous", "guess // previous * n"),
     ("quick_viper.py", "add_products"): ("value += 0 - low", "value -= 0 - low"),
 }
 NAMES = [name for _, name in MISTAKES]
@@ -56,27 +56,27 @@ def imported(tmp_path, path="", name="", error=""):
     elif name:
         write_broken(path, name, tmp_path / "kickstand" / path)
     environment = unix_port.environment() | {"MICROPYPATH": str(tmp_path)}
-    done = subprocess.run(
+    process = subprocess.run(
         unix_port.command("-c", _CHOSEN), capture_output=True, text=True, env=environment, cwd=tmp_path, timeout=120
     )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.splitlines()
+    assert process.returncode == 0, process.stderr
+    return process.stdout.splitlines()
 
 
 def test_correct_machine_code_is_used(tmp_path):
-    found = [
+    functions = [
         (path.relative_to(firmware_path.PACKAGE).as_posix(), name)
         for path in firmware_path.PACKAGE.rglob("*_viper.py")
         for name in re.findall(r"@micropython\.viper\ndef (\w+)", path.read_text(encoding="utf-8"))
     ]
-    assert sorted(found) == sorted(MISTAKES)
+    assert sorted(functions) == sorted(MISTAKES)
     assert imported(tmp_path) == [f"{name} quick" for name in NAMES]
 
 
 @pytest.mark.parametrize(("path", "name"), MISTAKES)
 def test_wrong_machine_code_is_not_used(tmp_path, path, name):
-    said, *chosen = imported(tmp_path, path, name)
-    assert said.startswith(f"the machine code for {name}() gives wrong results on this board")
+    warning, *chosen = imported(tmp_path, path, name)
+    assert warning.startswith(f"the machine code for {name}() gives wrong results on this board")
     assert chosen == [f"{other} {'plain' if other == name else 'quick'}" for other in NAMES]
 
 

@@ -85,14 +85,6 @@ def test_report_refuses_what_is_no_log(tmp_path):
         command.refused(tmp_path, "report", tmp_path / name, words=words)
 
 
-def test_an_export_in_vehicle_axes_needs_no_alignment(tmp_path):
-    (tmp_path / "v.vbo").write_text(app_exports.vbo(riding().every(2)))
-    result = command.works("import", tmp_path / "v.vbo", "--out", tmp_path / "RIDE.csv")
-    assert "x is left, y up, z forward, as far as the logger was mounted so" in result.out
-    units = {column.quantity: column.unit for column in api.import_recording(tmp_path / "v.vbo").taken}
-    assert units["position"] == "minutes, west positive"
-
-
 def test_a_damaged_export_gives_a_log_or_one_line(tmp_path):
     """The result of an import is a readable log or a message of one line, never a traceback."""
     ride = riding().every(8).every(1, 100)

@@ -124,19 +124,6 @@ def test_a_fix_is_only_in_the_nearest_row():
     assert np.flatnonzero(np.isfinite(log.utc_s)).tolist() == [0] and log.utc_s[0] == 1.0
 
 
-def test_repeated_and_shuffled_rows_of_an_export(tmp_path):
-    """Sensor Kinetics writes the same time for several samples. The times are spread. Late rows are sorted."""
-    imported = api.import_recording(app_exports.into(tmp_path / "k", app_exports.sensor_kinetics(riding())))
-    assert np.diff(imported.log.t_s).min() > 0.002 and len(imported.log.t_s) >= len(riding().t_s) - 3
-    ride = riding().every(4)
-    lines = app_exports.any_table(ride).splitlines()
-    lines[101], lines[103] = lines[103], lines[101]
-    (tmp_path / "log.csv").write_text("\n".join(lines))
-    units = {"a": "m/s2", "g": "rad/s", "speed": "km/h"}
-    log = api.import_recording(tmp_path / "log.csv", app_exports.ANY_NAMES, units).log
-    assert log.accel_g == pytest.approx(ride.phone_g, abs=1e-5)
-
-
 def test_a_damaged_row_costs_only_itself(tmp_path):
     """Rows with an impossible time, an impossible reading or a word are left out and counted, and a cut last line."""
     ride = riding().every(4)

@@ -47,17 +47,6 @@ def test_axes_of_the_bike_are_left_up_and_forward(tmp_path, name, head, row, for
         assert np.nanmin(imported.log.utc_s) == pytest.approx(86_400.0)
 
 
-def test_sensor_loggers_raw_accelerometer_is_in_g_on_an_iphone(tmp_path):
-    ride = riding().every(4)
-    files = app_exports.sensor_logger(ride, "ios")
-    rows = [
-        (f"{1715938200250 + 20 * k}000000", t, *row[::-1]) for k, (t, row) in enumerate(zip(ride.t_s, -ride.phone_g))
-    ]
-    files["AccelerometerUncalibrated.csv"] = app_exports.lines(["time", "seconds_elapsed", "z", "y", "x"], rows)
-    del files["Gravity.csv"]
-    assert up_at_rest(api.import_recording(app_exports.into(tmp_path / "s", files))) == pytest.approx(UP, abs=0.02)
-
-
 def test_without_the_platform_sensor_logger_is_refused(tmp_path):
     files = app_exports.sensor_logger(riding().every(4), "ios")
     del files["Metadata.csv"]
@@ -92,13 +81,6 @@ def test_turns_of_the_track_show_an_unknown_sign(tmp_path, sign):
     imported = api.import_recording(tmp_path / "r.csv")
     assert up_at_rest(imported) == pytest.approx(UP, abs=0.02) and not imported.notices
     assert imported.taken[0].sign.startswith(f"{sign:+.0f} g up, by the turns of the track")
-
-
-def test_no_turns_show_no_sign(tmp_path):
-    ride = riding().every(2)
-    ride.lat_deg, ride.lon_deg = 52.5 + 1e-5 * ride.t_s, np.full(len(ride.t_s), 13.4)
-    (tmp_path / "r.csv").write_text(app_exports.racechrono(ride))
-    assert [notice.code for notice in api.import_recording(tmp_path / "r.csv").notices] == ["import-sign"]
 
 
 def test_uncertain_sign_is_reported_and_can_be_turned(tmp_path):

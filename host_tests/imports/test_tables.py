@@ -1,6 +1,7 @@
 """A known motion, written as a table in any units, order of columns, clock and format, comes back."""
 
 import functools
+import json
 import zipfile
 
 import numpy as np
@@ -29,6 +30,8 @@ CLOCKS = {  # a function of the seconds, and the unit
     "day and month's name": (lambda t: f"17-May-2024 09:30:{t + 0.25:06.3f}", ""),
     "day first, points": (lambda t: f"17.05.2024 09.30.{t + 0.25:06.3f}", ""),
     "compact": (lambda t: f"20240517T0930{t + 0.25:06.3f}", ""),
+    "days since 1900": (lambda t: f"{25_569 + (START_UTC_S + t) / 86_400:.10f}", "d"),
+    "only digits": (lambda t: f"202405170930{round(1e3 * t + 250):05d}", ""),
     "month first, 12 hours": (lambda t: f"05/17/2024 09:30:{t + 0.25:06.3f} AM", ""),
     "100 ns since 1601": (lambda t: f"{round(1e3 * (START_UTC_S + t + 11_644_473_600))}0000", "ticks"),
     "100 ns since the year 1": (lambda t: f"{round(1e3 * (START_UTC_S + t + 62_135_596_800))}0000", "ticks"),
@@ -42,8 +45,13 @@ CLOCKS = {  # a function of the seconds, and the unit
     "min": (lambda t: f"{t / 60.0:.6f}", "min"),
     "h": (lambda t: f"{t / 3600.0:.8f}", "h"),
     "0.1 ms": (lambda t: f"{1e4 * t:.0f}", "0.1ms"),
+    "us since 1601": (lambda t: f"{13_359_034_395_000_000 + 1e6 * t:.0f}", "us"),
+    "millis in 16 bits": (lambda t: f"{(60_000 + round(1e3 * t)) % 2**16}", "ms"),
+    "a clock of 12 hours alone": (lambda t: f"{'12:59' if t < 5 else '1:00'}:{(t + 55.0) % 60:06.3f}", ""),
+    "noon in Japanese": (lambda t: f"{'午前11:59' if t < 5 else '午後12:00'}:{(t + 55.0) % 60:06.3f}", ""),
+    "digits of a clock": (lambda t: f"{115_955 + t + 4040.0 * (t >= 5):.3f}", ""),
 }
-DATED = list(CLOCKS)[5:17]
+DATED = list(CLOCKS)[5:19]
 
 
 def grouped(value, group, mark):
@@ -68,6 +76,9 @@ DRESSES = {  # separator, function of a number, function of any cell, encoding, 
     "tabs and decimal commas": ("\t", comma, comma, "utf-8", "\n"),
     "quoted decimal commas": (",", plain, lambda value: f'"{comma(value)}"', "utf-8", "\n"),
     "minus of a spreadsheet": (";", lambda value: value.replace("-", "\u2212"), plain, "utf-8", "\n"),
+    "a blank after the minus": (",", lambda value: value.replace("-", "- "), plain, "utf-8", "\n"),
+    "negative in brackets": (",", lambda value: f"({value[1:]})" if value[0] == "-" else value, plain, "utf-8", "\n"),
+    "bars": (" | ", plain, plain, "utf-8", "\n"),
     "an en dash as minus": (",", lambda value: value.replace("-", "\u2013"), plain, "utf-16", "\n"),
     "points for thousands": (";", lambda value: grouped(value, ".", ","), plain, "utf-8", "\n"),
     "commas for thousands": ("\t", lambda value: grouped(value, ",", "."), plain, "utf-8", "\n"),
@@ -212,6 +223,21 @@ READ = {
     ),
     "ids before the sensors": text_of("{0:.3f},3,{1:.4f},{2:.4f},{3:.4f},4,{4:.4f},{5:.4f},{6:.4f}"),
     "JSON, nested": text_of('{{"ts": {}, "acc": {{"x": {}, "y": {}, "z": {}}}, "gyro": [{}, {}, {}]}}'),
+    "JSON, a list per column": json.dumps({"data": dict(zip(HEAD.split(","), np.column_stack(hand()).T.tolist()))}),
+    "one row per axis": text_of(
+        "\n".join(f"{{0:.3f}},{axis},{{{k}:.4f}}" for k, axis in enumerate(HEAD.split(",")) if k),
+        head="time,field,value",
+    ),
+    "ArduPilot": "FMT, 129, 53, IMU, QffffffB, TimeUS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,I\n" + text_of(
+        "IMU, {0:.0f}, {4:.5f}, {5:.5f}, {6:.5f}, {1:.4f}, {2:.4f}, {3:.4f}, 0\n"
+        "IMU, {0:.0f}, {5:.5f}, {6:.5f}, {4:.5f}, {2:.4f}, {3:.4f}, {1:.4f}, 1", 1e6, G, 1.0 / RAD),
+    "a second accelerometer": text_of(FIELDS.replace(",{4", ",{3:.4f},{1:.4f},{2:.4f},{4")),
+    "sensors by their names": text_of(
+        FIELDS.replace(",{1", ",{5:.4f},{6:.4f},{4:.4f},{1"),
+        head="time,gx_seat,gy_seat,gz_seat,ax_fork,ay_fork,az_fork,gx_fork,gy_fork,gz_fork",
+    ),
+    "rare units": text_of(ROW, 1.0, 100.0 * G, 1.0 / 6.0,
+                          "t (s),ax (cm/s^2),ay (cm/s^2),az (cm/s^2),gx (rpm),gy (rpm),gz (rpm)"),
     "JSON, an array": f"[{JSON_ROWS.strip().replace(chr(10), ',')}]",
     "other sensors": text_of(
         ROW + ",0.01,0.02,0.01,10,20,30", 1.0, G, 1.0 / RAD,
@@ -270,7 +296,9 @@ def test_speed_and_positions_of_a_table(tmp_path):
         assert np.nanmin(log.lat_deg) == pytest.approx(48.0) and np.nanmin(log.lon_deg) == pytest.approx(11.0, abs=1e-6)
 
 
-@pytest.mark.parametrize("way", ["newest first", "the clock is set", "whole and fraction", "wider rows", "no suffix"])
+@pytest.mark.parametrize(
+    "way", ["newest first", "the clock is set", "whole and fraction", "clock in parts", "wider rows", "no suffix"]
+)
 def test_rows_in_another_order_or_shape_are_read(tmp_path, way):
     t, force, rates = hand()
     head, *rows = text_of(ROW, head="t,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps").strip().splitlines()
@@ -285,6 +313,13 @@ def test_rows_in_another_order_or_shape_are_read(tmp_path, way):
     if way == "whole and fraction":
         head = head.replace("t,", "secs,nsecs,")
         rows = [f"{1_714_557_600 + int(s)},{round(s % 1 * 1e3)}000000,{row}" for s, row in zip(t.tolist(), cells)]
+    if way == "clock in parts":
+        head = head.replace("t,", "hour,min,sec,ms,")
+        rows = [
+            f"11,{59 - 59 * (s >= 9)},{(51 + s) // 1 % 60:.0f},{round(s % 1 * 1e3)},{row}"
+            for s, row in zip(t.tolist(), cells)
+        ]
+        rows = [row.replace("11,0,", "12,0,", 1) for row in rows]
     if way == "wider rows":
         rows[5::80] = [f"{t[k]},48.1,11.5,1,{cells[k]}" for k in range(5, len(t), 80)]
     if way == "no suffix":

@@ -22,7 +22,7 @@ def _close_files():
 @pytest.mark.parametrize("hours", [0.01, pytest.param(0.1, marks=pytest.mark.long)])
 def test_some_minutes_of_random_rides_and_faults(hours):
     figures = soak(hours=hours, seed=4)
-    assert figures.found == [] and figures.hours >= hours and sum(figures.faults.values()) > 0
+    assert figures.violations == [] and figures.hours >= hours and sum(figures.faults.values()) > 0
     assert f"| trips | {figures.trips}," in table(figures)
 
 
@@ -50,4 +50,6 @@ def test_every_check_of_the_soak_can_fail(broken, cut_save, message, monkeypatch
     monkeypatch.setattr(soaking, "make_trip", lambda *_: trip(cut_save))
     figures = soak(hours=0.001)
     assert figures.trips == 1
-    assert any(message in line for line in figures.found) if message else not figures.found, figures.found
+    assert any(message in line for line in figures.violations) if message else not figures.violations, (
+        figures.violations
+    )

@@ -7,6 +7,7 @@ from ..errors import StoreError, report, unload
 from ..units import const
 
 _TRIM_MS = const(60_000)  # shortest time between two saves of the trim, because writing wears the flash
+_LOOK_MS = const(1000)  # time until the next attempt, because at rest each attempt takes heap
 
 
 class ActiveCalibration:
@@ -79,7 +80,7 @@ class ActiveCalibration:
         Call this method about every 100 ms."""
         if ticks_diff(now_ms, self._trim_due_ms) >= 0:
             saved = self.aligned and self._save_trim()
-            self._trim_due_ms = ticks_add(now_ms, _TRIM_MS if saved else 0)
+            self._trim_due_ms = ticks_add(now_ms, _TRIM_MS if saved else _LOOK_MS)
 
     def _save_trim(self):
         """Save the trim if it has changed enough. Return True if it was saved."""

@@ -159,7 +159,7 @@ class SensorFit:
             turn, seconds = self._turns[k]
             walk = _BIAS_WALK_DPS * 0.01745
             weight = 1.0 / (_SIGMA_TURN * _SIGMA_TURN + walk * walk * seconds * seconds * seconds / 12)
-            misfit, before = self._misfit(k, p[_GYRO:])
+            misfit, rotated_force = self._misfit(k, p[_GYRO:])
             first, second = self._force_columns(k), self._force_columns(k + 1)
             yield
             for a in range(3):
@@ -168,7 +168,7 @@ class SensorFit:
                     row[i] = first[9 * a + i]
                     for j in range(3):
                         row[i] -= turn[3 * a + j] * second[9 * j + i]
-                    row[_GYRO + i] = before[b] * turn[9 + 9 * c + i] - before[c] * turn[9 + 9 * b + i]
+                    row[_GYRO + i] = rotated_force[b] * turn[9 + 9 * c + i] - rotated_force[c] * turn[9 + 9 * b + i]
                 self._add(row, _UNKNOWNS, -misfit[a], weight)
                 yield
 

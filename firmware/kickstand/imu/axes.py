@@ -147,9 +147,9 @@ class AxisWatch:
         if notes[_DIFFER] & _ALL_DIFFER != _ALL_DIFFER or notes[_CLIPPED] or notes[_SHAKEN]:
             return False
         for i in _COLUMNS:
-            seen = notes[_SEEN + i]
-            more = seen & (seen - 1) & 0xFFFF  # clears the lowest bit; the result is 0 if the counts had only one value
-            if not (more & (more - 1) and seen & 0x5555 and seen & 0xAAAA and (seen & _HIGH_BYTE or seen < _WRAPPED)):
+            bits = notes[_SEEN + i]
+            upper = bits & (bits - 1) & 0xFFFF  # without the lowest bit; 0 if the counts had only one value
+            if not (upper & (upper - 1) and bits & 0x5555 and bits & 0xAAAA and (bits & _HIGH_BYTE or bits < _WRAPPED)):
                 return False
         for i in _COLUMNS:
             notes[_SEEN + i] = 0

@@ -108,10 +108,10 @@ class AxisJudge:
             limit = self._limits[i > 3]
             if limit == 1 and not notes[_DIFFER] >> i & 1:
                 equal |= 1 << i | 1 << (i - 1 if i & 3 else i + 2)
-            seen = notes[_SEEN + i]
-            values = seen & 0xFFFF
-            more = values & (values - 1)  # clears the lowest bit; the result is 0 if the counts had only one value
-            if not (more & (more - 1) and values & 0x5555 and values & 0xAAAA):
+            bits = notes[_SEEN + i]
+            values = bits & 0xFFFF
+            upper = values & (values - 1)  # clears the lowest bit; the result is 0 if the counts had only one value
+            if not (upper & (upper - 1) and values & 0x5555 and values & 0xAAAA):
                 if quiet[i] < 255:
                     quiet[i] += 1
                 if quiet[i] < limit or not limit:
@@ -119,9 +119,9 @@ class AxisJudge:
                 dead |= 1 << i
             else:
                 quiet[i] = 0
-                if seen & _HIGH_BYTE:
+                if bits & _HIGH_BYTE:
                     wrapped[i] = 0
-                elif seen & _WRAPPED and wrapped[i] < _WRAP_LOOKS:
+                elif bits & _WRAPPED and wrapped[i] < _WRAP_LOOKS:
                     wrapped[i] += 1
                 if wrapped[i] == _WRAP_LOOKS:
                     dead |= 1 << i

@@ -72,9 +72,9 @@ class Covariance:
         self.misfit = 0.0
 
     def _divide(self):
-        n, every = self.n, memoryview(self._p)
+        n, elements = self.n, memoryview(self._p)
         # Parts of _p. The type checker treats the elements of a memoryview as integers.
-        self.rows = [every[n * i : n * (i + 1)] for i in range(n)]  # type: list
+        self.rows = [elements[n * i : n * (i + 1)] for i in range(n)]  # type: list
 
     def __getstate__(self):  # without the memoryviews in `rows`, which copy and pickle on a computer cannot copy
         return {name: value for name, value in self.__dict__.items() if name != "rows"}

@@ -202,13 +202,13 @@ class RideBlock:
         """Complete the block: write the temperature, the last bits and the tail."""
         state, buffer = self._state, self.buffer
         struct.pack_into("<h", buffer, _TEMPERATURE_AT, int(100 * self._chip.temperature_c(self._temperature)))
-        at = state[_AT]
+        index = state[_AT]
         if state[_BITS]:
-            buffer[at] = (state[_PENDING] << (8 - state[_BITS])) & 0xFF
-            at += 1
-        while at < self._end:
-            buffer[at] = 0
-            at += 1
+            buffer[index] = (state[_PENDING] << (8 - state[_BITS])) & 0xFF
+            index += 1
+        while index < self._end:
+            buffer[index] = 0
+            index += 1
         buffer[_PLACES_AT] = self._places
         tail = self.length - _TAIL_LENGTH
         struct.pack_into("<H", buffer, tail, self.count)

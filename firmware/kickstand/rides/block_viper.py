@@ -31,10 +31,10 @@ def encode(entry: ptr32, state: ptr32, out: ptr8):  # noqa: F821 the names are v
         out: the buffer.
     """
     n = int(entry[0])
-    before = int(state[0])
+    previous = int(state[0])
     pending = int(state[_PENDING])
     bits = int(state[_BITS])
-    at = int(state[_AT])
+    index = int(state[_AT])
     i = 0
     while i < _FIELDS:
         value = int(entry[i])
@@ -45,8 +45,8 @@ def encode(entry: ptr32, state: ptr32, out: ptr8):  # noqa: F821 the names are v
             # sign-extend 24 bits, for an int of 32 or 64 bits
             value = ((value & 0xFFFFFF) ^ 0x800000) - 0x800000
             guess = ((guess & 0xFFFFFF) ^ 0x800000) - 0x800000
-            if n != before:
-                guess = guess * n // before
+            if n != previous:
+                guess = guess * n // previous
         difference = value - guess
         size = (difference << 1) ^ (difference >> 31)
         mean = int(state[_MEANS + i])
@@ -78,8 +78,8 @@ def encode(entry: ptr32, state: ptr32, out: ptr8):  # noqa: F821 the names are v
             bits += length
             while bits >= 8:
                 bits -= 8
-                out[at] = pending >> bits
-                at += 1
+                out[index] = pending >> bits
+                index += 1
                 pending &= (1 << bits) - 1
             part += 1
         if size > _MAX_SIZE:
@@ -94,4 +94,4 @@ def encode(entry: ptr32, state: ptr32, out: ptr8):  # noqa: F821 the names are v
             i = _FIELDS
     state[_PENDING] = pending
     state[_BITS] = bits
-    state[_AT] = at
+    state[_AT] = index

@@ -73,8 +73,7 @@ class Recorder:
         self._bytes = 0
         self._interrupted = False
         self._speed = self._place = None  # the last speed (cm/s) and position since the previous pass of the loop
-        self._waiting = None  # the block being written
-        self._at = 0  # number of bytes of `_waiting` that are already written
+        self._writing = None  # the generator that writes the previous block
         self.active = True
         self._begin_block()
 
@@ -84,7 +83,7 @@ class Recorder:
             return
         if self._block.count:
             self._end_block()
-        while self._waiting and self.active:
+        while self._writing and self.active:
             self.tick()
         if self.active:
             self.active = False
@@ -143,11 +142,14 @@ class Recorder:
 
     def tick(self):
         """Do one step of the writing. Call this method once per pass of the loop while active."""
-        waiting = self._waiting
-        if not waiting:
+        if not self._writing:
             return
         begun_ms = ticks_ms()
-        self._write(waiting)
+        try:
+            if next(self._writing, True):
+                self._writing = None
+        except (OSError, MemoryError) as error:
+            self._fail(error)
         self._note_stall(begun_ms)
 
     def _note_stall(self, begun_ms):
@@ -155,21 +157,16 @@ class Recorder:
         if ticks_diff(ticks_ms(), begun_ms) > _STALL_MS and self._writer.stops_interrupts:
             self.stalled = True
 
-    def _write(self, waiting):
-        """Do one step of writing the block `waiting`."""
-        try:
-            if not self._writer.ready():
-                return
-            if self._at < waiting.length:
-                end = min(self._at + _PAGE, waiting.length)
-                self._writer.write(memoryview(waiting.buffer)[self._at : end])
-                self._at = end
-            else:
-                self._writer.end_block()
-                self._bytes += waiting.length
-                self._waiting = None
-        except (OSError, MemoryError) as error:
-            self._fail(error)
+    def _write(self, block):
+        """Write a block, as a generator of short steps. Raises OSError, MemoryError."""
+        writer = self._writer
+        while not writer.ready():
+            yield
+        for at in range(0, block.length, _PAGE):
+            writer.write(memoryview(block.buffer)[at : min(at + _PAGE, block.length)])
+            yield
+        writer.end_block()
+        self._bytes += block.length
 
     def seconds(self):
         """Return the duration of this recording so far, in seconds."""
@@ -194,11 +191,11 @@ class Recorder:
     def _end_block(self):
         """Close the full block. tick() will write it."""
         # write the rest of the previous block first, if flash was slower than the ride
-        while self._waiting and self.active:
+        while self._writing and self.active:
             self.tick()
         self._block.close()
         self._block, self._spare = self._spare, self._block
-        self._waiting, self._at = self._spare, 0
+        self._writing = self._write(self._spare)
 
     def _fail(self, error):
         """End the ride after an error, and report it. Unwritten blocks are lost."""

@@ -267,7 +267,7 @@ def _minutes(field, degrees, negative):
     """Convert an angle in NMEA's form, (d)ddmm.mmmm, to units of 0.00001 minutes.
 
     More decimals are cut off. Return None if the field is not an angle, or if it exceeds `degrees` degrees."""
-    whole = part = 0
+    integer = part = 0
     digits = -1  # number of decimals so far, -1 before the point
     for byte in field:
         if byte == 46 and digits < 0:  # 46 is the decimal point
@@ -275,16 +275,16 @@ def _minutes(field, degrees, negative):
         elif not 48 <= byte <= 57:
             return None
         elif digits < 0:
-            whole = 10 * whole + byte - 48
+            integer = 10 * integer + byte - 48
         elif digits < _DIGITS:
             part = 10 * part + byte - 48
             digits += 1
-    if digits < 0 or whole >= 100 * degrees or whole % 100 >= 60:
+    if digits < 0 or integer >= 100 * degrees or integer % 100 >= 60:
         return None
     while digits < _DIGITS:
         part *= 10
         digits += 1
-    angle = (whole // 100 * 60 + whole % 100) * 100_000 + part
+    angle = (integer // 100 * 60 + integer % 100) * 100_000 + part
     return -angle if negative else angle
 
 

@@ -29,7 +29,8 @@ class Screen:
     Attributes:
         view: the name of the view in front: "notice", "align", "six", "menu", "info", "fault", "question", or the name
             of a page, which is "own" for a page of the board's owner.
-        notice: the Notice that is shown, or None. It disappears after two seconds, or with a press.
+        shown: the Notice or Refusal in front, or None. A wizard has its own.
+        notice: the Notice before all other views, or None. It disappears after two seconds, or with a press.
         wizard: the current AlignWizard or SixWizard, which takes every sample, or None.
         entry: the name of the menu's entry that is shown, or None.
     """
@@ -71,8 +72,9 @@ class Screen:
         ring = self._ring()
         self._at %= len(ring)
         self._page = page = ring[self._at]
+        self.shown = None
         if self.notice:
-            self.view = "notice"
+            self.view, self.shown = "notice", self.notice
         elif self.wizard:
             self.view = self.wizard.name
         elif self._menu:
@@ -80,9 +82,9 @@ class Screen:
         elif self._info:
             self.view = "info"
         elif app.sensor.fault is not None:
-            self.view = "fault"
+            self.view, self.shown = "fault", app.sensor.fault
         elif app.drive and app.drive.message:
-            self.view = "question"
+            self.view, self.shown = "question", app.drive.message
         else:
             self.view = "own" if app.user and page in app.user.pages else page.__name__
 
@@ -103,8 +105,8 @@ class Screen:
     def lines(self, now_ms):
         """Return the content of the display: two lines and, for a display that draws, a picture."""
         app, view = self._app, self.view
-        if view == "notice":
-            return pages.words(self.notice)
+        if self.shown:
+            return pages.words(self.shown)
         if self.wizard:
             return self.wizard.lines
         if view == "menu":
@@ -112,10 +114,6 @@ class Screen:
             return pages.ARROW + self.entry, "next %d/%d hold=ok" % (count - self._menu.index(_LEAVE), count)
         if view == "info":
             return pages.sensor_info(app.sensor, app.clock.lost, app.meter, now_ms // 1000)
-        if view == "fault":
-            return pages.words(app.sensor.fault)
-        if view == "question":
-            return pages.words(app.drive.message)
         page = self._page
         if view == "own":
             return page()

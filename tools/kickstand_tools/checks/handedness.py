@@ -32,8 +32,9 @@ TRIED, TRIED_IF_WRONG = 4, 12
 # Another exchange must reduce the mean square of the residual force (g2) by this factor, or by FEW_CLEARLY in at most
 # FEW_WINDOWS windows. In correct logs the factor was at most 1.6 in windows of simulated and recorded rides.
 CLEARLY, FEW_WINDOWS, FEW_CLEARLY = 2.0, 3, 3.0
-# Least reduction of the mean square, for any factor. In a parked vehicle, drift reduces it by under 0.0002.
-LEAST_G2 = 0.001
+# Least reduction of the mean square, for any factor. In a parked vehicle, drift reduces it by under 0.0002. In few
+# windows of one long bend, some exchange explains even the vibration.
+LEAST_G2, FEW_LEAST_G2 = 0.001, 0.003
 # An exchange is named if the residual of each other one is larger by this factor, or by FEW_NAMED in few windows.
 # Before, the residuals are multiplied by PENALTY: all axes reversed (or none) are the likeliest mistake, then some axes
 # reversed or two exchanged.
@@ -101,7 +102,7 @@ class AxesMisfit(WrongAxes):
     code = "axes-misfit"
     text = (
         "the rates do not belong to the accelerations, so the lean is wrong: axes are exchanged or reversed in one of "
-        "the sensors, and this ride does not show which"
+        "the sensors, or left-handed in both, and this ride does not show which"
     )
     todo = Remedy("half a minute in which a hand turns the sensor about each of its axes shows it")
 
@@ -160,8 +161,9 @@ def fit_exchanges(turning: Turning, guesses: list[Array]) -> dict[int, TurningFi
 def is_wrong(fits: dict[int, TurningFit]) -> bool:
     """True if another exchange explains the forces clearly better than the log's own axes."""
     own, least = float(np.mean(fits[0].left)), min(float(np.mean(fit.left)) for fit in fits.values())
-    clearly = CLEARLY if len(fits[0].left) > FEW_WINDOWS else FEW_CLEARLY
-    return own > clearly * least and own - least > LEAST_G2
+    few = len(fits[0].left) <= FEW_WINDOWS
+    clearly, least_g2 = (FEW_CLEARLY, FEW_LEAST_G2) if few else (CLEARLY, LEAST_G2)
+    return own > clearly * least and own - least > least_g2
 
 
 def likeliest(fits: dict[int, TurningFit]) -> int | None:

@@ -225,8 +225,10 @@ class _Ride:
         turning = np.linalg.norm(self._rate, axis=1) > TURNING_DPS
         if np.count_nonzero(turning) * MEAN_S < TURNING_S:
             return None
-        left, up, forward = np.median(self._force[turning], axis=0)
-        return float(np.degrees(np.arctan2(np.hypot(left, forward), up)))
+        # In a ride that is mostly one steady bend, the median rate is the bend's, and the rest of the ride turns
+        known = ~np.isnan(self._force[:, 0])
+        forces = [np.median(self._force[part], axis=0) for part in (turning, known)]
+        return min(float(np.degrees(np.arctan2(np.hypot(left, forward), up))) for left, up, forward in forces)
 
     def forward_by_speed(self) -> float | None:
         """Find forward from the changes of the log's speed.

@@ -30,11 +30,11 @@ def config() -> Path:
     is config.py in the current directory, if there is one. Without such a file, it is the config.py that belongs to
     these tools.
     """
-    here = Path("firmware").resolve()
-    if (here / "kickstand").is_dir() and (here / "config.py").is_file():
-        return here / "config.py"
-    own = Path("config.py").resolve()
-    return own if installed() and own.is_file() else directory() / "config.py"
+    checkout = Path("firmware").resolve()
+    if (checkout / "kickstand").is_dir() and (checkout / "config.py").is_file():
+        return checkout / "config.py"
+    user_config = Path("config.py").resolve()
+    return user_config if installed() and user_config.is_file() else directory() / "config.py"
 
 
 def documents() -> Path:

@@ -40,18 +40,18 @@ def _resolved(path: Path) -> Path:
 def _is_open_here(path: Path) -> bool:
     """Return True if the path is an open file of this process: /dev/stdin, /dev/stdout, /dev/stderr or /dev/fd/3."""
     with contextlib.suppress(OSError):
-        there = path.stat()
+        status = path.stat()
         for number in (0, 1, 2):
             with contextlib.suppress(OSError):
-                if os.path.samestat(os.fstat(number), there) and path.is_file():
+                if os.path.samestat(os.fstat(number), status) and path.is_file():
                     return True
-    place = Path(os.path.abspath(path))
+    target = Path(os.path.abspath(path))
     for _ in range(_MOST_LINKS):  # /dev/stdout is a link to /proc/self/fd/1
-        if place.is_relative_to("/dev/fd") or (place.is_relative_to("/proc") and place.parent.name == "fd"):
+        if target.is_relative_to("/dev/fd") or (target.is_relative_to("/proc") and target.parent.name == "fd"):
             return True
-        if not place.is_symlink():
+        if not target.is_symlink():
             return False
-        place = Path(os.path.abspath(place.parent / os.readlink(place)))
+        target = Path(os.path.abspath(target.parent / os.readlink(target)))
     return False
 
 
@@ -65,18 +65,18 @@ def check_directory(path: Path) -> None:
 @contextlib.contextmanager
 def new_directory(path: Path) -> Iterator[None]:
     """Make a directory and its parents. At the end of the `with`, new directories that are still empty are removed."""
-    made: list[Path] = []
+    created: list[Path] = []
     try:
         try:
-            made = [one for one in (path, *path.parents) if not one.exists()]
+            created = [folder for folder in (path, *path.parents) if not folder.exists()]
             path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"{path} cannot be made: {cause(error)}") from error
         yield
     finally:
         with contextlib.suppress(OSError):  # not empty
-            for one in made:
-                one.rmdir()
+            for folder in created:
+                folder.rmdir()
 
 
 def make_directory(path: Path) -> None:

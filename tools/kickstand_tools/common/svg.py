@@ -16,13 +16,13 @@ def element(name: str, *inside: str, **attributes: object) -> Markup:
     >>> print(element("text", "1 < 2", x=1.25, text_anchor="end", class_="small"))
     <text x="1.25" text-anchor="end" class="small">1 &lt; 2</text>
     """
-    given = "".join(
+    properties = "".join(
         f' {key.rstrip("_").replace("_", "-")}="{_written(value)}"'
         for key, value in attributes.items()
         if value is not None
     )
     body = "".join(map(escape, inside))
-    return Markup(f"<{name}{given}>{body}</{name}>" if inside else f"<{name}{given}/>")
+    return Markup(f"<{name}{properties}>{body}</{name}>" if inside else f"<{name}{properties}/>")
 
 
 def drawing(size: tuple[float, float], *inside: str, **attributes: object) -> Markup:

@@ -42,11 +42,11 @@ def lines(
     """
     transport.exec_raw_no_follow(code)
     serial: Any = transport.serial
-    said, count = b"", 0
+    received, count = b"", 0
     asked_s = None
     heard_s = time.monotonic()
     away_s, polled_s = 0.0, time.time()  # unlike the monotonic clock, time.time() continues while the computer sleeps
-    while said.count(_END) < 2 or not said.endswith(_PROMPT):
+    while received.count(_END) < 2 or not received.endswith(_PROMPT):
         if stopped and stopped.is_set() and asked_s is None:
             asked_s = time.monotonic()
             serial.write(_CTRL_C)
@@ -54,8 +54,8 @@ def lines(
         if waiting := serial.inWaiting():
             heard_s = time.monotonic()
             got = serial.read(waiting)
-            said, count = said + got, count + len(got)
-            if count > most_bytes or len(said) > _LONGEST_LINE + len(got):
+            received, count = received + got, count + len(got)
+            if count > most_bytes or len(received) > _LONGEST_LINE + len(got):
                 raise BrokenOff("the program on the board does not end")
         elif time.monotonic() - heard_s > silent_s:
             raise BrokenOff("the board says nothing any more")
@@ -65,13 +65,13 @@ def lines(
             return
         else:
             transport.wait(_POLL_S)
-        output, end, error = said.partition(_END)
+        output, end, error = received.partition(_END)
         *whole, output = output.split(b"\n")
-        said = output + end + error
+        received = output + end + error
         for line in whole:
             yield line.strip()
     # Let the board print its prompt again. mpremote waits for the prompt, which this function has already read
     serial.write(_CTRL_A)
-    error = said.split(_END)[1].decode(errors="replace").strip()
+    error = received.split(_END)[1].decode(errors="replace").strip()
     if error and asked_s is None:
         raise BrokenOff(f"the board reports {error.rpartition(chr(10))[2].strip()}")

@@ -43,7 +43,7 @@ class Checked:
     @property
     def faults(self) -> list[Finding]:
         """The findings that are not good."""
-        return [one for one in self.findings if one.verdict in (LOOK, BAD)]
+        return [finding for finding in self.findings if finding.verdict in (LOOK, BAD)]
 
 
 def line(finding: Finding) -> str:
@@ -53,8 +53,8 @@ def line(finding: Finding) -> str:
 
 def verdict(findings: list[Finding]) -> str:
     """Return the last line of a check, with the number of faults and their names."""
-    faults = [one.what for one in findings if one.verdict in (LOOK, BAD)]
-    count = sum(one.verdict != SKIPPED for one in findings)
+    faults = [finding.what for finding in findings if finding.verdict in (LOOK, BAD)]
+    count = sum(finding.verdict != SKIPPED for finding in findings)
     if not faults:
         return f"all {count} are as they should be"
     return f"{len(faults)} of {count} are not as they should be: {', '.join(faults)}"
@@ -155,8 +155,8 @@ class _Check:
         source = inspect.getsource(getattr(check_guest, name))
         call = f"{name}({', '.join(['parts', *map(str, arguments)])})"
         try:
-            said = self._ask(f"{source}\nprint(repr({call}))\ndel {name}\n")
-            values = ast.literal_eval(said.strip().rpartition("\n")[2].strip())
+            output = self._ask(f"{source}\nprint(repr({call}))\ndel {name}\n")
+            values = ast.literal_eval(output.strip().rpartition("\n")[2].strip())
             findings = JUDGES[name](*values, *judged_with)
         except GuestFailed as failed:
             self.add([Finding(_NAMES.get(name, name), BAD, f"broken off by {failed}")])

@@ -191,15 +191,15 @@ def noise(parts, seconds):
     while ticks_diff(ticks_ms(), begun) < 1000 * seconds:
         for j in range(parts.fetch()):
             chip.take(j)
-            now = list(chip.counts)
+            counts = list(chip.counts)
             if first is None:
-                first = last = now
+                first = last = counts
             for k in range(7):
-                off = now[k] - first[k]
+                off = counts[k] - first[k]
                 sums[k] += off
                 squares[k] += off * off
-                changes[k] += now[k] != last[k]
-            last = now
+                changes[k] += counts[k] != last[k]
+            last = counts
             count += 1
         sleep_ms(2)
     if not count:
@@ -231,9 +231,9 @@ def clock(parts, seconds):
         """Read until the FIFO is empty just after a sample has arrived. Returns the number of samples and the time."""
         count = 0
         for _ in range(2000):
-            got = parts.fetch()
-            count += got
-            if got and not chip.frames_left:
+            frames = parts.fetch()
+            count += frames
+            if frames and not chip.frames_left:
                 break
         return count, ticks_us()
 
@@ -313,11 +313,11 @@ def fifo(parts, writes):
     waiting = chip.waiting()
     expected = ticks_diff(ticks_us(), begun_us) // (1000 * chip.period_ms) * 14
     chip.start()
-    before = chip.overflows
+    overflows = chip.overflows
     sleep_ms(lasts + lasts // 4)
     for _ in range(3):  # the first count may be wrong if the chip is writing a sample at that moment
         parts.fetch()
-    noticed = chip.overflows > before
+    noticed = chip.overflows > overflows
     sleep_ms(10 * chip.period_ms)
     return "", size, lasts, waiting, expected, noticed, parts.fetch()
 
@@ -365,15 +365,15 @@ def display(parts, rounds):
     from kickstand import facts
 
     lcd, chosen = parts.lcd, parts.settings
-    there, address, draws = 0, 0, False
+    answering, address, draws = 0, 0, False
     for k in range(rounds):
         parts.show("Check: display", f"{k + 1} of {rounds}")
         if lcd.address is not None:
-            there += 1
+            answering += 1
             address, draws = lcd.address, lcd.draws
         sleep_ms(20)
-    words = "" if there else facts.bus(chosen, "LCD", chosen.LCD_ADDRESSES)[3]
-    return address, draws, there, rounds, words
+    words = "" if answering else facts.bus(chosen, "LCD", chosen.LCD_ADDRESSES)[3]
+    return address, draws, answering, rounds, words
 
 
 def speed(parts):
@@ -432,6 +432,6 @@ def loop(parts, seconds):
     gc.collect()
     free = gc.mem_free() if hasattr(gc, "mem_free") else 1 << 20
     lost = app.clock.lost
-    more = app.sensor.chip.overflows - overflows, lost, app.sensor.restarts - restarts
+    counters = app.sensor.chip.overflows - overflows, lost, app.sensor.restarts - restarts
     parts.show("Check", "done")
-    return (longest_us, places) + more + (", ".join(faults), turns[0], free)
+    return (longest_us, places) + counters + (", ".join(faults), turns[0], free)

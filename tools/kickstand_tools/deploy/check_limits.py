@@ -59,18 +59,18 @@ def board(version: str, name: str, release: str, settings: str, slow: str) -> li
 
 
 def button(at_first: bool, pressed: bool, released: bool, took_ms: int, edges: int, pin: int) -> list[Finding]:
-    where = f"GPIO {pin}"
+    pin_name = f"GPIO {pin}"
     if at_first and not released:
-        words = f"{where} is low all the time: the button is stuck, or its wire touches GND"
+        words = f"{pin_name} is low all the time: the button is stuck, or its wire touches GND"
     elif not pressed:
-        words = f"no press on {where}: press it when asked to; if you did, its wires or BUTTON_PIN are wrong"
+        words = f"no press on {pin_name}: press it when asked to; if you did, its wires or BUTTON_PIN are wrong"
     elif not released:
-        words = f"pressed on {where}, but not released"
+        words = f"pressed on {pin_name}, but not released"
     elif edges > BOUNCE_EDGES:
-        words = f"pressed and released on {where}; it bounces: {edges} edges (limit {BOUNCE_EDGES})"
+        words = f"pressed and released on {pin_name}; it bounces: {edges} edges (limit {BOUNCE_EDGES})"
         return [Finding("button", LOOK, words)]
     else:
-        return [Finding("button", GOOD, f"pressed for {took_ms} ms and released, on {where}, {edges} edges")]
+        return [Finding("button", GOOD, f"pressed for {took_ms} ms and released, on {pin_name}, {edges} edges")]
     return [Finding("button", BAD, words)]
 
 
@@ -99,17 +99,17 @@ def factory_trims(registers: tuple[int, ...]) -> list[float]:
 
 
 def self_test(registers: tuple[int, ...], off: tuple[float, ...], on: tuple[float, ...]) -> list[Finding]:
-    found = []
+    findings = []
     for axis, trim, without, with_it in zip(AXES, factory_trims(registers), off, on, strict=True):
-        what = f"self-test, {axis}"
+        name = f"self-test, {axis}"
         if not trim:
-            found.append(Finding(what, SKIPPED, "no factory trim in this chip: a clone"))
+            findings.append(Finding(name, SKIPPED, "no factory trim in this chip: a clone"))
             continue
         percent = 100 * ((with_it - without) / trim - 1)
         words = f"{percent:+.1f} % off its factory trim (limit {SELF_TEST_PERCENT:.0f} %)"
         verdict = GOOD if abs(percent) <= SELF_TEST_PERCENT else BAD  # BAD for NaN
-        found.append(_advised(what, verdict, words, ": the axis is damaged, or the chip is a clone"))
-    return found
+        findings.append(_advised(name, verdict, words, ": the axis is damaged, or the chip is a clone"))
+    return findings
 
 
 def noise(
@@ -130,9 +130,9 @@ def noise(
     values = [means[c] / unit for c, unit in zip(channels, lsb, strict=True)]
     noises = [spreads[c] / unit for c, unit in zip(channels, lsb, strict=True)]
     dead = [changes[c] < DEAD_SHARE * samples for c in channels]
-    found = []
-    moved = sum(one > MOVED_DPS for one in noises[3:]) >= 2
-    why = "it was moved, repeat with the sensor at rest" if moved else "this axis is faulty, or it vibrates"
+    findings = []
+    moved = sum(dps > MOVED_DPS for dps in noises[3:]) >= 2
+    cause = "it was moved, repeat with the sensor at rest" if moved else "this axis is faulty, or it vibrates"
     bands = BANDWIDTH_HZ[dlpf]
     for k, axis in enumerate(AXES):
         unit, digits = ("mg", 1) if k < 3 else ("deg/s", 3)
@@ -142,32 +142,36 @@ def noise(
         words = f"{factor * noises[k]:.{digits}f} {unit} (data sheet {factor * sheet:.{digits}f}, "
         words += f"limit {factor * NOISE_TIMES * sheet:.{digits}f})"
         if dead[k]:
-            found.append(Finding(f"noise, {axis}", BAD, "its count does not change: this axis is dead or in standby"))
+            findings.append(
+                Finding(f"noise, {axis}", BAD, "its count does not change: this axis is dead or in standby")
+            )
         elif noises[k] > NOISE_TIMES * sheet:
-            found.append(Finding(f"noise, {axis}", LOOK if moved else BAD, f"{words}: {why}"))
+            findings.append(Finding(f"noise, {axis}", LOOK if moved else BAD, f"{words}: {cause}"))
         else:
-            found.append(Finding(f"noise, {axis}", GOOD, words))
+            findings.append(Finding(f"noise, {axis}", GOOD, words))
     for k in range(3, 6):
         words = f"{values[k]:+.2f} deg/s (data sheet 20, limit {MOST_GYRO_BIAS_DPS:.0f})"
         size = abs(values[k])
         verdict = BAD if size > MOST_GYRO_BIAS_DPS else LOOK if size > GYRO_BIAS_DPS else GOOD
-        found.append(_advised(f"bias, {AXES[k]}", verdict, words, ": beyond the data sheet"))
+        findings.append(_advised(f"bias, {AXES[k]}", verdict, words, ": beyond the data sheet"))
     force = math.hypot(*values[:3])
     words = f"{force:.3f} g at rest (limit 1 +- {FORCE_OFF_G})"
     off = abs(force - 1.0)
     verdict = BAD if off > MOST_FORCE_OFF_G else LOOK if off > FORCE_OFF_G else GOOD
-    found.append(Finding("bias, accelerometer", verdict, words + (": do the six positions" if verdict == LOOK else "")))
+    findings.append(
+        Finding("bias, accelerometer", verdict, words + (": do the six positions" if verdict == LOOK else ""))
+    )
     for k in range(3):  # at rest, no axis can read more than the total force of 1 g
         if abs(values[k]) > 1.0 + MOST_FORCE_OFF_G:
-            found.append(Finding(f"bias, {AXES[k]}", BAD, f"{values[k]:+.2f} g at rest"))
+            findings.append(Finding(f"bias, {AXES[k]}", BAD, f"{values[k]:+.2f} g at rest"))
     low, high = TEMPERATURE_C
-    least, most = MOST_TEMPERATURE_C
+    least, highest = MOST_TEMPERATURE_C
     words = f"{temperature_c:.1f} C (limits {low:.0f} and {high:.0f})"
-    verdict = GOOD if low <= temperature_c <= high else LOOK if least <= temperature_c <= most else BAD
-    found.append(_advised("temperature", verdict, words, ": a chip at room temperature should not say that"))
+    verdict = GOOD if low <= temperature_c <= high else LOOK if least <= temperature_c <= highest else BAD
+    findings.append(_advised("temperature", verdict, words, ": a chip at room temperature should not say that"))
     if overflows:
-        found.append(Finding("readings", LOOK, f"{overflows} overflows of the FIFO while they were read"))
-    return found
+        findings.append(Finding("readings", LOOK, f"{overflows} overflows of the FIFO while they were read"))
+    return findings
 
 
 def clock(samples: int, us: int, rate_hz: int, overflows: int, errors: int) -> list[Finding]:
@@ -247,21 +251,21 @@ def loop(
     lasts_ms: int,
 ) -> list[Finding]:
     longest = longest_us / 1000
-    most = MOST_TURN_SHARE * lasts_ms
+    limit_ms = MOST_TURN_SHARE * lasts_ms
     words = f"{longest:.1f} ms in {turns} turns (limit {TURN_MS:.0f}); places left in the FIFO: {places}"
-    verdict = BAD if longest > most or overflows else LOOK if longest > TURN_MS else GOOD
-    found = [_advised("longest turn", verdict, words, f"; {lost} samples lost: something takes the board's time")]
+    verdict = BAD if longest > limit_ms or overflows else LOOK if longest > TURN_MS else GOOD
+    findings = [_advised("longest turn", verdict, words, f"; {lost} samples lost: something takes the board's time")]
     if faults or restarts > 1:
         words = f"faults while the lean meter ran: {faults or 'none'}; set up {restarts} times (limit 1): a loose wire"
-        found.append(Finding("sensor while running", BAD, words))
+        findings.append(Finding("sensor while running", BAD, words))
     elif lost:
-        found.append(Finding("sensor while running", LOOK, f"{lost} samples lost (limit 0)"))
+        findings.append(Finding("sensor while running", LOOK, f"{lost} samples lost (limit 0)"))
     else:
-        found.append(Finding("sensor while running", GOOD, "no fault"))
+        findings.append(Finding("sensor while running", GOOD, "no fault"))
     free_kb = free // 1024
     words = f"{free_kb} KB free while the lean meter runs (limit {LITTLE_HEAP_KB})"
     verdict = BAD if free_kb < LEAST_HEAP_KB else LOOK if free_kb < LITTLE_HEAP_KB else GOOD
-    return [*found, _advised("memory", verdict, words, ": do less in user.py, or switch LIVE or SPEED off")]
+    return [*findings, _advised("memory", verdict, words, ": do less in user.py, or switch LIVE or SPEED off")]
 
 
 # The function that judges each measurement, by the name of the function in check_guest.py that measures

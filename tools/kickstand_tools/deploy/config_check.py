@@ -60,7 +60,7 @@ def judge(path: Path, port: str, machine: str) -> Judged:
     machine: The board's sys.implementation._machine.
     """
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-P", "-m", __name__, port, machine, str(path)],
             env=os.environ | {"PYTHONPATH": firmware_path.search_path()},
             stdin=subprocess.DEVNULL,
@@ -70,8 +70,8 @@ def judge(path: Path, port: str, machine: str) -> Judged:
             check=True,
             timeout=LONGEST_S,
         )
-        found, unused = json.loads(done.stdout.splitlines()[-1])  # config.py may also print
-        return in_words(path, found or _syntax(path), unused)
+        fault, unused = json.loads(process.stdout.splitlines()[-1])  # config.py may also print
+        return in_words(path, fault or _syntax(path), unused)
     except (subprocess.SubprocessError, ValueError, TypeError, IndexError):
         reason = "it ends its own check, or does not come to an end: write only settings in it"
         return in_words(path, (None, reason), [])
@@ -165,7 +165,7 @@ def unused(path: Path, port: str) -> list[tuple[int, str]]:
     Returns the number and the text of each line. Call this function within posed(). port: the board's sys.platform.
     """
     defaults = default_settings()
-    found = []
+    names = []
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
         match = re.match(r"#\s*([A-Z_0-9]+) = (.*)", line)
         # Skip a setting whose default depends on the board
@@ -176,8 +176,8 @@ def unused(path: Path, port: str) -> list[tuple[int, str]]:
             chosen, default = ast.literal_eval(value), getattr(defaults, name)
             # A number in place of the default None is only an example of a pin
             if chosen != default and not (default is None and isinstance(chosen, int)):
-                found.append((number, f"{name} = {value}"))
-    return found
+                names.append((number, f"{name} = {value}"))
+    return names
 
 
 def _line_of(name: str, source: str) -> int | None:
@@ -192,7 +192,7 @@ def posed(port: str, machine: str) -> Iterator[None]:
 
     The process cannot pose as another board later, because settings.py is imported only once.
     """
-    before = sys.platform
+    platform = sys.platform
     vars(sys.implementation)["_machine"] = machine
     # The simulated board provides the module `machine`
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0), port="esp32" if port == "esp32" else "rp2"):
@@ -200,7 +200,7 @@ def posed(port: str, machine: str) -> Iterator[None]:
         try:
             yield
         finally:
-            sys.platform = before
+            sys.platform = platform
 
 
 if __name__ == "__main__":

@@ -33,8 +33,8 @@ def decoded(data: bytes) -> str:
 
 def lines(text: str) -> list[str]:
     """Split the text into the lines that Python counts. str.splitlines() would also split at a form feed or U+2028."""
-    found = re.split(r"\r\n|\r|\n", text)
-    return found if found[-1] else found[:-1]
+    parts = re.split(r"\r\n|\r|\n", text)
+    return parts if parts[-1] else parts[:-1]
 
 
 def values(text: str) -> dict[str, str]:
@@ -75,16 +75,16 @@ def with_values(text: str, wanted: dict[str, str | None]) -> str:
             if value is None:
                 written[begin:end] = [f"# {line}" for line in written[begin:end]]
             else:
-                rest = written[end - 1].encode()[node.end_col_offset or 0 :].decode()
+                tail = written[end - 1].encode()[node.end_col_offset or 0 :].decode()
                 # Keep the number of lines, because the positions of the settings below must stay the same
-                written[begin:end] = [f"{name} = {value}{rest}", *[""] * (end - begin - 1)]
+                written[begin:end] = [f"{name} = {value}{tail}", *[""] * (end - begin - 1)]
         elif value is not None:
             usual = re.compile(rf"# {name} = .*?(?=\s*#|$)")
-            at = next((i for i, line in enumerate(written) if usual.match(line)), None)
-            if at is None:
+            index = next((i for i, line in enumerate(written) if usual.match(line)), None)
+            if index is None:
                 added.append(f"{name} = {value}")
             else:
-                written[at] = f"{name} = {value}" + usual.sub("", written[at], count=1)
+                written[index] = f"{name} = {value}" + usual.sub("", written[index], count=1)
     return "\n".join([*written, *added]) + "\n"
 
 
@@ -94,14 +94,14 @@ def _assignments(text: str) -> dict[str, ast.Assign]:
         body = ast.parse(text).body
     except (SyntaxError, ValueError) as error:
         raise InputError(f"config.py cannot be read ({error}): correct it by hand") from error
-    found = {}
+    assignments = {}
     for i, node in enumerate(body):
         if i == 0 and isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             continue  # the file's docstring
         target = node.targets[0] if isinstance(node, ast.Assign) and len(node.targets) == 1 else None
         if not (isinstance(node, ast.Assign) and isinstance(target, ast.Name)) or node.col_offset:
             raise InputError(f"config.py, line {node.lineno} is not a setting NAME = VALUE: change this file by hand")
-        if target.id in found:
+        if target.id in assignments:
             raise InputError(f"config.py, line {node.lineno} sets {target.id} again: change this file by hand")
         try:
             ast.literal_eval(node.value)
@@ -109,8 +109,8 @@ def _assignments(text: str) -> dict[str, ast.Assign]:
             raise InputError(
                 f"config.py, line {node.lineno} computes {target.id}, it is not a literal: change this file by hand"
             ) from error
-        found[target.id] = node
-    return found
+        assignments[target.id] = node
+    return assignments
 
 
 def _check(name: str, value: str) -> None:

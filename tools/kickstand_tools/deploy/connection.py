@@ -120,17 +120,17 @@ class ConnectedBoard(SerialTransport):
 
     def read_until(self, min_num_bytes, ending, timeout=10, data_consumer=None, timeout_overall=None):
         """Read until the ending, as SerialTransport does. Raises TransportError for an answer of over MOST_BYTES."""
-        said, serial = bytearray(), cast(Any, self.serial)
+        received, serial = bytearray(), cast(Any, self.serial)
         began_s = heard_s = time.monotonic()
         limits: list[Any] = [math.inf if limit is None else limit * self.slower for limit in (timeout, timeout_overall)]
-        while not said.endswith(ending):
+        while not received.endswith(ending):
             now_s = time.monotonic()
             # An emulator's pseudo-terminal may not report waiting bytes. Older versions of mpremote lack is_pty.
             if piece := serial.read(1) if getattr(self, "is_pty", False) or serial.inWaiting() > 0 else b"":
-                said += piece
+                received += piece
                 self.heard = (self.heard + piece)[-_HEARD_BYTES:]
                 heard_s = now_s
-                if len(said) > MOST_BYTES:
+                if len(received) > MOST_BYTES:
                     raise TransportError("the answer does not end")
                 if data_consumer:
                     data_consumer(piece)
@@ -138,7 +138,7 @@ class ConnectedBoard(SerialTransport):
                 break
             else:
                 self.wait(_POLL_S)
-        return bytes(said)
+        return bytes(received)
 
 
 class _EmulatedBoard(ConnectedBoard):
@@ -196,12 +196,12 @@ def connected(
         _enter_raw_prompt(transport, name, before)
         yield transport, name
     except TransportExecError as error:
-        said = last_line(error.error_output)
-        if damaged(said):
+        reason = last_line(error.error_output)
+        if damaged(reason):
             raise InputError(
-                f"{name}: the board's file system is damaged ({said}): erase its flash: {_NUKE}"
+                f"{name}: the board's file system is damaged ({reason}): erase its flash: {_NUKE}"
             ) from error
-        raise InputError(f"{name}: the board reports {said}: try again") from error
+        raise InputError(f"{name}: the board reports {reason}: try again") from error
     except TransportError as error:
         raise InputError(f"{name}: the board stopped answering: plug it in again, then repeat this") from error
     except OSError as error:
@@ -237,17 +237,17 @@ def find_port() -> str:
 
     Waits up to RETURN_S for a board, because it may be restarting."""
     until_s = time.monotonic() + RETURN_S
-    while not (found := [p for p in list_ports.comports() if p.vid in VENDORS and (p.vid, p.pid) != _DEBUG_PROBE]):
+    while not (ports := [p for p in list_ports.comports() if p.vid in VENDORS and (p.vid, p.pid) != _DEBUG_PROBE]):
         if time.monotonic() >= until_s:
             break
         time.sleep(_RETURN_POLL_S)
-    if not found:
+    if not ports:
         plug_in = "plug it in with a USB cable that carries data, put MicroPython on it if it is new, or name its port "
         raise InputError("no board found", Remedy(plug_in + "with --port"))
-    if len(found) > 1:
-        names = ", ".join(f"{p.device} ({VENDORS[p.vid]})" for p in sorted(found, key=lambda p: p.device))
+    if len(ports) > 1:
+        names = ", ".join(f"{p.device} ({VENDORS[p.vid]})" for p in sorted(ports, key=lambda p: p.device))
         raise InputError(f"several boards found: {names}", Remedy("name one with --port"))
-    return found[0].device
+    return ports[0].device
 
 
 class MayPass(InputError):
@@ -307,8 +307,8 @@ def literal(text: bytes, *shapes: Any) -> Any:
         value = literal  # not a literal, so it matches none of the shapes
     if any(_fits(value, shape) for shape in shapes):
         return value
-    shown = ascii(text[:40].decode(errors="replace").strip())
-    raise InputError(f"the board's answer {shown} makes no sense: plug it in again, then repeat this")
+    excerpt = ascii(text[:40].decode(errors="replace").strip())
+    raise InputError(f"the board's answer {excerpt} makes no sense: plug it in again, then repeat this")
 
 
 def _fits(value: Any, shape: Any) -> bool:

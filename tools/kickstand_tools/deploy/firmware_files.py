@@ -40,10 +40,10 @@ def contents(mpy: int | None, compiler: bytecode.Compiler | None = None) -> dict
     """
     files = firmware_files()
     package = {path: source for path, source in files.items() if path.startswith(PACKAGE + "/")}
-    rest = {path: source.read_bytes() for path, source in files.items() if path not in package}
+    plain_files = {path: source.read_bytes() for path, source in files.items() if path not in package}
     if mpy is None:
-        return {path: source.read_bytes() for path, source in package.items()} | rest
-    return bytecode.compiled(package, mpy, compiler) | rest
+        return {path: source.read_bytes() for path, source in package.items()} | plain_files
+    return bytecode.compiled(package, mpy, compiler) | plain_files
 
 
 def unfinished(path: str) -> str:

@@ -106,25 +106,25 @@ def flash(
             def judged_here(path: Path) -> config_check.Judged:
                 return (judge or config_check.judge)(path, *machine)
 
-            there = others.find(others.read(transport), judged_here, replace_config)
-            config = source if replace_config or there.config is None else None
+            foreign = others.find(others.read(transport), judged_here, replace_config)
+            config = source if replace_config or foreign.config is None else None
             judged = judged_here(source)
             if config and judged.fault:
                 raise InputError(judged.fault, config_check.CORRECT)
-            wanted, why_sources = _contents(transport, compiler)
+            contents, why_sources = _contents(transport, compiler)
             with contextlib.suppress(InputError):  # in another encoding it was refused above, if it was to be copied
-                wanted[CONFIG] = cleaned(source.read_bytes())
-            if not config and there.mended and there.config is not None:
-                wanted[CONFIG] = there.config
-            update = prepare(transport, wanted, bool(config) or there.mended, there)
-            if there.moves and agree:
-                agree(there.words())
+                contents[CONFIG] = cleaned(source.read_bytes())
+            if not config and foreign.mended and foreign.config is not None:
+                contents[CONFIG] = foreign.config
+            update = prepare(transport, contents, bool(config) or foreign.mended, foreign)
+            if foreign.moves and agree:
+                agree(foreign.words())
         except InputError:
             restart(transport)  # start the interrupted program again
             raise
         installed = install(transport, update, progress)
         restart(transport)
-    return FlashResult(board, name, config, there.words(), judged.unused, why_sources, installed)
+    return FlashResult(board, name, config, foreign.words(), judged.unused, why_sources, installed)
 
 
 def prepare(
@@ -165,23 +165,23 @@ def install(transport: SerialTransport, update: Update, progress: Progress | Non
         transport.fs_rmdir(folder)
     for folder in update.make_folders:
         transport.fs_mkdir(folder)
-    total, done = sum(len(data) for data in update.copy.values()), 0
-    left = update.copy
+    total, copied = sum(len(data) for data in update.copy.values()), 0
+    remaining = update.copy
     for attempt in range(_TRIES):
-        for path, data in left.items():
+        for path, data in remaining.items():
 
-            def written(count: int, _size: int, what: str = f"copying {path[1:]}", before: int = done) -> None:
+            def written(count: int, _size: int, what: str = f"copying {path[1:]}", before: int = copied) -> None:
                 if progress:
                     progress(what, min(before + count, total), total)
 
             transport.fs_writefile(unfinished(path), data, chunk_size=_CHUNK, progress_callback=written)
-            done += len(data)
-        left = _differing(transport, left)
-        if not left:
+            copied += len(data)
+        remaining = _differing(transport, remaining)
+        if not remaining:
             break
         if attempt == _TRIES - 1:
             raise InputError(
-                f"{next(iter(left))[1:]} reads back differently, {_TRIES} times: the connection loses bytes, use "
+                f"{next(iter(remaining))[1:]} reads back differently, {_TRIES} times: the connection loses bytes, use "
                 "another USB cable or port and try again; if that does not help, the flash is worn out"
             )
     for path in update.copy:
@@ -202,5 +202,5 @@ def _contents(transport: SerialTransport, compiler: bytecode.Compiler | None) ->
 
 def _differing(transport: SerialTransport, copied: dict[str, bytes]) -> dict[str, bytes]:
     """Return the files whose content on the board differs from the content that was sent."""
-    found = survey(transport).files if copied else {}
-    return {path: data for path, data in copied.items() if found.get(unfinished(path)) != fingerprint(data)}
+    files = survey(transport).files if copied else {}
+    return {path: data for path, data in copied.items() if files.get(unfinished(path)) != fingerprint(data)}

@@ -82,8 +82,8 @@ class Contents:
 def read(transport: SerialTransport) -> Contents:
     """Read the board's files, without changing anything."""
     files = survey(transport)
-    there = [path for path in (MAIN, BOOT, CONFIG) if path in files.files]
-    return Contents(files, {path: bytes(transport.fs_readfile(path)) for path in there})
+    present = [path for path in (MAIN, BOOT, CONFIG) if path in files.files]
+    return Contents(files, {path: bytes(transport.fs_readfile(path)) for path in present})
 
 
 def find(there: Contents, judge: Callable[[Path], Judged], replace_config: bool) -> Others:
@@ -101,9 +101,9 @@ def find(there: Contents, judge: Callable[[Path], Judged], replace_config: bool)
         leave.append(MAIN)
     if not installed and _does_something(there.texts.get(BOOT, b"")):
         leave.append(BOOT)
-    own, mended = there.texts.get(CONFIG), False
-    if own is not None and not (installed and replace_config):
-        config, fault = _check_config(own, judge)
+    config_text, mended = there.texts.get(CONFIG), False
+    if config_text is not None and not (installed and replace_config):
+        config, fault = _check_config(config_text, judge)
         ours = _settings_named(config)
         if installed:
             foreign = fault and not ours
@@ -111,17 +111,17 @@ def find(there: Contents, judge: Callable[[Path], Judged], replace_config: bool)
             foreign = not ours or (fault and ours < _MANY)
         if foreign and _does_something(config):
             leave.append(CONFIG)
-            own = None
+            config_text = None
         elif fault and not replace_config:
             raise InputError(fault, _CORRECT_OR_REPLACE)
         else:
-            own, mended = config, config != own
-    taken = set(there.files.files)
+            config_text, mended = config, config != config_text
+    names = set(there.files.files)
     moves = {}
     for path in leave:
-        moves[path] = _free_name(path, taken)
-        taken.add(moves[path])
-    return Others(_after_renaming(there.files, moves), moves, own, mended)
+        moves[path] = _free_name(path, names)
+        names.add(moves[path])
+    return Others(_after_renaming(there.files, moves), moves, config_text, mended)
 
 
 def _check_config(content: bytes, judge: Callable[[Path], Judged]) -> tuple[bytes, str | None]:

@@ -79,10 +79,10 @@ def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> U
         del copy[CONFIG]
     left_over = {unfinished(MAIN), unfinished(CONFIG)}  # an interrupted update leaves these files
     stale = [path for path in board.files if path in left_over or (_is_module(path) and path not in wanted)]
-    kept = board.files.keys() - set(stale)
+    existing = board.files.keys() - set(stale)
     folders = {folder for path in wanted for folder in _folders(path)}
-    empty = board.folders.difference(folders, *map(_folders, kept))
-    _refuse_in_the_way(wanted, folders, kept)
+    empty = board.folders.difference(folders, *map(_folders, existing))
+    _refuse_in_the_way(wanted, folders, existing)
     if copy or stale or empty:
         copy[MAIN] = copy.pop(MAIN, wanted[MAIN])
     in_order = dict.fromkeys([MAIN, *stale, *copy] if copy else [])

@@ -1,7 +1,9 @@
 """Reads the text files of a recording: one file, a folder or a zip, in any encoding that apps use."""
 
+import contextlib
 import gzip
 import itertools
+import re
 import struct
 import zipfile
 from collections.abc import Callable, Iterator
@@ -18,7 +20,17 @@ _EXCEL = b"\xd0\xcf\x11\xe0"  # first bytes of older Excel files; newer Excel fi
 MOST_BYTES = 250_000_000
 MOST_FILES = 10_000  # largest number of files in a folder or a zip
 LONGEST_LINE = 1_000_000  # characters in the longest line, ten times as many as a thousand columns need
-_RARE = (".json", ".jsonl", ".ndjson", ".gcsv", ".log", "")  # suffixes of tables that are read if there are no others
+_RARE = (
+    ".json",
+    ".jsonl",
+    ".ndjson",
+    ".gcsv",
+    ".log",
+    ".dat",
+    ".asc",
+    "",
+)  # suffixes of tables that are read if there are no others
+_CHINESE = re.compile(b"(?:[\xb0-\xf7][\xa1-\xfe]){2}")  # two Chinese characters in gb18030
 _BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 
 
@@ -87,19 +99,19 @@ def _contents(path: Path) -> Iterator[tuple[str, bytes]]:
             zipped = file.read(4) == b"PK\x03\x04" or path.suffix.lower() == ".zip"
         yield from _unzipped(path) if zipped else [(path.name, _unpacked_file(path))]
         return
-    whole = path.resolve()
+    resolved = path.resolve()
     # skip links that lead out of the folder
-    names = (file for file in path.rglob("*") if file.is_file() and file.resolve().is_relative_to(whole))
+    names = (file for file in path.rglob("*") if file.is_file() and file.resolve().is_relative_to(resolved))
     names = sorted(itertools.islice(names, MOST_FILES + 1))
     if len(names) > MOST_FILES:
         raise InputError(f"{path} holds over {MOST_FILES} files: give the folder of one recording")
-    inside = _tables(names, lambda file: file.relative_to(path).as_posix())
-    packed = [file for file in names if file.suffix.lower() == ".zip"]
-    if not inside and len(packed) > 1:
-        raise InputError(f"{path} holds {len(packed)} zip files: give one of them, such as {packed[0]}")
-    if not inside and packed:
-        yield from _unzipped(packed[0])
-    for file in inside:
+    tables = _tables(names, lambda file: file.relative_to(path).as_posix())
+    zips = [file for file in names if file.suffix.lower() == ".zip"]
+    if not tables and len(zips) > 1:
+        raise InputError(f"{path} holds {len(zips)} zip files: give one of them, such as {zips[0]}")
+    if not tables and zips:
+        yield from _unzipped(zips[0])
+    for file in tables:
         yield file.relative_to(path).as_posix(), _unpacked_file(file)
 
 
@@ -153,6 +165,7 @@ def _tables(files: list[Any], name_of: Callable[[Any], str]) -> list[Any]:
     """The files with the name of a table, neither hidden nor a companion file of macOS."""
     paths = [(file, PurePosixPath(name_of(file).lower().removesuffix(".gz"))) for file in files]
     paths = [(file, path) for file, path in paths if not any(part.startswith((".", "__macosx")) for part in path.parts)]
+    paths = [(file, path) for file, path in paths if not path.name.startswith(("readme", "license", "licence"))]
     usual = [file for file, path in paths if path.suffix in SUFFIXES]
     return usual or [file for file, path in paths if path.suffix in _RARE and not path.name.endswith(".cal.json")]
 
@@ -183,7 +196,8 @@ def _decoded(content: bytes) -> str:
     sample = content[:1000]
     if not encoding and sample.count(0) > len(sample) // 4:  # UTF-16 without a byte order mark: every other byte is 0
         encoding = "utf-16-le" if sample[1::2].count(0) > sample[::2].count(0) else "utf-16-be"
-    try:
-        return content.decode(encoding or "utf-8")
-    except UnicodeDecodeError:
-        return content.decode("cp1252", errors="replace")  # Windows may write a degree sign in this encoding
+    # Windows may write a degree sign in cp1252, and Chinese in gb18030
+    for name in (encoding or "utf-8", *(["gb18030"] if _CHINESE.search(content) else [])):
+        with contextlib.suppress(UnicodeDecodeError):
+            return content.decode(name)
+    return content.decode("cp1252", errors="replace")

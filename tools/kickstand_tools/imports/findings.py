@@ -12,7 +12,8 @@ it.
 
 import difflib
 import re
-from collections.abc import Iterable, Sequence
+import struct
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,21 +30,27 @@ from .units import (
     COUNTS_PER_G,
     DATES,
     MOMENT,
-    NO_TIME,
+    RARE_ACCELERATIONS,
+    RARE_RATES,
     RATES,
+    REPEATED,
     SPEEDS,
     TIME_NAME,
     TIMES,
+    Nanoseconds,
     counts_per,
+    factor,
+    of_day,
     since_first_s,
+    tick_ns,
     time_unit,
     unit,
-    unwrapped,
 )
 
 ACCEL, GYRO = ("ax", "ay", "az"), ("gx", "gy", "gz")
 REQUIRED = ("t", *ACCEL, *GYRO)
 OPTIONAL = ("speed", "lat", "lon", "temp")
+LATITUDE, LONGITUDE = r"^lat(?!er)|latitude", r"^lon(?!gi?t?u?d?i?n?al|gacc)|^lng|longitude"
 _KINDS = {  # kinds of sensors, by the words in their columns' names
     "linear": r"lin|user|withoutgravity|nograv",
     "gravity": r"^(?!.*(incl|with)).*grav",
@@ -57,7 +64,7 @@ _AXES = {"longitudinal": "x", "inline": "x", "long": "x", "roll": "x", "beta": "
 _AXES |= {"pitch": "y", "gamma": "y", "vertical": "z", "vert": "z", "yaw": "z", "alpha": "z"}
 # Scales above the rows: seconds per count, g per count, rad/s per count, counts per g
 _SCALE = re.compile(
-    r'^\W*(tscale|ascale|gscale|gyro_?scale|acc_?1g)"?[,;:=\s]+"?(\d*\.?\d+(?:[eE][+-]?\d+)?)',
+    r'^\W*(tscale|ascale|gscale|gyro_?scale|acc_?1g)"?[,;:=\s]+"?(0x[0-9a-f]{8}|\d*\.?\d+(?:[eE][+-]?\d+)?)',
     re.IGNORECASE | re.MULTILINE,
 )
 _SAMPLE_RATE = re.compile(r"(?:rate|frequency|sampl\w*)[^\d\n]*(\d+(?:\.\d+)?)\W*hz", re.IGNORECASE)
@@ -70,8 +77,9 @@ NOISE_DPS = 0.1  # standard deviation of a gyro at rest
 # Length of the mean acceleration, divided by the mean length of the accelerations. Without gravity the ratio is smaller
 # than this.
 LINEAR = 0.35
-_SLOWEST_S, _QUICKEST_S = 1.0, 1e-4  # limits of the time between samples
+_SLOWEST_S = 1.0  # longest usual time between samples
 DOUBTED_HZ, DOUBTED_S, DOUBTED_ROWS = 1000.0, 10.0, 2000  # more samples per second, or so many rows in less time
+_USUAL_HZ = 4.0, 50.0, 600.0  # lowest, middle and highest usual rate of samples, if the unit of the time is doubted
 
 
 @dataclass
@@ -124,8 +132,8 @@ class Findings:
         """The units by "t", "a", "g" and "speed", and of single axes whose name has another unit."""
         units = {key: finding.unit for key, finding in self.found.items() if finding.unit}
         for axes, kinds in ((ACCEL, ACCELERATIONS), (GYRO, RATES)):
-            own = {axis: stated_unit(self.columns[axis]) for axis in axes if axis in self.columns}
-            units |= {axis: name for axis, name in own.items() if name in kinds and len(set(own.values())) > 1}
+            stated = {axis: stated_unit(self.columns[axis]) for axis in axes if axis in self.columns}
+            units |= {axis: name for axis, name in stated.items() if name in kinds and len(set(stated.values())) > 1}
         return units
 
     @property
@@ -152,7 +160,7 @@ def find(sheet: Sheet) -> Findings:
             findings.single |= _single(sheet, key, kind)
     used = [name for finding in findings.found.values() for name in finding.columns]
     speed = _speed(sheet, used)
-    lat, lon = (_find_by_name(sheet, words, used) for words in ("^lat|latitude", "^lon|^lng|longitude"))
+    lat, lon = (_find_by_name(sheet, words, used) for words in (LATITUDE, LONGITUDE))
     if lat is not None and lon is not None:
         findings.found |= {"lat": lat, "lon": lon}
     if speed is not None:
@@ -166,74 +174,78 @@ def find(sheet: Sheet) -> Findings:
 def _time(sheet: Sheet) -> ColumnFinding | None:
     """The column of the time, which must increase. Among several such columns, columns named like a time are preferred,
     then the column with the finest steps."""
-    usable = []
+    usable: list[tuple[tuple[bool | int, ...], Nanoseconds]] = []
     for place, name in enumerate(sheet.columns):
         named = bool(TIME_NAME.search(plain(name.rpartition(":")[2])))
-        stated = stated_unit(name) if stated_unit(name) in TIMES else ""
-        values = sheet.cells[place]
-        if not (named or stated) and values.dtype.kind == "O" and not MOMENT.fullmatch(str(values[0])):
+        stated = stated_unit(name) if tick_ns(stated_unit(name)) else ""
+        cells = sheet.cells[place]
+        if not (named or stated) and cells.dtype.kind == "O" and not MOMENT.fullmatch(str(cells[0])):
             continue
         try:
-            text = time_unit(values) == DATES
-            ns = sheet.times(place, stated)
+            text = time_unit(cells, stated) == DATES
+            time_ns = sheet.times(place, stated)
         except InputError:
             continue
-        good = ns[ns != NO_TIME].astype(float)
-        steps = np.diff(good[:: -1 if named and len(good) and good[-1] < good[0] else 1])  # newest first
-        if len(steps) < 2 or np.mean(steps >= 0.0) < 0.95 or np.sum(steps) <= 0.0:
+        valid = time_ns[time_ns > REPEATED]
+        steps = np.diff(valid[:: -1 if named and len(valid) and valid[-1] < valid[0] else 1])  # newest first
+        if len(steps) < 2 or np.mean(steps >= 0) < 0.95 or not np.any(steps > 0):
             continue
         if not named and (_COUNTER.match(plain(name)) or np.all(np.diff(sheet.numbers(place)) == 1.0)):
             continue  # the column only numbers the rows
-        usable.append((named, len(np.unique(good)) > 0.5 * len(good), not text, -place))
+        finest = len(np.unique(valid)) > 0.5 * len(valid)
+        usable.append(((named, finest, bool(np.all(steps >= 0)), not text, -place), valid))
     if not usable:
         return None
-    place = -max(usable)[3]
-    name, numbers = sheet.columns[place], sheet.numbers(place)
-    if time_unit(sheet.cells[place]) == DATES:
+    merits, valid = max(usable, key=lambda column: column[0])
+    name, cells = sheet.columns[-merits[-1]], sheet.cells[-merits[-1]]
+    stated = stated_unit(name) if tick_ns(stated_unit(name)) else ""
+    unit_name = time_unit(cells, stated)
+    if unit_name == DATES:
         return ColumnFinding([name], "", "dates or times of day")
-    step, stated, rate = _mean_step(numbers), stated_unit(name), _SAMPLE_RATE.search(sheet.head)
-    fitting = [key for key, size in TIMES.items() if rate and 0.9 < step * size * float(rate[1]) / 1e9 < 1.1]
+    low, high = np.percentile(valid, (10.0, 90.0))
+    step = float(high - low) / max(0.8 * len(valid), 1.0) / tick_ns(unit_name)  # mean, in units
+    rate = _SAMPLE_RATE.search(sheet.head)
+    fitting = [key for key in _CLOCK_UNITS if rate and 0.9 < step * tick_ns(key) * float(rate[1]) / 1e9 < 1.1]
     above = _scales(sheet).get("t", "") or next(iter(fitting), "")
-    unit_name = above or (stated if stated in TIMES else "") or time_unit(sheet.cells[place])
-    step_s = step * TIMES[unit_name] / 1e9
+    unit_name = above or unit_name
+    step_s = step * tick_ns(unit_name) / 1e9
     why = f"in {unit_name} there are {1.0 / max(step_s, 1e-9):.3g} samples per second"
-    doubted = step_s * DOUBTED_HZ < 1.0 or (len(numbers) >= DOUBTED_ROWS and step_s * len(numbers) < DOUBTED_S)
+    doubted = step_s * DOUBTED_HZ < 1.0 or (len(cells) >= DOUBTED_ROWS and step_s * len(cells) < DOUBTED_S)
     if doubted or step_s > _SLOWEST_S:
-        usual = (key for key in ("s", "ms", "us", "min", "h", "d") if 1e9 / DOUBTED_HZ < step * TIMES[key] < 1e9)
-        return ColumnFinding([name], next(usual, unit_name), f"{why}, which is doubtful", False)
-    if above or unit_name == stated:
+        rates = {key: 1e9 / (max(step, 1e-12) * tick_ns(key)) for key in TIMES}
+        usual = [key for key, hz in rates.items() if _USUAL_HZ[0] < hz < _USUAL_HZ[2]]
+        likely = min(usual, key=lambda key: abs(np.log(rates[key] / _USUAL_HZ[1])), default=stated or "?")
+        return ColumnFinding([name], likely if doubted or not stated else stated, f"{why}, which is doubtful", False)
+    if above or stated:
         why = "the lines above the rows say so" if above else f"{name} says {unit_name}"
     return ColumnFinding([name], unit_name, why + (": at least 20 are needed" if step_s * 19.5 > 1.0 else ""))
 
 
+_CLOCK_UNITS = [*TIMES, "0.1ms", "10ms"]
+
+
 def _scales(sheet: Sheet) -> dict[str, str]:
     """The units that the lines above the rows give, by "t", "a" and "g"."""
-    found: dict[str, str] = {}
+    scales: dict[str, str] = {}
     for key, text in _SCALE.findall(sheet.head):
-        scale, kind = float(text), key[0].lower()
+        # Betaflight writes the bits of a 32-bit float
+        scale = struct.unpack(">f", bytes.fromhex(text[2:]))[0] if text.startswith("0x") else float(text)
+        kind = key[0].lower()
         if kind == "t":
-            found["t"] = _time_unit_of(scale)
+            named = (name for name, ns in TIMES.items() if abs(ns - 1e9 * scale) < 1e6 * scale)
+            scales["t"] = next(named, f"{scale:g}s")
         elif scale > 0.0:
-            counts = scale if key.lower().endswith("1g") else 1.0 / (np.degrees(scale) if kind == "g" else scale)
-            found[kind] = f"counts/{counts:.6g}"
-    return found
-
-
-def _time_unit_of(seconds: float) -> str:
-    return next((name for name, size in TIMES.items() if abs(size / 1e9 - seconds) < 1e-3 * seconds), "")
-
-
-def _mean_step(numbers: Array) -> float:
-    good = unwrapped(numbers[np.isfinite(numbers)])
-    low, high = np.percentile(good, (10.0, 90.0))
-    return float(high - low) / max(0.8 * len(good), 1.0)
+            degrees = 1.0 if text.startswith("0x") and scale > 0.99 else np.degrees(1.0)
+            counts = scale if key.lower().endswith("1g") else 1.0 / (scale * (degrees if kind == "g" else 1.0))
+            scales[kind] = f"counts/{counts:.6g}"
+    return scales
 
 
 def _seconds(sheet: Sheet, time: ColumnFinding | None) -> Array | None:
     """Return the seconds since the first time, shape (n), or None without a time column."""
     if time is None:
         return None
-    return since_first_s(sheet.times(sheet.columns.index(time.columns[0]), time.unit))
+    return since_first_s(sheet.times(sheet.columns.index(time.columns[0]), time.unit.strip("?")))
 
 
 # Groups of three
@@ -253,18 +265,8 @@ def completed(sheet: Sheet) -> Sheet:
     """Complete columns that belong together: seconds and their fractions, axes that are in several rows, and the user's
     acceleration and gravity."""
     names = [plain(name) for name in sheet.columns]
-    scale = next((float(text) for key, text in _SCALE.findall(sheet.head) if key.lower() == "tscale"), 0.0)
-    if scale and not _time_unit_of(scale):
-        sheet.columns[0], sheet.cells[0] = f"{sheet.columns[0]} (s)", sheet.numbers(0) * scale
-    for fraction, size in _FRACTIONS.items():
-        k = next((k for k, name in enumerate(names) if k and name.removesuffix("s").endswith(fraction)), 0)
-        if k and re.search(r"secs?$|seconds?$|stamp$|time$", names[k - 1]) and names[k - 1] != names[k]:
-            whole, part = sheet.cells[k - 1], sheet.numbers(k)
-            if whole.dtype.kind == "i" and np.all((part >= 0.0) & (part * size < 10**9)):
-                part_ns = (part * size).astype(np.int64)
-                sheet.columns.append(f"time {sheet.columns[k - 1]} + {sheet.columns[k]} (ns)")
-                sheet.cells.append(whole.astype(np.int64) * 10**9 + part_ns)
-                break
+    _add_time(sheet, names)
+    _sign_positions(sheet, names)
     threes = {three.kind: three for three in reversed(_find_triples(sheet))}
     for three in threes.values():
         if not np.any(np.all(np.isfinite(three.values), axis=1)):
@@ -283,7 +285,53 @@ def completed(sheet: Sheet) -> Sheet:
 
 # The ends of names of columns with fractions of a second, without a plural s, and the ns of their unit
 _FRACTIONS = {"nsec": 1, "nanosec": 1, "nanosecond": 1, "usec": 1000, "microsecond": 1000, "msec": 10**6}
-_FRACTIONS |= {"millisecond": 10**6, "milli": 10**6}
+_FRACTIONS |= {"millisecond": 10**6, "milli": 10**6, "m": 10**6}
+
+
+def _add_time(sheet: Sheet, names: Sequence[str]) -> None:
+    """Add the time of a clock in several columns: of hours, minutes and seconds, of whole seconds and their fraction.
+
+    names: the columns' names by plain()."""
+    for k, name in enumerate(names[:-1]):
+        last = k
+        if [part[:1] for part in names[k : k + 3]] == ["h", "m", "s"] and all(map(_PART.fullmatch, names[k : k + 3])):
+            hours, minutes, seconds = (sheet.numbers(k + part) for part in range(3))
+            time_ns, last = of_day(10_000.0 * hours + 100.0 * minutes + seconds), k + 2
+        elif re.search(r"secs?$|seconds?$|stamp$|time$|clock$", name) and sheet.cells[k].dtype.kind in "iO":
+            try:
+                time_ns = sheet.times(k, "s" if sheet.cells[k].dtype.kind == "i" else "")
+            except InputError:
+                continue
+        else:
+            continue
+        after = names[last + 1].removesuffix("s") if last + 1 < len(names) else ""
+        size = next((ns for ending, ns in _FRACTIONS.items() if after.endswith(ending)), 0)
+        fraction = np.nan_to_num(sheet.numbers(last + 1)) * size if size else np.zeros(len(time_ns))
+        if (size and np.any(time_ns[time_ns > REPEATED] % 10**9)) or np.any((fraction < 0) | (fraction >= 1e9)):
+            continue
+        if size or last > k:
+            sheet.columns.append(f"time {' + '.join(sheet.columns[k : last + 1 + (size > 0)])} (ns)")
+            sheet.cells.append(np.where(time_ns > REPEATED, time_ns + fraction.astype(np.int64), time_ns))
+            return
+
+
+_PART = re.compile(r"h(our|r)?s?|m(in|inute)?s?|s(ec|econd)?s?")
+
+
+def _sign_positions(sheet: Sheet, names: Sequence[str]) -> None:
+    """Give positions their signs: south and west are negative. The letter is in the same cell or in its own column."""
+    for words, letters in ((LATITUDE, "NS"), (LONGITUDE, "EW")):
+        place = next((k for k, name in enumerate(names) if re.search(words, name)), None)
+        if place is None:
+            continue
+        for k in dict.fromkeys((place, place + 1, *range(len(names)))):
+            texts = as_text(sheet.cells[k]) if k < len(names) and sheet.cells[k].dtype.kind == "O" else []
+            marks = {mark for text in texts for mark in re.findall("[A-Za-z]+", text)}
+            if marks and marks <= set(letters):
+                numbers = [re.sub("[^0-9.]", "", text) for text in as_text(sheet.cells[place])]
+                signs = np.array([-1.0 if letters[1] in text else 1.0 for text in texts])
+                sheet.cells[place] = signs * np.array([float(number or "nan") for number in numbers])
+                break
 
 
 def _merge_rows(sheet: Sheet, three: _Triple) -> None:
@@ -303,24 +351,23 @@ def _find_triples(sheet: Sheet) -> list[_Triple]:
             while axis in stems.setdefault(stem, {}):
                 stem += " "  # another sensor with the same names
             stems[stem][axis] = place
-    found, used = [], set()
+    triples: list[_Triple] = []
+    used: set[int] = set()
     for stem, axes in stems.items():
-        groups = ["xyz"] if set("xyz") <= set(axes) else _numbered(axes)
-        for axes_of_one in groups:
-            places = [axes[axis] for axis in axes_of_one]
-            if _kind(stem) in ("accel", "gyro", "either") and not _numeric(sheet, places):
+        for group in ["xyz"] if set("xyz") <= set(axes) else _numbered(axes):
+            places = [axes[axis] for axis in group]
+            stated = stated_unit(sheet.columns[places[0]])
+            by_unit = "gyro" if _is_of(RATES, stated) else "accel" if _is_of(ACCELERATIONS, stated) else ""
+            kind = _kind(stem) or by_unit
+            if kind in ("accel", "gyro", "either") and not _numeric(sheet, places):
                 cell = next((cell for place in places for cell in as_text(sheet.cells[place]) if cell), "")
                 sheet.unread = (
                     f"its columns {', '.join(sheet.columns[k] for k in places)} hold no numbers ({cell[:20]!a})"
                 )
             if not used & set(places) and _numeric(sheet, places):
                 used |= set(places)
-                said = stated_unit(sheet.columns[places[0]])
-                kind = _kind(stem) or ("gyro" if said in RATES else "accel" if said in ACCELERATIONS else "")
-                found.append(_Triple(stem, places, kind, sheet.table(places)))
-    if not found:
-        found = _side_by_side(sheet)
-    return found
+                triples.append(_Triple(stem, places, kind, sheet.table(places)))
+    return triples or _side_by_side(sheet)
 
 
 def _single(sheet: Sheet, key: str, kind: str) -> dict[str, str]:
@@ -342,15 +389,20 @@ def _numbered(axes: dict[str, int]) -> list[list[str]]:
 
 
 def _side_by_side(sheet: Sheet) -> list[_Triple]:
-    """Two groups for columns without meaningful names: the first six adjacent columns that are not a time."""
+    """Groups of three adjacent columns without meaningful names, of which one contains gravity if possible."""
     numeric = [
         place
         for place, name in enumerate(sheet.columns)
         if _numeric(sheet, [place]) and not TIME_NAME.search(plain(name)) and not _increasing(sheet, place)
-        if np.nanstd(sheet.numbers(place)) > 0.0 and not _KNOWN.search(plain(name))
+        if len(np.unique(sheet.numbers(place))) > 3 and not _KNOWN.search(plain(name))
     ]
-    runs = [numeric[k : k + 3] for k in range(0, len(numeric) - 2, 3)] if len(numeric) > 5 else []
-    return [_Triple("", run, "", sheet.table(run)) for run in runs if run[2] - run[0] == 2]
+    runs = [numeric[k : k + 3] for k in range(len(numeric) - 2)] if len(numeric) > 5 else []
+    for shift in range(3):  # where the groups begin
+        beside = [run for run in runs[shift::3] if run[2] - run[0] == 2]
+        triples = [_Triple("", run, "", sheet.table(run)) for run in beside]
+        if any(_has_gravity(triple, None, near=True) for triple in triples):
+            return triples
+    return [_Triple("", run, "", sheet.table(run)) for run in runs[::3] if run[2] - run[0] == 2]
 
 
 _KNOWN = re.compile(r"speed|velocity|lat|lon|lng|alt|height|lean|angle|heading|temp|sat|acc")
@@ -362,41 +414,54 @@ def _increasing(sheet: Sheet, place: int) -> bool:
     return len(steps) > 2 and bool(np.mean(steps >= 0.0) > 0.95 and np.any(steps > 0.0))
 
 
-def _split_axis(name: str) -> Iterable[tuple[str, str]]:
+def _split_axis(name: str) -> Iterator[tuple[str, str]]:
     """Yield (name without its axis, axis) for each way to find an axis in a name."""
-    bare = _without_unit(name)
-    sensor, colon, bare = bare.rpartition(":")
+    sensor, colon, bare = _without_unit(name).rpartition(":")
     words = re.sub(r"axis|[\W_]+", " ", bare.lower()).split()
     sensor = plain(sensor) + (":" if colon else "")
-    if len(words) == 1:  # LongAcc, accLat
-        word = next((word for word in _AXES if words[0].startswith(word) or words[0].endswith(word)), "")
-        words = [word, words[0].replace(word, "", 1)] if word and word != words[0] else words
+    if words in (["p"], ["q"], ["r"]):  # rates about x, y and z in flight mechanics
+        yield f"{sensor}omega", "xyz"["pqr".index(words[0])]
+        return
+    for k, word in enumerate(words):  # LongAcc, accLat
+        part = next((part for part in _AXES if word.startswith(part) or word.endswith(part)), word)
+        words[k : k + 1] = [word] if part == word else [part, word.replace(part, "", 1)]
     for k, word in enumerate(words):
-        rest = " ".join(words[:k] + words[k + 1 :])
+        others = " ".join(words[:k] + words[k + 1 :])
         axis = word if word in ("x", "y", "z") else _AXES.get(word, "")
-        if axis and (rest or word == axis):
-            yield sensor + rest, axis
+        if axis and (others or word == axis):
+            yield sensor + others, axis
             return
-    whole, head, last = "".join(words), " ".join(words[:-1]), words[-1] if words else ""
-    head += " " if head else ""
-    if len(whole) > 1 and last[-1] in "xyz" and not (len(whole) > 6 and whole.endswith(("accuracy", "velocity"))):
-        yield sensor + (head + last[:-1]).strip(), last[-1]
-    elif len(whole) > 1 and whole[0] in "xyz":
-        yield sensor + whole[1:], whole[0]
-    elif (match := re.fullmatch(r"(.*?)(\d{1,2})", whole)) and (colon or not bare.startswith("#")):
+    joined = "".join(words)
+    for k, word in reversed(list(enumerate(words))):  # accx, or ax before the name of a sensor
+        last = k == len(words) - 1
+        if len(joined) > 1 and word[-1] in "xyz" and not _NO_AXIS.search(word) and (last or len(word) == 2):
+            yield sensor + " ".join([*words[:k], word[:-1], *words[k + 1 :]]).strip(), word[-1]
+            return
+    if len(joined) > 1 and joined[0] in "xyz":
+        yield sensor + joined[1:], joined[0]
+    elif (match := re.fullmatch(r"(.*?)(\d{1,2})", joined)) and (colon or not bare.startswith("#")):
         yield sensor + match[1], match[2]
+
+
+_NO_AXIS = re.compile(r"..(acy|ity|ncy)$")  # accuracy, velocity, frequency
 
 
 def _without_unit(name: str) -> str:
     """A name without its unit. The unit is in brackets at the end, or after the last _."""
-    bare = re.sub(r"[(\[]([^)\]]*)[)\]]\s*$", lambda found: "" if _is_unit(found[1]) else " " + found[1], name)
+    bare = re.sub(r"[(\[]([^)\]]*)[)\]]\s*$", lambda bracket: "" if _is_unit(bracket[1]) else " " + bracket[1], name)
     head, mark, last = bare.rpartition("_")
     return head if mark and _is_unit(last) and len(head) > 1 else bare
 
 
+def _is_of(units: dict[str, float], name: str) -> bool:
+    """True if a unit is one of ACCELERATIONS or RATES, or a rare one of the same kind."""
+    return name in units or name in (RARE_RATES if units is RATES else RARE_ACCELERATIONS)
+
+
 def _is_unit(text: str) -> bool:
-    known = unit(text)
-    return known in (*ACCELERATIONS, *RATES, *SPEEDS, *TIMES, "counts") or bool(counts_per(text))
+    name = unit(text)
+    in_tables = name in (*SPEEDS, "counts") or _is_of(ACCELERATIONS, name) or _is_of(RATES, name)
+    return in_tables or tick_ns(name) > 0 or bool(counts_per(text)) or "/" in text
 
 
 def stated_unit(name: str) -> str:
@@ -407,9 +472,11 @@ def stated_unit(name: str) -> str:
         return in_brackets
     if "_" in name and _is_unit(last):
         return last
-    for word, known in (("milli", "ms"), ("micro", "us"), ("nano", "ns"), ("minutes", "min"), ("hours", "h")):
+    if "gyroadc" in bare:  # Betaflight
+        return "deg/s"
+    for word, unit_name in (("milli", "ms"), ("micro", "us"), ("nano", "ns"), ("minutes", "min"), ("hours", "h")):
         if word in bare:
-            return known
+            return unit_name
     if bare.endswith("ms"):
         return "ms"
     return unit(bare) if unit(bare) in TIMES else ""
@@ -431,16 +498,18 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
     """Add the accelerometer and the gyro to findings, and note what is missing."""
     threes = _find_triples(sheet)
     kinds = {kind: [three for three in threes if three.kind == kind] for kind in (*_KINDS, "")}
-    unnamed, scales = [*kinds["either"], *kinds[""]], _scales(sheet)
+    scales = _scales(sheet)
     possible = [*kinds["accel"], *kinds["either"], *([] if kinds["accel"] else kinds[""])]
     without = kinds["linear"] or kinds["accel"]
     accel = _first_with_gravity(possible, seconds)
     accel = accel or next((three for three in kinds["linear"] if _has_gravity(three, seconds, near=True)), None)
-    accel = accel or next((three for three in kinds["accel"] if not _is_linear(three, seconds)), None)
     exchanged = None if accel else _first_with_gravity(kinds["gyro"], seconds)
-    rates = _partner(accel, kinds["gyro"]) or _partner(accel, [three for three in unnamed if three is not accel])
+    accel = accel or exchanged or next((three for three in kinds["accel"] if not _is_linear(three, seconds)), None)
+    unnamed = [three for three in (*kinds["either"], *kinds[""]) if three is not accel]
+    others = [three for three in unnamed if accel is None or not _is_second(three, accel, seconds)]
+    rates = _partner(accel, kinds["gyro"]) or _partner(accel, others)
     if exchanged is not None and without:
-        accel, rates = exchanged, without[0]
+        rates = without[0]
     if accel is None:
         lost = "gravity in its acceleration" if without else "acceleration"
         findings.lacking.append(lost)
@@ -460,9 +529,11 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
     names = _names(sheet, rates)
     findings.found["g"] = ColumnFinding(names, stated_unit(names[0]), "by name", False)
     if accel is not None:
-        found = gyro(accel.values, rates.values, findings.found["a"], seconds, scales.get("g") or stated_unit(names[0]))
-        found.columns = names
-        findings.found["g"] = found
+        of_gyro = gyro(
+            accel.values, rates.values, findings.found["a"], seconds, scales.get("g") or stated_unit(names[0])
+        )
+        of_gyro.columns = names
+        findings.found["g"] = of_gyro
 
 
 def _partner(accel: _Triple | None, gyros: Sequence[_Triple]) -> _Triple | None:
@@ -503,6 +574,12 @@ def _has_gravity(three: _Triple, seconds: Array | None, near: bool) -> bool:
     return float(np.std(means)) / length < (0.25 if near else 0.02)
 
 
+def _is_second(three: _Triple, accel: _Triple, seconds: Array | None) -> bool:
+    """True for another accelerometer beside accel: its values are as long, and contain gravity."""
+    lengths = [float(np.nanmedian(np.linalg.norm(each.values, axis=1))) for each in (three, accel)]
+    return 1.0 / NEAR < lengths[0] / max(lengths[1], 1e-9) < NEAR and _has_gravity(three, seconds, near=True)
+
+
 def _is_linear(three: _Triple, seconds: Array | None) -> bool:
     """True if the mean of the values over some seconds is short, because they do not contain gravity."""
     values = three.values[np.all(np.isfinite(three.values), axis=1)]
@@ -540,13 +617,13 @@ def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> Col
     values: the accelerations, shape (n, 3). stated: the unit in the names of their columns.
     """
     length = calm_length(values, seconds)
-    whole = _are_whole(values)
-    gravities = {name: size for name, size in _gravities().items() if whole or not name.startswith("counts")}
+    counts = _are_whole(values)
+    gravities = {name: size for name, size in _gravities().items() if counts or not name.startswith("counts")}
     near = min(gravities, key=lambda name: abs(np.log(length / gravities[name])))
     why = f"gravity at rest is {length:.4g} long"
-    if counts_per(stated):
-        gravities[stated] = counts_per(stated)
-    most = NEAR if whole else LEANT
+    if counts_per(stated) or stated in RARE_ACCELERATIONS:
+        gravities[stated] = 1.0 / factor(stated, ACCELERATIONS, "a")
+    most = NEAR if counts else LEANT
     if stated in gravities and 1.0 / NEAR < length / gravities[stated] < most:
         return ColumnFinding([], stated, f"{why}, as its name says")
     if near.startswith("counts"):
@@ -568,9 +645,9 @@ def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None
     fit = RateFit() if seconds is None else fit_rates(seconds, force, rates)
     candidates = gyro_units(rates, accel)
     by_fit = fit.unit_among(candidates)
-    if stated in RATES or counts_per(stated):
+    if _is_of(RATES, stated) or counts_per(stated):
         also = f", and so do the turns of gravity: {by_fit}" if by_fit == stated else ""
-        size = RATES.get(stated) or 1.0 / counts_per(stated)
+        size = factor(stated, RATES, "g")
         apart = by_fit and not 0.7 < candidates[by_fit] / size < 1.4
         against = f", but gravity turns as by {by_fit}" if apart else ""
         return ColumnFinding([], stated, f"its name says so{also}{against}", not against)
@@ -603,9 +680,9 @@ def _by_size(rates: Array, force: Array) -> tuple[str, str]:
     good = rates[np.all(np.isfinite(rates), axis=1)]
     length = np.linalg.norm(good - np.median(good, axis=0), axis=1)
     most, noise = float(np.percentile(length, 90.0)), float(np.median(np.std(good, axis=0)))
-    whole = float(np.median(np.linalg.norm(force[np.all(np.isfinite(force), axis=1)], axis=1)))
-    moved = float(np.max(np.std(force[np.all(np.isfinite(force), axis=1)], axis=0))) / max(whole, 1e-9)
-    if moved < 0.02:  # the sensor is at rest
+    length_force = float(np.median(np.linalg.norm(force[np.all(np.isfinite(force), axis=1)], axis=1)))
+    unrest = float(np.max(np.std(force[np.all(np.isfinite(force), axis=1)], axis=0))) / max(length_force, 1e-9)
+    if unrest < 0.02:  # the sensor is at rest
         near = min(RATES, key=lambda name: abs(np.log(max(noise, 1e-9) * RATES[name] / NOISE_DPS)))
         return near, f"its noise at rest is {noise:.2g}"
     if most > 1000.0:

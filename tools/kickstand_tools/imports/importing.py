@@ -79,6 +79,14 @@ class ImportSign(Message):
     )
 
 
+class ImportTurned(Message):
+    """The sign of the accelerations of a table is changed, because the track shows that it is -1 g up."""
+
+    code = "import-turned"
+    text = "by the turns of the track, up reads -1 g, so the sign of the accelerations is changed"
+    todo = Remedy("if latitude and longitude are exchanged or without their sign, the lean is mirrored: leave them out")
+
+
 @dataclass(eq=False)
 class Imported:
     """An imported recording.
@@ -105,9 +113,9 @@ class Imported:
     @property
     def shortfalls(self) -> list[Message]:
         """The reasons why the recording gives no alignment: too few samples per second, or too short."""
-        found: list[Message] = [ImportSlow(self.rate_hz)] if self.rate_hz < LEAST_HZ else []
+        notices: list[Message] = [ImportSlow(self.rate_hz)] if self.rate_hz < LEAST_HZ else []
         lasts_s = float(self.log.t_s[-1])
-        return found + ([ImportShort(lasts_s, MIN_RIDING_S)] if lasts_s < MIN_RIDING_S else [])
+        return notices + ([ImportShort(lasts_s, MIN_RIDING_S)] if lasts_s < MIN_RIDING_S else [])
 
     @property
     def gaps_s(self) -> Array:
@@ -194,21 +202,21 @@ def write_imported(path: Path | str, imported: Imported) -> None:
 def _recording(
     files: list[RecordingFile], name: str, columns: Mapping[str, str] | None, units: dict[str, str]
 ) -> AppRecording:
-    found = recordings(files)
+    groups = recordings(files)
     if columns is not None:
         return mapped.read_mapped(mapped.sheet_of(files, name, columns), columns, units)
-    if not found:
+    if not groups:
         table = mapped.table_in(files)
         mapped.check_units(units)
         recording = None if table is None else mapped.read_table(table, units)
         if recording is None:
             raise mapped.unknown(files, name, table)
         return recording
-    if len(found) > 1:
-        which = ", ".join(group[0].folder or group[0].name for _, group in found[:4])
-        more = ", ..." if len(found) > 4 else ""
-        raise InputError(f"{name} holds {len(found)} recordings ({which}{more}): give one of them")
-    app, group = found[0]
+    if len(groups) > 1:
+        which = ", ".join(group[0].folder or group[0].name for _, group in groups[:4])
+        more = ", ..." if len(groups) > 4 else ""
+        raise InputError(f"{name} holds {len(groups)} recordings ({which}{more}): give one of them")
+    app, group = groups[0]
     asked = getattr(app, "ASKS", frozenset[str]())
     recording = app.read(group, name, units) if asked else app.read(group, name)
     asked = asked or (frozenset() if recording.sign_known else {"a"})
@@ -225,13 +233,13 @@ def _recording(
 def recordings(files: list[RecordingFile]) -> list[tuple[Any, list[RecordingFile]]]:
     """Return the recordings among some files, each as (module, files of the recording). The module is in apps/, and its
     NAME is the app's name."""
-    found, left = [], files
+    groups, unclaimed = [], files
     for app in _APPS:
-        for group in app.find_recordings(left):
-            found.append((app, group))
-        claimed = {id(file) for _, group in found for file in group}
-        left = [file for file in left if id(file) not in claimed]
-    return found
+        for group in app.find_recordings(unclaimed):
+            groups.append((app, group))
+        claimed = {id(file) for _, group in groups for file in group}
+        unclaimed = [file for file in unclaimed if id(file) not in claimed]
+    return groups
 
 
 def _check_sign(recording: AppRecording, log: Log) -> None:
@@ -249,6 +257,8 @@ def _check_sign(recording: AppRecording, log: Log) -> None:
     else:
         log.accel_g = -log.accel_g
         _note_sign(recording, "-1 g up, by the turns of the track: sign turned")
+        if recording.app == mapped.NAME:
+            recording.notices.append(ImportTurned())
 
 
 def _note_sign(recording: AppRecording, sign: str) -> None:

@@ -36,23 +36,23 @@ def join(recording: AppRecording, name: str) -> tuple[Log, int]:
     accel = in_order(recording.accel, name)
     gyro = in_order(recording.gyro, name)
     rates = on_clock(gyro, accel.time_ns, _period_ns(accel))
-    there = np.all(np.isfinite(rates), axis=1)
-    past = np.any(np.abs(accel.values) > MOST_G, axis=1) | np.any(np.abs(np.nan_to_num(rates)) > MOST_DPS, axis=1)
-    if np.count_nonzero(past) > MANY * len(past):
+    valid = np.all(np.isfinite(rates), axis=1)
+    impossible = np.any(np.abs(accel.values) > MOST_G, axis=1) | np.any(np.abs(np.nan_to_num(rates)) > MOST_DPS, axis=1)
+    if np.count_nonzero(impossible) > MANY * len(impossible):
         raise InputError(f"{name}: its readings are past any sensor's, {_most(accel.values, rates)}: check their units")
-    there &= ~past
-    lost = int(np.count_nonzero(past)) + len(recording.accel.time_ns) - len(accel.time_ns)
+    valid &= ~impossible
+    lost = int(np.count_nonzero(impossible)) + len(recording.accel.time_ns) - len(accel.time_ns)
     # The larger number is used, not the sum, because the same rows may contain both sensors
     lost += max(recording.accel.damaged, recording.gyro.damaged)
-    if np.count_nonzero(there) < 2:
+    if np.count_nonzero(valid) < 2:
         raise InputError(f"{name}: accelerometer and gyro have no time in common: were they recorded together?")
     temp_c = recording.temp_c
-    if temp_c is None or len(temp_c) != len(there):
-        temp_c = np.full(len(there), np.nan)
-    time_ns = accel.time_ns[there]
+    if temp_c is None or len(temp_c) != len(valid):
+        temp_c = np.full(len(valid), np.nan)
+    time_ns = accel.time_ns[valid]
     since_s = (time_ns - accel.time_ns[0]) * 1e-9
     track = _on_rows(recording.track, time_ns, recording.utc_ns)
-    log = Log(since_s, accel.values[there], rates[there], temperature_c=temp_c[there], name=name, **track)
+    log = Log(since_s, accel.values[valid], rates[valid], temperature_c=temp_c[valid], name=name, **track)
     return log, lost
 
 
@@ -64,8 +64,8 @@ def in_order(sensor: RecordedSensor, name: str) -> RecordedSensor:
     time_ns, values = sensor.time_ns, sensor.values
     if np.mean(np.diff(time_ns) < 0) > 1.0 - MOST_LATE:  # newest first
         time_ns, values = time_ns[::-1], values[::-1]
-    kept = ~_damaged(time_ns)
-    time_ns, values = time_ns[kept], values[kept]
+    valid = ~_damaged(time_ns)
+    time_ns, values = time_ns[valid], values[valid]
     late = np.maximum.accumulate(time_ns) - time_ns
     steps = np.diff(time_ns)
     usual_ns = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
@@ -94,12 +94,12 @@ def _damaged(time_ns: Ints) -> Bools:
     """Find single wrong times, shape (n): the times before and after it fit each other, but not this time."""
     wrong = np.zeros(len(time_ns), dtype=bool)
     if len(time_ns) > 2:
-        before, now, after = time_ns[:-2], time_ns[1:-1], time_ns[2:]
-        far = SHUFFLED_NS
-        fits = (after >= before) & (after - before < 2 * far)
-        wrong[1:-1] = fits & ((now < before - far) | (now > after + far))
-        wrong[0] = time_ns[0] > time_ns[1] + far and time_ns[2] >= time_ns[1]
-        wrong[-1] = time_ns[-1] < time_ns[-2] - far and time_ns[-2] >= time_ns[-3]
+        previous, now, following = time_ns[:-2], time_ns[1:-1], time_ns[2:]
+        limit = SHUFFLED_NS
+        fits = (following >= previous) & (following - previous < 2 * limit)
+        wrong[1:-1] = fits & ((now < previous - limit) | (now > following + limit))
+        wrong[0] = time_ns[0] > time_ns[1] + limit and time_ns[2] >= time_ns[1]
+        wrong[-1] = time_ns[-1] < time_ns[-2] - limit and time_ns[-2] >= time_ns[-3]
     return wrong
 
 
@@ -110,25 +110,25 @@ def on_clock(sensor: RecordedSensor, clock_ns: Ints, period_ns: float) -> Array:
     period_ns.
     """
     slow = _period_ns(sensor) * FASTER < period_ns
-    known = _averaged(sensor, period_ns) if slow else sensor.values
-    since, at = (np.asarray(ns - sensor.time_ns[0], dtype=float) for ns in (sensor.time_ns, clock_ns))
-    values = np.column_stack([_between(at, since, column) for column in known.T])
-    own = sensor.time_ns
-    after = np.searchsorted(own, clock_ns, side="left")
-    next_ns = own[np.minimum(after, len(own) - 1)]
+    readings = _averaged(sensor, period_ns) if slow else sensor.values
+    sensor_s, clock_s = (np.asarray(ns - sensor.time_ns[0], dtype=float) for ns in (sensor.time_ns, clock_ns))
+    values = np.column_stack([_between(clock_s, sensor_s, column) for column in readings.T])
+    sensor_ns = sensor.time_ns
+    following = np.searchsorted(sensor_ns, clock_ns, side="left")
+    next_ns = sensor_ns[np.minimum(following, len(sensor_ns) - 1)]
     exact = next_ns == clock_ns
-    apart = next_ns - own[np.maximum(after - 1, 0)]
+    apart = next_ns - sensor_ns[np.maximum(following - 1, 0)]
     values[~exact & (apart > GAP_NS)] = np.nan
     return values
 
 
-def _between(at: Array, since: Array, values: Array) -> Array:
+def _between(times: Array, since: Array, values: Array) -> Array:
     """Interpolate values, shape (n), linearly at other times. NaN are ignored. The result is NaN before the first and
     after the last value."""
-    there = ~np.isnan(values)
-    if not np.any(there):
-        return np.full(len(at), np.nan)
-    return np.interp(at, since[there], values[there], left=np.nan, right=np.nan)
+    valid = ~np.isnan(values)
+    if not np.any(valid):
+        return np.full(len(times), np.nan)
+    return np.interp(times, since[valid], values[valid], left=np.nan, right=np.nan)
 
 
 def _averaged(sensor: RecordedSensor, over_ns: float) -> Array:
@@ -137,8 +137,8 @@ def _averaged(sensor: RecordedSensor, over_ns: float) -> Array:
     begin, end = (np.searchsorted(sensor.time_ns, sensor.time_ns + side, side="right") for side in (-half, half))
     sums = np.cumsum(np.vstack((np.zeros(3), np.nan_to_num(sensor.values))), axis=0)
     counts = np.cumsum(np.vstack((np.zeros(3), ~np.isnan(sensor.values))), axis=0)
-    found, count = sums[end] - sums[begin], counts[end] - counts[begin]
-    return np.where(count > 0.0, found / np.maximum(count, 1.0), np.nan)
+    sums_over, count = sums[end] - sums[begin], counts[end] - counts[begin]
+    return np.where(count > 0.0, sums_over / np.maximum(count, 1.0), np.nan)
 
 
 def with_gravity(
@@ -176,18 +176,18 @@ def _period_ns(sensor: RecordedSensor) -> float:
 
 def _on_rows(track: ReceiverTrack | None, time_ns: Ints, utc_ns: int | None) -> dict[str, Any]:
     """Speed, latitude, longitude and UTC, each of shape (n). A value of the track is in the row nearest in time."""
-    found = {name: np.full(len(time_ns), np.nan) for name in TRACK}
+    columns = {name: np.full(len(time_ns), np.nan) for name in TRACK}
     if utc_ns is not None:
-        found["utc_s"][0] = (time_ns[0] + utc_ns) * 1e-9
+        columns["utc_s"][0] = (time_ns[0] + utc_ns) * 1e-9
     if track is None or not len(track.time_ns):
-        return found
-    after = np.clip(np.searchsorted(time_ns, track.time_ns), 1, len(time_ns) - 1)
-    row = after - (track.time_ns - time_ns[after - 1] < time_ns[after] - track.time_ns)
+        return columns
+    following = np.clip(np.searchsorted(time_ns, track.time_ns), 1, len(time_ns) - 1)
+    row = following - (track.time_ns - time_ns[following - 1] < time_ns[following] - track.time_ns)
     near = np.abs(time_ns[row] - track.time_ns) <= GAP_NS
     for name in ("speed_mps", "lat_deg", "lon_deg"):
         values = getattr(track, name)
         good = near & np.isfinite(values) & (np.abs(values) < MOST_MPS)
-        found[name][row[good]] = values[good]
+        columns[name][row[good]] = values[good]
     if utc_ns is not None:
-        found["utc_s"][row[near]] = (time_ns[row[near]] + utc_ns) * 1e-9
-    return found
+        columns["utc_s"][row[near]] = (time_ns[row[near]] + utc_ns) * 1e-9
+    return columns

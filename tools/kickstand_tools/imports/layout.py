@@ -10,16 +10,20 @@ import csv
 import itertools
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePosixPath
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..common.errors import InputError
 from ..logs.csv_reader import Cells, cells_of, columns_of, columns_of_text, filled, numbers_of, separator_of
 from .files import RecordingFile
+from .findings import stated_unit
 from .recording import Sheet, plain
-from .units import ACCELERATIONS, MOMENT, RATES, SPEEDS, TIME_NAME, TIMES, unit
+from .units import ACCELERATIONS, MOMENT, RATES, SPEEDS, TIME_NAME, TIMES, tick_ns, times_ns, unit
 
 LOOKED_AT = 400  # lines used to find the layout
 SEPARATORS = "\t;, "  # if two separators split the same lines into the same number of cells, the first is used
@@ -29,7 +33,8 @@ EVENT = ":"  # separates a sensor's name from a column's name
 _UNITS = {**ACCELERATIONS, **RATES, **SPEEDS, **TIMES}
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _MARKS = " \t#%/;*'\"!"  # characters that begin a comment
-_SENSOR_ID = re.compile(r"sensor|type|kind|event|source|device")
+_SENSOR_ID = re.compile(r"sensor|type|kind|event|source|device|imu|node|channel|addr|axis|field|^id$|^i$|instance")
+_ARDUPILOT = re.compile(r"^FMT, *\d+, *\d+, *(\w+), *\w+, *(.+)$", re.MULTILINE)  # names of a message's columns
 _STAMP = re.compile(r"^\s*(\d{1,2}:\d\d:\d\d[.,]\d+)\s*->\s*")
 _STAMPED = "monitor_s"  # the name of the serial monitor's time
 _PAIR = re.compile(
@@ -64,7 +69,10 @@ def sheet_in(file: RecordingFile, wanted: Collection[str] = ()) -> Sheet | None:
         return labelled
     lines = text.split("\n", LOOKED_AT)[:LOOKED_AT]
     grid = _grid_below(lines, wanted) or find_grid(lines)
-    return None if grid is None else _by_sensor(_read(file.name, text, lines, grid))
+    if grid is None:
+        return None
+    titles = {name: re.split(", *", columns) for name, columns in _ARDUPILOT.findall("\n".join(lines))}
+    return _by_sensor(_read(file.name, text, lines, grid), titles)
 
 
 def joined_sheet(files: list[RecordingFile]) -> Sheet | None:
@@ -76,22 +84,31 @@ def joined_sheet(files: list[RecordingFile]) -> Sheet | None:
     sheets = [(PurePosixPath(file.name).name.partition(".")[0], sheet_in(file)) for file in files]
     if len({name for name, _ in sheets}) < len(sheets):
         return None
-    there = [(name, sheet) for name, sheet in sheets if sheet is not None and len(sheet.columns) >= FEWEST_CELLS]
-    if len(there) < 2:
+    parts = [(name, sheet) for name, sheet in sheets if sheet is not None and len(sheet.columns) >= FEWEST_CELLS]
+    if len(parts) < 2:
         return None
-    clocks = [sheet.columns[0] for _, sheet in there]
-    rows = [len(sheet.cells[0]) for _, sheet in there]
-    total, columns, cells = sum(rows), [clocks[0]], [np.concatenate([sheet.cells[0] for _, sheet in there])]
-    for k, (name, sheet) in enumerate(there):
+    rows = [len(sheet.cells[0]) for _, sheet in parts]
+    clocks = [sheet.columns[0] for _, sheet in parts]
+    if len({stated_unit(clock) for clock in clocks}) == 1:
+        clock, times = clocks[0], np.concatenate([sheet.cells[0] for _, sheet in parts])
+    else:
+        units = [name if tick_ns(name) else "" for name in map(stated_unit, clocks)]
+        try:
+            times = np.concatenate([times_ns(sheet.cells[0], name) for (_, sheet), name in zip(parts, units)])
+        except InputError:
+            return None
+        clock = "time (ns)"
+    columns, cells = [clock], [times]
+    for k, (name, sheet) in enumerate(parts):
         begin = sum(rows[:k])
         for column, values in zip(sheet.columns[1:], sheet.cells[1:]):
             if TIME_NAME.search(plain(column)):
                 continue  # another time, which only the rows of this file have
-            wide = np.full(total, np.nan)
+            wide = np.full(sum(rows), np.nan)
             wide[begin : begin + rows[k]] = numbers_of(values)
             columns.append(f"{name}{EVENT}{column}")
             cells.append(wide)
-    return Sheet(there[0][1].name, columns, cells, sum(sheet.left_out for _, sheet in there))
+    return Sheet(parts[0][1].name, columns, cells, sum(sheet.left_out for _, sheet in parts))
 
 
 def without_stamps(text: str) -> str:
@@ -123,27 +140,32 @@ def split_row(line: str, separator: str) -> list[str]:
 
 def find_grid(lines: Sequence[str]) -> Grid | None:
     """Find the layout that fits most of these lines; None if hardly any line has numbers."""
+    return _best_grid(lines, FEWEST_CELLS) or _best_grid(lines, 2)  # a time and one value: one row per axis
+
+
+def _best_grid(lines: Sequence[str], fewest: int) -> Grid | None:
     best: tuple[int, int, Grid] | None = None
     for separator in SEPARATORS:
-        found = _rows(lines, separator)
+        rows = _rows(lines, separator, fewest)
         compared = 1 if separator == " " else 2  # dates and zones contain blanks, so blanks need more rows to win
-        if found is not None and (best is None or found[:compared] > best[:compared]):
-            best = found
-    return None if best is None else best[2]
+        if rows is not None and (best is None or rows[:compared] > best[:compared]):
+            best = rows
+    grid = None if best is None else best[2]
+    return grid if grid is None or fewest == FEWEST_CELLS or (grid.names is not None and grid.width > 2) else None
 
 
-def _rows(lines: Sequence[str], separator: str) -> tuple[int, int, Grid] | None:
+def _rows(lines: Sequence[str], separator: str, fewest: int) -> tuple[int, int, Grid] | None:
     """Return the number of rows, the number of numbers, and the grid for cells separated in this way. None if the lines
-    do not fit."""
+    do not fit. fewest: the least number of numbers in a row."""
     split = [split_row(line, separator) for line in lines]
     counts = [_numbers_in(cells) for cells in split]
-    widths = Counter(len(cells) for cells, count in zip(split, counts) if count >= FEWEST_CELLS)
+    widths = Counter(len(cells) for cells, count in zip(split, counts) if count >= fewest)
     if not widths:
         return None
     width = max(widths, key=lambda width: (widths[width], width))
-    rows = [k for k, count in enumerate(counts) if count >= FEWEST_CELLS and len(split[k]) == width]
+    rows = [k for k, count in enumerate(counts) if count >= fewest and len(split[k]) == width]
     numbers = int(np.median([counts[k] for k in rows]))
-    first = next(k for k, count in enumerate(counts) if count >= FEWEST_CELLS and len(split[k]) in widths)
+    first = next(k for k, count in enumerate(counts) if count >= fewest and len(split[k]) in widths)
     above = [k for k in range(first - 1, -1, -1) if lines[k].strip()]
     width, names = next(((w, k) for k in above[:3] for w in (width, *widths) if _has_names(lines[k], w)), (width, None))
     if names not in above[:1] and not (above and _all_units(split_row(lines[above[0]].lstrip(_MARKS), separator))):
@@ -167,16 +189,16 @@ def _has_names(line: str, width: int) -> bool:
 
 def _is_names(cells: list[str], width: int) -> bool:
     """True if the cells can be the names of `width` columns: most differ, and hardly any is a number or a unit."""
-    there = [cell for cell in cells if cell]
-    numbers = sum(bool(_NUMBER.fullmatch(cell)) or bool(re.search(r"[{}=]|:$", cell)) for cell in there)
-    if len(set(there)) <= len(there) / 2 or (_all_units(cells) and len(there) > FEWEST_CELLS):
+    filled_cells = [cell for cell in cells if cell]
+    numbers = sum(bool(_NUMBER.fullmatch(cell)) or bool(re.search(r"[{}=]|:$", cell)) for cell in filled_cells)
+    if len(set(filled_cells)) <= len(filled_cells) / 2 or (_all_units(cells) and len(filled_cells) > FEWEST_CELLS):
         return False
-    return max(2, width - 3) <= len(there) <= width + 1 and numbers <= len(there) / 4
+    return max(2, width - 3) <= len(filled_cells) <= width + 1 and numbers <= len(filled_cells) / 4
 
 
 def _all_units(cells: list[str]) -> bool:
-    there = [cell.strip("[]()") for cell in cells if cell]
-    return len(there) > 2 and sum(unit(cell) in _UNITS for cell in there) > len(there) / 2
+    filled_cells = [cell.strip("[]()") for cell in cells if cell]
+    return len(filled_cells) > 2 and sum(unit(cell) in _UNITS for cell in filled_cells) > len(filled_cells) / 2
 
 
 def _grid_below(lines: Sequence[str], wanted: Collection[str]) -> Grid | None:
@@ -221,50 +243,75 @@ def _names(lines: Sequence[str], grid: Grid) -> list[str]:
         last = next(line for line in reversed(lines[: grid.first]) if line.strip())
         units = split_row(last.lstrip("#%/ "), grid.separator)
         if _all_units(units) and len(units) <= len(names):
-            rest = names[len(units) :]
-            names = [f"{name} ({mark.strip('[]()')})" if mark else name for name, mark in zip(names, units)] + rest
+            without_unit = names[len(units) :]
+            names = [
+                f"{name} ({mark.strip('[]()')})" if mark else name for name, mark in zip(names, units)
+            ] + without_unit
     return [*names, *[""] * (grid.width - len(names))]
 
 
 # One row per event
 
 
-def _by_sensor(sheet: Sheet) -> Sheet:
-    """If one column names the sensor of each row, give each sensor its own columns."""
-    place = _sensor_column(sheet)
-    if place is None:
+def _by_sensor(sheet: Sheet, names: Mapping[str, Sequence[str]]) -> Sheet:
+    """If columns name the sensor of each row, give each sensor its own columns. The names may also be those of axes.
+
+    names: the names of the columns of each sensor, if the lines above the rows give them."""
+    places = [k for k in range(len(sheet.columns)) if _names_sensors(sheet, k, names)]
+    if not places:
         return sheet
-    kinds = np.array([str(cell).strip() for cell in sheet.cells[place].tolist()], dtype=object)
-    columns, cells = [], []
-    for k, (name, values) in enumerate(zip(sheet.columns, sheet.cells)):
-        if k == place:
-            continue
-        numbers = numbers_of(values)
-        own = bool(np.any(np.isfinite(numbers.astype(float)))) and not _increases(numbers)
-        per_kind = {kind: kinds == kind for kind in dict.fromkeys(kinds.tolist())} if own else {}
-        if not per_kind:
-            columns.append(name)
-            cells.append(values)
-        for kind, there in per_kind.items():
-            if np.any(np.isfinite(numbers[there].astype(float))):
-                columns.append(f"{kind}{EVENT}{name}")
-                cells.append(np.where(there, numbers.astype(float), np.nan))
+    words = [[str(cell).strip() for cell in sheet.cells[k].tolist()] for k in places]
+    kinds = np.array([" ".join(row) for row in zip(*words)], dtype=object)
+    others = [k for k in range(len(sheet.columns)) if k not in places]
+    shared, own = [], []
+    for k in others:
+        numbers = numbers_of(sheet.cells[k])
+        varies = any(len(np.unique(numbers[kinds == kind])) > 1 for kind in dict.fromkeys(kinds.tolist()))
+        valid = np.any(np.isfinite(numbers.astype(float))) and varies
+        (own if valid and not _is_time(sheet, k, kinds) else shared).append(k)
+    columns, cells = [sheet.columns[k] for k in shared], [sheet.cells[k] for k in shared]
+    for kind in dict.fromkeys(kinds.tolist()):
+        rows = kinds == kind
+        for k in own:
+            values = numbers_of(sheet.cells[k]).astype(float)
+            if np.any(np.isfinite(values[rows])):
+                titles = names.get(kind.split(" ")[0], ())
+                title = titles[k - 1] if 0 < k <= len(titles) else sheet.columns[k]
+                columns.append(kind if len(own) == 1 else f"{kind}{EVENT}{title}")
+                cells.append(np.where(rows, values, np.nan))
+    if names and shared:
+        columns[0] = next((names[kind.split(" ")[0]][0] for kind in kinds if kind.split(" ")[0] in names), columns[0])
+    clock = next((k for k, name in enumerate(columns[: len(shared)]) if TIME_NAME.search(plain(name))), None)
+    if clock is not None:  # one sensor after the other
+        order = np.argsort(times_ns(cells[clock]), kind="stable")
+        cells = cells if np.all(np.diff(order) > -MOST_KINDS) else [values[order] for values in cells]
     return Sheet(sheet.name, columns, cells, sheet.left_out, sheet.head)
 
 
-def _sensor_column(sheet: Sheet) -> int | None:
-    """Return the column that names the sensor of each row, or None. Its cells change repeatedly between a few texts, or
-    between a few numbers if the column's name is suitable."""
-    for place, (name, values) in enumerate(zip(sheet.columns, sheet.cells)):
-        if values.dtype.kind == "f" or (values.dtype.kind != "O" and not _SENSOR_ID.search(name.lower())):
-            continue
-        texts = [str(cell).strip() for cell in values.tolist()]
-        counts = Counter(texts)
-        named = values.dtype.kind != "O" or all(re.match(r"[A-Za-z]", kind) for kind in counts)
-        changes = sum(a != b for a, b in itertools.pairwise(texts))
-        if 2 <= len(counts) <= MOST_KINDS and named and changes > 0.01 * len(texts) + 2:
-            return place
-    return None
+def _names_sensors(sheet: Sheet, place: int, names: Mapping[str, Sequence[str]]) -> bool:
+    """Return True if a column names the sensor of each row. Its cells change repeatedly between a few texts, or between
+    a few numbers if the column's name is suitable."""
+    name, values = sheet.columns[place], sheet.cells[place]
+    if names and not place:
+        return any(str(cell) in names for cell in values[:100].tolist())
+    instances = any(titles[place - 1 : place] == ["I"] for titles in names.values())
+    if values.dtype.kind == "f" or (values.dtype.kind != "O" and not (_SENSOR_ID.search(name.lower()) or instances)):
+        return False
+    texts = [str(cell).strip() for cell in values.tolist()]
+    counts = Counter(texts)
+    named = values.dtype.kind != "O" or all(re.match(r"[A-Za-z]", kind) for kind in counts)
+    changes = sum(a != b for a, b in itertools.pairwise(texts))
+    blocks = changes == len(counts) - 1 and bool(_SENSOR_ID.search(name.lower())) and len(texts) > 20 * len(counts)
+    return 2 <= len(counts) <= MOST_KINDS and named and (changes > 0.01 * len(texts) + 2 or blocks)
+
+
+def _is_time(sheet: Sheet, place: int, kinds: NDArray[Any]) -> bool:
+    """True if a column increases, perhaps in each sensor's rows."""
+    numbers = numbers_of(sheet.cells[place])
+    return _increases(numbers) or (
+        bool(TIME_NAME.search(plain(sheet.columns[place])))
+        and all(_increases(numbers[kinds == kind]) for kind in dict.fromkeys(kinds.tolist()))
+    )
 
 
 def _increases(numbers: Cells) -> bool:
@@ -310,14 +357,14 @@ def _labelled_values(line: str) -> Iterator[tuple[str, str]]:
         values = re.split(r"[\s,;]+", several[2])
         for axis, value in zip("xyz" if len(values) == 3 else map(str, range(1, 10)), values):
             yield f"{several[1]} {axis}", value
-    before, found = "", list(_PAIR.finditer(_SEVERAL.sub("", line)))
-    stated = next((pair["unit"] for pair in reversed(found) if pair["unit"] and unit(pair["unit"]) in _UNITS), "")
-    for pair in found:
+    prefix, pairs = "", list(_PAIR.finditer(_SEVERAL.sub("", line)))
+    stated = next((pair["unit"] for pair in reversed(pairs) if pair["unit"] and unit(pair["unit"]) in _UNITS), "")
+    for pair in pairs:
         label = re.sub(r"\s+", " ", pair["label"].strip(" ,;|-"))
         words = label.split()
         if len(words) > 1 and len(words[-1]) == 1:
-            before = " ".join(words[:-1])
-        elif len(label) == 1 and before:
-            label = f"{before} {label}"
-        own = pair["unit"] if pair["unit"] and unit(pair["unit"]) in _UNITS else stated
-        yield (f"{label} ({own})" if own and label[-1:].lower() in "xyz" else label), pair["value"]
+            prefix = " ".join(words[:-1])
+        elif len(label) == 1 and prefix:
+            label = f"{prefix} {label}"
+        label_unit = pair["unit"] if pair["unit"] and unit(pair["unit"]) in _UNITS else stated
+        yield (f"{label} ({label_unit})" if label_unit and label[-1:].lower() in "xyz" else label), pair["value"]

@@ -30,6 +30,7 @@ from .units import (
     counts_per,
     factor,
     since_first_s,
+    tick_ns,
     time_unit,
     unit,
 )
@@ -61,17 +62,17 @@ class MappedTable:
     def first_seconds(self, seconds: float = 10.0, points: int = 300) -> dict[str, list[float] | list[list[float]]]:
         """The first seconds of the found time (t, s), accelerometer (a) and gyro (g), reduced to `points` points, in
         the table's units. Empty without a time."""
-        found = self.findings.found
-        if "t" not in found:
+        parts = self.findings.found
+        if "t" not in parts:
             return {}
         columns = self.sheet.columns
-        since = since_first_s(self.sheet.times(columns.index(found["t"].columns[0]), found["t"].unit))
-        shown = np.flatnonzero(since <= seconds)
-        shown = shown[:: max(1, len(shown) // points)]
-        picture: dict[str, list[float] | list[list[float]]] = {"t": since[shown].round(3).tolist()}
+        since = since_first_s(self.sheet.times(columns.index(parts["t"].columns[0]), parts["t"].unit.strip("?")))
+        rows = np.flatnonzero(since <= seconds)
+        rows = rows[:: max(1, len(rows) // points)]
+        picture: dict[str, list[float] | list[list[float]]] = {"t": since[rows].round(3).tolist()}
         for key in ("a", "g"):
-            if key in found:
-                values = self.sheet.table([columns.index(name) for name in found[key].columns])[shown]
+            if key in parts:
+                values = self.sheet.table([columns.index(name) for name in parts[key].columns])[rows]
                 picture[key] = np.nan_to_num(values).round(5).T.tolist()
         return picture
 
@@ -98,10 +99,10 @@ def read_mapped(
     places = {key: _place(sheet, key, wanted) for key, wanted in columns.items()}
     _check_apart(places, columns)
     _check_units(sheet, places, units)
-    said = unit(_unit(units, ("t",), sheet.columns[places["t"]]))
-    t_unit = time_unit(sheet.cells[places["t"]], said if said in TIMES else "")
+    stated = unit(_unit(units, ("t",), sheet.columns[places["t"]]))
+    t_unit = time_unit(sheet.cells[places["t"]], stated if tick_ns(stated) else "")
     time_ns = sheet.times(places["t"], t_unit)
-    if said not in TIMES and why is None and rate_hz(time_ns) > findings.DOUBTED_HZ:
+    if not tick_ns(stated) and why is None and rate_hz(time_ns) > findings.DOUBTED_HZ:
         raise InputError(
             f"{sheet.name}: {rate_hz(time_ns):.0f} samples per second: add the unit of t, as in --units t=min"
         )
@@ -120,7 +121,8 @@ def read_mapped(
     speed, speed_unit, notices = _speed(sheet, time_ns, places, units, (lat, lon))
     if why is not None and "lat" in places and "lon" in places:
         north, east = sheet.numbers(places["lat"]) * lat, sheet.numbers(places["lon"]) * lon
-        doubt = doubt_of_positions(time_ns, sheet.numbers(places.get("speed")), north, east)
+        speed_mps = sheet.numbers(speed) * SPEEDS[speed_unit]
+        doubt = doubt_of_positions(time_ns, speed_mps, north, east)
         if doubt:
             notices.append(ImportPositions(sheet.named([places.pop("lat"), places.pop("lon")]), doubt))
     track = track_of(sheet, time_ns, speed, places.get("lat"), places.get("lon"), speed_unit, (lat, lon))
@@ -138,15 +140,15 @@ def table_in(files: list[RecordingFile]) -> MappedTable | None:
     together, return the largest."""
     largest = max(files, key=lambda file: len(file.text))
     sheet = sheet_in(largest)
-    found = None if sheet is None else findings.find(findings.completed(sheet))
-    if len(files) > 1 and (found is None or found.lacking):
+    result = None if sheet is None else findings.find(findings.completed(sheet))
+    if len(files) > 1 and (result is None or result.lacking):
         joined = joined_sheet(files)
         of_all = None if joined is None else findings.find(findings.completed(joined))
-        if joined and of_all and (found is None or len(of_all.lacking) < len(found.lacking)):
+        if joined and of_all and (result is None or len(of_all.lacking) < len(result.lacking)):
             return MappedTable(joined.name, joined, of_all, True)
-    if sheet is None or found is None or not ({"a", "g"} & set(found.found) or len(sheet.columns) >= len(REQUIRED)):
+    if sheet is None or result is None or not ({"a", "g"} & set(result.found) or len(sheet.columns) >= len(REQUIRED)):
         return None
-    return MappedTable(largest.name, sheet, found)
+    return MappedTable(largest.name, sheet, result)
 
 
 def sheet_of(files: list[RecordingFile], name: str, columns: Mapping[str, str]) -> Sheet:
@@ -166,11 +168,11 @@ def read_table(table: MappedTable, units: Mapping[str, str]) -> AppRecording | N
 
     Raises InputError.
     """
-    found = table.findings
-    uncertain = {key for key in ("t", "a", "g") if key not in found.found or not found.found[key].certain}
-    if found.lacking or not uncertain <= set(units):
+    result = table.findings
+    uncertain = {key for key in ("t", "a", "g") if key not in result.found or not result.found[key].certain}
+    if result.lacking or not uncertain <= set(units):
         return None
-    return read_mapped(table.sheet, found.columns, found.units | dict(units), found)
+    return read_mapped(table.sheet, result.columns, result.units | dict(units), result)
 
 
 def unknown(files: list[RecordingFile], source: str, table: MappedTable | None = None) -> InputError:
@@ -184,33 +186,33 @@ def unknown(files: list[RecordingFile], source: str, table: MappedTable | None =
             "folder or the zip that an app has exported as CSV"
         )
     several = f" (of {len(files)} files, the largest is {table.name})" if len(files) > 1 else ""
-    columns, found = table.sheet.columns, table.findings
+    columns, result = table.sheet.columns, table.findings
     shown = ", ".join(columns[:40]) + (", ..." if len(columns) > 40 else "")
     start = f"{source}: not a file of an app that is known{several}"
     named = not all(name.startswith("#") for name in columns)
-    if "gyro" in found.lacking and not table.sheet.unread and ("a" in found.found or (named and not found.single)):
+    if "gyro" in result.lacking and not table.sheet.unread and ("a" in result.found or (named and not result.single)):
         return InputError(
             f"{start}, and no gyro found in it: without one there is no lean. Record the gyroscope as well. Its "
             f"columns are {shown}"
         )
-    if found.remarks:
-        return InputError(f"{start}{table.lacking}: {found.remarks[0]}")
-    if found.lacking == ["time"]:
+    if result.remarks:
+        return InputError(f"{start}{table.lacking}: {result.remarks[0]}")
+    if result.lacking == ["time"]:
         return InputError(
             f"{start}, and no time found in it: write the time of each row, such as millis(), or switch the time "
             "stamps of the serial monitor on"
         )
-    keys = [key for key in (*REQUIRED, *OPTIONAL) if key in (*REQUIRED, *found.columns)]
-    given = [f"{key}={_column_as_typed(table, key)}" for key in keys]
-    units = ",".join(f"{key}={name}" for key, name in found.units.items())
+    keys = [key for key in (*REQUIRED, *OPTIONAL) if key in (*REQUIRED, *result.columns)]
+    typed = [f"{key}={_column_as_typed(table, key)}" for key in keys]
+    units = ",".join(f"{key}={name}" for key, name in result.units.items())
     where = source if len(files) == 1 or table.joined else f"{source}/{table.name}"
     ask = "Replace each ?" if table.missing else "Correct what is wrong"
-    reasons = f" ({found.reasons})" if found.reasons else ""
+    reasons = f" ({result.reasons})" if result.reasons else ""
     return InputError(
         f"{start}{table.lacking}",
         Remedy(
             f"its columns are {shown}. {ask}{reasons}, and type: kickstand import {shlex.quote(where)} --out RIDE.csv "
-            f"--columns {shlex.quote(','.join(given))} --units {units}",
+            f"--columns {shlex.quote(','.join(typed))} --units {units}",
             "needed are a time, the acceleration along three axes and the rates of a gyro about them",
         ),
     )
@@ -267,16 +269,16 @@ def _with_counts(
     force, rates = (sheet.table([places[axis] for axis in axes]) for axes in (ACCEL, GYRO))
     seconds = since_first_s(time_ns)
     accel = findings.accelerometer(force, seconds)
-    found = {"a": accel.unit, "g": findings.gyro(force, rates, accel, seconds).unit}
+    likely = {"a": accel.unit, "g": findings.gyro(force, rates, accel, seconds).unit}
     for key, text in units.items():
         if _is_counts(text):
-            if not counts_per(found[key[0]]):
-                what, usual = ("g", COUNTS_PER_G) if key[0] == "a" else ("deg/s", COUNTS_PER_DPS)
+            if not counts_per(likely[key[0]]):
+                what, sizes = ("g", COUNTS_PER_G) if key[0] == "a" else ("deg/s", COUNTS_PER_DPS)
                 raise InputError(
                     f"{sheet.name}: nothing shows how many counts are 1 {what}: write {key}=counts/N, for an MPU6050 "
-                    f"with N one of {', '.join(f'{size:g}' for size in usual)}"
+                    f"with N one of {', '.join(f'{size:g}' for size in sizes)}"
                 )
-            units[key] = ("-" if text.strip().startswith("-") else "") + found[key[0]]
+            units[key] = ("-" if text.strip().startswith("-") else "") + likely[key[0]]
     return units
 
 
@@ -284,10 +286,10 @@ def _check_rates(name: str, seconds: Array, force: Array, rates: Array) -> None:
     """Raise InputError if rates do not fit the turns of gravity: if another unit fits, or if gravity keeps its
     direction although the rates would turn it."""
     fit = fit_rates(seconds, force, rates)
-    shown = float(np.degrees(fit.factor))
-    if fit.decides and not 1.0 / _TIMES_OFF < shown < _TIMES_OFF:
-        much = f"{shown:.3g} times too little" if shown > 1.0 else f"{1.0 / shown:.3g} times too far"
-        raise InputError(f"{name}: in this unit the rates turn gravity {much}: check the unit of the gyro")
+    scale = float(np.degrees(fit.factor))
+    if fit.decides and not 1.0 / _TIMES_OFF < scale < _TIMES_OFF:
+        error = f"{scale:.3g} times too little" if scale > 1.0 else f"{1.0 / scale:.3g} times too far"
+        raise InputError(f"{name}: in this unit the rates turn gravity {error}: check the unit of the gyro")
     if turns_too_far(seconds, force, rates):
         raise InputError(
             f"{name}: gravity keeps its direction while the rates, in this unit, turn it round: check the unit of the "
@@ -310,12 +312,12 @@ def _speed(
     place = places.get("speed")
     if place is None:
         return None, "m/s", []
-    known = unit(_unit(units, ("speed",), sheet.columns[place]))
-    if known not in SPEEDS:
-        known = unit_by_positions(sheet, time_ns, place, places.get("lat"), places.get("lon"), degrees)
-    if not known:
+    speed_unit = unit(_unit(units, ("speed",), sheet.columns[place]))
+    if speed_unit not in SPEEDS:
+        speed_unit = unit_by_positions(sheet, time_ns, place, places.get("lat"), places.get("lon"), degrees)
+    if not speed_unit:
         return None, "m/s", [ImportSpeedUnit(sheet.columns[place])]
-    return place, known, []
+    return place, speed_unit, []
 
 
 def _place(sheet: Sheet, key: str, wanted: str) -> int:

@@ -71,12 +71,12 @@ def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
         return RateFit()
     u, w = cells
     length = np.linalg.norm(u, axis=1)
-    good = np.abs(length / np.median(length) - 1.0) < STRAIGHT
+    good = np.abs(length - np.median(length)) < STRAIGHT * np.median(length)
     u = u / np.maximum(length, 1e-9)[:, None]
     span = round(WINDOW_S / CELL_S)
     begins = np.arange(0, len(u) - span, span // 2)
-    whole = np.array([np.all(good[begin : begin + span + 1]) for begin in begins], dtype=bool)
-    begins = begins[whole]
+    complete = np.array([np.all(good[begin : begin + span + 1]) for begin in begins], dtype=bool)
+    begins = begins[complete]
     if len(begins) < FEWEST:
         return RateFit()
     change = u[begins + span] - u[begins]
@@ -92,17 +92,17 @@ def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
     turned = np.einsum("ila,wnl,wnj->waij", _LEVI_CIVITA, mid, rate) * CELL_S
     bias = np.einsum("ila,wnl->wai", _LEVI_CIVITA, mid) * CELL_S
     flat = bias.reshape(-1, 3)
-    seen = change.ravel()
+    turns = change.ravel()
     inverse = np.linalg.pinv(flat.T @ flat + 1e-9 * np.eye(3)) @ flat.T
-    rest = seen - flat @ (inverse @ seen)
+    residual = turns - flat @ (inverse @ turns)
     for exchange in EXCHANGES:
         column = np.einsum("waij,ij->wa", turned, exchange).ravel()
         column = column - flat @ (inverse @ column)
         size = float(column @ column)
         if size <= 0.0:
             continue
-        factor = float(column @ rest) / size
-        explained = 1.0 - float(np.sum((rest - factor * column) ** 2)) / max(float(np.sum(rest**2)), 1e-12)
+        factor = float(column @ residual) / size
+        explained = 1.0 - float(np.sum((residual - factor * column) ** 2)) / max(float(np.sum(residual**2)), 1e-12)
         preferred = explained + 0.02 if exchange is EXCHANGES[0] else explained
         if factor > 0.0 and preferred > best.explained:
             unturned = float(np.sqrt(np.mean(np.sum(column.reshape(-1, 3) ** 2, axis=1))))
@@ -122,15 +122,15 @@ def turns_too_far(seconds: Array, force: Array, rates: Array) -> bool:
     u = u / np.maximum(np.linalg.norm(u, axis=1), 1e-9)[:, None]
     span = round(TURNED_S / CELL_S)
     begins = np.arange(0, len(u) - span + 1, span)
-    kept, much = [], []
+    steady, fast = [], []
     for begin in begins:
-        part = u[begin : begin + span]
-        mean = np.mean(part, axis=0)
+        window = u[begin : begin + span]
+        mean = np.mean(window, axis=0)
         across = np.mean(w[begin : begin + span], axis=0)
         across = across - mean * (across @ mean) / max(float(mean @ mean), 1e-9)
-        kept.append(float(np.linalg.norm(mean)) > KEPT_DIRECTION)
-        much.append(float(np.linalg.norm(across)) * TURNED_S > MOST_TURNED)
-    return sum(k and m for k, m in zip(kept, much)) > 0.5 * len(begins)
+        steady.append(float(np.linalg.norm(mean)) > KEPT_DIRECTION)
+        fast.append(float(np.linalg.norm(across)) * TURNED_S > MOST_TURNED)
+    return sum(k and m for k, m in zip(steady, fast)) > 0.5 * len(begins)
 
 
 def _steady(u: Array) -> bool:
@@ -141,8 +141,8 @@ def _steady(u: Array) -> bool:
 def _in_cells(seconds: Array, force: Array, rates: Array) -> tuple[Array, Array] | None:
     """Return the means of force and rates in cells of CELL_S, each of shape (m, 3). None if the stretch is too
     short."""
-    there = np.isfinite(seconds)
-    seconds, force, rates = seconds[there], force[there], rates[there]
+    timed = np.isfinite(seconds)
+    seconds, force, rates = seconds[timed], force[timed], rates[timed]
     if len(seconds) < 4:
         return None
     begin, end = float(np.percentile(seconds, 1.0)), float(np.percentile(seconds, 99.0))
@@ -152,17 +152,17 @@ def _in_cells(seconds: Array, force: Array, rates: Array) -> tuple[Array, Array]
     edges = begin + CELL_S * np.arange(count + 1)
     within = (seconds >= begin) & (seconds <= edges[-1])
     seconds, force, rates = seconds[within], force[within], rates[within]
-    found = []
+    means = []
     for values in (force, rates):
-        known = np.all(np.isfinite(values), axis=1)
-        order = np.argsort(seconds[known], kind="stable")
-        at, rows = seconds[known][order], values[known][order]
-        if len(at) < 4:
+        valid = np.all(np.isfinite(values), axis=1)
+        order = np.argsort(seconds[valid], kind="stable")
+        times, rows = seconds[valid][order], values[valid][order]
+        if len(times) < 4:
             return None
-        sums = np.vstack((np.zeros(3), np.cumsum(0.5 * (rows[1:] + rows[:-1]) * np.diff(at)[:, None], axis=0)))
-        integral = np.column_stack([np.interp(edges, at, column) for column in sums.T])
-        found.append(np.diff(integral, axis=0) / CELL_S)
-    return found[0], found[1]
+        sums = np.vstack((np.zeros(3), np.cumsum(0.5 * (rows[1:] + rows[:-1]) * np.diff(times)[:, None], axis=0)))
+        integral = np.column_stack([np.interp(edges, times, column) for column in sums.T])
+        means.append(np.diff(integral, axis=0) / CELL_S)
+    return means[0], means[1]
 
 
 def _levi_civita() -> Array:

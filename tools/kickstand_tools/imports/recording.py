@@ -42,18 +42,18 @@ class Sheet:
     def place(self, *names: str) -> int | None:
         """Find the first of these names that a column has, compared by plain(). Return the column's number, or None."""
         wanted = [plain(name) for name in names]
-        found = [plain(column) for column in self.columns]
-        return next((found.index(name) for name in wanted if name in found), None)
+        names_here = [plain(column) for column in self.columns]
+        return next((names_here.index(name) for name in wanted if name in names_here), None)
 
     def axes(self, *names: str | tuple[str, ...]) -> tuple[list[int], list[str]]:
         """Return place() of each name, and the names of missing columns.
 
         A name may be a tuple of alternatives. Then the first name that exists counts. If all alternatives are missing,
         the first is returned as missing."""
-        each = [name if isinstance(name, tuple) else (name,) for name in names]
-        found = {one[0]: self.place(*one) for one in each}
-        places = [place for place in found.values() if place is not None]
-        return places, [name for name, place in found.items() if place is None]
+        groups = [name if isinstance(name, tuple) else (name,) for name in names]
+        places_of = {alternatives[0]: self.place(*alternatives) for alternatives in groups}
+        places = [place for place in places_of.values() if place is not None]
+        return places, [name for name, place in places_of.items() if place is None]
 
     def times(self, place: int, unit: str = "s") -> Nanoseconds:
         """Return a column as times, shape (n). Raises InputError.
@@ -89,8 +89,8 @@ def plain(name: str) -> str:
 
 def unit_in(name: str) -> str:
     """The unit in brackets in a column's name, or ""."""
-    found = re.search(r"[(\[]([^)\]]*)[)\]]\s*$", name)
-    return found[1].strip() if found else ""
+    match = re.search(r"[(\[]([^)\]]*)[)\]]\s*$", name)
+    return match[1].strip() if match else ""
 
 
 def names_in(line: str) -> list[str]:
@@ -135,8 +135,8 @@ def rate_hz(time_ns: Nanoseconds) -> float:
     steps = np.diff(time_ns[time_ns > REPEATED])
     if not np.any(steps > 0):
         return 0.0
-    whole = (steps >= 0) & (steps < 5.0 * np.median(steps[steps > 0]))
-    return SECOND_NS * int(np.count_nonzero(whole)) / float(np.sum(steps[whole]))
+    usual = (steps >= 0) & (steps < 5.0 * np.median(steps[steps > 0]))
+    return SECOND_NS * int(np.count_nonzero(usual)) / float(np.sum(steps[usual]))
 
 
 @dataclass
@@ -200,9 +200,9 @@ class ReceiverTrack:
         nowhere |= ~((np.abs(self.lat_deg) <= 90.0) & (np.abs(self.lon_deg) <= 180.0))
         self.lat_deg, self.lon_deg = (np.where(nowhere, np.nan, place) for place in (self.lat_deg, self.lon_deg))
         rows = np.column_stack((self.speed_mps, self.lat_deg, self.lon_deg))
-        there = (self.time_ns != NO_TIME) & ~np.all(np.isnan(rows), axis=1)
-        self.keep(there)
-        same = np.all((rows[there][1:] == rows[there][:-1]) | np.isnan(rows[there][1:]), axis=1)
+        filled = (self.time_ns != NO_TIME) & ~np.all(np.isnan(rows), axis=1)
+        self.keep(filled)
+        same = np.all((rows[filled][1:] == rows[filled][:-1]) | np.isnan(rows[filled][1:]), axis=1)
         same &= np.diff(self.time_ns // SECOND_NS) == 0  # at a standstill, repeated values are kept once per second
         self.keep(np.concatenate(([True], ~same)) if len(self.time_ns) else np.zeros(0, dtype=bool))
 

@@ -13,8 +13,14 @@ from typing import Any
 
 FEWEST_ROWS = 20  # JSON with fewer rows is something else, such as a calibration
 LOOKED_AT = 400  # lines used to find the decimal mark
-_MINUS = re.compile("[\u2010-\u2013\u2212\ufe63\uff0d](?=[0-9.,])")
-_BLANK = re.compile("(?<=[0-9])[\u00a0\u2009\u202f'](?=[0-9]{3})")  # separates thousands
+_MINUS = re.compile("[\u2010-\u2015\u2212\ufe58\ufe63\uff0d\u00ad](?=[0-9.,])")
+_BLANK = re.compile("(?<=[0-9])[\u00a0\u2009\u202f'\u2019](?=[0-9]{3})")  # separates thousands
+_QUOTES = str.maketrans(dict.fromkeys("'\u2018\u2019\u201c\u201d\u201e", '"'))
+# A negative number with a blank after its minus, or in brackets, as accountants write it
+_APART, _IN_BRACKETS = (re.compile(r'(?<=[,;\t"\n])( *)' + number) for number in (r"- +(?=[\d.])", r"\((\d[\d.,]*)\)"))
+_UNIT = re.compile(
+    r'(?<=\d) ?(?:m/s(?:\^?2|²)|(?:°|deg|rad)/s|dps|mg|g|m?s)(?=[,;\t"]|$)', re.MULTILINE
+)  # behind a number
 _BETWEEN = re.compile(r'[;\t\s"]+')
 _CELL = r'(?<![^;\t\s"])[+-]?\d{1,3}(?:%s\d{3})+(?:%s\d+)?(?![^;\t\s"])'  # a number with separators of thousands
 _POINTS, _COMMAS = re.compile(_CELL % (r"\.", ",")), re.compile(_CELL % (",", r"\."))
@@ -27,6 +33,14 @@ def plain_text(text: str) -> str:
         text = _rows_of_json(text)
     if not text.isascii() or "'" in text:
         text = _BLANK.sub("", _MINUS.sub("-", text))
+        text = text.translate(_QUOTES) if text.lstrip()[:1] in "'\u2018\u201c\u201e" else text
+    head = text.split("\n", LOOKED_AT)[:LOOKED_AT]
+    if sum(line.count("|") > 2 for line in head) > len(head) / 2:
+        text = "\n".join(line.strip(" |").replace("|", "\t") for line in text.split("\n"))
+    if any(_APART.search(f"\n{line}") or _IN_BRACKETS.search(f"\n{line}") for line in head[1:]):
+        text = _IN_BRACKETS.sub(r"-\2", _APART.sub("-", text))
+    if sum(len(_UNIT.findall(line)) > 5 for line in head) > len(head) / 2:
+        text = _UNIT.sub("", text)
     votes = [_decimal_comma(line) for line in text.split("\n", LOOKED_AT)[:LOOKED_AT]]
     if votes.count(False) > len(votes) / 2:
         return text
@@ -50,21 +64,22 @@ def _decimal_comma(line: str) -> bool | None:
 
 
 def _rows_of_json(text: str) -> str:
-    """Convert JSON to CSV: an array of objects, an object of arrays, or one object per line. Nested names are joined by
-    a point. Another text is unchanged."""
+    """Convert JSON to CSV. Another text is unchanged.
+
+    The rows may be objects, lists, or numbers of a list per column, in one value or one per line. They may be inside
+    other objects. Nested names are joined by a point. Rows of several sensors get the name of their sensor, and are
+    sorted by their first value, the time."""
     try:
-        found = json.loads(text)
+        values = json.loads(text)
     except (ValueError, RecursionError):
-        found = list(_objects(text))
-    if isinstance(found, dict):
-        lists = {name: values for name, values in found.items() if isinstance(values, list)}
-        found = [row | {"sensor": name} for name, rows in lists.items() for row in rows if isinstance(row, dict)]
-        found = found or [dict(zip(lists, row)) for row in zip(*lists.values())]
-        with contextlib.suppress(TypeError):
-            found.sort(key=lambda row: next(iter(row.values())))  # by time
-    rows = [dict(_flat(row)) for row in found if isinstance(row, dict)]
-    if len(rows) < FEWEST_ROWS:
+        values = list(_objects(text))
+    tables = [(name, rows) for name, rows in _tables(values) if len(rows) >= FEWEST_ROWS]
+    rows = [row | ({"sensor": name} if len(tables) > 1 else {}) for name, rows in tables for row in rows]
+    if not rows:
         return text
+    if len(tables) > 1:
+        with contextlib.suppress(TypeError):
+            rows.sort(key=lambda row: next(iter(row.values())))
     table = io.StringIO()
     writer = csv.DictWriter(table, list(dict.fromkeys(name for row in rows for name in row)), lineterminator="\n")
     writer.writeheader()
@@ -78,6 +93,37 @@ def _objects(text: str) -> Iterator[Any]:
             yield json.loads(line.strip().rstrip(","))
         except (ValueError, RecursionError):
             continue
+
+
+def _tables(value: Any, name: str = "") -> Iterator[tuple[str, list[dict[str, Any]]]]:
+    """Yield (name, rows) for each table in a value of JSON."""
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        named = all(isinstance(cell, str) for cell in value[0])
+        names = value[0] if named else [f"#{k + 1}" for k in range(len(value[0]))]
+        yield name, [dict(zip(names, row)) for row in value[named:] if isinstance(row, list)]
+    elif isinstance(value, list):
+        yield name, [dict(_flat(row)) for row in value if isinstance(row, dict)]
+    elif isinstance(value, dict):
+        columns = dict(_columns(value))
+        if isinstance(value.get("columns"), list) and isinstance(value.get("data"), list):  # pandas
+            yield from _tables([value["columns"], *value["data"]], name)
+        elif len(columns) > 1 and len({len(cells) for cells in columns.values()}) == 1:
+            yield name, [dict(_flat(dict(zip(columns, row)))) for row in zip(*columns.values())]
+        else:
+            for key, inner in value.items():
+                yield from _tables(inner, key)
+
+
+def _columns(value: dict[str, Any], name: str = "") -> Iterator[tuple[str, list[Any]]]:
+    """Yield (name, cells) for each column in an object, whose cells are a list, or an object with a number per row."""
+    for key, inner in value.items():
+        joined = f"{name}.{key}" if name else key
+        if isinstance(inner, dict) and len(inner) >= FEWEST_ROWS:
+            inner = list(inner.values())
+        if isinstance(inner, dict):
+            yield from _columns(inner, joined)
+        elif isinstance(inner, list) and inner and not isinstance(inner[0], dict):
+            yield joined, inner
 
 
 def _flat(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:

@@ -102,13 +102,13 @@ class StoredBlock:
 
         The samples of a turn should fill the time since the turn before it. The rest of this time is a gap.
         """
-        period_us, before_us, found = 1_000_000 // self.sample_hz, self.time_us, []
+        period_us, before_us, gaps = 1_000_000 // self.sample_hz, self.time_us, []
         for turn in self.turns:
             late_us = turn.time_us - before_us - turn.n * period_us
             if late_us > _LATE_PERIODS * period_us:
-                found.append(late_us / 1e6)
+                gaps.append(late_us / 1e6)
             before_us = turn.time_us
-        return found
+        return gaps
 
 
 def read(content: bytes) -> tuple[list[StoredBlock], list[str]]:
@@ -120,17 +120,17 @@ def read(content: bytes) -> tuple[list[StoredBlock], list[str]]:
             damage.
     """
     blocks, problems = [], []
-    at = 0
-    while at < len(content):
-        length = int.from_bytes(content[at + 6 : at + 8], "little")
+    offset = 0
+    while offset < len(content):
+        length = int.from_bytes(content[offset + 6 : offset + 8], "little")
         try:
-            blocks.append(parse(content[at : at + length]))
-            at += length
+            blocks.append(parse(content[offset : offset + length]))
+            offset += length
         except BadBlock as problem:
-            following = content.find(block_format.MAGIC, at + 1)
+            following = content.find(block_format.MAGIC, offset + 1)
             last = following < 0 and str(problem) == CUT_SHORT
-            problems.append(CUT_SHORT if last else f"{problem} at byte {at}")
-            at = following if following > 0 else len(content)
+            problems.append(CUT_SHORT if last else f"{problem} at byte {offset}")
+            offset = following if following > 0 else len(content)
     return blocks, problems
 
 
@@ -157,8 +157,8 @@ def parse(data: bytes) -> StoredBlock:
         if not all(units) or not all(abs(value) <= _MOST for value in block.numbers()):
             raise ValueError  # "not <=" also refuses NaN
         end = len(data) - _TAIL_LENGTH - places * _PLACE_LENGTH
-        found = dict(_places(data[end : len(data) - _TAIL_LENGTH]))
-        block.turns = list(_turns(block, data[start:end], count, found))
+        positions = dict(_places(data[end : len(data) - _TAIL_LENGTH]))
+        block.turns = list(_turns(block, data[start:end], count, positions))
     except (ValueError, ZeroDivisionError) as error:  # the check sum is right, so the board wrote invalid values
         raise BadBlock("not decodable") from error
     return block
@@ -184,42 +184,42 @@ def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]
     places: {number of the entry: its position}.
     """
     bits = bin(int.from_bytes(b"\x01" + data, "big"))[3:]
-    before = [1] + [0] * (block_format.FIELDS - 1)
+    previous = [1] + [0] * (block_format.FIELDS - 1)
     means = [block_format.START_MEAN] * block_format.FIELDS
     period_us = 1_000_000 // block.sample_hz
-    now, at, speed = block.time_us, 0, None
+    time_us, bit, speed = block.time_us, 0, None
 
     def difference(i: int) -> int:
-        nonlocal at
+        nonlocal bit
         mean = means[i]
-        zero = bits.index("0", at)
-        ones = zero - at
+        zero = bits.index("0", bit)
+        ones = zero - bit
         if ones < block_format.LIMIT:
             k = max(0, mean.bit_length() - block_format.MEAN_SHIFT - 1)
-            at = zero + 1 + k
-            size = ones << k | (int(bits[zero + 1 : at], 2) if k else 0)
+            bit = zero + 1 + k
+            size = ones << k | (int(bits[zero + 1 : bit], 2) if k else 0)
         else:
-            start = at + block_format.LIMIT
-            at = start + block_format.RAW_BITS
-            size = int(bits[start:at], 2)
+            start = bit + block_format.LIMIT
+            bit = start + block_format.RAW_BITS
+            size = int(bits[start:bit], 2)
         means[i] = mean + min(size, block_format.MAX_SIZE) - (mean >> block_format.MEAN_SHIFT)
         return size >> 1 ^ -(size & 1)
 
     for entry in range(count):
-        n_before = before[0]
+        n_before = previous[0]
         n = n_before + difference(0)
         if n == 0:
-            before[8] += difference(8)
-            speed = before[8] / 100
+            previous[8] += difference(8)
+            speed = previous[8] / 100
             continue
         dt_us = n * period_us + difference(1)
         for i in range(2, 8):
-            before[i] = (before[i] if n == n_before else before[i] * n // n_before) + difference(i)
-        if n < 0 or dt_us < 0 or max(map(abs, before[2:8])) > n << 15:
+            previous[i] = (previous[i] if n == n_before else previous[i] * n // n_before) + difference(i)
+        if n < 0 or dt_us < 0 or max(map(abs, previous[2:8])) > n << 15:
             raise ValueError  # the time must increase, and counts have 16 bits
-        now += dt_us
-        before[0] = n
-        yield StoredTurn(now, n, tuple(before[2:8]), speed, places.get(entry))
+        time_us += dt_us
+        previous[0] = n
+        yield StoredTurn(time_us, n, tuple(previous[2:8]), speed, places.get(entry))
         speed = None
 
 

@@ -129,13 +129,13 @@ def pull(
             if rides:
                 make_directory(out)
             result = PullResult(name, [])
-            total, done = sum(part.size for parts in rides.values() for part in parts), 0
+            total, fetched = sum(part.size for parts in rides.values() for part in parts), 0
 
             def came(what: str, count: int) -> None:
-                nonlocal done
-                done += count
+                nonlocal fetched
+                fetched += count
                 if progress:
-                    progress(what, done, total)
+                    progress(what, fetched, total)
 
             for number, parts in rides.items():
                 ride = _pull_ride(transport, number, parts, vehicle, out, came)
@@ -179,16 +179,16 @@ def _pull_ride(
     blocks: list[StoredBlock] = []
     for part in parts:
         title = f"ride {number}, part {part.part}"
-        content, whole = _read(transport, part, title, came)
-        if not whole:
+        content, complete = _read(transport, part, title, came)
+        if not complete:
             short = f"only {len(content)} of its {part.size} bytes arrived"
             wrong = short if len(content) < part.size else "some bytes arrived with errors"
             ride.problems.append(f"{title}: {wrong}: try another cable; if that fails, the flash or card is damaged")
             ride.whole = False
-        found, problems = read(content)
-        blocks += found
+        blocks_read, problems = read(content)
+        blocks += blocks_read
         for problem in problems:
-            if problem == CUT_SHORT and whole and part is parts[-1]:
+            if problem == CUT_SHORT and complete and part is parts[-1]:
                 ride.problems.append(f"{title}: the last block is cut short, as by a power cut: left out")
             else:
                 ride.problems.append(f"{title}: {problem}: left out")
@@ -198,7 +198,7 @@ def _pull_ride(
         ride.problems.append(f"{title}: nothing in it can be read")
         ride.whole = False
         return ride
-    missing = [after.sequence - before.sequence - 1 for before, after in itertools.pairwise(blocks)]
+    missing = [following.sequence - previous.sequence - 1 for previous, following in itertools.pairwise(blocks)]
     if any(missing):
         ride.problems.append(f"{title}: {sum(missing)} blocks are missing: the log has a gap there")
     if missing_s := [seconds for block in blocks for seconds in block.missing_s()]:
@@ -253,13 +253,13 @@ def _read(transport: ConnectedBoard, part: _Part, title: str, came: _Came) -> tu
         content: the bytes that arrived.
         whole: True if all announced bytes arrived unchanged.
     """
-    content, whole = b"", False
+    content, complete = b"", False
     for attempt in range(_TRIES):
-        again, whole = _try_to_copy(transport, part, title, came if attempt == 0 else _no_progress)
-        content = max(content, again, key=len) if not whole else again
-        if whole:
+        retry, complete = _try_to_copy(transport, part, title, came if attempt == 0 else _no_progress)
+        content = max(content, retry, key=len) if not complete else retry
+        if complete:
             break
-    return content, whole
+    return content, complete
 
 
 def _no_progress(_what: str, _count: int) -> None:
@@ -269,14 +269,14 @@ def _no_progress(_what: str, _count: int) -> None:
 def _try_to_copy(transport: ConnectedBoard, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
     """Try once to read a file of the board. Returns the same values as _read()."""
     content = bytearray()
-    there = None
+    answer = None
     came(f"pulling {title}", 0)
     try:
         # base64 needs four characters per three bytes, and two per line end. The file of a running recording may grow.
         code = _READ.replace("PATH", repr(part.path))
         for line in lines(transport, code, _SILENT_S, most_bytes=2 * part.size + 9999):
             if line.startswith(b"("):
-                there = literal(line, (int, int))
+                answer = literal(line, (int, int))
                 continue
             with contextlib.suppress(binascii.Error):  # a byte was lost; the check sum will show the loss
                 piece = binascii.a2b_base64(line)
@@ -284,4 +284,4 @@ def _try_to_copy(transport: ConnectedBoard, part: _Part, title: str, came: _Came
                 came(f"pulling {title}", len(piece))
     except BrokenOff as error:
         raise InputError(f"{part.path} did not arrive completely ({error}): try again, with another cable") from error
-    return bytes(content), len(content) >= part.size and there == (len(content), binascii.crc32(content))
+    return bytes(content), len(content) >= part.size and answer == (len(content), binascii.crc32(content))

@@ -58,8 +58,8 @@ def record(
     if not out.name.endswith((".csv", ".csv.gz")):
         raise InputError(f"{out}: give --out a name that ends in .csv or .csv.gz")
     check_output(out, [])
-    beside = ride_log.calibration_path(out)
-    for path in (out, beside):
+    calibration_file = ride_log.calibration_path(out)
+    for path in (out, calibration_file):
         if path.exists():
             raise InputError(f"{path} exists already: give --out another name")
     with connected(port) as (transport, name):
@@ -70,14 +70,14 @@ def record(
             recorded = StreamLog(stopped, live)
             notes: list[str] = []
             # Write the calibration before the log, because the log may fill the disk
-            with whole_file(out) as temporary, whole_file(beside) as calibration, _signals(stopped):
+            with whole_file(out) as temporary, whole_file(calibration_file) as calibration, _signals(stopped):
                 with _GrowingFile(temporary, out.suffix == ".gz") as file:
-                    made = _save_first_calibration(blocks(transport, name, notes, stopped), calibration)
-                    recorded.write(file, made, notes)
+                    first = _save_first_calibration(blocks(transport, name, notes, stopped), calibration)
+                    recorded.write(file, first, notes)
         finally:
             with contextlib.suppress(Exception):  # the cable may be unplugged
                 restart(transport)
-    return RecordResult(out, beside, recorded.seconds, recorded.count, notes)
+    return RecordResult(out, calibration_file, recorded.seconds, recorded.count, notes)
 
 
 def _save_first_calibration(blocks: Iterator[StoredBlock], calibration: Path) -> Iterator[StoredBlock]:
@@ -101,10 +101,10 @@ class _GrowingFile(io.TextIOBase):
     def write(self, text: str) -> int:
         """Write all of the text, or nothing. Raises OSError if the write fails."""
         data = memoryview(gzip.compress(text.encode("ascii"), mtime=0) if self._packed else text.encode("ascii"))
-        at = 0
+        offset = 0
         try:
-            while at < len(data):
-                at += self._file.write(data[at:])
+            while offset < len(data):
+                offset += self._file.write(data[offset:])
         except OSError:
             self._file.truncate(self._length)
             self._file.seek(self._length)
@@ -141,11 +141,11 @@ def live_line() -> Iterator[Callable[[str], None]]:
 @contextlib.contextmanager
 def _signals(stopped: threading.Event) -> Iterator[None]:
     """A context in which signals that would end this program only set `stopped`."""
-    before = {number: signal.signal(number, lambda *_: stopped.set()) for number in _ending_signals()}
+    handlers = {number: signal.signal(number, lambda *_: stopped.set()) for number in _ending_signals()}
     try:
         yield
     finally:
-        for number, handler in before.items():
+        for number, handler in handlers.items():
             signal.signal(number, handler)
 
 

@@ -82,13 +82,13 @@ def write(path: Path, blocks: list[StoredBlock]) -> Path:
     Returns the path of NAME.cal.json.
     """
     turns = [turn for block in blocks for turn in block.turns]
-    there = {
+    columns = {
         "speed_mps": any(turn.speed_mps is not None for turn in turns),
         "lat_deg": any(turn.place for turn in turns),
         "utc_s": any(turn.place and turn.place.utc_s is not None for turn in turns),
     }
-    track = [name for name in TRACK if there[name.replace("lon", "lat")]]
+    track = [name for name in TRACK if columns[name.replace("lon", "lat")]]
     write_table(path, header(track), rows(blocks, track, blocks[0].time_us))
-    beside = calibration_path(path)
-    write_calibration(beside, calibration(blocks[0]))
-    return beside
+    calibration_file = calibration_path(path)
+    write_calibration(calibration_file, calibration(blocks[0]))
+    return calibration_file

@@ -125,9 +125,9 @@ class StreamLog:
             if self._live:
                 meter = replay.meter
                 rate_hz = len(block.turns) * 1e6 / max(1, last_us - block.time_us)
-                most = meter.max_left_deg, meter.max_right_deg, meter.max_accel_g, meter.max_brake_g
-                most = most if aligned else (0.0, 0.0, 0.0, 0.0)
-                self._live(LiveReading(aligned, car, moments, *most, rate_hz, self.seconds))
+                maxima = meter.max_left_deg, meter.max_right_deg, meter.max_accel_g, meter.max_brake_g
+                maxima = maxima if aligned else (0.0, 0.0, 0.0, 0.0)
+                self._live(LiveReading(aligned, car, moments, *maxima, rate_hz, self.seconds))
         if not self.written:
             raise InputError("; ".join(["nothing was recorded: does the display show readings?", *notes]))
         if missing:
@@ -161,14 +161,14 @@ def blocks(transport: ConnectedBoard, name: str, notes: list[str], stopped: thre
 
 def _lines(transport: ConnectedBoard, name: str, notes: list[str], stopped: threading.Event) -> Iterator[bytes]:
     """Yield the lines that the app on the board prints."""
-    at = f"{name}: " if name else ""
+    prefix = f"{name}: " if name else ""
     try:
         yield from lines(transport, _START, _SILENT_S, stopped)
         if not stopped.is_set():
-            notes.append(f"{at}the board stopped on its own: the log up to there is kept")
+            notes.append(f"{prefix}the board stopped on its own: the log up to there is kept")
     except OSError as error:
-        why = f" ({cause(error)})" if name else ""  # a browser gives no cause
-        notes.append(f"{at}connection lost{why}: the log up to there is kept")
+        reason = f" ({cause(error)})" if name else ""  # a browser gives no cause
+        notes.append(f"{prefix}connection lost{reason}: the log up to there is kept")
     except BrokenOff as error:
         refuse_unfit_firmware(str(error), name or "this port")
-        notes.append(f"{at}{error}: the log up to there is kept")
+        notes.append(f"{prefix}{error}: the log up to there is kept")

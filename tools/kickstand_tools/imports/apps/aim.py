@@ -31,9 +31,9 @@ def read(files: list[RecordingFile], name: str) -> AppRecording:
     )
     if header is None:
         raise InputError(f"{name}: no line with the names of its channels: export it again as AiM CSV")
-    following = lines[header + 1] if header + 1 < len(lines) else []
-    has_units = bool(following) and unit(following[0]) in ("s", "ms")
-    units = dict(enumerate(following)) if has_units else {}
+    units_line = lines[header + 1] if header + 1 < len(lines) else []
+    has_units = bool(units_line) and unit(units_line[0]) in ("s", "ms")
+    units = dict(enumerate(units_line)) if has_units else {}
     sheet = read_sheet(files[0], header, 1 if has_units else 0)
     places, missing = sheet.axes(*_ACCEL, *_RATES)
     if missing:

@@ -52,8 +52,8 @@ def read(files: list[RecordingFile], name: str) -> AppRecording:
 def _utc_ns(sheet: Sheet, time_ns: Nanoseconds) -> int | None:
     """UTC minus the log's own time, ns since 1970; None if the log has no UTC."""
     utc_s = sheet.numbers(sheet.place("utc_s"))
-    there = np.isfinite(utc_s)
-    return int(np.median(utc_s[there] * 1e9 - time_ns[there])) if np.any(there) else None
+    valid = np.isfinite(utc_s)
+    return int(np.median(utc_s[valid] * 1e9 - time_ns[valid])) if np.any(valid) else None
 
 
 def _is_ours(file: RecordingFile) -> bool:

@@ -49,7 +49,7 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing column or sensor."""
-    found: dict[str, RecordedSensor] = {}
+    sensors: dict[str, RecordedSensor] = {}
     track: ReceiverTrack | None = None
     pauses = _Pauses(files)
     for file in files:
@@ -57,14 +57,14 @@ def read(files: list[RecordingFile], name: str) -> AppRecording:
             continue
         sheet = read_sheet(file)
         for kind, sensor in _sensors(sheet, file.stem, pauses):
-            found.setdefault(kind, sensor)
+            sensors.setdefault(kind, sensor)
         track = track or _location(sheet, pauses)
     remedy = "record Acceleration (with g), or Gravity beside it"
     none = "no acceleration: add the accelerometer, and give all files of the export"
-    accel = with_gravity(found, found.__getitem__, name, "acceleration", remedy, none)
-    if "gyro" not in found:
+    accel = with_gravity(sensors, sensors.__getitem__, name, "acceleration", remedy, none)
+    if "gyro" not in sensors:
         raise InputError(f"{name}: no gyroscope: add it to the experiment, and give all files of the export")
-    return AppRecording(NAME, accel, found["gyro"], track, utc_ns=pauses.utc_ns)
+    return AppRecording(NAME, accel, sensors["gyro"], track, utc_ns=pauses.utc_ns)
 
 
 def _is_meta(file: RecordingFile) -> bool:
@@ -98,8 +98,11 @@ def _sensors(sheet: Sheet, stem: str, pauses: "_Pauses") -> Iterator[tuple[str, 
             continue
         time_ns = pauses.after(sheet.times(time))
         of_gyro = unit_name in RATES
-        said = ("gyro", unit_name, "right-handed") if of_gyro else ("accelerometer", unit_name, _SIGN)
-        yield "gyro" if of_gyro else _kind(what), sensor_of(sheet, time_ns, [axes[axis] for axis in "xyz"], *said)
+        words = ("gyro", unit_name, "right-handed") if of_gyro else ("accelerometer", unit_name, _SIGN)
+        yield (
+            "gyro" if of_gyro else _kind(what),
+            sensor_of(sheet, time_ns, [axes[axis] for axis in "xyz"], *words),
+        )
 
 
 def _kind(what: str) -> str:
@@ -129,21 +132,24 @@ class _Pauses:
         if file is None or len(file.first_lines(2)) < 2:
             return
         sheet = read_sheet(file)
-        own, utc = sheet.place("experiment time"), sheet.place("system time")
-        if own is None or utc is None or sheet.columns[0].lower() != "event":
+        experiment, utc = sheet.place("experiment time"), sheet.place("system time")
+        if experiment is None or utc is None or sheet.columns[0].lower() != "event":
             return
         events = [event.upper() for event in as_text(sheet.cells[0])]
-        at = of_seconds(sheet.numbers(own)).tolist()
+        time_ns = of_seconds(sheet.numbers(experiment)).tolist()
         clock = of_seconds(sheet.numbers(utc)).tolist()
         starts = [k for k, event in enumerate(events) if event == "START" and k < len(clock)]
-        starts = [k for k in starts if 0 <= at[k] < EPOCH_NS < clock[k]]
+        starts = [k for k in starts if 0 <= time_ns[k] < EPOCH_NS < clock[k]]
         if starts:
-            self.utc_ns = clock[starts[0]] - at[starts[0]]
-            self._resumed = [(at[k], max(0, clock[k] - clock[starts[0]] - (at[k] - at[starts[0]]))) for k in starts[1:]]
+            self.utc_ns = clock[starts[0]] - time_ns[starts[0]]
+            self._resumed = [
+                (time_ns[k], max(0, clock[k] - clock[starts[0]] - (time_ns[k] - time_ns[starts[0]])))
+                for k in starts[1:]
+            ]
 
     def after(self, time_ns: Nanoseconds) -> Nanoseconds:
         """Add to each of the experiment's times the pauses before it."""
-        moved = time_ns.copy()
-        for at, paused in self._resumed:
-            moved = np.where(time_ns >= at, time_ns + paused, moved)
-        return moved
+        moved_ns = time_ns.copy()
+        for since_ns, paused in self._resumed:
+            moved_ns = np.where(time_ns >= since_ns, time_ns + paused, moved_ns)
+        return moved_ns

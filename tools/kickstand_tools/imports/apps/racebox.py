@@ -29,10 +29,10 @@ def read(files: list[RecordingFile], name: str, units: Mapping[str, str] = {}) -
     """Read a recording. units: "speed" is the unit of the column Speed. Without this entry, the unit is found from the
     positions. Raises InputError for a missing column and for a unit that is not a unit of speed.
     """
-    said = units.get("speed", "")
-    if said:
-        factor(said, SPEEDS, "speed")
-    speed_unit = unit(said)
+    stated = units.get("speed", "")
+    if stated:
+        factor(stated, SPEEDS, "speed")
+    speed_unit = unit(stated)
     sheet = read_sheet(files[0], _header(files[0]) or 0)
     places, missing = sheet.axes(*_AXES)
     if {"GForceY", "GForceZ"} & set(missing):
@@ -65,5 +65,5 @@ def _header(file: RecordingFile) -> int | None:
 
 
 def _unit_in_name(column: str) -> str:
-    said = "km/h" if plain(column) == "kph" else unit(unit_in(column))
-    return said if said in SPEEDS else ""
+    name = "km/h" if plain(column) == "kph" else unit(unit_in(column))
+    return name if name in SPEEDS else ""

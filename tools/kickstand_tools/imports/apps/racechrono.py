@@ -61,9 +61,9 @@ def _is_header(line: str) -> bool:
 
 def _units(lines: list[str], header: int) -> tuple[dict[int, str], int]:
     """The units by column number, and the number of header lines after the first."""
-    following = [names_in(line) for line in lines[header + 1 : header + 3]]
-    if len(following) == 2 and following[0] and following[0][0] == "unix time":
-        return {place: cell for place, cell in enumerate(following[0]) if cell}, 2
+    lines_below = [names_in(line) for line in lines[header + 1 : header + 3]]
+    if len(lines_below) == 2 and lines_below[0] and lines_below[0][0] == "unix time":
+        return {place: cell for place, cell in enumerate(lines_below[0]) if cell}, 2
     names = names_in(lines[header])
     return {place: name.rpartition("(")[2].rstrip(")") for place, name in enumerate(names) if name.endswith(")")}, 0
 

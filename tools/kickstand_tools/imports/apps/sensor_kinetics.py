@@ -22,12 +22,12 @@ _SENSOR = re.compile(r"^(.*?)[_.]?(acc|gyr|grv|lac|mag|rot)m?$")  # the end of a
 
 def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """The recordings among these files: the names of a recording's files differ only in the sensor."""
-    alike: dict[str, list[RecordingFile]] = {}
+    groups: dict[str, list[RecordingFile]] = {}
     for file in files:
         head = [cell.lower() for cell in names_in(next(iter(file.first_lines(1)), ""))]
         if head == _HEAD:
-            alike.setdefault(f"{file.folder}/{_parts(file)[0]}", []).append(file)
-    return list(alike.values())
+            groups.setdefault(f"{file.folder}/{_parts(file)[0]}", []).append(file)
+    return list(groups.values())
 
 
 def read(files: list[RecordingFile], name: str) -> AppRecording:

@@ -40,10 +40,10 @@ def read(files: list[RecordingFile], name: str) -> AppRecording:
         raw = turned and stem == _RAW
         return _sensor(by_stem[stem], "accelerometer", "g" if raw else "m/s2", up, -1.0 if turned else 1.0)
 
-    there = [kind for kind, stems in _KINDS.items() if any(stem in by_stem for stem in stems)]
+    kinds = [kind for kind, stems in _KINDS.items() if any(stem in by_stem for stem in stems)]
     remedy = "record Gravity, or Total Acceleration, beside it"
     none = "no acceleration: switch Accelerometer and Gravity on, and give all files of the export"
-    accel = with_gravity(there, acceleration, name, "Accelerometer.csv", remedy, none)
+    accel = with_gravity(kinds, acceleration, name, "Accelerometer.csv", remedy, none)
     gyro_file = next((by_stem[stem] for stem in _GYROS if stem in by_stem), None)
     if gyro_file is None:
         raise InputError(f"{name}: no Gyroscope.csv: switch the gyroscope on, and give all files of the export")
@@ -65,9 +65,9 @@ def _platform(by_stem: dict[str, RecordingFile]) -> tuple[bool | None, bool]:
     """True for an iPhone (None: unknown), and True if units and signs were standardised."""
     if "metadata" in by_stem and len(by_stem["metadata"].first_lines(2)) > 1:
         names, values = (names_in(line) for line in by_stem["metadata"].first_lines(2))
-        said = {name.lower(): value.lower() for name, value in zip(names, values)}
-        if said.get("platform"):
-            return said["platform"] == "ios", said.get("standardisation") == "true"
+        metadata = {name.lower(): value.lower() for name, value in zip(names, values)}
+        if metadata.get("platform"):
+            return metadata["platform"] == "ios", metadata.get("standardisation") == "true"
     return (False, False) if _TOTAL in by_stem else (None, False)  # only Android has that file
 
 

@@ -48,9 +48,9 @@ def read(files: list[RecordingFile], name: str) -> AppRecording:
     def acceleration(kind: str) -> RecordedSensor:
         return sensor_of(sheet, _clock(sheet, _KINDS[kind][0]), places[kind], "accelerometer", "g", _UP, -1.0)
 
-    there = [kind for kind, columns in places.items() if columns]
+    kinds = [kind for kind, columns in places.items() if columns]
     remedy = "log the accelerometer, or gravity beside the user's acceleration"
-    accel = with_gravity(there, acceleration, name, "acceleration", remedy, f"no acceleration: {remedy}")
+    accel = with_gravity(kinds, acceleration, name, "acceleration", remedy, f"no acceleration: {remedy}")
     return AppRecording(NAME, accel, _gyro(sheet, name), _location(sheet), utc_ns=_utc_ns(sheet))
 
 
@@ -61,8 +61,8 @@ def _is_ours(file: RecordingFile) -> bool:
 
 def _axis_columns(sheet: Sheet, names: list[str]) -> list[int]:
     """The columns of three axes; an empty list if one is missing or empty."""
-    found, missing = sheet.axes(*names)
-    return found if not missing and np.any(np.isfinite(sheet.table(found)).all(axis=1)) else []
+    axes, missing = sheet.axes(*names)
+    return axes if not missing and np.any(np.isfinite(sheet.table(axes)).all(axis=1)) else []
 
 
 def _clock(sheet: Sheet, sensor: str) -> Nanoseconds:

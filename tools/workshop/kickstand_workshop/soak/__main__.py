@@ -29,7 +29,7 @@ def table(figures: Tallies) -> str:
         ("presses", str(figures.presses)),
         ("changes of the display", str(figures.pages)),
         *((words, f"{figures.worst.get(name, 0.0):.1f}") for name, words in _WORST.items()),
-        ("found", str(len(figures.found))),
+        ("found", str(len(figures.violations))),
     ]
     return "\n".join(("| tried or seen | |", "|---|---|", *(f"| {name} | {value} |" for name, value in rows)))
 
@@ -41,9 +41,9 @@ def main(hours: float, seed: int) -> None:
     """Test the firmware on the simulated board for hours, with random rides, faults and presses."""
     figures = soak(hours, seed, say=lambda line: click.echo(line, err=True))
     click.echo(table(figures))
-    for line in figures.found:
+    for line in figures.violations:
         click.echo(line, err=True)
-    sys.exit(1 if figures.found else 0)
+    sys.exit(1 if figures.violations else 0)
 
 
 if __name__ == "__main__":

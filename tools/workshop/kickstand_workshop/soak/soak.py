@@ -37,7 +37,7 @@ SAYS_WHY = re.compile("No sensor|Sensor |Readings lost|Kickstand|Lean  --")
 class Watch:
     """Checks the invariants during a trip.
 
-    found: One line per broken invariant.
+    violations: One line per broken invariant.
     wrong_s: Longest time for which a lean with an error over WRONG_DEG was shown.
     error_deg: Largest error that was shown for a second.
     stale_s: Longest time for which a lean was shown while no sample was read.
@@ -46,7 +46,7 @@ class Watch:
     """
 
     def __init__(self, board: Board, trip: Trip, readings: Callable[[], int]) -> None:
-        self.found: list[str] = []
+        self.violations: list[str] = []
         self.wrong_s = self.error_deg = self.stale_s = self.without_s = 0.0
         self.changes = 0
         self._board, self._trip, self._readings = board, trip, readings
@@ -60,8 +60,8 @@ class Watch:
 
     def _report(self, fault: str) -> None:
         line = f"{fault} at {self._board.clock.now_us / 1e6:.1f} s: {'|'.join(self._text)}"
-        if not self.found or self.found[-1].split(" at ")[0] != fault:
-            self.found.append(line)
+        if not self.violations or self.violations[-1].split(" at ")[0] != fault:
+            self.violations.append(line)
 
     def _look(self) -> None:
         t_s = self._board.clock.now_us / 1e6
@@ -158,7 +158,7 @@ class Tallies:
     pages: int = 0  # number of changes of the display
     worst: dict[str, float] = field(default_factory=dict)  # largest value of each figure, by name
     host_s: float = 0.0  # time on this computer
-    found: list[str] = field(default_factory=list)  # one line per broken invariant
+    violations: list[str] = field(default_factory=list)  # one line per broken invariant
 
     def keep_worst(self, name: str, value: float) -> None:
         """Keep the value if it is the largest value with this name."""
@@ -224,7 +224,7 @@ def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: 
                 figures.host_s = time.monotonic() - begun
                 if figures.hours >= said_h + 1.0:
                     said_h = figures.hours
-                    say(f"{said_h:.1f} h in {figures.host_s:.0f} s, {len(figures.found)} findings")
+                    say(f"{said_h:.1f} h in {figures.host_s:.0f} s, {len(figures.violations)} findings")
         finally:
             os.chdir(directory)
     return figures
@@ -280,20 +280,20 @@ def _run(bike: SoakBoard, trip: Trip, figures: Tallies) -> None:
             finally:
                 mpu6050.add_up, settings.load = add_up, load
         if end != "off":
-            watch.found.append(f"the board ended with {end!r} at {board.clock.now_us / 1e6:.1f} s")
+            watch.violations.append(f"the board ended with {end!r} at {board.clock.now_us / 1e6:.1f} s")
     except Exception as error:
-        watch.found.append(f"{type(error).__name__}: {error}")
+        watch.violations.append(f"{type(error).__name__}: {error}")
         saves_cut = 0
     finally:
         gc.unfreeze()
     if "Traceback" in console.getvalue():
-        watch.found.append("a traceback: " + console.getvalue()[-400:])
+        watch.violations.append("a traceback: " + console.getvalue()[-400:])
     lasted_s = board.clock.now_us / 1e6
     if len(blocks) > 2 and figures.trips >= WARM_TRIPS:
         growth = blocks[-1] - blocks[1]
         figures.keep_worst("memory_growth_blocks", growth)
         if growth > MAX_GROWTH:
-            watch.found.append(f"memory has grown by {growth} blocks")
+            watch.violations.append(f"memory has grown by {growth} blocks")
     _check_calibration(bike, watch, figures)
     _count(figures, trip, watch, lasted_s, saves_cut)
 
@@ -308,9 +308,9 @@ def _check_calibration(bike: SoakBoard, watch: Watch, figures: Tallies) -> None:
     """Check that the board still has a calibration, its old one or a new one. The power may have been cut in a save."""
     calibration = bike.store().load()
     if bike.aligned and not calibration.aligned:
-        watch.found.append("the alignment is lost")
+        watch.violations.append("the alignment is lost")
     if not calibration.six_done:
-        watch.found.append("the six positions are lost")
+        watch.violations.append("the six positions are lost")
     if calibration.aligned and not bike.aligned:
         figures.alignments += 1
     bike.aligned = calibration.aligned
@@ -326,4 +326,4 @@ def _count(figures: Tallies, trip: Trip, watch: Watch, lasted_s: float, saves_cu
     figures.pages += watch.changes
     for name in ("wrong_s", "error_deg", "stale_s", "without_s"):
         figures.keep_worst(name, getattr(watch, name))
-    figures.found += [f"trip {figures.trips} ({trip.kind}): {line}" for line in watch.found]
+    figures.violations += [f"trip {figures.trips} ({trip.kind}): {line}" for line in watch.violations]
