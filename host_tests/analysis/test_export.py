@@ -15,7 +15,6 @@ from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
 from support import command
-from support.recordings import analysis_rides
 
 EVENING_S = 1_700_000_000.0  # Unix time of 22:13:20 UTC on 14/11/2023
 VALUES = {
@@ -143,24 +142,7 @@ def test_the_command_exports_every_sample(short_ride, tmp_path):
             f"written: {out}, "
         )
         exported = read(out)
-        course = joined(open_ride(short_ride, smoothed=not options).blocks())
+        course = joined(open_ride(short_ride, smoothed=not options).read().parts())
         for column in "lean_deg", "lateral_g", "forward_g", "speed_mps":
             assert np.allclose(exported[column], getattr(course, column), atol=1e-3, equal_nan=True), column
         assert np.allclose(exported["t_s"], course.t_s, atol=1e-9) and exported["temp_c"].isna().all()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("alone.csv",), "no calibration alone.cal.json beside it: give one with --calibration, or make it"),
-        (("empty.csv",), "is empty: there are no readings below the names of its columns"),
-        (("none.csv",), "there is no such file"),
-        (("alone.csv", "--calibration", "flat.json"), "is not aligned"),
-    ],
-)
-def test_a_ride_that_cannot_be_exported_is_refused(short_ride, tmp_path, monkeypatch, arguments, words):
-    monkeypatch.chdir(tmp_path)
-    Path("alone.csv").write_bytes(short_ride.read_bytes())
-    Path("empty.csv").write_text(command.HEADER + "\n")
-    analysis_rides.calibration(Path("flat.json"), aligned=False)
-    command.refused(tmp_path, "export", *arguments, "--to", "csv", "--out", "out", words=words)

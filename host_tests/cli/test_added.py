@@ -13,9 +13,9 @@ import errno, os, signal
 import click
 
 
-@click.command()
+@click.command(short_help="Split a ride into laps.")
 def laps_command():
-    """Split a ride into laps."""
+    """Not this."""
     ACTION
 '''
 THREE_LAPS = LAPS.replace("ACTION", 'click.echo("three laps")')

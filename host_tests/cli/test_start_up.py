@@ -8,7 +8,7 @@ from importlib.metadata import EntryPoint
 
 import pytest
 from kickstand_tools.cli import main
-from kickstand_tools.cli.added import GROUP, help_line
+from kickstand_tools.cli.added import GROUP
 from support import command
 
 LOADED = """
@@ -47,42 +47,6 @@ def processor_s(*arguments):
 @pytest.mark.long
 def test_help_takes_at_most_twice_the_time_of_its_libraries():
     assert processor_s("-m", "kickstand_tools.cli", "--help") < 2.0 * processor_s("-c", "import click, rich.console")
-
-
-TEXTS = '''
-import click
-from click import command as decorator
-
-raise RuntimeError("it was loaded")
-
-
-@click.command(short_help="A short help.")
-@click.option("--more", help="Not this.")
-def short_command(more):
-    """A long help."""
-
-
-@click.command(help="A help. More of it.")
-def help_command():
-    """A docstring."""
-
-
-@click.command()
-@click.option("--more", help="Not this.", default=3)
-def docstring_command(more):
-    """The first sentence. The second one."""
-'''
-
-
-@pytest.mark.parametrize(
-    ("name", "line"), [("short", "A short help."), ("help", "A help."), ("docstring", "The first sentence.")]
-)
-def test_a_help_line_is_read_without_loading_its_module(tmp_path, monkeypatch, name, line):
-    (tmp_path / "lap_texts").mkdir()
-    (tmp_path / "lap_texts" / "__init__.py").write_text("raise RuntimeError")
-    (tmp_path / "lap_texts" / "commands.py").write_text(TEXTS)
-    monkeypatch.syspath_prepend(tmp_path)
-    assert help_line(EntryPoint("x", f"lap_texts.commands:{name}_command", GROUP)) == line
 
 
 def test_an_invalid_entry_point_does_not_hide_a_crash(tmp_path, monkeypatch):
