@@ -28,17 +28,17 @@ ANGLES = {"deg": 1.0, "min": 1.0 / 60.0}
 COUNTS_PER_G = (16384.0, 8192.0, 4096.0, 2048.0)
 COUNTS_PER_DPS = (131.0, 65.5, 32.8, 16.4)
 _SPELLINGS = {
-    "m/s2": "m/s/s m/sec2 mps2 ms2",
+    "m/s2": "\u043c/\u04412 m/s/s m/sec2 mps2 ms2",
     "cm/s2": "gal cm/s/s",
     "ft/s2": "ft/s/s fps2",
     "rpm": "r/min rev/min u/min",
     "rev/s": "r/s rps",
     "deg/h": "°/h deg/hr dph",
     "g": "gs",
-    "deg/s": "dps °/s deg/sec degrees/s",
+    "deg/s": "°/\u0441 dps °/s deg/sec degrees/s",
     "mdeg/s": "mdps",
     "mrad/s": "mrads mrps",
-    "rad/s": "radians/s rad/sec rads",
+    "rad/s": "\u0440\u0430\u0434/\u0441 radians/s rad/sec rads",
     "km/h": "kmh kph km/hr",
     "m/s": "mps",
     "mph": "mi/h",
