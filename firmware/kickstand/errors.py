@@ -95,6 +95,14 @@ def tried(function, *arguments):
         return None, Notice("incomplete" if isinstance(error, ImportError) else "no-memory", str(error))
 
 
+def unload(name):
+    """Remove a module of this package that is rarely needed, to free its heap."""
+    name = "kickstand." + name
+    if sys.modules.pop(name, None):
+        folder, _, module = name.rpartition(".")
+        delattr(sys.modules[folder], module)
+
+
 class CaptureError(Refusal):
     """A pose was not still, or its readings cannot come from a still sensor."""
 

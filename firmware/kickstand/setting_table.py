@@ -4,10 +4,14 @@ settings.py removes this module after use, to free heap. To add a setting, write
 with its purpose in config.py.
 """
 
-from .board import port
+from .board import pins, port
 from .board.display import ADDRESSES, KINDS, LCD_HZ, OLED_HZ
 from .errors import SettingsError
-from .imu.mpu6050 import ACCEL_LSB_PER_G, GYRO_LSB_PER_DPS, MIN_DLPF
+from .imu.mpu6050 import ACCEL_LSB_PER_G, GYRO_LSB_PER_DPS
+
+# For each sample rate in Hz, the dlpf of the widest low-pass (98, 44 or 21 Hz) below half of the rate (register map,
+# p. 13)
+MIN_DLPF = {50: 4, 100: 3, 125: 3, 200: 2}
 
 
 def _one_of(*choices):
@@ -32,12 +36,12 @@ def _pulses(value):
 
 
 def _pin(value):
-    return isinstance(value, int) and 0 <= value <= 48 and value not in port.TAKEN_PINS
+    return isinstance(value, int) and 0 <= value <= 48 and value not in pins.TAKEN_PINS
 
 
 _INPUT = _pin, "a number from 0 to 48, no pin of the chip's own USB, flash or console"
 # A button needs a pull-up. Pins that are only inputs have no pull-up.
-_PIN = (lambda v: _pin(v) and v not in port.INPUT_PINS), _INPUT[1] + ", and none that is an input only"
+_PIN = (lambda v: _pin(v) and v not in pins.INPUT_PINS), _INPUT[1] + ", and none that is an input only"
 _SD_PINS = ("SD_SCK", "SD_MOSI", "SD_MISO", "SD_CS")
 # For each speed source, the names of its pin settings
 _SPEED_PINS = {None: (), "gps": ("GPS_TX", "GPS_RX"), "wheel": ("WHEEL_PIN",)}
@@ -64,28 +68,28 @@ _TABLE = {
     "RECORD": (False, _one_of(True, False)),
     "LIVE": (False, _one_of(True, False)),
     "LIVE_PIN": (None, _or_none(_whole(100_000, 999_999))),
-    "SD_SPI": (None, _or_none(_one_of(*port.SD_SPI))),
+    "SD_SPI": (None, _or_none(_one_of(*pins.SD_SPI))),
     "VEHICLE": ("motorcycle", _one_of("motorcycle", "car")),
     "SPEED": (None, _one_of(None, "gps", "wheel")),
-    "GPS_UART": (port.GPS_UART, _whole(0, 2)),
+    "GPS_UART": (pins.GPS_UART, _whole(0, 2)),
     "GPS_BAUD": (9600, _whole(4800, 115_200)),
     "PULSES_PER_METRE": (0.5, (_pulses, "pulses along a metre of road, from 0.1 to 100")),
 }
 # The settings of the pins, as entries like those of _TABLE. A wrong pin is replaced by None, because the default pin
 # may be connected to something else.
 _PINS = {
-    "SENSOR_SDA": (port.SENSOR_PINS[0], _PIN),
-    "SENSOR_SCL": (port.SENSOR_PINS[1], _PIN),
-    "LCD_SDA": (port.LCD_PINS[0], _PIN),
-    "LCD_SCL": (port.LCD_PINS[1], _PIN),
-    "BUTTON_PIN": (port.BUTTON_PIN, _PIN),
+    "SENSOR_SDA": (pins.SENSOR_PINS[0], _PIN),
+    "SENSOR_SCL": (pins.SENSOR_PINS[1], _PIN),
+    "LCD_SDA": (pins.LCD_PINS[0], _PIN),
+    "LCD_SCL": (pins.LCD_PINS[1], _PIN),
+    "BUTTON_PIN": (pins.BUTTON_PIN, _PIN),
     "SD_SCK": (None, _or_none(_PIN)),
     "SD_MOSI": (None, _or_none(_PIN)),
     "SD_MISO": (None, _or_none(_INPUT)),
     "SD_CS": (None, _or_none(_PIN)),
-    "GPS_TX": (port.GPS_PINS[0], _PIN),
-    "GPS_RX": (port.GPS_PINS[1], _INPUT),
-    "WHEEL_PIN": (port.WHEEL_PIN, _PIN),
+    "GPS_TX": (pins.GPS_PINS[0], _PIN),
+    "GPS_RX": (pins.GPS_PINS[1], _INPUT),
+    "WHEEL_PIN": (pins.WHEEL_PIN, _PIN),
 }
 _NAMES = set(_TABLE) | set(_PINS)
 
@@ -152,7 +156,7 @@ def _check(settings, config):
         raise SettingsError("no-pins", missing[0], ", ".join(missing), port.MACHINE)
     if len({getattr(settings, name) for name in names}) != len(names):
         raise SettingsError("pin-twice", "", ", ".join(names))
-    if port.I2C_NUMBERED:
+    if pins.I2C_NUMBERED:
         _check_i2c(settings)
     if not settings.leans and settings.SPEED is None:
         raise SettingsError("needs-speed", "SPEED")

@@ -3,7 +3,7 @@
 import sys
 from io import StringIO
 
-from .errors import SettingsError
+from .errors import SettingsError, unload
 
 
 def load():
@@ -48,6 +48,6 @@ class Settings:
         except SettingsError as error:
             error.settings = self
             raise
-        finally:  # remove the table, which takes 8 KB of heap
-            if sys.modules.pop("kickstand.setting_table", None):
-                del sys.modules["kickstand"].setting_table  # type: ignore[attr-defined]
+        finally:
+            unload("setting_table")  # which takes 8 KB of heap
+            unload("board.pins")

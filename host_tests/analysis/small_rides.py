@@ -11,6 +11,7 @@ from kickstand_tools.analysis.overview import Overview
 from kickstand_tools.analysis.ride import Ride
 from kickstand_tools.analysis.stops.brake_test import Stop
 from kickstand_tools.analysis.summary import summary
+from kickstand_tools.checks.log import CheckedLog
 
 STOP = Stop(61.0, 63.5, 20.0, 30.04, 7.114, 8.125, 12.4, 0.24, 1.0, "log")
 ALIGNED = api.CalibrationFile(aligned=True)
@@ -29,7 +30,7 @@ def quality_of(roll=None, pitch=None, yaw=None, gravity=None, lateral_g=(), forw
 
 def overview_of(course, quality=None, stops=(), riding_s=60.0, notices=(), smoothed=False, **calibration):
     log = api.Log(np.array([0.0, 0.01]), np.tile([0.0, 1.0, 0.0], (2, 1)), np.zeros((2, 3)), name="trip/RIDE.csv")
-    ride = Ride(log, api.CalibrationFile(aligned=True, **calibration), smoothed)
+    ride = Ride(CheckedLog(log, np.ones(2, dtype=bool), []), api.CalibrationFile(aligned=True, **calibration), smoothed)
     quality = quality or quality_of(0.1, None, 1.0, 1.0)
     return Overview(ride, summary(course), course, list(stops), quality, riding_s, list(notices))
 

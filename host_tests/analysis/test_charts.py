@@ -1,7 +1,6 @@
 """The charts of a ride as data, and as the page and the picture draw them. Left is on the left, braking is below."""
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ from kickstand_tools.analysis.plot.charts import (
     Chart,
     Charts,
 )
-from kickstand_tools.checks.mount import UpOff
+from kickstand_tools.calibration.mount import UpOff
 from kickstand_tools.estimation.smooth import NotTheBikes
 from small_rides import overview_of, samples
 
@@ -120,8 +119,7 @@ def test_a_page_has_its_warnings_if_asked_and_names_as_text():
     ride_overview = overview_of(samples(100), notices=[UpOff(30.0, False)])
     words = '<p class="warning">Warning: the calibration&#39;s up is 30'
     assert words not in page.page(ride_overview, "", "") and words in page.page(ride_overview, "", "", warnings=True)
-    html = page.page(
-        replace(ride_overview, ride=replace(ride_overview.ride, log=Path("<b>&.csv"))), "LIBRARY", "ALLOWED"
-    )
+    ride_overview.ride.log.name = "<b>&.csv"
+    html = page.page(ride_overview, "LIBRARY", "ALLOWED")
     assert "<title>&lt;b&gt;&amp;</title>" in html and "<b>" not in html
     assert "LIBRARY" in html and "script-src ALLOWED " in html

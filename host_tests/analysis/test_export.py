@@ -142,7 +142,7 @@ def test_the_command_exports_every_sample(short_ride, tmp_path):
             f"written: {out}, "
         )
         exported = read(out)
-        course = joined(open_ride(short_ride, smoothed=not options).blocks())
+        course = joined(open_ride(short_ride, smoothed=not options).read().parts())
         for column in "lean_deg", "lateral_g", "forward_g", "speed_mps":
             assert np.allclose(exported[column], getattr(course, column), atol=1e-3, equal_nan=True), column
         assert np.allclose(exported["t_s"], course.t_s, atol=1e-9) and exported["temp_c"].isna().all()

@@ -1,11 +1,10 @@
-"""The blocks of a ride: parts that are left out, warnings, the riding time, and refusals of unusable files."""
+"""The channels of a ride: parts that are left out, warnings, the riding time, and refusals of unusable files."""
 
 from typing import Any
 
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.analysis.brake_tests import car_channels
 from kickstand_tools.analysis.channels import joined
 from kickstand_tools.analysis.overview import overview
 from kickstand_tools.common.errors import InputError
@@ -18,9 +17,8 @@ CAR = api.CalibrationFile(aligned=True, vehicle="car")
 
 def read(log, calibration=ALIGNED, smoothed=False):
     """Return the channels of a ride and the codes of its notices."""
-    notices = []
-    course = joined(list(api.open_ride(log, calibration, smoothed).blocks(notices=notices)))
-    return course, notices
+    reading = api.open_ride(log, calibration, smoothed).read()
+    return joined(reading.parts()), reading.notices()
 
 
 def frozen_log():
@@ -54,10 +52,8 @@ def test_readings_that_contradict_each_other_are_noticed(tmp_path, calibration, 
 
 
 def test_a_car_has_no_lean():
-    (block,) = car_channels(standing_log(), CAR)
-    assert np.all(np.isnan(block.lean_deg) & np.isnan(block.lean_formula_deg)) and len(block.t_s) == 400
-    assert block.lateral_g == pytest.approx(block.left_g)
     course, _ = read(standing_log(), CAR)
+    assert np.all(np.isnan(course.lean_formula_deg)) and course.lateral_g == pytest.approx(course.left_g)
     assert np.all(np.isnan(course.lean_deg)) and np.all(course.lean_sigma_deg == 0.0)
 
 
@@ -91,7 +87,7 @@ def test_a_calibration_is_given_or_refused(tmp_path):
     for arguments, words in refused:
         with pytest.raises(InputError, match=words):
             api.open_ride(*arguments)
-    (tmp_path / "RIDE.csv").write_text(LOG)
+    (tmp_path / "RIDE.csv").write_text(LOG + "1,0,1,0,0,0,0\n")
     api.write_calibration(tmp_path / "RIDE.cal.json", ALIGNED)
     assert api.open_ride(tmp_path / "RIDE.csv").calibration == ALIGNED
 

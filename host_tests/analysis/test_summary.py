@@ -139,7 +139,7 @@ def test_channels_and_maxima_are_those_of_the_display(tmp_path):
         displayed_g.append(engine.meter.smooth_force[2])
         rolling.append(engine.meter.filter.rolling)
         trusted.append(engine.meter.trusted)
-    course, meter = joined(list(ride.blocks())), engine.meter
+    course, meter = joined(list(ride.read().parts())), engine.meter
     for name, column in zip(replay_engine.COLUMNS, np.transpose(rows)):
         if name not in ("static_lean_deg", "lean_formula_deg", "lean_sigma_deg"):
             assert np.max(np.abs(getattr(course, name) - column)) < 1e-5, name
@@ -153,7 +153,7 @@ def test_channels_and_maxima_are_those_of_the_display(tmp_path):
 
 
 def test_a_smoothed_ride_differs_only_in_its_lean(short_ride):
-    live, smoothed = (joined(open_ride(short_ride, None, smoothed=smooth).blocks()) for smooth in (False, True))
+    live, smoothed = (joined(open_ride(short_ride, None, smoothed=smooth).read().parts()) for smooth in (False, True))
     names = {field.name for field in fields(Channels)}
     equal = {name for name in names if np.array_equal(getattr(smoothed, name), getattr(live, name), equal_nan=True)}
     assert names - equal == {"lean_deg", "lean_sigma_deg", "lateral_g", "sure"}

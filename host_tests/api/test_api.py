@@ -12,7 +12,7 @@ import sys
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.calibration.pose_refusals import SamePose
+from kickstand_tools.calibration.refusals import SamePose
 from kickstand_tools.simulation.files import simulate
 from support import command
 

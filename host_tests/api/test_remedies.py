@@ -7,9 +7,9 @@ from dataclasses import fields
 
 import pytest
 from kickstand_tools import api
-from kickstand_tools.calibration.drive_refusals import MountMoved
-from kickstand_tools.checks.handedness import RatesMisfit
-from kickstand_tools.checks.mount import ForwardExchanged, ForwardOff, UpOff
+from kickstand_tools.calibration.mount import ForwardExchanged, ForwardOff, UpOff
+from kickstand_tools.calibration.refusals import MountMoved
+from kickstand_tools.checks.axes import RatesMisfit
 from kickstand_tools.cli.main import kickstand
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.common.messages import Message, Remedy, as_data
@@ -30,7 +30,13 @@ CLASSES = sorted(classes(), key=lambda one: one.code)
 
 
 def sample(one):
-    return WHOLE.get(one) or one(*(SAMPLES[str(getattr(f.type, "__name__", f.type))] for f in fields(one)))
+    return WHOLE.get(one) or one(*map(value_of, fields(one)))
+
+
+def value_of(field):
+    """Return a value of a field. The fields of a kind() have no type."""
+    any_value = "x" if field.name in ("axis", "by", "name", "phone", "pose", "side") else 160.0
+    return SAMPLES.get(str(getattr(field.type, "__name__", field.type)), any_value)
 
 
 def with_a_command(words):

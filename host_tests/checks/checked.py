@@ -3,15 +3,15 @@
 import functools
 
 import numpy as np
-from kickstand_tools.checks.cells import CellTable, LogCells
+from kickstand_tools.checks.bins import LogBins, log_bins
 from kickstand_tools.common.messages import sentence
 from kickstand_tools.logs.log import Log
 from kickstand_tools.signals import rotation_matrix
 from kickstand_tools.simulation.ride import SimulatedRide, ride
 
 
-def cells_of(log: Log, accel=None, gyro=None, speed=True) -> LogCells:
-    """Return the cells of a log with changed axes.
+def bins_of(log: Log, accel=None, gyro=None, speed=True) -> LogBins:
+    """Return the bins of a log with changed axes.
 
     accel: matrix (3, 3) that exchanges and reverses the accelerometer's axes.
     gyro: the same for the gyro, or a multiple of the identity matrix to scale its readings.
@@ -20,11 +20,9 @@ def cells_of(log: Log, accel=None, gyro=None, speed=True) -> LogCells:
     force = log.accel_g if accel is None else log.accel_g @ np.transpose(accel)
     rate = log.gyro_dps if gyro is None else log.gyro_dps @ np.transpose(gyro)
     mps = log.speed_mps if speed else np.full(len(log.t_s), np.nan)
-    table = CellTable()
-    table.add(log.t_s, force, rate, mps, log.lat_deg, log.lon_deg)
-    cells = table.cells()
-    assert cells is not None
-    return cells
+    bins = log_bins(log.t_s, force, rate, mps, log.lat_deg, log.lon_deg)
+    assert bins is not None
+    return bins
 
 
 def words(notice) -> str:

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from checked import cells_of, simulated, words
-from kickstand_tools.checks.bends import bends
-from kickstand_tools.checks.handedness import handedness
+from checked import bins_of, simulated, words
+from kickstand_tools.checks.axes import bends, handedness
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.simulation.profiles import PROFILES
@@ -14,7 +13,7 @@ from kickstand_workshop.evaluation.drawn_rides import drawn_ride
 
 def judged(log, scale=1.0):
     """Return the remark on a log whose rates are multiplied by `scale`."""
-    return words(bends(cells_of(log, gyro=scale * np.eye(3))))
+    return words(bends(bins_of(log, gyro=scale * np.eye(3))))
 
 
 @pytest.mark.parametrize("profile", PROFILES)
@@ -34,9 +33,9 @@ def test_one_long_steady_bend_is_not_the_gyros_bias():
     """The bend takes 60 s of a ride of 92 s, so it contains most of the calmest seconds. The check measures the gyro's
     bias in the calmest seconds, and must not take the bend's yaw rate for a bias."""
     log = drawn_ride(1036, mounts=["firm"], kind="sweepers").logs[0]
-    assert words(handedness(cells_of(log)) or bends(cells_of(log))) == ""
+    assert words(handedness(bins_of(log)) or bends(bins_of(log))) == ""
     log.gyro_dps = -log.gyro_dps
-    assert "the gyro of the opposite sign" in words(handedness(cells_of(log)) or bends(cells_of(log)))
+    assert "the gyro of the opposite sign" in words(handedness(bins_of(log)) or bends(bins_of(log)))
 
 
 TURN = np.reshape(random_mounting(3), (3, 3))

@@ -5,12 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from checked import cells_of, made_up
+from checked import bins_of, made_up
 from kickstand_tools import api
-from kickstand_tools.checks.course import course_agrees
-from kickstand_tools.logs import reader
+from kickstand_tools.checks.axes import course_agrees
+from kickstand_tools.checks.log import check_log
 from kickstand_tools.logs.log import Log
-from kickstand_tools.logs.reader import read_log
 from kickstand_tools.simulation.files import positions
 
 
@@ -28,7 +27,7 @@ def simulated(profile: str = "street", late_s: float = 0.6) -> Log:
 
 
 def codes(log: Log) -> list[str]:
-    return [notice.code for notice in read_log(log).notices]
+    return [notice.code for notice in check_log(log).notices]
 
 
 def mirrored(log: Log) -> Log:
@@ -39,7 +38,7 @@ def mirrored(log: Log) -> Log:
 def test_a_mirrored_log_is_reported_and_a_right_one_is_not(profile):
     assert codes(simulated(profile)) == []
     assert codes(mirrored(simulated(profile))) == ["mirrored"]
-    assert "left and right are exchanged" in api.sentence(read_log(mirrored(simulated(profile))).notices[0])
+    assert "left and right are exchanged" in api.sentence(check_log(mirrored(simulated(profile))).notices[0])
 
 
 @pytest.mark.parametrize("bias_dps", [[20.0, 0.0, 0.0], [0.0, -20.0, 0.0], [-12.0, 12.0, 12.0]])
@@ -68,7 +67,7 @@ def circling(both_sides: bool, bias_dps: float, wavering_dps: float = 0.0) -> bo
     rates = np.column_stack((0 * t_s, turning_dps - wave_dps + bias_dps, 0 * t_s))
     places = [np.where(has_position, coordinate, np.nan) for coordinate in (lat, lon)]
     up = np.tile([0.0, 1.0, 0.0], (len(t_s), 1))
-    return course_agrees(cells_of(Log(t_s, up, rates, lat_deg=places[0], lon_deg=places[1])))
+    return course_agrees(bins_of(Log(t_s, up, rates, lat_deg=places[0], lon_deg=places[1])))
 
 
 def test_turns_to_one_side_might_be_a_bias_and_show_nothing():
@@ -84,8 +83,7 @@ def test_a_gyro_of_the_opposite_sign_is_reported_as_that_alone():
     assert codes(replace(log, gyro_dps=-log.gyro_dps)) == ["left-handed"]
 
 
-def test_blocks_and_gaps_change_nothing(monkeypatch):
-    monkeypatch.setattr(reader, "BLOCK_SAMPLES", 333)
+def test_gaps_change_nothing():
     log = simulated()
     recorded = (log.t_s % 20.0) > 2.0
     assert codes(mirrored(log)) == ["mirrored"]
@@ -109,4 +107,4 @@ def test_errors_of_the_positions_are_no_turns(seed):
     lat, lon = (np.where(has_position, coordinate * 9e-6, np.nan) for coordinate in (north, east))
     rates = np.column_stack((0 * t_s, 2.0 * np.sin(t_s + seed), 0 * t_s))
     up = np.tile([0.0, 1.0, 0.0], (len(t_s), 1))
-    assert course_agrees(cells_of(Log(t_s, up, rates, lat_deg=lat, lon_deg=lon))) is None
+    assert course_agrees(bins_of(Log(t_s, up, rates, lat_deg=lat, lon_deg=lon))) is None

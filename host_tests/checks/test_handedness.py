@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from checked import cells_of, hand, simulated, words
-from kickstand_tools.checks.cells import CELL_S
-from kickstand_tools.checks.handedness import EXCHANGES, handedness, is_wrong, likeliest
+from checked import bins_of, hand, simulated, words
+from kickstand_tools.checks.axes import PERMUTATIONS, handedness, is_wrong, likeliest
+from kickstand_tools.checks.bins import BIN_S
+from kickstand_tools.checks.log import check_log
 from kickstand_tools.checks.turning import TurningFit, bias_dps
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
@@ -23,7 +24,7 @@ DEFAULT = "street", "sweeper"  # the other profiles take longer than the default
 
 def judged(log, accel=None, gyro=None, speed=True):
     """Return the remark on a log whose axes these matrices exchange and reverse, or "" if there is no remark."""
-    return words(handedness(cells_of(log, accel, gyro, speed)))
+    return words(handedness(bins_of(log, accel, gyro, speed)))
 
 
 @pytest.mark.parametrize("profile", [pytest.param(p, marks=[] if p in DEFAULT else pytest.mark.long) for p in PROFILES])
@@ -36,7 +37,7 @@ def test_only_rates_of_the_opposite_sign_are_reported(profile):
 
 @pytest.mark.parametrize("number", [7, 30, *(pytest.param(k, marks=pytest.mark.long) for k in range(1, 48, 4))])
 def test_axes_exchanged_in_both_sensors_are_wrong_if_left_handed(number):
-    exchange = EXCHANGES[number]
+    exchange = PERMUTATIONS[number]
     remark = judged(simulated("street"), exchange, exchange)
     assert (WRONG_WAY in remark) == bool(remark) == (np.linalg.det(exchange) < 0.0)
 
@@ -90,9 +91,9 @@ def test_an_exchange_is_named_only_if_no_other_fits_nearly_as_well(second, windo
     "number", [pytest.param(k, marks=[] if k == 20 else pytest.mark.long) for k in range(2, 48, 6)]
 )
 def test_a_named_exchange_is_the_right_one(number):
-    remark = handedness(cells_of(simulated("street"), gyro=EXCHANGES[number].T))
+    remark = handedness(bins_of(simulated("street"), gyro=PERMUTATIONS[number].T))
     assert remark is not None
-    assert remark.code == "axes-misfit" or np.array_equal(remark.values, EXCHANGES[number])
+    assert remark.code == "axes-misfit" or np.array_equal(remark.values, PERMUTATIONS[number])
 
 
 def test_a_phone_in_the_hand():
@@ -111,8 +112,8 @@ def test_gaps_and_frozen_readings():
     for k in range(1000, len(force) - 1500, 1500):  # freeze the readings for 8 s in every 30 s
         force[k : k + 400], rate[k : k + 400] = force[k], rate[k]
     for sign, codes in (1.0, ["frozen-readings"]), (-1.0, ["frozen-readings", "left-handed"]):
-        read = read_log(Log(log.t_s, force, sign * rate, log.speed_mps))
-        assert [notice.code for notice in read.notices] == codes
+        checked = check_log(Log(log.t_s, force, sign * rate, log.speed_mps))
+        assert [notice.code for notice in checked.notices] == codes
 
 
 def test_too_little_to_tell():
@@ -125,9 +126,9 @@ def test_too_little_to_tell():
 def test_the_bias_is_found_in_a_ride_of_long_bends(bias):
     """Without a standstill and in bends of 60 s, the median rate is not the gyro's bias."""
     log = simulated("held")
-    cells = cells_of(log.part((log.t_s > 20.0) & (log.t_s < 130.0)))
+    bins = bins_of(log.part((log.t_s > 20.0) & (log.t_s < 130.0)))
     resting_rate = np.mean(log.gyro_dps[log.t_s < 2.0], axis=0)
-    fitted = bias_dps(cells.force, cells.rate - resting_rate + bias, cells.known, CELL_S)
+    fitted = bias_dps(bins.force, bins.rate - resting_rate + bias, bins.valid, BIN_S)
     assert fitted == pytest.approx(np.array(bias), abs=1.5)
 
 
@@ -135,7 +136,7 @@ def test_recordings(shared_data):
     chance = np.random.default_rng(4)
     for path in sorted(shared_data.glob("*.csv.gz")):
         log, turned = read_log(path), random_rotation(chance)
-        assert log.notices == [], path
+        assert check_log(log).notices == [], path
         assert judged(log, turned, turned) == "", path
         if "car" not in path.name:  # a car hardly leans, so its log need not show a wrong sign
             remark = judged(log, turned, -turned)

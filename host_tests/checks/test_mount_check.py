@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from checked import cells_of, made_up, simulated, words
+from checked import bins_of, made_up, simulated, words
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.checks.mount import ForwardOff, contradiction
+from kickstand_tools.calibration.mount import ForwardOff, contradiction
 from kickstand_tools.common.messages import sentence
 from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.log import Log
@@ -49,7 +49,7 @@ def other(calibration, vehicle="", **turns):
 
 
 def said(log, calibration):
-    return words(contradiction(cells_of(log), calibration))
+    return words(contradiction(bins_of(log), calibration))
 
 
 @pytest.mark.parametrize("profile", PROFILES)
@@ -73,7 +73,7 @@ def test_wrong_calibrations_are_reported(profile, speed):
     ):
         assert line in said(log, other(calibration, "", **turns)), turns
     for angle, side in (90.0, "left"), (-90.0, "right"):
-        notice = contradiction(cells_of(log), other(calibration, up=angle))
+        notice = contradiction(bins_of(log), other(calibration, up=angle))
         assert isinstance(notice, ForwardOff)
         assert (notice.angle_deg, notice.by, notice.car) == (pytest.approx(angle, abs=8.0), by, False)
         assert f" degrees to the {side} of the calibration's" in sentence(notice)
@@ -161,7 +161,7 @@ ALONG_Z = CalibrationFile(aligned=True, vehicle="car")
 
 
 def exchanged(log: Log) -> bool:
-    notice = contradiction(cells_of(log), ALONG_Z)
+    notice = contradiction(bins_of(log), ALONG_Z)
     assert notice is None or notice.code == "forward-exchanged"
     return notice is not None
 

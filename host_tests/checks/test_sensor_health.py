@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kickstand_tools.analysis.overview import overview
-from kickstand_tools.analysis.ride import Ride
+from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.api import Log, replay, smooth
-from kickstand_tools.checks.sensor import NAMES, AxisDead, GyroSaturated, SensorHealth
+from kickstand_tools.checks.sensor import NAMES, AxisDead, GyroSaturated, find_faulty
 from kickstand_tools.common.messages import sentence
 from kickstand_tools.signals import rotation_matrix
 from kickstand_workshop.evaluation.smoothed_rides import rms, simulated
@@ -66,7 +66,7 @@ def test_a_bias_that_steps_is_said_by_replay_and_report(street):
         rate += 0.4 * np.maximum(0.0, time - 30.0)[:, None] * street.calibration.vehicle_from_sensor[2]
 
     log = ill(street, drift)
-    ride_overview = overview(Ride(log, street.calibration))
+    ride_overview = overview(open_ride(log, street.calibration))
     for notices in (replay(log, street.calibration).notices, ride_overview.notices):
         (notice,) = (n for n in notices if n.code == "readings-misfit")
         assert notice.values[0] > 2.0
@@ -112,6 +112,5 @@ def test_rounding_and_a_standstill_are_no_dead_axis():
     rate = np.round(0.05 * np.random.default_rng(2).normal(size=(4000, 3)), 1)
     ideal = np.column_stack((np.sin(time), np.zeros_like(time), np.zeros_like(time)))
     for log in (Log(time, force, rate), Log(time, np.tile(turn[1], (4000, 1)), 10.0 * ideal)):
-        health = SensorHealth()
-        assert not np.any(health.mark((time * 1e6).astype(np.int64), log.readings))
-        assert not health.notices()
+        faulty, notices = find_faulty(log)
+        assert not np.any(faulty) and not notices

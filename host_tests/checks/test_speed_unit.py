@@ -4,10 +4,9 @@ import functools
 
 import numpy as np
 import pytest
-from checked import cells_of, simulated, words
-from kickstand_tools.checks.units import speed_unit
+from checked import bins_of, simulated, words
+from kickstand_tools.checks.log import check_log, speed_unit
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.logs import reader
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.simulation.profiles import PROFILES
@@ -19,7 +18,7 @@ MOUNT = random_mounting(3)
 
 def said(time, force, speed) -> str:
     """Return the message about the unit of the speed, or "" if there is no message."""
-    return words(speed_unit(cells_of(Log(time, force, np.zeros(force.shape), speed))))
+    return words(speed_unit(bins_of(Log(time, force, np.zeros(force.shape), speed))))
 
 
 KMH, MPH, KNOTS = 3.6, 2.2369, 1.9438
@@ -52,7 +51,7 @@ def record(brakings=7, **source):
 )
 def test_other_units_are_refused(scale, words, every_s, late_s):
     with pytest.raises(InputError, match=words):
-        read_log(record(scale=scale, every_s=every_s, late_s=late_s))
+        check_log(record(scale=scale, every_s=every_s, late_s=late_s))
 
 
 def test_one_impossible_reading_hides_nothing():
@@ -60,29 +59,18 @@ def test_one_impossible_reading_hides_nothing():
     log = record(scale=KMH)
     log.accel_g[1000] = 1e4
     with pytest.raises(InputError, match="it is in km/h"):
-        read_log(log)
+        check_log(log)
 
 
 @pytest.mark.parametrize(("every_s", "late_s"), [(0.1, 0.0), (0.1, 3.0), (0.5, 1.0), (2.0, 0.0), (2.0, 3.0)])
 def test_a_speed_in_mps_is_read(every_s, late_s):
-    read_log(record(every_s=every_s, late_s=late_s, step=1 / 3.6))
-
-
-@pytest.mark.parametrize("samples", [30, 1500])
-def test_a_wrong_unit_is_refused_before_the_end_of_the_log(monkeypatch, samples):
-    """Evidence accumulates from block to block. The reader refuses the log as soon as the evidence is enough."""
-    log = record(20, scale=KMH)
-    monkeypatch.setattr(reader, "BLOCK_SAMPLES", samples)
-    read_us = 0
-    with pytest.raises(InputError, match="km/h"):
-        for block in reader.read_blocks(log):
-            read_us = block.time_us[-1]
-    assert 20e6 < read_us < 90e6
+    check_log(record(every_s=every_s, late_s=late_s, step=1 / 3.6))
 
 
 @pytest.mark.parametrize("profile", PROFILES)
 def test_no_simulated_ride_is_refused(profile):
-    log = read_log(simulated(profile))
+    log = simulated(profile)
+    check_log(log)
     time, force, speed = log.t_s, log.accel_g, log.speed_mps
     rng = np.random.default_rng(1)
     noisy = np.abs(speed + rng.normal(scale=0.5, size=len(speed)))

@@ -6,7 +6,8 @@ import functools
 
 import numpy as np
 import pytest
-from kickstand_tools.checks.handedness import EXCHANGES
+from kickstand_tools.checks.axes import PERMUTATIONS
+from kickstand_tools.checks.log import check_log
 from kickstand_tools.common.errors import RefusedInput
 from kickstand_tools.estimation.alignment import mounted_windows
 from kickstand_tools.estimation.first_guess import axes
@@ -16,10 +17,10 @@ from kickstand_tools.simulation.files import positions
 from kickstand_tools.simulation.profiles import PROFILES
 from kickstand_tools.simulation.ride import ride
 
-MOUNTINGS = [exchange for exchange in EXCHANGES if np.linalg.det(exchange) > 0.0]
+MOUNTINGS = [exchange for exchange in PERMUTATIONS if np.linalg.det(exchange) > 0.0]
 NOT_ENOUGH = {"ride-short", "no-bends", "side-unsure"}  # refusals that accuse nothing
 BENDY = "sweeper", "corners", "hills"  # profiles whose windows were accused once
-WRONG = [matrix for matrix in EXCHANGES if not np.array_equal(matrix, np.eye(3))]
+WRONG = [matrix for matrix in PERMUTATIONS if not np.array_equal(matrix, np.eye(3))]
 
 
 @functools.cache
@@ -48,7 +49,7 @@ def window(log: Log, chance: np.random.Generator) -> Log:
 
 def accusations(log: Log) -> set[str]:
     """Return the codes of the remarks on a log, and of the refusal of its alignment."""
-    codes = {notice.code for notice in read_log(log).notices}
+    codes = {notice.code for notice in check_log(log).notices}
     try:
         axes(mounted_windows(log))
     except RefusedInput as refusal:
@@ -87,7 +88,7 @@ def test_mistakes_are_found_in_most_windows_and_named_right(profile, count):
     named = 0
     for _ in range(count):
         log, wrong = window(long_ride(profile, 200.0), chance), WRONG[chance.integers(len(WRONG))]
-        notices = read_log(Log(log.t_s, log.accel_g, log.gyro_dps @ wrong.T)).notices
+        notices = check_log(Log(log.t_s, log.accel_g, log.gyro_dps @ wrong.T)).notices
         assert len(notices) <= 1
         for notice in notices:
             named += 1

@@ -149,7 +149,6 @@ def test_message_has_words_for_a_terminal_and_for_a_page():
     assert filled.words() == filled.words(True) == "wait 3 s or stop"
     assert Plain("it is {broken}", Remedy("stop")).line() == "it is {broken}: stop"
     assert messages.by_code(Late, Turned) == {"late": Late, "turned": Turned}
-    assert messages.distinct([late, Turned(), Late(2.0, "a.csv")]) == [late, Turned()]
     assert messages.is_explained([late, Turned()]) and not messages.is_explained([late])
 
 

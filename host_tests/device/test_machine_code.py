@@ -15,9 +15,9 @@ from kickstand.calibration.transform import products
 from kickstand.imu.axes import decode, add_up
 from kickstand.lean import kalman
 from kickstand.rides.block import encode
-for name in ("decode", "add_up", "products", "encode"):
+for name in ("decode", "add_up", "products", "encode", "add_products"):
     print(name, "plain" if name in quick.plain else "quick")
-print("add_products", "plain" if kalman.add_products is kalman.add_products_python else "quick")
+assert ("add_products" in quick.plain) == (kalman.add_products is kalman.add_products_python)
 """
 # One mistake in each viper function, as a compiler might make it: {(module, function): (text, its replacement)}.
 MISTAKES = {
@@ -25,7 +25,7 @@ MISTAKES = {
     ("quick_viper.py", "add_up"): ("value > 32767", "value > 32768"),
     ("quick_viper.py", "products"): ("matrices[index + 2] * z", "matrices[index + 2] * (z & 0x1FFFF)"),
     ("rides/block_viper.py", "encode"): ("guess * n // previous", "guess // previous * n"),
-    ("lean/kalman_viper.py", "add_products"): ("value += 0 - low", "value -= 0 - low"),
+    ("quick_viper.py", "add_products"): ("value += 0 - low", "value -= 0 - low"),
 }
 NAMES = [name for _, name in MISTAKES]
 

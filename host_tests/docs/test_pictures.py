@@ -2,15 +2,14 @@
 
 import io
 import re
-import runpy
 from pathlib import Path
 
 import numpy as np
 import pytest
-from kickstand_tools.common import firmware_path
 from kickstand_tools.simulated_board import simulator
 from kickstand_tools.web import site
 from kickstand_workshop.pictures import displays, page, rides, terminal
+from support.device_runs import FreshFirmware
 
 ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "tools" / "pictures"
@@ -64,9 +63,9 @@ def test_drawings_are_small_and_fetch_nothing():
 @pytest.mark.parametrize(("machine", "prefix"), [("pico", "GP"), ("esp32", "")])
 def test_the_wires_go_to_the_pins_of_the_settings(machine, prefix):
     """In the drawing the default pins are bold, and no other pin is. The page Install has the same pins as a table."""
-    with simulator.Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=machine):
-        port = runpy.run_path(str(firmware_path.PACKAGE / "board" / "port.py"))
-    pins = [prefix + str(pin) for pin in (*port["SENSOR_PINS"], *port["LCD_PINS"], port["BUTTON_PIN"])]
+    with simulator.Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=machine), FreshFirmware():
+        from kickstand.board import pins as usual
+    pins = [prefix + str(pin) for pin in (*usual.SENSOR_PINS, *usual.LCD_PINS, usual.BUTTON_PIN)]
     drawing = checked_in()[f"wiring_{machine}.svg"]
     assert sorted(re.findall(r'font-weight="bold"[^>]*>(?:\d+  )?(GP\d+|\d+)<', drawing)) == sorted(pins)
     (table,) = re.findall(

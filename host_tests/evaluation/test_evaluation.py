@@ -139,14 +139,6 @@ def test_evaluate_prints_json_and_the_table_of_faults(monkeypatch, one_other):
     assert data["rides"][0]["seed"] == 0 and data["rides"][0]["available"] > 0.9
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [(("--profiles", "street,moon"), "no profile moon"), (("--whole-device",), "belong to --faults")],
-)
-def test_wrong_options_of_evaluate_are_refused(arguments, words, tmp_path):
-    refused(tmp_path, "evaluate", *arguments, words=words)
-
-
 @pytest.mark.long
 def test_bands_of_simulated_and_recorded_rides(tmp_path):
     works("simulate", "--profile", "street", "--seed", "4", "--seconds", "120", "--road", "C", "--out", tmp_path)

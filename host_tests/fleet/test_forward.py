@@ -74,7 +74,7 @@ REFERENCES = {
 
 @pytest.mark.parametrize("name", REFERENCES)
 def test_forward_of_recorded_drives(shared_data, name):
-    log = usable(read_log(shared_data / f"car-urban-{name}.csv.gz", axes=False), False)
+    log = usable(read_log(shared_data / f"car-urban-{name}.csv.gz"), False)
     fit = fit_logs([log], None, "car")
     driven = [evidence.intervals(log, "car", fit.lag_s or 0.0, fit.bias_dps)]
     alone, mean = forward_of(*driven), forward_of(*driven, device=fit)

@@ -81,7 +81,7 @@ def driven(log, lag_s=0.3, bias_dps=(0.0, 0.0, 0.0)):
 
 
 def test_turns_of_five_degrees_in_a_recorded_drive(shared_data):
-    log = usable(read_log(shared_data / "car-urban-medium-turn-loop-nominal-001.csv.gz", axes=False), False)
+    log = usable(read_log(shared_data / "car-urban-medium-turn-loop-nominal-001.csv.gz"), False)
     fit = fit_logs([log], None, "car")
     frame, lag_s = fit.calibration.vehicle_from_sensor, fit.lag_s or 0.0
     assert find_moves([driven(log, lag_s, fit.bias_dps)]) == []

@@ -184,7 +184,7 @@ def test_a_doubtful_table_is_refused_with_a_line_that_works(tmp_path, monkeypatc
     line = command.refused(tmp_path, "import", "log.csv", "--out", "R.csv", words=words)
     typed = shlex.split(line.partition("type: kickstand ")[2])
     command.works(*typed)
-    log = api.read_log("RIDE.csv", axes=False)
+    log = api.read_log("RIDE.csv")
     assert log.accel_g == pytest.approx(force_g, abs=1e-4) and log.gyro_dps == pytest.approx(rates_dps, abs=1e-3)
     assert log.t_s[-1] == pytest.approx(t_s[-1], abs=0.01)
 

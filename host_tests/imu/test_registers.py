@@ -112,7 +112,8 @@ def test_ranges_and_their_counts(accel_g, gyro_dps, bits, lsb_per_g, lsb_per_dps
 def test_delays_and_low_passes_of_the_register_map():
     """DLPF_CFG selects the gyro's bandwidth and delay (p. 13). The low-pass of a rate is the widest below half of the
     rate. The filter's default is the delay of the default low-pass."""
-    from kickstand.imu.mpu6050 import GYRO_DELAY_S, MIN_DLPF
+    from kickstand.imu.mpu6050 import GYRO_DELAY_S
+    from kickstand.setting_table import MIN_DLPF
 
     assert GYRO_DELAY_S == {dlpf: DLPF_DELAY_US[dlpf] / 1e6 for dlpf in range(1, 7)}
     assert lean_filter.DELAY_S == GYRO_DELAY_S[3]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from joining.known_roads import another_device, road, turned
 from kickstand_tools import api
+from kickstand_tools.checks.log import check_log
 from kickstand_tools.joining.clocks import clocks
 from kickstand_tools.joining.motion import motion
 
@@ -33,7 +34,7 @@ def test_two_devices_on_one_bike_have_one_clock(seconds, device, apart_deg, word
         t_s = np.asarray(np.append(log.t_s, log.t_s + 300.0), dtype=np.float64)
         log = api.Log(t_s, np.tile(log.accel_g, (2, 1)), np.tile(log.gyro_dps, (2, 1)))
     changes = {name: device[name] for name in ("from_s", "to_s", "drift") if name in device}
-    a, b = motion(log), motion(another_device(other, **changes, mount=MOUNT))
+    a, b = motion(check_log(log)), motion(check_log(another_device(other, **changes, mount=MOUNT)))
     of_a = api.CalibrationFile(vehicle_from_sensor=np.eye(3), aligned=True)
     tilt = turned(apart_deg, (1.0, 0.0, 0.0))
     of_b = api.CalibrationFile(vehicle_from_sensor=tilt @ MOUNT.T, aligned=True)

@@ -84,7 +84,7 @@ def added(cases):
     script = (
         "from array import array\n"
         "from math import inf, nan\n"
-        "from kickstand.lean.kalman_viper import add_products\n"
+        "from kickstand.quick_viper import add_products\n"
         f"for out, factors, source, rows in {cases}:\n"
         "    out = array('f', out)\n"
         "    add_products(out, array('f', factors), array('f', source), len(source), rows)\n"

@@ -1,4 +1,4 @@
-"""Logs as text, and the sizes of the blocks in which they are read."""
+"""Logs as text, and the size of the chunks in which they are read."""
 
 import io
 
@@ -8,14 +8,9 @@ from support import command
 
 
 @pytest.fixture
-def small_blocks(monkeypatch):
-    """Return a function that makes the blocks of a log small: bytes of text, and samples of a log in memory."""
-
-    def limit(size: int, samples: int = 55) -> None:
-        monkeypatch.setattr(reader, "BLOCK_BYTES", size)
-        monkeypatch.setattr(reader, "BLOCK_SAMPLES", samples)
-
-    return limit
+def small_chunks(monkeypatch):
+    """Return a function that sets the bytes of text that are read at once."""
+    return lambda size: monkeypatch.setattr(reader, "CHUNK_BYTES", size)
 
 
 @pytest.fixture

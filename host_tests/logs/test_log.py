@@ -7,7 +7,7 @@ import pytest
 from kickstand_tools.api import Log, Stretch
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import reader
-from kickstand_tools.logs.reader import read_blocks, read_log
+from kickstand_tools.logs.reader import read_log
 from support import command
 
 FORCE, RATE = [0.1, 0.2, 0.9], [1.0, 2.0, 3.0]
@@ -54,16 +54,14 @@ def test_arrays_that_do_not_fit_are_refused(arrays, words):
         Log(**({"t_s": [0.0, 1.0], "accel_g": [FORCE] * 2, "gyro_dps": [RATE] * 2} | arrays))
 
 
-def test_a_log_in_memory_comes_in_blocks(small_blocks):
-    small_blocks(100, samples=4)
-    progress = []
+def test_a_log_comes_in_parts():
     log = log_of(10, 7.0, speed_mps=[5.0, *[np.nan] * 9])
-    blocks = list(read_blocks(log, progress=lambda *done: progress.append(done)))
-    assert progress == [(4, 10), (8, 10), (10, 10)] and [len(block.time_us) for block in blocks] == [4, 4, 2]
-    assert np.concatenate([block.time_us for block in blocks]).tolist() == log.time_us.tolist()
-    assert [block.start_s for block in blocks] == [7.0] * 3 and not blocks[0].has_temp
-    assert blocks[0].speed_mps[0] == 5.0 and blocks[1].t_s == pytest.approx([0.04, 0.05, 0.06, 0.07])
-    assert blocks[1].time_text == ["7.040000", "7.050000", "7.060000", "7.070000"]
+    selected = np.arange(10) != 5
+    spans, parts = zip(*log.parts(selected, slice(1, 9), most=4))
+    assert [(span.start, span.stop) for span in spans] == [(1, 5), (5, 9)]
+    assert np.concatenate([part.time_us for part in parts]).tolist() == [10_000 * k for k in (1, 2, 3, 4, 6, 7, 8)]
+    part = log.between(0.04, 0.07)
+    assert (part.start_s, part.t_s.tolist()) == (pytest.approx(7.04), pytest.approx([0.0, 0.01, 0.02, 0.03]))
 
 
 @pytest.mark.parametrize(

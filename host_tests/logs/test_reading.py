@@ -3,14 +3,13 @@
 import contextlib
 import gzip
 import io
-import tracemalloc
 
 import numpy as np
 import pytest
 from kickstand_tools.api import Log
-from kickstand_tools.checks import cells
+from kickstand_tools.checks.log import check_log
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.logs.reader import is_log, read_blocks, read_log
+from kickstand_tools.logs.reader import is_log, read_log, text_rows, time_texts
 from kickstand_tools.logs.source import chunks, open_input
 from psutil import Process
 from support import command
@@ -153,7 +152,9 @@ def test_values_beyond_any_reading_are_refused(text_log, name, quoted):
         if name == "t_s":  # a larger step is in milliseconds, which another check refuses
             words = words if factor > 1.0 else "milliseconds" if factor == 1.0 else "line 6: t"
         with pytest.raises(InputError, match=words) if words else contextlib.nullcontext():
-            assert len(read_log(text_log(*rows, more=MORE)).t_s) == 5
+            log = read_log(text_log(*rows, more=MORE))
+            check_log(log, axes=False)
+            assert len(log.t_s) == 5
 
 
 @pytest.mark.parametrize(
@@ -166,7 +167,7 @@ def test_common_wrong_units_are_refused(size_g, step_s, words):
     force[:4] = [0.0, 1.0, 0.0]
     log = Log(np.arange(9) * step_s, force, np.zeros((9, 3)))
     with pytest.raises(InputError, match=words) if words else contextlib.nullcontext():
-        read_log(log)
+        check_log(log)
 
 
 def test_optional_columns_may_be_empty_anywhere(text_log):
@@ -189,37 +190,19 @@ HEADER = NAMES + ",temp_c,speed_mps"
 
 @pytest.mark.parametrize("name", ["ride.csv", "ride.csv.gz"])
 @pytest.mark.parametrize("size", [200, 5000])
-def test_blocks_add_up_to_the_log(tmp_path, small_blocks, name, size):
+def test_the_size_of_the_chunks_changes_nothing(tmp_path, small_chunks, name, size):
     path = tmp_path / name
     content = text(*row_texts(1500), header=HEADER)
     path.write_bytes(gzip.compress(content) if path.suffix == ".gz" else content)
     log, progress, length = read_log(path), [], path.stat().st_size
-    small_blocks(size)
-    blocks = list(read_blocks(str(path), progress=lambda *done: progress.append(done)))
-    assert progress == [(block.done, length) for block in blocks] == sorted(progress)
-    assert progress[-1] == (length, length) and len(blocks) >= 10
-    assert [line for block in blocks for line in block.lines] == row_texts(1500)
-    assert [time for block in blocks for time in block.time_text] == [row.partition(",")[0] for row in row_texts(1500)]
-    assert np.concatenate([block.time_us for block in blocks]).tolist() == log.time_us.tolist()
-    assert np.array_equal(np.concatenate([block.readings for block in blocks]), log.readings)
+    small_chunks(size)
+    small = read_log(str(path), progress=lambda *done: progress.append(done))
+    assert progress == sorted(progress) and progress[-1] == (length, length) and len(progress) >= 10
+    for column, values in log.columns().items():
+        assert np.array_equal(small.columns()[column], values, equal_nan=True), column
+    assert [line for _, lines in text_rows(path) for line in lines] == row_texts(1500)
+    assert list(time_texts(path, small)) == [row.partition(",")[0] for row in row_texts(1500)]
     assert np.flatnonzero(np.isfinite(log.speed_mps)).tolist() == list(range(0, 1500, 200))
-    bare = list(read_blocks(path, lines=False))
-    assert not any(block.lines for block in bare) and len(bare) == len(blocks)
-    assert len(blocks[0].part(slice(0, 1)).lines) == len(blocks[0].part(blocks[0].time_us < 5000).lines) == 1
-
-
-def test_memory_does_not_grow_with_the_log(tmp_path, small_blocks, monkeypatch):
-    """The checks keep the cells of the last hour. In this test, they keep ten seconds."""
-    small_blocks(1 << 14)
-    monkeypatch.setattr(cells, "KEPT", 100)
-    peaks = []
-    for count in 3_000, 12_000:
-        (tmp_path / "ride.csv").write_bytes(text(*row_texts(count), header=HEADER))
-        tracemalloc.start()
-        assert sum(len(block.time_us) for block in read_blocks(tmp_path / "ride.csv")) == count
-        peaks.append(tracemalloc.get_traced_memory()[1])
-        tracemalloc.stop()
-    assert peaks[1] < 1.2 * peaks[0]
 
 
 def test_16_mb_without_the_end_of_a_line_are_no_log():

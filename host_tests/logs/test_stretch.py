@@ -6,7 +6,6 @@ import json
 import pytest
 from kickstand_tools import api
 from kickstand_tools.logs.log import Stretch
-from kickstand_tools.logs.reader import read_blocks
 from support import command
 from support.recordings import analysis_rides
 
@@ -26,12 +25,12 @@ def log(tmp_path):
     [(2.0, 3.0, 200, 300), (9.0, None, 900, 999), (None, -9.0, 0, 99), (-5.0, -4.0, 499, 599), (0.0, 99.0, 0, 999)],
 )
 @pytest.mark.parametrize("size", [500, 1 << 22])
-def test_a_stretch_keeps_the_lines_of_its_samples(log, small_blocks, from_s, to_s, first, last, size):
-    small_blocks(size)
-    blocks = list(read_blocks(Stretch(log, from_s, to_s)))
-    assert [line for block in blocks for line in block.lines] == ROWS[first : last + 1]
-    assert blocks[0].time_text[0] == ROWS[first].partition(",")[0]
-    assert blocks[0].start_s == pytest.approx(7.0 + first / 100) and blocks[0].time_us[0] == 0
+def test_a_stretch_keeps_the_lines_of_its_samples(log, tmp_path, small_chunks, from_s, to_s, first, last, size):
+    small_chunks(size)
+    api.cut_log(log, tmp_path / "cut.csv", from_s, to_s)
+    assert (tmp_path / "cut.csv").read_text().splitlines() == [HEADER, *ROWS[first : last + 1]]
+    part = api.read_log(Stretch(log, from_s, to_s))
+    assert part.start_s == pytest.approx(7.0 + first / 100) and part.time_us[0] == 0
 
 
 def test_cut_copies_the_lines_unchanged(log, tmp_path):

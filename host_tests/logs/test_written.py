@@ -25,7 +25,7 @@ from kickstand_tools.logs.csv_reader import (
     numbers_of,
 )
 from kickstand_tools.logs.log import float_schema
-from kickstand_tools.logs.reader import read_blocks
+from kickstand_tools.logs.reader import time_texts
 from support import command
 
 AWKWARD = [0.0, -0.0, -1e-9, 5e-324, 0.5, 1.5, 2.5, -0.5, 9.9999999, 99999.5, 2.0**53, -(2.0**60), 1e300, 1.005]
@@ -116,7 +116,7 @@ def test_a_written_log_comes_back(tmp_path):
     log.lat_deg[0], log.lon_deg[0], log.utc_s[0] = -33.8688197, 151.2092955, 1_700_000_000.25
     write_log(tmp_path / "a.csv.gz", log)
     assert gzip.decompress((tmp_path / "a.csv.gz").read_bytes()).count(b"\n") == 3
-    copy = read_log(tmp_path / "a.csv.gz", axes=False)
+    copy = read_log(tmp_path / "a.csv.gz")
     for name, values in log.columns().items():
         assert copy.columns()[name] == pytest.approx(values, abs=5e-3 if name == "temp_c" else 1e-8, nan_ok=True)
     write_table(tmp_path / "b.csv", ["a", "b"], [(1, "x"), (2.5, "y")])
@@ -124,16 +124,18 @@ def test_a_written_log_comes_back(tmp_path):
 
 
 def test_a_lean_has_the_times_of_the_log(tmp_path, text_log):
-    log = text_log("0.50,0,1,0,0,0,0", " 1.0,0,1,0,0,0,1", "1.50,0,1,0,0,0,2")
-    rows = [(block, np.array([[1.25, 2.0], [0.0, -3.0], [np.nan, 4.0]])) for block in read_blocks(log)]
-    assert write_lean(tmp_path / "a.csv", ["lean_deg", "x"], [1, 0], rows) == 3
+    path = tmp_path / "log.csv"
+    path.write_bytes(text_log("0.50,0,1,0,0,0,0", " 1.0,0,1,0,0,0,1", "1.50,0,1,0,0,0,2").read())
+    parts = [np.array([[1.25, 2.0]]), np.array([[0.0, -3.0], [np.nan, 4.0]])]
+    assert write_lean(tmp_path / "a.csv", ["lean_deg", "x"], [1, 0], time_texts(path, read_log(path)), parts) == 3
     assert (tmp_path / "a.csv").read_text() == "t_s,lean_deg,x\n0.50,1.2,2\n1.0,0.0,-3\n1.50,nan,4\n"
 
 
 def test_a_cut_log_counts_its_samples(tmp_path, text_log):
     rows = [f"{k / 4},0,1,0,0,0,{k}" for k in range(9)]
     for from_s, to_s, part, result in ((0.5, 1.25, rows[2:6], (4, 0.75)), (2.0, None, rows[8:], (1, 0.0))):
-        assert cut_log(text_log(*rows), tmp_path / "b.csv", from_s, to_s) == result
+        (tmp_path / "a.csv").write_bytes(text_log(*rows).read())
+        assert cut_log(tmp_path / "a.csv", tmp_path / "b.csv", from_s, to_s) == result
         assert (tmp_path / "b.csv").read_text().splitlines()[1:] == part
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.joining.motion import STEP_S, CellMotion
+from kickstand_tools.joining.motion import STEP_S, BinMotion
 from kickstand_tools.overlay.camera_match import camera_offset_s
 from kickstand_tools.overlay.video import Telemetry
 
@@ -18,9 +18,9 @@ def rates(t_s, seed=4):
     return np.column_stack([np.interp(t_s, knots_s, axis) for axis in knots.T])
 
 
-def bike(rate_dps) -> CellMotion:
+def bike(rate_dps) -> BinMotion:
     count = len(rate_dps)
-    return CellMotion(np.zeros((count, 3)), rate_dps, np.ones(count, dtype=bool), False, False)
+    return BinMotion(np.zeros((count, 3)), rate_dps, np.ones(count, dtype=bool), False, False)
 
 
 CELLS_S = STEP_S * (np.arange(round(RIDE_S / STEP_S)) + 0.5)

@@ -6,8 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from kickstand_tools.checks.log import check_log
 from kickstand_tools.logs.csv_lines import write_log
-from kickstand_tools.logs.reader import read_blocks, read_log
+from kickstand_tools.logs.reader import read_log
 from kickstand_tools.replay import replay, replay_engine
 from kickstand_tools.replay.meter_along import MeterAlong
 from kickstand_workshop.evaluation import smoothed_rides
@@ -37,21 +38,20 @@ def by_steps(log, calibration):
     Rows with frozen readings are NaN.
     """
     engine = replay_engine.Replay(calibration.to_firmware(), calibration.delay_s())
-    rows = []
-    for block in read_blocks(log):
-        rows.append(np.full((len(block.time_us), len(replay_engine.COLUMNS)), np.nan))
-        rows[-1][~block.frozen] = [engine.step(*row) for row in block.measured.rows()]
-    return np.concatenate(rows)
+    measured = check_log(log).measured
+    rows = np.full((len(log.t_s), len(replay_engine.COLUMNS)), np.nan)
+    rows[measured] = [engine.step(*row) for row in log.part(measured).rows()]
+    return rows
 
 
 def test_fast_loop_equals_the_meter_for_each_sample(ride_and_calibration):
     log, calibration = ride_and_calibration
-    (block,) = read_blocks(log)
-    measured, along = block.measured, MeterAlong(calibration)
-    assert 0 < len(measured.time_us) < len(block.time_us)
-    cuts = [0, 1, 1, 700, 5000, len(measured.time_us)]  # limits of the blocks, one of which is empty
+    selected = check_log(log).measured
+    measured, along = log.part(selected), MeterAlong(calibration)
+    assert 0 < len(measured.t_s) < len(log.t_s)
+    cuts = [0, 1, 1, 700, 5000, len(measured.t_s)]  # limits of the parts, one of which is empty
     parts = [along.columns(measured.part(slice(a, b))) for a, b in pairwise(cuts)]
-    fast, slow = np.concatenate(parts), by_steps(log, calibration)[~block.frozen]
+    fast, slow = np.concatenate(parts), by_steps(log, calibration)[selected]
     is_shown = fast[:, -1] != replay_engine.NOT_SHOWN
     assert 0.2 < np.mean(is_shown) < 0.999
     for name, mine, meters in zip(replay_engine.COLUMNS, fast.T, slow.T, strict=True):
@@ -66,7 +66,7 @@ def test_lean_file_has_values_as_python_writes_them(ride_and_calibration, tmp_pa
     write_log(tmp_path / "log.csv", log)
     count, _ = replay.replay_to_csv(tmp_path / "log.csv", calibration, "cpython", tmp_path / "LEAN.csv")
     rows = by_steps(read_log(tmp_path / "log.csv"), calibration)
-    rows[rows[:, -1] == replay_engine.NOT_SHOWN, -1] = np.nan
+    rows[rows[:, -1] < 0.0, -1] = np.nan
     header, *lines = (tmp_path / "LEAN.csv").read_text().splitlines()
     assert header == ",".join(("t_s", *replay_engine.COLUMNS))
     times = [line.partition(",")[0] for line in (tmp_path / "log.csv").read_text().splitlines()[1:]]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from kickstand import console
 from kickstand_tools.calibration.file import read_calibration
-from kickstand_tools.logs.reader import read_blocks, read_log
+from kickstand_tools.logs.reader import read_log
 from kickstand_tools.replay import replay_engine
 from kickstand_tools.rides import block_reader, ride_log
 from support import device_plans, engines
@@ -40,7 +40,7 @@ def replayed(blocks, directory):
     """Return the lean that `replay` computes for each row of the ride's log."""
     cal = ride_log.write(directory / "ride.csv.gz", blocks)
     engine = replay_engine.Replay(read_calibration(cal).to_firmware())
-    return [engine.step(*row)[0] for block in read_blocks(directory / "ride.csv.gz") for row in block.rows()]
+    return [engine.step(*row)[0] for row in read_log(directory / "ride.csv.gz").rows()]
 
 
 def lean_matches(record, blocks, leans, slack_s=0.4):

@@ -5,13 +5,14 @@ import pytest
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.signals import (
-    Cells,
     best_lag,
-    cell_numbers,
+    bin_numbers,
+    binned,
     correlation,
     correlations,
     cross_matrix,
     integral,
+    intervals,
     log_likelihood_ratio,
     motionless,
     moving_mean,
@@ -23,7 +24,6 @@ from kickstand_tools.signals import (
     rotation_vector,
     runs,
     smoothed,
-    stretches,
     window_means,
     window_spreads,
 )
@@ -72,47 +72,36 @@ def test_smoothing_and_integrals_along_time():
     assert smoothed(np.ones(1), time[:1], 0.2).tolist() == [1.0]
 
 
-def in_cells(block: int) -> Cells:
+def test_bins_hold_the_means_of_their_samples():
     time = np.concatenate((np.arange(0.3, 2.0, 0.06), np.arange(3.0, 4.0, 0.06)))
     speed = np.where(np.arange(len(time)) % 7 == 0, time, np.nan)
-    cells = Cells(0.1)
-    for k in range(0, len(time), block):
-        part = slice(k, k + block)
-        cells.add(time[part], np.column_stack((time, time**2))[part], speed[part, None])
-    return cells
-
-
-@pytest.mark.parametrize("block", [1, 3, 1000])
-def test_cells_hold_the_means_of_their_samples(block):
-    even = in_cells(block).evenly(100)
-    assert even and even.first == 3
-    assert even.count[:4].tolist() == [2, 2, 1, 2]
-    assert even.means[0] == pytest.approx([0.33, (0.09 + 0.36**2) / 2.0])
-    assert even.latest[0, 0] == pytest.approx(0.3)
-    assert np.all(np.isnan(even.means[18:26])), "nothing is known where there are no samples"
-    seconds = even.merged(10)
+    bins = binned(time, 0.1, [time, time**2], [speed], 100, 100)
+    assert bins and bins.first == 3
+    assert bins.count[:4].tolist() == [2, 2, 1, 2]
+    assert bins.means[0] == pytest.approx([0.33, (0.09 + 0.36**2) / 2.0])
+    assert bins.latest[0, 0] == pytest.approx(0.3)
+    assert np.all(np.isnan(bins.means[18:26])), "nothing is known where there are no samples"
+    seconds = bins.merged(10)
     assert seconds.first == 0
-    assert seconds.count.sum() == even.count.sum()
+    assert seconds.count.sum() == bins.count.sum()
     assert seconds.means[1, 0] == pytest.approx(np.mean(np.arange(1.02, 1.99, 0.06)))
     assert np.isnan(seconds.means[2]).all()
     assert seconds.latest[1, 0] == pytest.approx(1.14), "the first of a second's"
 
 
-def test_number_of_cells_is_limited():
-    cells = Cells(1.0, most=3)
-    assert cells.evenly(100) is None
-    for start in (0.0, 1.0, 2.0, 5.0):
-        cells.add(np.array([start]), np.ones((1, 1)), np.ones((1, 1)))
-    even = cells.evenly(100)
-    assert even and even.first == 1
-    assert even.count.tolist() == [1, 1, 0, 0, 1]
-    assert cells.evenly(4) is None
+def test_number_of_bins_is_limited():
+    time, ones = np.array([0.0, 1.0, 2.0, 5.0]), np.ones(4)
+    assert binned(time[:0], 1.0, [ones[:0]], [], 3, 100) is None
+    bins = binned(time, 1.0, [ones], [], 3, 100)
+    assert bins and bins.first == 1
+    assert bins.count.tolist() == [1, 1, 0, 0, 1]
+    assert binned(time, 1.0, [ones], [], 3, 4) is None
 
 
-def test_runs_and_stretches():
-    assert cell_numbers(np.array([0.0, 0.1, 0.3, 0.31]), 0.1).tolist() == [0, 1, 3, 3]
+def test_runs_and_intervals():
+    assert bin_numbers(np.array([0.0, 0.1, 0.3, 0.31]), 0.1).tolist() == [0, 1, 3, 3]
     assert runs(np.array([4, 4, 5, 4])).tolist() == [0, 2, 3]
-    assert stretches(np.array([True, True, False, True])).tolist() == [[0, 2], [3, 4]]
+    assert intervals(np.array([True, True, False, True])).tolist() == [[0, 2], [3, 4]]
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.33, 0.8])
@@ -209,5 +198,5 @@ def test_leaning_shows_forward_speed_handedness_and_unit():
     assert np.allclose(leaning.matrix, turn, atol=0.05)
     assert leaning.speed == pytest.approx(15.0, rel=0.1)
     assert leaning.share == pytest.approx(1.0, rel=0.1)
-    assert leaning.likeness > 0.9
+    assert leaning.correlation > 0.9
     assert leaning_of(-rate @ turn, force @ turn, riding).share == pytest.approx(-1.0, rel=0.1)

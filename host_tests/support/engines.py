@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from kickstand.errors import Refusal
-from kickstand_tools.calibration import drive_refusals, pose_refusals
+from kickstand_tools.calibration import refusals
 from kickstand_tools.common import unix_port
 
 from support import firmware_calls
@@ -31,8 +31,4 @@ def run(engine, calls):
 
 def words(answer):
     """Return the terminal's message for a refusal. answer: a result of run()."""
-    refusal = Refusal(answer["refused"], *answer["values"])
-    for of in (pose_refusals, drive_refusals):
-        if refusal.code in of.CODES:
-            return of.of_firmware(refusal).line()
-    raise AssertionError(f"no class for {refusal.code}")
+    return refusals.of_firmware(Refusal(answer["refused"], *answer["values"])).line()

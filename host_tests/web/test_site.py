@@ -96,7 +96,7 @@ def test_browser_without_serial_ports_offers_the_firmware(files):
 
 
 def test_each_board_gets_its_own_machine_code(files):
-    """Three modules contain machine code. All other files are the same for every board."""
+    """Two modules contain machine code. All other files are the same for every board."""
     packed = archive(files, "install.zip")
     modules = {name[1:-2] + "mpy" for name in firmware_files() if name.startswith("/kickstand/")}
     first, *other_architectures = archives.ARCHITECTURES
@@ -108,7 +108,7 @@ def test_each_board_gets_its_own_machine_code(files):
     machine_code = {name for name in modules if packed[f"compiled/{first}/{name.removeprefix('kickstand/')}"][2]}
     for other in other_architectures:
         assert {f"kickstand/{name}" for name in compiled[other]} == machine_code
-    assert len(machine_code) == 3 and {name for name in modules if name.endswith("_viper.mpy")} == machine_code
+    assert len(machine_code) == 2 and {name for name in modules if name.endswith("_viper.mpy")} == machine_code
 
 
 @pytest.mark.parametrize(

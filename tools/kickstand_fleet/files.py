@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import IO, Any, cast
 from urllib.parse import quote
 
+from kickstand_tools.checks.log import read_with_notices
 from kickstand_tools.common.errors import InputError, cause, extra
 from kickstand_tools.common.output import whole_file
 from kickstand_tools.logs.log import Log
-from kickstand_tools.logs.reader import read_log
 from kickstand_tools.logs.source import open_input
 
 MOST_BYTES = 300_000_000  # largest packed log in a store, in bytes. Ten hours at 200 Hz use 150 million bytes
@@ -130,12 +130,12 @@ def identities(paths: Iterable[str]) -> dict[str, str]:
 def open_log(path: str) -> Log:
     """Read a log without checking its axes. Raises InputError."""
     if not is_remote(path):
-        return read_log(path, axes=False)
+        return read_with_notices(path, axes=False)
     file: io.BytesIO = _Named(path, read_bytes(path))
     if path.endswith(".gz"):
         with gzip.GzipFile(filename=path, fileobj=file) as unpacked:
-            return read_log(cast(IO[bytes], unpacked), axes=False)
-    return read_log(file, axes=False)
+            return read_with_notices(cast(IO[bytes], unpacked), axes=False)
+    return read_with_notices(file, axes=False)
 
 
 class _Named(io.BytesIO):

@@ -13,12 +13,11 @@ from kickstand.drive_alignment.quality import AGREE_DEG, fit_problem
 from kickstand_tools.analysis.brake_tests import brake_tests
 from kickstand_tools.analysis.stops.brake_test import Stop
 from kickstand_tools.calibration.drive import DriveFit, fit_logs, usable
-from kickstand_tools.calibration.drive_refusals import Uncertain, of_firmware
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.checks.bends import LeftHanded
-from kickstand_tools.checks.sensor import AccelClipped, AxisDead, GyroSaturated
+from kickstand_tools.calibration.refusals import Uncertain, of_firmware
+from kickstand_tools.checks.axes import LeftHanded
+from kickstand_tools.checks.sensor import AccelClipped, AxisDead, FrozenReadings, GyroSaturated
 from kickstand_tools.common.errors import InputError, RefusedInput, cause
-from kickstand_tools.logs.frozen import FrozenReadings
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import CutLine
 from kickstand_tools.logs.source import CutGzip, NulEnd

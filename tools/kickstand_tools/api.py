@@ -36,6 +36,7 @@ from .calibration.poses import (
     fit_two_positions as fit_two_positions,
 )
 from .calibration.procedure import fit_procedure as fit_procedure
+from .checks.log import CheckedLog as CheckedLog, check_log as check_log
 from .common.errors import InputError as InputError, RefusedInput as RefusedInput
 from .common.messages import Message as Message, sentence as sentence
 from .estimation.alignment import RideFit as RideFit, fit_ride as fit_ride

@@ -1,7 +1,7 @@
-"""The differences between boards: default pins, I2C, interrupts, the SD card's driver, how to disarm the watchdog, and
+"""The differences between boards: I2C, interrupts, the SD card's driver, how to disarm the watchdog, and
 how the heap grows.
 
-No other module depends on the kind of board.
+Except pins.py, no other module depends on the kind of board.
 """
 
 import gc
@@ -13,44 +13,10 @@ IS_ESP32 = sys.platform == "esp32"
 # The board and its chip, such as "Raspberry Pi Pico with RP2040" or "ESP32C3 module with ESP32-C3"
 MACHINE = getattr(sys.implementation, "_machine", "")
 
-if IS_ESP32:
-    _KNOWN = MACHINE.startswith("Generic ESP32 module")  # ESP32-DevKitC and similar, with the classic chip
-    SENSOR_PINS, LCD_PINS, BUTTON_PIN = (21, 22), (18, 19), 4  # (SDA, SCL)
-    GPS_UART, GPS_PINS, WHEEL_PIN = 2, (17, 16), 27  # (TX, RX)
-    if "SPIRAM" in MACHINE:  # MicroPython's image for PSRAM uses pins 16 and 17 itself, and has no Pin for them
-        GPS_PINS = None, None
-    # Extra arguments of Pin.irq(). An ESP32 has only soft interrupts, and transfers by SoftI2C delay them
-    PIN_IRQ = {}
-    I2C_NUMBERED = False  # see open_i2c()
-    ONLY_MS_YIELD = True  # sleep_us() gives no time to the radio and the idle task, only sleep_ms() does
-    SD_SPI = (2, 3)  # slots of machine.SDCard that use SPI
-    # Pins that the chip itself needs. An output on a pin of the chip's USB disconnects the board from the computer
-    # until BOOT is held. An output on a pin of a classic chip's flash (6 to 11) crashes the board at each start. Pins 1
-    # and 3 of a classic chip are the console. ESP32-PICO-D4 and D2WD have their flash on 16 and 17, too (data sheet of
-    # the PICO-D4, section 2.2).
-    _CHIP = MACHINE.split(" with ESP32")[-1].lstrip("-")[:2]  # "S2", "C3", ...; classic: "", "UN", "D2" or "PI"
-    _CLASSIC = not (_CHIP[:1] in ("S", "C", "H", "P") and _CHIP[1:].isdigit())
-    TAKEN_PINS = {
-        "S2": (19, 20), "S3": (19, 20), "C3": (18, 19), "C5": (13, 14), "C6": (12, 13), "H2": (26, 27), "P4": (24, 25),
-    }.get(_CHIP, (1, 3, 6, 7, 8, 9, 10, 11) if _CLASSIC else ())  # fmt: skip
-    if "PICO-D4" in MACHINE or "D2WD" in MACHINE:
-        TAKEN_PINS += 16, 17
-        GPS_PINS = None, None
-    INPUT_PINS = (34, 35, 36, 37, 38, 39) if _CLASSIC else ()  # pins without output and without pull-up
-else:  # Raspberry Pi Pico and Pico 2, and boards of other makers with the same pins and name
-    _KNOWN = sys.platform != "rp2" or "Pico" in MACHINE
-    SENSOR_PINS, LCD_PINS, BUTTON_PIN = (4, 5), (6, 7), 15
-    GPS_UART, GPS_PINS, WHEEL_PIN = 1, (8, 9), 14
-    PIN_IRQ = {"hard": True}  # soft interrupts would be lost during a transfer to the display
-    I2C_NUMBERED = True  # two I2C buses must have two different controller numbers
-    ONLY_MS_YIELD = False
-    SD_SPI = (0, 1)  # the numbers of machine.SPI
-    TAKEN_PINS = INPUT_PINS = ()
-if not _KNOWN:  # an unknown board may lack these pins or use them for something else
-    SENSOR_PINS = LCD_PINS = GPS_PINS = None, None
-    BUTTON_PIN = WHEEL_PIN = None
-    GPS_UART = 1
-
+# Extra arguments of Pin.irq(). An ESP32 has only soft interrupts, and transfers by SoftI2C delay them. On a Pico soft
+# interrupts would be lost during a transfer to the display.
+PIN_IRQ = {} if IS_ESP32 else {"hard": True}
+ONLY_MS_YIELD = IS_ESP32  # there sleep_us() gives no time to the radio and the idle task, only sleep_ms() does
 
 _ESP32_HZ = 240_000_000
 # Largest clock of SoftI2C, with half a period of 2 us. At 400 kHz, half a period is 1 us, but the MPU6050 needs 1.3 us

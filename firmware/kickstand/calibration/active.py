@@ -1,10 +1,10 @@
 """Keeps the calibration in use: loads it for the running chip, saves it to flash, and updates it while riding."""
 
+import sys
 from time import ticks_add, ticks_diff, ticks_ms
 
-from ..errors import StoreError, report
+from ..errors import StoreError, report, unload
 from ..units import const
-from .store import Store
 
 _TRIM_MS = const(60_000)  # shortest time between two saves of the trim, because writing wears the flash
 _LOOK_MS = const(1000)  # time until the next attempt, because at rest each attempt takes heap
@@ -31,7 +31,8 @@ class ActiveCalibration:
         self._meter = meter
         self.value = meter.calibration
         self.changed = None
-        self._store = None  # None until a chip runs, because a stored calibration belongs to one chip
+        self._chip = None  # None until a chip runs, because a stored calibration belongs to one chip
+        self.newest = None  # see Store
         self._trim_due_ms = ticks_add(ticks_ms(), _TRIM_MS)
 
     @property
@@ -45,11 +46,10 @@ class ActiveCalibration:
         Args:
             chip: an Mpu6050 that runs.
         """
-        if self._store and self._store.who_am_i == chip.who_am_i:
+        if self._chip and self._chip_id == chip.who_am_i:
             return False
-        self._chip = chip
-        self._store = Store(chip.who_am_i, chip.accel_range_g)
-        self._use(self._store.load(), self.REPLACED)
+        self._chip, self._chip_id = chip, chip.who_am_i
+        self._use(self._stored(), self.REPLACED)
         return True
 
     def save(self, calibration, posed=False):
@@ -59,13 +59,13 @@ class ActiveCalibration:
             calibration: the new Calibration.
             posed: as for LeanMeter.use().
         """
-        self._store.save(calibration)
+        self._stored(calibration)
         self._use(calibration, self.REPLACED, posed)
 
     def refine(self, calibration):
         """Save and use an alignment from driving. Unlike save(), keep the maxima and the results of driving. Raises
         StoreError."""
-        self._store.save(calibration)
+        self._stored(calibration)
         self._use(calibration, self.REFINED)
 
     def restart(self):
@@ -84,13 +84,41 @@ class ActiveCalibration:
 
     def _save_trim(self):
         """Save the trim if it has changed enough. Return True if it was saved."""
-        if not self._meter.keep_trim() or not self._store.unchanged():
-            return False
         try:
-            self._store.save(self.value)
+            return self._meter.keep_trim() and self._stored(self.value, True)
         except StoreError as error:  # a failed save is not fatal, because the next ride estimates the trim again
             report(error)
-        return True
+            return True
+
+    def _stored(self, calibration=None, careful=False):
+        """Save a Calibration, or without one load the Calibration in flash. Raises StoreError.
+
+        The Store is imported only for this, because it takes 3 KB of heap.
+
+        Args:
+            careful: True to save only if the files are unchanged.
+
+        Returns:
+            The loaded Calibration, or True if the Calibration was saved.
+        """
+        recording = "kickstand.rides.recorder" in sys.modules  # which uses the module too
+        store = self  # for its attribute newest, if the import fails
+        try:
+            from .store import Store
+
+            store = Store(self._chip_id, self._chip.accel_range_g, newest=self.newest)
+            if calibration is None:
+                return store.load()
+            if careful and not store.unchanged():
+                return False
+            store.save(calibration)
+            return True
+        except (ImportError, MemoryError) as error:
+            raise StoreError("not-written", str(error))
+        finally:
+            self.newest = store.newest
+            if not recording:
+                unload("calibration.store")
 
     def _use(self, calibration, changed, posed=False):
         calibration.set_scale(self._chip.accel_lsb_per_g, self._chip.gyro_lsb_per_dps)

@@ -44,24 +44,26 @@ class Store:
         accel_range_g: accelerometer range of the chip in use. Records of another range are valid, because offset and
             slope hardly depend on the range.
         directory: the directory of the files, "" for the current one.
+        newest: the attribute of an earlier Store of this chip, or None.
 
     Attributes:
         message: after load(), a few words about the record in use, or the reason why no record is valid.
+        newest: the sequence number of the record in use, 0 without a record, and the faults of the invalid records in
+            words.
     """
 
-    def __init__(self, who_am_i, accel_range_g, directory=""):
+    def __init__(self, who_am_i, accel_range_g, directory="", newest=None):
         self.who_am_i = who_am_i
         self._chip = (who_am_i, accel_range_g)
         self._directory = directory
         self.message = ""
-        self._sequence = 0  # sequence number of the record in use, 0 without a record
-        self._problems = []  # faults of the invalid records, in words
+        self.newest = newest or (0, [])
 
     def load(self):
         """Return the newest valid Calibration, or a default Calibration if no record is valid. Raises nothing and
         writes nothing."""
         sequence, calibration, problems = self._newest()
-        self._sequence, self._problems = sequence, problems
+        self.newest = sequence, problems
         if calibration is None:
             self.message = "not calibrated" + (": " + ", ".join(problems) if problems else "")
             return Calibration()
@@ -74,7 +76,7 @@ class Store:
         If the files read differently, a file was misread, for example in a voltage sag. After a misread the loaded
         record may be the older of the two, and the newer record must not be overwritten."""
         sequence, _, problems = self._newest()
-        return sequence == self._sequence and problems == self._problems
+        return (sequence, problems) == self.newest
 
     def save(self, calibration):
         """Write a Calibration over the older record and read it back. The record in use is never damaged. Raises
@@ -91,7 +93,8 @@ class Store:
             raise StoreError("not-written", str(error))
         if written != record:
             raise StoreError("read-back")
-        self._sequence, _, self._problems = self._newest()
+        sequence, _, problems = self._newest()
+        self.newest = sequence, problems
 
     def _newest(self):
         """Find the newest valid record.

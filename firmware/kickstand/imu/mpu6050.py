@@ -47,8 +47,6 @@ _FIFO_RESET = const(0x04)  # bit of USER_CTRL
 
 ACCEL_LSB_PER_G = {2: 16384, 4: 8192, 8: 4096, 16: 2048}  # counts per g for each range in g (p. 29)
 GYRO_LSB_PER_DPS = {250: 131.0, 500: 65.5, 1000: 32.8, 2000: 16.4}  # counts per deg/s for each range in deg/s (p. 31)
-# For each sample rate in Hz, the dlpf of the widest low-pass (98, 44 or 21 Hz) below half of the rate (p. 13)
-MIN_DLPF = {50: 4, 100: 3, 125: 3, 200: 2}
 # For each dlpf, the delay of the gyro in seconds (p. 13)
 GYRO_DELAY_S = {1: 0.0019, 2: 0.0028, 3: 0.0048, 4: 0.0083, 5: 0.0134, 6: 0.0186}
 

@@ -8,7 +8,7 @@ work may be interrupted. Rows of Jacobians are written as ((state, value), ...),
 from array import array
 from math import sqrt
 
-from ..quick import NO_MACHINE_CODE, passes
+from ..quick import load, plain
 from ..units import const
 
 # Lower bound of a variance, because rounding in 32-bit floats could make a variance negative
@@ -25,7 +25,7 @@ def add_products_python(out, factors, source, n, rows):
     """Add factors[i] * source[k] to out[i * n + k], for i below rows and k below n.
 
     out, factors, source: arrays of floats. rows: 1, or n for a symmetric matrix. Half of a symmetric matrix is computed
-    and copied to the other half. On the board add_products() is the machine code of kalman_viper.py, for array("f").
+    and copied to the other half. On the board add_products() is the machine code of quick_viper.py, for array("f").
     Elsewhere add_products() is this function.
     """
     for i in range(rows):
@@ -37,18 +37,16 @@ def add_products_python(out, factors, source, n, rows):
                 out[k * n + i] = value
 
 
-try:
-    from .kalman_viper import add_products
+def _adding():
+    """Return arrays and their mark. Some of the sums grow, vanish, change their sign or are rounded."""
+    sums = array("f", (0.65625, 0, 0, -0.75, 8388609, 0, 1e-9, 3e9, -0.984))
+    return (sums, array("f", (1.5, -2.6875, 0.75)), array("f", (-0.4375, 98304.5, 1.3125)), 3, 3), 0x6E921598
 
-    # Some of the sums grow, vanish, change their sign or are rounded
-    _TRIAL = array("f", (0.65625, 0, 0, -0.75, 8388609, 0, 1e-9, 3e9, -0.984))
-    _FACTORS, _SOURCE = array("f", (1.5, -2.6875, 0.75)), array("f", (-0.4375, 98304.5, 1.3125))
-    _PASSES = passes("add_products", add_products, (_TRIAL, _FACTORS, _SOURCE, 3, 3), 0x6E921598)
-    del _TRIAL, _FACTORS, _SOURCE
-except NO_MACHINE_CODE:
-    _PASSES = False
-if not _PASSES:
+
+(add_products,) = load("quick_viper", ("add_products", _adding))
+if "add_products" in plain:  # as plain Python it cannot take floats apart
     add_products = add_products_python
+del _adding
 _KIND = "d" if add_products is add_products_python else "f"  # type of the arrays' elements
 
 

@@ -33,7 +33,7 @@ def simulated(directory, profile, seconds, seed=2):
     pair = directory / "KICKSTAND.csv", directory / "UPRIGHT.csv"
     fit = fit_two_positions(*pair, read_calibration(directory / "six.json"))
     write_calibration(directory / "RIDE.cal.json", fit.calibration)
-    course = joined(list(downsampled(open_ride(directory / "RIDE.csv", None).blocks(), RATE_S)))
+    course = joined(list(downsampled(open_ride(directory / "RIDE.csv", None).read().parts(), RATE_S)))
     return course, simulation.time, simulation.truth["speed_mps"]
 
 

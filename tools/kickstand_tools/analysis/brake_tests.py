@@ -1,9 +1,13 @@
 """Measures the brake tests of a log: its stops, as defined by UN Regulation No. 13."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..calibration.file import CalibrationFile
-from ..logs.reader import Source, read_blocks
+from ..checks.log import check_log
+from ..logs.log import Source
+from ..logs.reader import read_log
 from ..signals import Array
 from .channels import Channels, channels, downsampled, joined
 from .ride import Ride
@@ -27,17 +31,14 @@ def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
     >>> stops[-1].initial_speed_mps > 3.0, stops[-1].mfdd_mps2 > 1.0
     (True, True)
     """
-    ride = Ride(log, calibration)
-    blocks = car_channels(log, calibration) if ride.car else list(ride.blocks())
-    return find_stops(joined(list(downsampled(blocks, RATE_S))))
+    ride = Ride(check_log(read_log(log), axes=False), calibration)
+    parts = _car_channels(ride) if ride.car else ride.read().parts()
+    return find_stops(joined(downsampled(parts, RATE_S)))
 
 
-def car_channels(log: Source, calibration: CalibrationFile) -> list[Channels]:
-    """Return the channels of a car's log, in the vehicle's axes and without a lean. The list has one item per block."""
-    parts = []
-    for block in read_blocks(log, lines=False):
-        measured = block.measured
-        if len(measured.time_us):
-            lean: dict[str, Array] = {name: np.zeros(len(measured.time_us)) for name in ("shown_g", "resting", "sure")}
-            parts.append(channels(measured, calibration, lean, car=True))
-    return parts
+def _car_channels(ride: Ride) -> Iterator[Channels]:
+    """Yield the channels of a car's ride, without a lean."""
+    for _, part in ride.log.parts(ride.checked.measured):
+        lean: dict[str, Array] = {name: np.zeros(len(part.t_s)) for name in ("shown_g", "resting", "sure")}
+        if len(part.t_s):
+            yield channels(part, ride.calibration, lean, car=True)

@@ -11,7 +11,7 @@ import numpy as np
 from kickstand.lean.meter import FALLEN_DEG
 
 from ..calibration.file import CalibrationFile
-from ..logs.log import ROOM_TEMP_C, Block, Table
+from ..logs.log import ROOM_TEMP_C, Log, Table
 from ..replay.meter_along import formula_lean_deg
 from ..signals import Array, Bools
 
@@ -82,8 +82,8 @@ class Channels(Table):
         return np.column_stack((-self.pitch_rate_dps, self.yaw_rate_dps, self.roll_rate_dps))
 
 
-def channels(block: Block, calibration: CalibrationFile, lean: dict[str, Array], car: bool = False) -> Channels:
-    """Convert a block to the vehicle's axes.
+def channels(log: Log, calibration: CalibrationFile, lean: dict[str, Array], car: bool = False) -> Channels:
+    """Convert samples to the vehicle's axes.
 
     The forces are computed by Nicolae's formulas (18)-(20) and the matrix vehicle_from_sensor. Then (25)-(26) give
     lean_formula_deg, and (23) gives lateral_g. A car has no lean, and its lateral acceleration is the force to the
@@ -92,17 +92,17 @@ def channels(block: Block, calibration: CalibrationFile, lean: dict[str, Array],
     lean: lean_deg, lean_sigma_deg, shown_g, resting, rolling, sure and doubtful. For a car, only shown_g, resting and
         sure are used.
     """
-    none = np.zeros(len(block.time_us))
+    none = np.zeros(len(log.t_s))
     if car:
         lean = lean | {"lean_deg": none + np.nan, "lean_sigma_deg": none, "rolling": none, "doubtful": none}
-    force, rate = calibration.in_vehicle(block.readings)
+    force, rate = calibration.in_vehicle(log.readings)
     left, up, forward = force.T
     angle = np.radians(np.nan_to_num(lean["lean_deg"]))
-    temperature = block.readings[:, 3]
-    if block.has_temp:
+    temperature = log.temperature_c
+    if log.has_temperature:
         temperature = np.nan_to_num(temperature, nan=ROOM_TEMP_C)
     return Channels(
-        t_s=block.t_s,
+        t_s=log.t_s,
         lean_formula_deg=none + np.nan if car else formula_lean_deg(left, up, rate[:, 1]),
         left_g=left,
         up_g=up,
@@ -111,11 +111,11 @@ def channels(block: Block, calibration: CalibrationFile, lean: dict[str, Array],
         pitch_rate_dps=-rate[:, 0],
         yaw_rate_dps=rate[:, 1],
         roll_rate_dps=rate[:, 2],
-        speed_mps=block.speed_mps,
+        speed_mps=log.speed_mps,
         temp_c=temperature,
-        lat_deg=block.lat_deg,
-        lon_deg=block.lon_deg,
-        utc_s=block.utc_s,
+        lat_deg=log.lat_deg,
+        lon_deg=log.lon_deg,
+        utc_s=log.utc_s,
         **lean,
     )
 

@@ -1,14 +1,13 @@
 """Reads a ride once and keeps the data for its report and its pictures."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..checks.mount import ForwardExchanged
+from ..calibration.mount import ForwardExchanged
+from ..checks.sensor import FrozenReadings
 from ..common.messages import Message
-from ..logs.frozen import FrozenReadings
-from ..logs.log import Stretch
 from ..logs.source import Progress
 from ..signals import Array, Bools, smoothed
 from .alignment_quality import Quality, quality
@@ -50,7 +49,7 @@ class Overview:
     notices: list[Message]
 
     @property
-    def exchanged(self) -> ForwardExchanged | None:
+    def exchanged(self) -> Message | None:
         """The notice that forward and backward are exchanged; None without this notice."""
         return next((notice for notice in self.notices if isinstance(notice, ForwardExchanged)), None)
 
@@ -60,10 +59,11 @@ class Overview:
         return self.summary.speed_mps.time_s is not None
 
 
-def overview(ride: Ride, progress: Progress | None = None) -> Overview:
-    """Read a ride of open_ride() block by block, so the memory hardly grows with the ride's length.
+def overview(ride: Ride, progress: Progress | None = None, keep: Callable[[Array], None] | None = None) -> Overview:
+    """Read a ride of open_ride() part by part, so the memory hardly grows with the ride's length.
 
-    progress: called with (done, total) of the log.
+    progress: called with (done, total) of the log's samples.
+    keep: called with the smoothed lean of successive samples, see Ride.read().
     Raises InputError.
 
     >>> import numpy as np
@@ -74,23 +74,24 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     (2.5, [])
     """
     total = Summary()
-    notices: list[Message] = []
+    reading = ride.read(progress, keep)
 
-    def blocks() -> Iterator[Channels]:
-        for block in ride.blocks(progress, notices):
-            total.add(block)
-            yield replace(block, **dict.fromkeys(_NOT_KEPT, np.full(len(block.t_s), np.nan)))
+    def parts() -> Iterator[Channels]:
+        for part in reading.parts():
+            total.add(part)
+            yield replace(part, **dict.fromkeys(_NOT_KEPT, np.full(len(part.t_s), np.nan)))
 
-    course = joined(downsampled(blocks(), RATE_S))
+    course = joined(downsampled(parts(), RATE_S))
+    notices = reading.notices()
     # A speed that is always 0 does not prove a standstill, because a broken contact at the wheel also gives 0.
     if total.speed_mps.time_s is None:
         course = replace(course, speed_mps=np.broadcast_to(np.nan, len(course.t_s)))
     frozen_s = sum((notice.seconds for notice in notices if isinstance(notice, FrozenReadings)), 0.0)
     # The notice is about the whole log, even if the ride is a stretch of the log.
-    total.frozen_s = min(frozen_s, total.missing_s) if isinstance(ride.log, Stretch) else frozen_s
+    total.frozen_s = min(frozen_s, total.missing_s) if ride.is_stretch else frozen_s
     still = standing(course)
     alignment = quality(course, still)
-    moved_s = min(total.riding_s, _riding_s(course, still, whole_ride=not isinstance(ride.log, Stretch)))
+    moved_s = min(total.riding_s, _riding_s(course, still, whole_ride=not ride.is_stretch))
     notices = [replace(n, roll_deg=alignment.roll_deg) if isinstance(n, ForwardExchanged) else n for n in notices]
     result = Overview(ride, total, course, [], alignment, moved_s, notices)
     if not result.exchanged:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..calibration.file import BY_RIDE
-from ..checks.mount import SWAPPED_DEG
+from ..calibration.mount import SWAPPED_DEG
 from ..common.messages import Remedy, WrongAxes, WrongMount, as_data as remarks_as_data
 from ..common.times import clock
 from ..estimation.smooth import PoseOff

@@ -1,70 +1,64 @@
-"""Reads a recorded ride block by block.
+"""Computes the channels of a recorded ride part by part.
 
 A ride is a log with its calibration. Its lean is the displayed lean or the smoothed lean.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from kickstand.units import GAP_US
 
 from ..calibration.file import ALIGN, CalibrationFile, calibration_path, read_calibration
+from ..calibration.mount import read_ride
+from ..checks.log import CheckedLog
 from ..common.errors import InputError
-from ..common.messages import Message, Remedy
-from ..estimation.smooth import smooth_blocks
-from ..logs.log import Block, Stretch
-from ..logs.reader import Source, check_first_line, read_blocks, split_stretch
+from ..common.messages import Message, Remedy, kind
+from ..estimation.smooth import Smoother
+from ..logs.cells import MOST_DPS, MOST_G
+from ..logs.log import Log, Source, Stretch
+from ..logs.reader import check_first_line
 from ..logs.source import File, Progress, log_stem, name_of
 from ..replay.meter_along import MeterAlong, Misfit
-from ..signals import Array, Bools
+from ..signals import Array
 from .channels import Channels, channels, joined
 
+SMOOTH_US = 300_000  # time constant of the display's force, as in kickstand.lean.meter
 _MAX_SIGMA_DEG = 3.0  # a smoothed lean with a larger standard deviation is not trusted
 
 
-class SmoothSlow(Message):
-    """There are too few samples per second to smooth the lean."""
-
-    code = "smooth-slow"
-    text = (
-        "the smoothed lean needs 10 samples per second: where the log has fewer, the lean is the one that the display "
-        "showed"
-    )
-
-
-class AbsurdReadings(Message):
-    """The log has implausible readings.
-
-    at_s: time in the log.
-    rate_dps: largest rate in the second before at_s.
-    force_g: largest force in the second before at_s.
-    """
-
-    at_s: float
-    rate_dps: float
-    force_g: float
-
-    code = "absurd-readings"
-    text = (
-        "implausible readings at {at_s:.1f} s, up to {rate_dps:.0f} deg/s and {force_g:.1f} g, where the lean is not "
-        "known"
-    )
-    todo = Remedy("check the sensor, and the units in the log")
+SmoothSlow = kind(
+    "smooth-slow",
+    text="the smoothed lean needs 10 samples per second: where the log has fewer, the lean is the one that the display "
+    "showed",
+)
+# at_s: time in the log; rate_dps, force_g: largest rate and force in the second before it
+AbsurdReadings = kind(
+    "absurd-readings",
+    "at_s rate_dps force_g",
+    "implausible readings at {at_s:.1f} s, up to {rate_dps:.0f} deg/s and {force_g:.1f} g, where the lean is not known",
+    Remedy("check the sensor, and the units in the log"),
+)
 
 
 @dataclass
 class Ride:
-    """A log and its calibration. smoothed: True to use the smoothed lean, False for the displayed lean."""
+    """A checked log and its calibration. smoothed: True to use the smoothed lean, False for the displayed lean."""
 
-    log: Source
+    checked: CheckedLog
     calibration: CalibrationFile
     smoothed: bool = False
 
     @property
+    def log(self) -> Log:
+        """The whole log, even if the ride is a stretch of it."""
+        return self.checked.log
+
+    @property
     def name(self) -> str:
         """The log's name, with its path if it has one."""
-        return name_of(self.log)
+        return self.log.name
 
     @property
     def stem(self) -> str:
@@ -76,56 +70,137 @@ class Ride:
         """True for a car, which has no lean; False for a motorcycle."""
         return self.calibration.vehicle == "car"
 
-    def blocks(self, progress: Progress | None = None, notices: list[Message] | None = None) -> Iterator[Channels]:
-        """Yield the channels of the ride block by block. Frozen readings are left out, so they become gaps.
+    @property
+    def is_stretch(self) -> bool:
+        """True if the ride is a stretch of the log."""
+        return self.checked.rows != slice(None)
 
-        progress, notices: see read_blocks(). They are about the whole log, even if the ride is a stretch of the log.
-        Raises InputError.
+    def read(self, progress: Progress | None = None, keep: Callable[[Array], None] | None = None) -> "RideReading":
+        """Compute the channels of the ride.
+
+        progress: called with (done, total) of the log's samples.
+        keep: called with the values of estimation.smooth.COLUMNS of successive samples, if the lean is smoothed.
         """
-        along, absurd, slow, any_block = MeterAlong(self.calibration), False, False, False
-        log, stretch = split_stretch(self.log)
-        misfit = Misfit()
-        for raw_block, smoothed_values in self._read(log, progress, notices):
-            block = raw_block.measured
-            if not len(block.time_us):
+        return RideReading(self, progress, keep)
+
+
+class RideReading:
+    """Computes the channels of a ride part by part, so that memory hardly grows with its length. Call parts(), and at
+    its end notices()."""
+
+    def __init__(self, ride: Ride, progress: Progress | None, keep: Callable[[Array], None] | None) -> None:
+        self._ride, self._progress, self._keep = ride, progress, keep
+        self._smoother = Smoother(ride.checked, ride.calibration) if ride.smoothed else None
+        self._meter, self._misfit = MeterAlong(ride.calibration), Misfit()
+        self._absurd: Message | None = None
+        self._slow = False
+
+    def parts(self) -> Iterator[Channels]:
+        """Yield the channels of successive samples. Frozen readings are left out, so they become gaps.
+
+        Raises InputError if all readings are frozen.
+        """
+        ride, has_readings = self._ride, False
+        first, last, _ = ride.checked.rows.indices(len(ride.log.t_s))
+        for span, log, lean in self._leans():
+            part = channels(log, ride.calibration, lean, ride.car)
+            if span.start < first or span.stop > last:
+                rows = np.flatnonzero(ride.checked.measured[span]) + span.start
+                part = part.part((rows >= first) & (rows < last))
+            if len(part.t_s):
+                has_readings = True
+                yield part
+        if not has_readings:
+            raise InputError(f"{ride.name}: all readings are frozen, so that nothing is known: check the sensor")
+
+    def notices(self) -> list[Message]:
+        """Return the remarks about the whole log and its calibration, after the last part."""
+        notices = self._smoother.notices() if self._smoother else self._ride.checked.notices
+        notices = [*notices, *([self._absurd] if self._absurd else [])]
+        notices += [] if self._ride.car else self._misfit.remarks(notices)
+        return [*notices, SmoothSlow()] if self._slow else notices
+
+    def _leans(self) -> Iterator[tuple[slice, Log, dict[str, Array]]]:
+        """Yield the rows of successive parts in the log, their measured samples, and their lean for channels()."""
+        log, measured = self._ride.log, self._ride.checked.measured
+        if self._smoother is None:
+            for span, part in log.parts(measured):
+                yield span, part, self._displayed(part)
+                if self._progress:
+                    self._progress(span.stop, len(log.t_s))
+            return
+        pushes = _Smoothed()
+        for span, values in self._smoother.batches(self._progress):
+            part = log.part(span).part(measured[span])
+            if values is not None and self._keep:
+                self._keep(self._smoother.with_frozen(span, values))
+            if values is None:
+                self._slow = True
+                yield span, part, self._displayed(part)
                 continue
-            lean, variance, odd = _lean_along(along, block, displayed=smoothed_values is None)
-            misfit.add(block.t_s, odd)
-            if notices is not None and not absurd and np.any(variance < 0.0):
-                absurd = True
-                notices.append(_divergence_notice(block, int(np.argmax(variance < 0.0))))
-            slow |= self.smoothed and smoothed_values is None
-            if smoothed_values is not None:
-                lean_deg, sigma_deg, _, _, doubtful = smoothed_values[~raw_block.frozen].T
-                sure = sigma_deg <= _MAX_SIGMA_DEG  # False for NaN
-                lean |= {"lean_deg": lean_deg, "lean_sigma_deg": sigma_deg, "doubtful": doubtful}
-                lean["sure"] = sure.astype(float)
-            part = channels(block, self.calibration, lean, self.car)
-            if stretch is not None:
-                in_stretch = stretch.holds(block)
-                if not in_stretch.any():
-                    continue
-                part = part.part(in_stretch)
-            any_block = True
-            yield part
-        if not any_block:
-            raise InputError(f"{self.name}: all readings are frozen, so that nothing is known: check the sensor")
-        if notices is not None and not self.car:
-            notices += misfit.remarks(notices)
-        if notices is not None and slow:
-            notices.append(SmoothSlow())
+            lean_deg, sigma_deg, _, _, doubtful, standing, rolling = values.T
+            if len(values) and np.all(np.isnan(lean_deg)):
+                self._note_absurd(part, _largest(part))
+            lean = {"lean_deg": lean_deg, "lean_sigma_deg": sigma_deg, "doubtful": doubtful}
+            lean |= {"resting": standing == 1.0, "rolling": rolling == 1.0, "sure": sigma_deg <= _MAX_SIGMA_DEG}
+            yield span, part, lean | {"shown_g": pushes.of(part, self._ride.calibration)}
 
-    def _read(
-        self, log: Source, progress: Progress | None, notices: list[Message] | None
-    ) -> Iterator[tuple[Block, Array | None]]:
-        """Yield the blocks of the log, each with its smoothed values (see smooth_blocks()).
+    def _displayed(self, log: Log) -> dict[str, Array]:
+        """Run the firmware's meter over a part of the log."""
+        names = ("lean_deg", "shown_g", "variance", "resting", "rolling", "odd", "sure")
+        rows = [
+            (
+                meter.lean_deg,
+                meter.smooth_force[2],
+                meter.filter.variance,
+                meter.filter.at_rest,
+                meter.filter.rolling,
+                meter.odd is not None,
+                meter.trusted,
+            )
+            for meter in self._meter.after_each(log, *self._meter.in_vehicle(log))
+        ]
+        lean: dict[str, Array] = dict(zip(names, np.array(rows, dtype=float).reshape(-1, len(names)).T))
+        self._misfit.add(log.t_s, lean.pop("odd") > 0.0)
+        variance = lean.pop("variance")
+        if np.any(variance < 0.0):
+            self._note_absurd(log, int(np.argmax(variance < 0.0)))
+        sigma = np.degrees(np.sqrt(np.where(variance >= 0.0, variance, np.nan)))
+        return lean | {
+            "lean_sigma_deg": sigma,
+            "doubtful": np.zeros(len(sigma)),
+        }  # only smooth() finds doubtful samples
 
-        The values are None if the ride is not smoothed, or if the log has under 10 samples per second.
-        """
-        if self.smoothed:
-            return smooth_blocks(log, self.calibration, progress, notices, lines=False)
-        blocks = read_blocks(log, 2, progress, notices, lines=False, calibration=self.calibration)
-        return ((block, None) for block in blocks)
+    def _note_absurd(self, log: Log, row: int) -> None:
+        """Note that the lean is lost at this row, with the largest readings of the previous second."""
+        last_second = slice(int(np.searchsorted(log.t_s, log.t_s[row] - 1.0)), row + 1)
+        rate, force = (float(np.max(np.abs(values[last_second]))) for values in (log.gyro_dps, log.accel_g))
+        self._absurd = self._absurd or AbsurdReadings(float(log.t_s[row]), rate, force)
+
+
+class _Smoothed:
+    """The forward force, smoothed as on the display, part by part."""
+
+    def __init__(self) -> None:
+        self._last_s, self._last_g = -1e9, 0.0
+
+    def of(self, log: Log, calibration: CalibrationFile) -> Array:
+        """Return the smoothed force for the samples of the next part, shape (n), in g."""
+        steps = np.diff(log.t_s, prepend=self._last_s)
+        gains = np.where(steps > GAP_US * 1e-6, 1.0, steps / (SMOOTH_US * 1e-6 + steps))
+        smooth, column = self._last_g, []
+        for force, gain in zip(calibration.in_vehicle(log.readings)[0][:, 2].tolist(), gains.tolist()):
+            smooth += gain * (force - smooth)
+            column.append(smooth)
+        if column:
+            self._last_s, self._last_g = float(log.t_s[-1]), smooth
+        return np.array(column)
+
+
+def _largest(log: Log) -> int:
+    """Return the row with the largest reading, as a share of the sensors' ranges."""
+    shares = np.hstack((log.accel_g / MOST_G, log.gyro_dps / MOST_DPS))
+    return int(np.argmax(np.max(np.abs(shares), axis=1)))
 
 
 def calibration_beside(log: Path) -> Path:
@@ -146,12 +221,18 @@ def calibration_beside(log: Path) -> Path:
     return path
 
 
-def open_ride(log: Source, calibration: CalibrationFile | File | None = None, smoothed: bool = False) -> Ride:
-    """Open a ride from a log and its calibration.
+def open_ride(
+    log: Source,
+    calibration: CalibrationFile | File | None = None,
+    smoothed: bool = False,
+    progress: Progress | None = None,
+) -> Ride:
+    """Read and check a log with its calibration.
 
     log: see read_log.
     calibration: an object or a file. None: NAME.cal.json beside the log.
     smoothed: use the lean of smooth() instead of the firmware's lean. It has no effect for a car, which has no lean.
+    progress: called with the bytes read and the bytes of the file.
     Raises InputError, also for a calibration that is not aligned, because lean and braking are then unknown.
 
     >>> import numpy as np
@@ -160,17 +241,17 @@ def open_ride(log: Source, calibration: CalibrationFile | File | None = None, sm
     >>> open_ride(log, CalibrationFile(aligned=True)).car
     False
     """
-    source = calibration
     file = log.source if isinstance(log, Stretch) else log
-    if source is None and isinstance(file, (Path, str)):
-        source = calibration_beside(Path(file))
-    if source is None:
-        raise InputError(f"{name_of(log)}: an open file has no calibration beside it: give one")
-    parameters = source if isinstance(source, CalibrationFile) else read_calibration(source)
+    if calibration is None:
+        if not isinstance(file, (Path, str)):
+            raise InputError(f"{name_of(log)}: an open file has no calibration beside it: give one")
+        calibration = calibration_beside(Path(file))
+    parameters = calibration if isinstance(calibration, CalibrationFile) else read_calibration(calibration)
     if not parameters.aligned:
-        name = "the calibration" if isinstance(source, CalibrationFile) else name_of(source)
+        name = "the calibration" if isinstance(calibration, CalibrationFile) else name_of(calibration)
         raise InputError(f"{name} is not aligned, so lean and braking are unknown", ALIGN)
-    return Ride(log, parameters, smoothed and parameters.vehicle != "car")
+    ride = read_ride(log, parameters, progress)
+    return Ride(ride, parameters, smoothed and parameters.vehicle != "car")
 
 
 def vehicle_channels(
@@ -181,7 +262,7 @@ def vehicle_channels(
     Forces are computed by Nicolae's formulas (18)-(20) and the matrix vehicle_from_sensor.
 
     log, calibration: see open_ride(), which raises the same errors.
-    progress: called with (done, total) of the log.
+    progress: called with (done, total) of the log's samples.
 
     >>> import numpy as np
     >>> from kickstand_tools.api import CalibrationFile, Log
@@ -190,41 +271,4 @@ def vehicle_channels(
     >>> bool(abs(channels.lean_deg).max() < 0.1), float(channels.up_g[-1])
     (True, 1.0)
     """
-    return joined(open_ride(log, calibration).blocks(progress))
-
-
-def _divergence_notice(block: Block, row: int) -> Message:
-    """Return the notice that the lean filter diverged at row `at`, with the largest readings of the previous second."""
-    last_second = slice(int(np.searchsorted(block.time_us, block.time_us[row] - 1_000_000)), row + 1)
-    largest = np.max(np.abs(block.readings[last_second]), axis=0)
-    return AbsurdReadings(block.time_us[row] / 1e6, float(np.max(largest[4:])), float(np.max(largest[:3])))
-
-
-def _lean_along(along: MeterAlong, block: Block, displayed: bool) -> tuple[dict[str, Array], Array, Bools]:
-    """Run the firmware's meter over a block of n samples.
-
-    displayed: True to compute the displayed lean. False leaves lean_deg and sure at 0, which saves a tenth of the time.
-    Returns:
-        lean: the argument `lean` of channels().
-        variance: variance of the lean, shape (n), in rad2; negative if the filter diverged.
-        odd: True where the meter reports that the sensor's readings contradict each other, shape (n).
-    """
-    names = ("lean_deg", "shown_g", "variance", "resting", "rolling", "odd", "sure")
-    columns: list[list[float]] = [[] for _ in names]
-    lean_deg, forward, variance, resting, rolling, odd, sure = (column.append for column in columns)
-    for meter in along.after_each(block, *along.in_vehicle(block)):
-        lean = meter.filter
-        forward(meter.smooth_force[2])
-        variance(lean.variance)
-        resting(lean.at_rest)
-        rolling(lean.rolling)
-        odd(meter.odd is not None)
-        if displayed:
-            lean_deg(meter.lean_deg)
-            sure(meter.trusted)
-    n = len(block.time_us)
-    columns_by_name = {name: np.array(column or np.zeros(n), dtype=float) for name, column in zip(names, columns)}
-    variances = columns_by_name.pop("variance")
-    columns_by_name["doubtful"] = np.zeros(n)  # only smooth() finds doubtful samples
-    columns_by_name["lean_sigma_deg"] = np.degrees(np.sqrt(np.where(variances >= 0.0, variances, np.nan)))
-    return columns_by_name, variances, columns_by_name.pop("odd") > 0.0
+    return joined(open_ride(log, calibration).read(progress).parts())

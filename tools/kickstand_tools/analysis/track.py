@@ -1,10 +1,10 @@
 """The track of a ride: the positions in a log, and positions interpolated between them."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
-from ..logs.log import Block
+from ..logs.log import Log
 from ..signals import Array
 from .channels import Channels
 
@@ -44,13 +44,7 @@ class LogTrack:
         return np.where(valid, lat, np.nan), np.where(valid, (lon + 180.0) % 360.0 - 180.0, np.nan)
 
 
-def track(part: Channels | Block) -> LogTrack:
-    """Return the positions in a block of a ride or of a log, or in a whole ride."""
+def track(part: Channels | Log) -> LogTrack:
+    """Return the positions in a ride, in a part of it, or in a log."""
     valid = np.isfinite(part.lat_deg) & np.isfinite(part.lon_deg)
     return LogTrack(part.t_s[valid], part.lat_deg[valid], part.lon_deg[valid])
-
-
-def joined(tracks: list[LogTrack]) -> LogTrack:
-    """Join the tracks of successive blocks."""
-    columns = ([getattr(part, field.name) for part in tracks] for field in fields(LogTrack))
-    return LogTrack(*(np.concatenate(column) for column in columns))

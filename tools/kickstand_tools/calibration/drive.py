@@ -9,18 +9,19 @@ import numpy as np
 from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE, DriveAlignment, compare, yaw_deg
 from kickstand.errors import AlignmentError
 
+from ..checks.log import read_with_notices
+from ..checks.sensor import without_frozen
 from ..common.errors import InputError, RefusedInput
 from ..common.messages import Message
-from ..logs.frozen import without_frozen
-from ..logs.reader import Log, Source, read_log
+from ..logs.log import Log, Source
 from ..logs.source import Progress
 from ..signals import Array
 from .drive_events import DriveEvent, DriveWatch
 from .drive_feed import Steps, feed, standing
-from .drive_refusals import of_firmware
 from .file import CalibrationFile
 from .poses import refuse_same_file
 from .published import PublishedAlignment
+from .refusals import of_firmware
 
 METHODS = {"improved": DriveAlignment, "published": PublishedAlignment}
 _SLOWEST_US = 50_000  # longest allowed time between samples
@@ -124,7 +125,7 @@ def fit_drive(
     (True, True, (3, 3))
     """
     refuse_same_file(logs)
-    usable_logs = [usable(read_log(source), len(logs) > 1) for source in logs]
+    usable_logs = [usable(read_with_notices(source), len(logs) > 1) for source in logs]
     fit = fit_logs(usable_logs, calibration, vehicle, method, progress, on_event)
     if fit.refusal:
         raise fit.refusal

@@ -7,8 +7,8 @@ from kickstand.drive_alignment.alignment import DriveAlignment
 from kickstand.errors import Refusal
 
 from ..common.messages import Message
-from .drive_refusals import of_firmware
 from .published import PublishedAlignment
+from .refusals import of_firmware
 
 # DriveEvent.what
 LOG_BEGINS = "log-begins"

@@ -14,12 +14,13 @@ from kickstand.calibration.still_pose import StillPose
 from kickstand.errors import AlignmentError, CalibrationError, CaptureError
 from kickstand.units import AXES
 
+from ..checks.log import check_log
 from ..common.errors import InputError, RefusedInput
-from ..logs.log import ROOM_TEMP_C
-from ..logs.reader import Source, read_log
+from ..logs.log import ROOM_TEMP_C, Source
+from ..logs.reader import read_log
 from ..signals import Array
 from .file import CalibrationFile
-from .pose_refusals import FreePoseOff, SideTilted, of_firmware
+from .refusals import FreePoseOff, SideTilted, of_firmware
 
 _MICRO = 1_000_000  # readings are in millionths of g and deg/s, because StillPose sums integers
 _SATURATED = 1_990_000  # almost 2 g, the end of the smallest range: an axis that reads more may be at its limit
@@ -64,6 +65,7 @@ def read_pose(source: Source) -> Pose:
     Raises InputError that names the file. Raises its subclass RefusedInput if the pose was not still.
     """
     log = read_log(source)
+    check_log(log, axes=False)
     return take_pose(log.name, log.readings, "capture this pose again")
 
 

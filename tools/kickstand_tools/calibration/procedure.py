@@ -12,12 +12,13 @@ from kickstand.calibration.six_position import SIDES
 from kickstand.calibration.turn import Turn
 from kickstand.errors import CalibrationError, GyroError
 
+from ..checks.log import check_log
 from ..common.errors import InputError, RefusedInput
-from ..logs.log import Log
-from ..logs.reader import Source, read_log
+from ..logs.log import Log, Source
+from ..logs.reader import read_log
 from .file import CalibrationFile
-from .pose_refusals import SideTilted, UnprovedGyro, of_firmware
 from .poses import Pose, SixPositions, beyond_sheet, take_pose, wrong_number
+from .refusals import SideTilted, UnprovedGyro, of_firmware
 
 _WINDOW_S = 0.5  # length of the windows in which the sensor must be still
 _LEAST_S = 1.0  # a shorter pose is not used
@@ -52,13 +53,14 @@ def fit_procedure(source: Source) -> SixPositions:
     ((3, 3), 6)
     """
     log = read_log(source)
-    stretches = _still_stretches(log)
-    if len(stretches) == 1:
+    check_log(log, axes=False)
+    intervals = _still_intervals(log)
+    if len(intervals) == 1:
         raise wrong_number(1)
-    poses = [_pose(log, first, last) for first, last in stretches]
+    poses = [_pose(log, first, last) for first, last in intervals]
     means = [pose.accel_g.tolist() for pose in poses]
     sides = _sides(log, means)
-    turns = _turns(log, stretches, poses)
+    turns = _turns(log, intervals, poses)
     slanted = [k for k, mean in enumerate(means) if six_position.tilt_deg(mean) >= six_position.FREE_TILT_DEG]
     free = [k for k in slanted if k not in sides]
     try:
@@ -87,8 +89,8 @@ def fit_procedure(source: Source) -> SixPositions:
     )
 
 
-def _still_stretches(log: Log) -> list[tuple[int, int]]:
-    """Find the stretches in which the sensor was still.
+def _still_intervals(log: Log) -> list[tuple[int, int]]:
+    """Find the intervals in which the sensor was still.
 
     Returns the index of the first sample, and the index after the last sample, of each stretch.
     """
@@ -154,7 +156,7 @@ def _sides(log: Log, means: list[list[float]]) -> list[int]:
     return [best[side] for side in range(6)]
 
 
-def _turns(log: Log, stretches: list[tuple[int, int]], poses: list[Pose]) -> list[tuple[list[float], float] | None]:
+def _turns(log: Log, intervals: list[tuple[int, int]], poses: list[Pose]) -> list[tuple[list[float], float] | None]:
     """Return the turns between the poses, for SensorFit; None for a turn with missing or clipped readings."""
     times_us = np.round(log.t_s * 1e6).astype(int)
     steps_us = np.diff(times_us, prepend=times_us[0])
@@ -164,7 +166,7 @@ def _turns(log: Log, stretches: list[tuple[int, int]], poses: list[Pose]) -> lis
     limit = next((_QUICK * end for end in _RANGES_DPS if low * end <= most <= high * end), 2 * most + 1)
     turn = Turn(_MICRO, int(np.median(steps_us[1:])), int(limit * _MICRO))
     turns: list[tuple[list[float], float] | None] = []
-    for (_, begin), (end, _), first, second in zip(stretches, stretches[1:], poses, poses[1:]):
+    for (_, begin), (end, _), first, second in zip(intervals, intervals[1:], poses, poses[1:]):
         turn.start(first.gyro_dps.tolist())
         for k in range(begin, end):
             turn.add((0, 0, 0, 0, *rates[k]), 1, int(steps_us[k]))

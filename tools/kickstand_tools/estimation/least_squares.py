@@ -7,7 +7,7 @@ deviation. Outliers of both kinds are down-weighted (Cauchy).
 
 import numpy as np
 
-from ..signals import Array, Bools, Ints, rotation_matrix, stretches
+from ..signals import Array, Bools, Ints, intervals, rotation_matrix
 from .equations import BALANCED, RESTING, RESTING_RATE, ROWS, SLIDING, jacobian, process_and_measurements
 from .first_guess import lean_and_speed, standing
 from .hypotheses import Hypotheses
@@ -117,7 +117,7 @@ class Estimate:
         """
         contradicted = np.max(np.abs(self._residuals() / self.noise.sigma())[:, CONTRADICTING], axis=1) > CONTRADICTED
         false = np.zeros_like(still)
-        for begin, end in stretches(still):
+        for begin, end in intervals(still):
             near = contradicted[max(0, begin - AROUND) : end + AROUND]
             false[begin:end] = end - begin < BRIEF and bool(np.any(near))
         return false
@@ -144,10 +144,10 @@ class Estimate:
         Only the covariance uses this noise. The states are kept. The states were estimated with the larger noise of a
         rough ride. That noise gives less weight to lasting errors that the model lacks.
         """
-        off = self._residuals()
+        residuals = self._residuals()
         self.noise.count_own_misfit()
-        self.noise.estimate_roughness(off / self.noise.robust(self.noise.sigma(), off))
-        self.noise.estimate_unbalance(off[:, BALANCED], LONG_S)
+        self.noise.estimate_roughness(residuals / self.noise.robust(self.noise.sigma(), residuals))
+        self.noise.estimate_unbalance(residuals[:, BALANCED], LONG_S)
         self.prior.sigma[CAMBER] *= min(1.0, self.noise.unbalance / CAMBERED)
 
     def _step(self, robust: bool, weigh: bool) -> None:
@@ -202,8 +202,8 @@ class Estimate:
 
     def _reduced(self, robust: bool) -> Reduced:
         windows, s, unknown = self._windows, STATES, self.prior.unknown
-        off, sigma = self._residuals(), self.noise.sigma()
-        sigma = self.noise.robust(sigma, off) if robust else sigma
+        residuals, sigma = self._residuals(), self.noise.sigma()
+        sigma = self.noise.robust(sigma, residuals) if robust else sigma
         derivatives = jacobian(windows, self._middle(), np.concatenate((np.arange(s), s + unknown)))
         derivatives[:, :s] *= -windows.covered
         derivatives = derivatives.transpose(2, 1, 0) / sigma[..., None]
@@ -213,7 +213,7 @@ class Estimate:
         step = np.arange(s)
         rows[:, step, step] -= 1.0 / sigma[:, :s]
         rows[:, step, s + step] += 1.0 / sigma[:, :s]
-        rows[..., 2 * s : -1], rows[..., -1] = derivatives[..., s:], off / sigma
+        rows[..., 2 * s : -1], rows[..., -1] = derivatives[..., s:], residuals / sigma
         blocks = reduce_windows(rows.reshape(-1, self._length, *rows.shape[1:]), s)
         blocks.left[0, step, step] += 1.0 / START**2
         blocks.left[0, DRAWN, -1] += self.states[0, DRAWN] / START[DRAWN] ** 2

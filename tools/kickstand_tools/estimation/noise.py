@@ -87,6 +87,7 @@ class Noise:
     lean, pitch: estimates in rad.
     speed: estimate in m/s.
     riding: True where the bike may be riding.
+    still: True where the bike stands.
     roughness: factor on the noise of vibration; 1 for a rough ride.
     misfit: factor on the noise of the velocities; 1 if the accelerations are the bike's.
     doubtful: True where the bike is riding and the misfit is at its limit.
@@ -94,7 +95,7 @@ class Noise:
     """
 
     def __init__(self, windows: Windows, still: Bools) -> None:
-        self._windows, self._still = windows, still & ~windows.gap
+        self._windows, self.still = windows, still & ~windows.gap
         self._in_hand, self._not_riding = (held & ~still for held in in_hand(windows))
         self._rolling = np.gradient(windows.rate[:, 2]) / WINDOW_S if len(windows) > 1 else np.zeros(1)
         self.riding = ~windows.gap & ~still & ~self._not_riding
@@ -136,7 +137,7 @@ class Noise:
         sigma *= self._lasting
         sigma[balanced, eq.BALANCED] = np.hypot(sigma[:, eq.BALANCED], BALANCE_ROLLING * self._rolling)[balanced]
         sigma[~np.isnan(w.speed) & ~w.gap, eq.MEASURED_SPEED] = SPEED_MPS
-        sigma[self._still, eq.RESTING], sigma[self._still, eq.RESTING_RATE] = REST_MPS, REST_RADPS
+        sigma[self.still, eq.RESTING], sigma[self.still, eq.RESTING_RATE] = REST_MPS, REST_RADPS
         sigma[self._not_riding & ~w.gap, eq.RESTING] = HAND_MPS
         sigma[riding, eq.BACKWARD] = BACKWARD_MPS
         return sigma
@@ -207,8 +208,8 @@ class Noise:
         self.unbalance = 1.0
         if np.count_nonzero(complete) < LEAST_WINDOWS:
             return
-        off = force - averaged(np.where(counted, force, 0.0), LASTS_S) / np.maximum(share, 1e-9)
-        mean = averaged(np.where(counted, off / self._of_balance(), 0.0), over_s)[complete]
+        deviation = force - averaged(np.where(counted, force, 0.0), LASTS_S) / np.maximum(share, 1e-9)
+        mean = averaged(np.where(counted, deviation / self._of_balance(), 0.0), over_s)[complete]
         # An error that lasts for BALANCE_S keeps this share of its variance in a mean over over_s.
         ratio = over_s / BALANCE_S
         remaining = 2.0 * (ratio - 1.0 + np.exp(-ratio)) / ratio**2

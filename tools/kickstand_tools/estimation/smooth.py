@@ -1,20 +1,23 @@
 """Computes the smoothed lean of a recorded ride. Each lean is computed from all readings of the ride, earlier and
 later."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from kickstand.lean.measurements import ROLLING_SIGMAS, ROLLING_SPEED
 
 from ..calibration.file import ALIGN, CalibrationFile
+from ..calibration.mount import read_ride
+from ..checks.log import CheckedLog
 from ..common.errors import InputError
-from ..common.messages import Message, Remedy, is_explained
+from ..common.messages import Message, Remedy, is_explained, kind
 from ..logs.csv_lines import write_lean
-from ..logs.log import Block, Table, within
-from ..logs.reader import Source, read_blocks, split_stretch
-from ..logs.source import Progress, name_of
-from ..signals import Array, Bools
+from ..logs.log import Log, Source, Table
+from ..logs.reader import time_texts
+from ..logs.source import Progress
+from ..signals import Array, Ints
 from .equations import corrected_rates
 from .hypotheses import ALL, ROLL
 from .least_squares import Estimate
@@ -23,14 +26,15 @@ from .unknowns import FORWARD, GYRO, LEAN, PITCH, Prior
 from .windows import Windows, windows_of
 
 SLOWEST_HZ = 10.0  # a log with a lower sample rate is not smoothed
-SEGMENT_S = 120.0  # longest part of a log between two cuts
-TOGETHER = 8  # number of segments estimated together, with one more before and one after
+SEGMENT_S = 60.0  # longest part of a log between two cuts
+TOGETHER = 6  # number of segments estimated together, with one more before and one after
 # LEANED_SHARE times the lean is added to the standard deviation of the lean, to cover errors that the model lacks,
 # such as the gyro's sensitivity to acceleration.
 LEANED_SHARE = 0.001
 # TIMING_S times the roll rate is also added to this standard deviation, to cover the delay of the gyro's low-pass
 # filter and errors of the samples' times.
 TIMING_S = 0.002
+CHUNK = 8192  # number of samples whose rates are corrected at once
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps", "doubtful")
 DIGITS = 3, 3, 3, 3, 0
 DOUBTFUL = 0.2  # a larger share of doubtful riding gets a remark
@@ -42,50 +46,31 @@ POSE_DEG = 1.8
 ODD_SIGMAS = 4.0
 
 
-class SensorOdd(Message):
-    """The gyro's errors are larger than those of any working gyro."""
-
-    sigmas: float
-
-    code = "sensor-odd"
-    text = (
-        "no sound gyro fits this ride: its scale or axis error would be {sigmas:.0f} standard deviations, so "
-        "the smoothed lean is not certain, and its standard deviation says so"
+def _pose_off_words(message) -> str:
+    side = "right" if message.angle_deg > 0.0 else "left"
+    return (
+        f"on straights the bike is in balance {abs(message.angle_deg):.1f} degrees to the {side} of the "
+        "calibration's upright, and the smoothed lean counts from there. Causes are a pose that was not upright, "
+        "and a sensor without six positions; with luggage on one side the lean is wrong by that much"
     )
-    todo = Remedy("is an axis of the gyro faulty?")
 
 
-class NotTheBikes(Message):
-    """The accelerations are not a bike's. percent: the share of the riding time with such accelerations."""
-
-    percent: float
-
-    code = "not-the-bikes"
-    text = (
-        "in {percent:.0f} % of the riding the accelerations are not those of a bike on its wheels, so the smoothed "
-        "lean is less exact there"
-    )
-    todo = Remedy("is the sensor in a soft mount or in a pocket? Fix it firmly")
-
-
-class PoseOff(Message):
-    """The upright pose was not upright.
-
-    angle_deg: the lean at which the bike is in balance, relative to the upright pose; positive to the right.
-    """
-
-    angle_deg: float
-
-    code = "pose-off"
-
-    def sentence(self) -> str:
-        """See Message."""
-        side = "right" if self.angle_deg > 0.0 else "left"
-        return (
-            f"on straights the bike is in balance {abs(self.angle_deg):.1f} degrees to the {side} of the "
-            "calibration's upright, and the smoothed lean counts from there. Causes are a pose that was not upright, "
-            "and a sensor without six positions; with luggage on one side the lean is wrong by that much"
-        )
+SensorOdd = kind(
+    "sensor-odd",
+    "sigmas",
+    "no sound gyro fits this ride: its scale or axis error would be {sigmas:.0f} standard deviations, so the smoothed "
+    "lean is not certain, and its standard deviation says so",
+    Remedy("is an axis of the gyro faulty?"),
+)
+NotTheBikes = kind(
+    "not-the-bikes",
+    "percent",
+    "in {percent:.0f} % of the riding the accelerations are not those of a bike on its wheels, so the smoothed lean is "
+    "less exact there",
+    Remedy("is the sensor in a soft mount or in a pocket? Fix it firmly"),
+)
+# angle_deg: the lean at which the bike is in balance, relative to the upright pose; positive to the right
+PoseOff = kind("pose-off", "angle_deg", _pose_off_words)
 
 
 @dataclass(eq=False)
@@ -123,189 +108,162 @@ def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None 
     >>> from kickstand_tools.api import CalibrationFile, Log, simulate_ride
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)
     >>> calibration = CalibrationFile(vehicle_from_sensor=ride.vehicle_from_sensor, aligned=True)
-    >>> found = smooth(Log.from_readings(ride.readings, ride.rate_hz), calibration)
-    >>> float(abs(found.lean_deg - ride.truth["lean_deg"]).max()) < 10.0
+    >>> smoothed = smooth(Log.from_readings(ride.readings, ride.rate_hz), calibration)
+    >>> float(abs(smoothed.lean_deg - ride.truth["lean_deg"]).max()) < 10.0
     True
     """
-    notices: list[Message] = []
-    blocks = [(block.t_s, values) for block, values in _checked_blocks(log, calibration, progress, notices)]
-    time_s, columns = (np.concatenate(parts) for parts in zip(*blocks))
-    return SmoothedRide(time_s, *columns.T, notices=notices)
+    return smooth_checked(read_ride(log, calibration), calibration, progress)
+
+
+def smooth_checked(ride: CheckedLog, calibration: CalibrationFile, progress: Progress | None = None) -> SmoothedRide:
+    """Run smooth() over a checked log."""
+    smoother = Smoother(ride, calibration)
+    columns = np.concatenate(list(smoother.rows(progress)))
+    return SmoothedRide(ride.log.t_s[ride.rows], *columns.T, notices=smoother.notices())
 
 
 def smooth_to_csv(
     log: Source, calibration: CalibrationFile, out: Path, progress: Progress | None = None
 ) -> tuple[int, list[Message]]:
-    """Write LEAN.csv with the log's own times and COLUMNS. The memory used does not grow with the log.
+    """Write LEAN.csv with the log's own times and COLUMNS.
 
     Returns the number of samples and the notices. Raises InputError.
     """
-    notices: list[Message] = []
-    return write_lean(out, COLUMNS, DIGITS, _checked_blocks(log, calibration, progress, notices)), notices
-
-
-def _checked_blocks(
-    log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Message]
-) -> Iterator[tuple[Block, Array]]:
-    """Yield the results of smooth_blocks() for the stretch in `log`.
-
-    Raises InputError, also for under SLOWEST_HZ samples per second.
-    """
-    whole, stretch = split_stretch(log)
-    for block, found in smooth_blocks(whole, calibration, progress, notices):
-        if found is None:
-            raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples per second: too few to smooth the lean")
-        yield from within(stretch, block, found)
-
-
-def smooth_blocks(
-    log: Source,
-    calibration: CalibrationFile,
-    progress: Progress | None = None,
-    notices: list[Message] | None = None,
-    lines: bool = True,
-) -> Iterator[tuple[Block, Array | None]]:
-    """Yield each segment of the log with its values.
-
-    The values have the shape (n, COLUMNS). The values are None if the segment has too few samples per second.
-
-    notices, lines: see read_blocks().
-    Raises InputError.
-    """
-    if calibration.vehicle == "car":
-        raise InputError(f"{name_of(log)}: a car does not lean, and its calibration is a car's")
-    if not calibration.aligned:
-        raise InputError("the calibration is not aligned, so the lean is unknown", ALIGN)
-    past: list[Block] = []
-    waiting: list[Block] = []
-    smoother = Smoother(calibration)
-    for segment in _segments(read_blocks(log, 2, progress, notices, lines=lines, calibration=calibration)):
-        waiting.append(segment)
-        if len(waiting) > TOGETHER:
-            past, waiting, before = waiting[:TOGETHER], waiting[TOGETHER:], past[-1:]
-            yield from smoother.together(before, past, waiting)
-    # The rest of a ride may be short, so up to TOGETHER earlier segments are estimated with it.
-    yield from smoother.together(past[-max(1, TOGETHER - len(waiting)) :], waiting, [])
-    if notices is not None:
-        notices.extend(smoother.remarks(notices))
-
-
-def _segments(blocks: Iterator[Block]) -> Iterator[Block]:
-    """Cut the blocks into segments of at most SEGMENT_S seconds."""
-    for block in blocks:
-        number = np.floor(block.t_s / SEGMENT_S)
-        cuts = np.flatnonzero(np.diff(number)) + 1
-        for begin, end in zip([0, *cuts.tolist()], [*cuts.tolist(), len(number)]):
-            yield block.part(slice(begin, end))
+    ride = read_ride(log, calibration)
+    smoother = Smoother(ride, calibration)
+    count = write_lean(out, COLUMNS, DIGITS, time_texts(log, ride.log, ride.rows), smoother.rows(progress))
+    return count, smoother.notices()
 
 
 class Smoother:
-    """Smooths a ride segment by segment. Collects remarks about errors that the standard deviation does not include."""
+    """Smooths a ride in batches. Collects remarks about errors that the standard deviation does not include.
 
-    def __init__(self, calibration: CalibrationFile) -> None:
-        self._calibration = calibration
-        self._start_c = np.nan  # the first temperature of the log
+    Raises InputError for a calibration that is a car's or not aligned.
+    """
+
+    def __init__(self, ride: CheckedLog, calibration: CalibrationFile) -> None:
+        if calibration.vehicle == "car":
+            raise InputError(f"{ride.log.name}: a car does not lean, and its calibration is a car's")
+        if not calibration.aligned:
+            raise InputError("the calibration is not aligned, so the lean is unknown", ALIGN)
+        self._ride, self._calibration = ride, calibration
+        temperature = ride.log.temperature_c
+        self._start_c = temperature[np.argmax(~np.isnan(temperature))]  # the first temperature of the log
         self._doubtful_s = self._riding_s = self._leaned = self._odd = 0.0
 
-    def together(
-        self, before: list[Block], own: list[Block], after: list[Block]
-    ) -> Iterator[tuple[Block, Array | None]]:
-        """Yield the segments `own` with their values.
+    def rows(self, progress: Progress | None = None) -> Iterator[Array]:
+        """Yield the values of COLUMNS for successive samples of the stretch, NaN for frozen readings.
 
-        The segments before and after them are used in the same estimate, but are not returned.
+        Raises InputError for under SLOWEST_HZ samples per second.
         """
-        measured = [segment.measured for segment in (*before, *own, *after)]
-        ends = np.cumsum([0, *(len(segment.time_us) for segment in measured)])
-        first = int(ends[len(before)])
-        values = self.estimated(measured, slice(first, int(ends[len(before) + len(own)])))
-        for segment in own:
+        log = self._ride.log
+        first, last, _ = self._ride.rows.indices(len(log.t_s))
+        for span, values in self.batches(progress):
             if values is None:
-                yield segment, None
-                continue
-            found = np.full((len(segment.time_us), len(COLUMNS)), np.nan)
-            there = ~segment.frozen
-            count = int(np.count_nonzero(there))
-            found[there] = values[first : first + count]
-            first += count
-            yield segment, found
+                raise InputError(f"{log.name}: under {SLOWEST_HZ:.0f} samples per second: too few to smooth the lean")
+            if first < span.stop and span.start < last:
+                yield self.with_frozen(span, values)[max(0, first - span.start) : last - span.start]
 
-    def estimated(self, segments: list[Block], own: slice) -> Array | None:
-        """Estimate the values of the samples in these segments.
+    def with_frozen(self, span: slice, values: Array) -> Array:
+        """Return the values of COLUMNS for the rows `span` of the log. Frozen readings become NaN."""
+        columns = np.full((span.stop - span.start, len(COLUMNS)), np.nan)
+        columns[self._ride.measured[span]] = values[:, : len(COLUMNS)]
+        return columns
+
+    def batches(self, progress: Progress | None = None) -> Iterator[tuple[slice, Array | None]]:
+        """Smooth the whole log. A batch is several segments of SEGMENT_S.
+
+        Yields the rows of each batch in the log, and the values of its measured samples: those of COLUMNS, then
+        STANDING and ROLLING. The values are None if there are too few samples per second.
+        """
+        log = self._ride.log
+        number = np.searchsorted(log.t_s, np.arange(0.0, log.t_s[-1] + SEGMENT_S, SEGMENT_S))
+        edges = np.unique(np.append(number, len(log.t_s))).tolist()
+        for k in range(0, len(edges) - 1, TOGETHER):
+            end = min(k + TOGETHER, len(edges) - 1)
+            # The rest of a ride may be short, so up to TOGETHER earlier segments are estimated with it
+            lead = 1 if end < len(edges) - 1 else max(1, TOGETHER - (end - k))
+            extended = slice(edges[max(0, k - lead)], edges[min(end + 1, len(edges) - 1)])
+            span = slice(edges[k], edges[end])
+            measured = self._ride.measured
+            begin = int(np.count_nonzero(measured[extended.start : span.start]))
+            own = slice(begin, begin + int(np.count_nonzero(measured[span])))
+            part = log.part(extended)
+            values = self._estimated(part if np.all(measured[extended]) else part.part(measured[extended]), own)
+            yield span, None if values is None else values[own]
+            if progress:
+                progress(span.stop, len(log.t_s))
+
+    def notices(self) -> list[Message]:
+        """Return the remarks about the ride, after the last batch."""
+        notices = self._ride.notices
+        if not self._riding_s or is_explained(notices):
+            return notices
+        if self._odd:
+            return [*notices, SensorOdd(self._odd)]
+        share, pose_deg = self._doubtful_s / self._riding_s, self._leaned / self._riding_s
+        notices = [*notices, NotTheBikes(100.0 * share)] if share > DOUBTFUL else notices
+        return [*notices, PoseOff(pose_deg)] if abs(pose_deg) > POSE_DEG else notices
+
+    def _estimated(self, log: Log, own: slice) -> Array | None:
+        """Estimate the values of the samples of a part of the log.
 
         own: the samples that need a lean. The other samples only improve the estimate, and remarks do not count them.
-        Returns the values, shape (samples, COLUMNS); NaN where the readings are not from riding. Returns None
-        if there are fewer than SLOWEST_HZ samples per second.
+        Returns the values, see batches(); NaN where the readings are not from riding. Returns None if there are fewer
+        than SLOWEST_HZ samples per second.
         """
-        t_s = np.concatenate([segment.t_s for segment in segments])
-        readings = np.concatenate([segment.readings for segment in segments])
-        speed = np.concatenate([segment.speed_mps for segment in segments])
-        nothing = np.full((len(t_s), len(COLUMNS)), np.nan)
+        t_s, temperature = log.t_s, log.temperature_c
+        nothing = np.full((len(t_s), len(COLUMNS) + 2), np.nan)
         if len(t_s) < 2:
             return nothing
         if float(np.median(np.diff(t_s))) * SLOWEST_HZ > 1.0:
             return None
-        there, warm = ~np.isnan(readings[:, 3]), np.zeros(len(t_s))
-        if np.any(there):
-            self._start_c = readings[there, 3][0] if np.isnan(self._start_c) else self._start_c
-            warm = np.interp(t_s, t_s[there], readings[there, 3]) - self._start_c
-        force, rate = self._calibration.in_vehicle(readings)
+        valid, temperature_difference = ~np.isnan(temperature), np.zeros(len(t_s))
+        if np.any(valid):
+            temperature_difference = np.interp(t_s, t_s[valid], temperature[valid]) - self._start_c
+        force, rate = self._calibration.in_vehicle(log.readings)
         rate = np.radians(rate)
-        windows = windows_of(t_s, force, rate, speed, warm, aligned=True)
+        windows = windows_of(t_s, force, rate, log.speed_mps, temperature_difference, aligned=True)
         try:
             prior = Prior.of_pose(self._calibration.six_done, self._calibration.gyro_sigma_in_vehicle())
             estimate = Estimate(windows, prior, ALL)
         except np.linalg.LinAlgError:
             return nothing  # the readings are not from riding
-        noise, mine = estimate.noise, np.unique(windows.number[own])
-        roll = float(np.mean(estimate.parameters[:, ROLL]))
-        self.add(windows.seconds[mine], noise.riding[mine], noise.doubtful[mine], roll)
-        doubtful = noise.doubtful[windows.number].astype(float)
-        found = np.column_stack((at_samples(windows, rate, estimate, self._calibration.delay_s()), doubtful))
-        found[:, :3] = np.degrees(found[:, :3])
-        odd = oddness(estimate)
+        self._count(estimate, windows, np.unique(windows.number[own]))
+        noise, number, sigma = estimate.noise, windows.number, estimate.sigma()
+        lean = at_samples(windows, rate, estimate, sigma[:, LEAN], self._calibration.delay_s())
+        lean[:, :3] = np.degrees(lean[:, :3])
+        rolling = (lean[:, 3] > ROLLING_SPEED) & (lean[:, 3] > ROLLING_SIGMAS * sigma[number, FORWARD])
+        odd = gyro_deviation(estimate)
         if odd > ODD_SIGMAS:
             self._odd = max(self._odd, odd)
-            found[:, 1] *= odd
-        return found
+            lean[:, 1] *= odd
+        return np.column_stack((lean, noise.doubtful[number], noise.still[number], rolling)).astype(float)
 
-    def add(self, seconds: Array, riding: Bools, doubtful: Bools, pose_rad: float) -> None:
-        """Count n windows for the remarks.
-
-        seconds: duration of each window, shape (n).
-        riding: True where the bike may be riding, shape (n).
-        doubtful: True where the accelerations are not the bike's, shape (n).
-        pose_rad: the lean at which the bike is in balance on straights, relative to the upright pose; positive to the
-            right.
-        """
-        riding_s = float(np.sum(seconds[riding]))
+    def _count(self, estimate: Estimate, windows: Windows, own: Ints) -> None:
+        """Count the windows `own` for the remarks."""
+        noise, seconds = estimate.noise, windows.seconds[own]
+        riding_s = float(np.sum(seconds[noise.riding[own]]))
         self._riding_s += riding_s
-        self._doubtful_s += float(np.sum(seconds[riding & doubtful]))
-        self._leaned += riding_s * float(np.degrees(pose_rad))
-
-    def remarks(self, known: Iterable[Message]) -> list[Message]:
-        """Return the remarks about the whole ride. known: earlier remarks about the log."""
-        if not self._riding_s or is_explained(known):
-            return []
-        if self._odd:
-            return [SensorOdd(self._odd)]
-        share, pose_deg = self._doubtful_s / self._riding_s, self._leaned / self._riding_s
-        found: list[Message] = [NotTheBikes(100.0 * share)] if share > DOUBTFUL else []
-        return [*found, PoseOff(pose_deg)] if abs(pose_deg) > POSE_DEG else found
+        self._doubtful_s += float(np.sum(seconds[noise.riding[own] & noise.doubtful[own]]))
+        # The lean at which the bike is in balance on straights, relative to the upright pose; positive to the right
+        self._leaned += riding_s * float(np.degrees(np.mean(estimate.parameters[:, ROLL])))
 
 
-def oddness(found: Estimate) -> float:
+def gyro_deviation(estimate: Estimate) -> float:
     """Return the gyro's largest error of scale or axes, in standard deviations of its prior."""
-    return float(np.max(np.abs(found.parameters - found.prior.mean)[:, GYRO] / found.prior.sigma[GYRO]))
+    return float(np.max(np.abs(estimate.parameters - estimate.prior.mean)[:, GYRO] / estimate.prior.sigma[GYRO]))
 
 
-def at_samples(windows: Windows, rate: Array, found: Estimate, delay_s: float) -> Array:
+def at_samples(windows: Windows, rate: Array, estimate: Estimate, lean_sigma: Array, delay_s: float) -> Array:
     """Interpolate the estimate at each sample. Between the edges of the windows, the lean follows the corrected gyro.
 
     rate: the rates that were passed to windows_of(), shape (samples, 3), in rad/s.
+    lean_sigma: standard deviation of the lean at the edges of the windows, in rad.
     delay_s: delay of the gyro's low-pass filter.
     Returns four columns, shape (samples, 4): lean, its standard deviation and pitch in rad, and speed in m/s.
     """
-    number, sigma = windows.number, found.sigma()[:, LEAN]
+    number = windows.number
     duration = windows.before + windows.after
     last = np.append(np.diff(number) > 0, True)  # True for the last sample of each window
     window = np.cumsum(last) - last
@@ -321,14 +279,19 @@ def at_samples(windows: Windows, rate: Array, found: Estimate, delay_s: float) -
 
     since, seconds = integral(np.ones(len(number)))
     share = since / seconds
-    before, after = found.states[number], found.states[number + 1]
-    lean, pitch, speed = (before + share[:, None] * (after - before))[:, [LEAN, PITCH, FORWARD]].T
-    wx, wy, wz = corrected_rates(rate.T, found.unknowns(number, 0.5 * (before + after)), windows.warm[number])
+    first, second = estimate.states[number], estimate.states[number + 1]
+    lean, pitch, speed = (first + share[:, None] * (second - first))[:, [LEAN, PITCH, FORWARD]].T
+    middle, corrected = 0.5 * (first + second), np.empty((3, len(number)))
+    for start in range(0, len(number), CHUNK):  # each sample has 45 unknowns, which would need much memory
+        rows = slice(start, start + CHUNK)
+        x = estimate.unknowns(number[rows], middle[rows])
+        corrected[:, rows] = corrected_rates(rate[rows].T, x, windows.warm[number[rows]])
+    wx, wy, wz = corrected
     roll_rate = wz - np.tan(pitch) * (wx * np.sin(lean) + wy * np.cos(lean))
-    rolled, whole = integral(roll_rate)
-    lean = before[:, LEAN] + rolled + share * ((after - before)[:, LEAN] - whole)
-    spread = sigma[number] + share * (sigma[number + 1] - sigma[number])
+    rolled, window_roll = integral(roll_rate)
+    lean = first[:, LEAN] + rolled + share * ((second - first)[:, LEAN] - window_roll)
+    spread = lean_sigma[number] + share * (lean_sigma[number + 1] - lean_sigma[number])
     jolt = 2.0 * np.sqrt(np.clip(share * (1.0 - share), 0.0, 1.0)) * jolted(windows)[number]
-    for more in (TIMING_S * roll_rate, LEANED_SHARE * lean, jolt):
-        spread = np.hypot(spread, more)
+    for error in (TIMING_S * roll_rate, LEANED_SHARE * lean, jolt):
+        spread = np.hypot(spread, error)
     return np.column_stack((lean + delay_s * roll_rate, spread, pitch, speed))

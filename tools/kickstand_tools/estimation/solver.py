@@ -224,10 +224,10 @@ def posterior_covariance(blocks: Reduced, walks: RandomWalks, weight: Array) -> 
     reduced, ends, _ = _chains(blocks, walks)
     s, n = blocks.s, reduced.s
     states = _first_states(reduced, ends)
-    off = np.concatenate((states[:, :-1], states[:, 1:]), axis=2)
-    off -= np.einsum("g,gbi->bi", weight, off)
+    deviation = np.concatenate((states[:, :-1], states[:, 1:]), axis=2)
+    deviation -= np.einsum("g,gbi->bi", weight, deviation)
     within = covariances(reduced, np.linalg.inv(ends[..., :-1]).astype(float))
-    joint = np.einsum("g,gbij->bij", weight, within + off[..., :, None] * off[..., None, :])
+    joint = np.einsum("g,gbij->bij", weight, within + deviation[..., :, None] * deviation[..., None, :])
     order = np.r_[:s, n : n + s, s:n]
     return joint[:, order[:, None], order]
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..signals import Array, Bools, Ints, cell_numbers, rotated
+from ..signals import Array, Bools, Ints, bin_numbers, rotated
 from ..signals.leaning import WINDOW_S
 
 GAP_S = 0.17  # if the time between two samples is longer, readings are missing
@@ -109,7 +109,7 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array,
     lead, trail = np.append(0.5 * usual, half), np.append(half, 0.5 * usual)
     begins = np.append(True, lost)  # True for the first sample of each stretch without missing readings
     since = t_s - t_s[begins][np.cumsum(begins) - 1]
-    starts = np.flatnonzero(np.append(True, (np.diff(cell_numbers(since, WINDOW_S)) != 0) | lost))
+    starts = np.flatnonzero(np.append(True, (np.diff(bin_numbers(since, WINDOW_S)) != 0) | lost))
     weight = lead + trail
     length = np.add.reduceat(weight, starts)
 

@@ -428,7 +428,7 @@ def _split_axis(name: str) -> Iterator[tuple[str, str]]:
     for k, word in enumerate(words):
         others = " ".join(words[:k] + words[k + 1 :])
         axis = word if word in ("x", "y", "z") else _AXES.get(word, "")
-        if axis and (others or word == axis):
+        if axis and (others or word == axis or _is_of(RATES, stated_unit(name))):
             yield sensor + others, axis
             return
     joined = "".join(words)
@@ -617,6 +617,8 @@ def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> Col
     values: the accelerations, shape (n, 3). stated: the unit in the names of their columns.
     """
     length = calm_length(values, seconds)
+    if stated and not (_is_of(ACCELERATIONS, stated) or counts_per(stated) or stated == "counts"):
+        return ColumnFinding([], "?", f"its unit {stated} is not known", False)
     counts = _are_whole(values)
     gravities = {name: size for name, size in _gravities().items() if counts or not name.startswith("counts")}
     near = min(gravities, key=lambda name: abs(np.log(length / gravities[name])))
@@ -643,6 +645,8 @@ def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None
     rates: shape (n, 3). accel: the finding of the accelerometer. The returned finding names no columns.
     """
     fit = RateFit() if seconds is None else fit_rates(seconds, force, rates)
+    if "/" in stated and not (_is_of(RATES, stated) or counts_per(stated)):
+        return ColumnFinding([], "?", f"its unit {stated} is not known", False)
     candidates = gyro_units(rates, accel)
     by_fit = fit.unit_among(candidates)
     if _is_of(RATES, stated) or counts_per(stated):

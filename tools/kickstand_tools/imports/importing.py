@@ -2,20 +2,20 @@
 writes a log."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from zipfile import is_zipfile
 
 import numpy as np
 
-from ..checks.course import log_agrees
+from ..checks.axes import log_agrees
+from ..checks.log import check_log
 from ..common.errors import InputError
 from ..common.messages import AT_REST, Message, Remedy
 from ..estimation.first_guess import MIN_RIDING_S
 from ..logs.csv_lines import write_log
 from ..logs.log import Log
-from ..logs.reader import read_log
 from ..signals import Array
 from . import mapped
 from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo
@@ -178,9 +178,9 @@ def _imported(recording: AppRecording, name: str, start_s: float | None = None, 
     _check_sign(recording, log)
     if damaged:
         recording.notices.append(ImportDamaged(damaged))
-    log = read_log(_stretch(log, start_s, end_s))
-    notices = [*recording.notices, *log.notices]
-    return Imported(recording.app, log, recording.taken, notices, recording.vehicle_axes)
+    log = _stretch(log, start_s, end_s)
+    log.notices = recording.notices
+    return Imported(recording.app, log, recording.taken, check_log(log).notices, recording.vehicle_axes)
 
 
 def write_imported(path: Path | str, imported: Imported) -> None:
@@ -249,7 +249,7 @@ def _check_sign(recording: AppRecording, log: Log) -> None:
     """
     if recording.sign_known:
         return
-    agrees = log_agrees(log.t_s, log.accel_g, log.gyro_dps, log.lat_deg, log.lon_deg)
+    agrees = log_agrees(log)
     if agrees is None:
         recording.notices.append(ImportSign(recording.app))
     elif agrees:
@@ -277,4 +277,4 @@ def _stretch(log: Log, start_s: float | None, end_s: float | None) -> Log:
     if np.count_nonzero(wanted) < 2:
         asked = f"from {begin_s:g} s on" if end_s is None else f"from {begin_s:g} to {end_s:g} s"
         raise InputError(f"{log.name} lasts {last_s:.1f} s: there is nothing {asked}")
-    return log.part(wanted)
+    return replace(log.part(wanted))  # its times count from its own first sample

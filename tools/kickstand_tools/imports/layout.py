@@ -35,6 +35,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _MARKS = " \t#%/;*'\"!"  # characters that begin a comment
 _SENSOR_ID = re.compile(r"sensor|type|kind|event|source|device|imu|node|channel|addr|axis|field|^id$|^i$|instance")
 _ARDUPILOT = re.compile(r"^FMT, *\d+, *\d+, *(\w+), *\w+, *(.+)$", re.MULTILINE)  # names of a message's columns
+_WITH_UNIT = re.compile(r'^"?([^|"]*)"?\|"?([^|"]*)"?\|.*')  # RaceCapture: "AccelX"|"G"|-3.0|3.0|25
 _STAMP = re.compile(r"^\s*(\d{1,2}:\d\d:\d\d[.,]\d+)\s*->\s*")
 _STAMPED = "monitor_s"  # the name of the serial monitor's time
 _PAIR = re.compile(
@@ -239,6 +240,7 @@ def _names(lines: Sequence[str], grid: Grid) -> list[str]:
     line = line.lstrip(_MARKS) if line.lstrip()[:1] in ("#", "%", "/") else line
     parts = [split_row(line, separator) for separator in dict.fromkeys((grid.separator, separator_of(line), " "))]
     names = next((part for part in parts if len(part) >= grid.width - 3), parts[0])
+    names = [_WITH_UNIT.sub(r"\1 (\2)", name) for name in names]
     if grid.first > grid.names + 1:
         last = next(line for line in reversed(lines[: grid.first]) if line.strip())
         units = split_row(last.lstrip("#%/ "), grid.separator)

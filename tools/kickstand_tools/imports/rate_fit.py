@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks.handedness import EXCHANGES
+from ..checks.axes import PERMUTATIONS
 from ..signals import Array
 
 CELL_S = 0.05  # readings are averaged over cells of this length
@@ -95,15 +95,15 @@ def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
     turns = change.ravel()
     inverse = np.linalg.pinv(flat.T @ flat + 1e-9 * np.eye(3)) @ flat.T
     residual = turns - flat @ (inverse @ turns)
-    for exchange in EXCHANGES:
-        column = np.einsum("waij,ij->wa", turned, exchange).ravel()
+    for permutation in PERMUTATIONS:
+        column = np.einsum("waij,ij->wa", turned, permutation).ravel()
         column = column - flat @ (inverse @ column)
         size = float(column @ column)
         if size <= 0.0:
             continue
         factor = float(column @ residual) / size
         explained = 1.0 - float(np.sum((residual - factor * column) ** 2)) / max(float(np.sum(residual**2)), 1e-12)
-        preferred = explained + 0.02 if exchange is EXCHANGES[0] else explained
+        preferred = explained + 0.02 if permutation is PERMUTATIONS[0] else explained
         if factor > 0.0 and preferred > best.explained:
             unturned = float(np.sqrt(np.mean(np.sum(column.reshape(-1, 3) ** 2, axis=1))))
             best = RateFit(factor, explained, turn, unturned)

@@ -146,7 +146,7 @@ def time_unit(cells: Cells, stated: str = "") -> str:
     """Return the unit of times. If the unit is not stated, find it from the size and the steps of the times. Dates and
     clocks return "date or clock".
     """
-    if _are_dates(cells, stated):
+    if _are_dates(cells, stated) or (not stated and _is_of_day(numbers_of(cells).astype(float))):
         return DATES
     return unit(stated) if stated else _likely_unit(numbers_of(cells).astype(float))
 
@@ -248,7 +248,7 @@ def _after_midnight(ns: Nanoseconds) -> Nanoseconds:
 
 
 def _of_numbers(values: NDArray[Any], unit_name: str, where: str) -> Nanoseconds:
-    if not unit_name and _is_of_day(values.astype(float)):
+    if unit_name in ("", DATES) and _is_of_day(values.astype(float)):
         return of_day(values.astype(float))
     name = unit(unit_name) if unit_name else _likely_unit(values.astype(float))
     scale = tick_ns(name)

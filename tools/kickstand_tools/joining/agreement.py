@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 
 from ..calibration.file import CalibrationFile
+from ..calibration.mount import read_ride
 from ..common.errors import InputError, extra
-from ..common.messages import Message, as_data, distinct
+from ..common.messages import Message, as_data
 from ..common.times import clock, tick_s
-from ..estimation.smooth import SmoothedRide, smooth
-from ..logs.reader import Source, read_twice
+from ..estimation.smooth import SmoothedRide, smooth_checked
+from ..logs.log import Source
 from ..logs.source import Progress, name_of
-from ..replay.replay import replay
+from ..replay.replay import LeanTable, replay_checked
 from ..signals import Array, Bools
 from .clocks import Clocks, clocks
 from .motion import motion
@@ -83,7 +84,7 @@ class Agreement:
     def as_data(self) -> dict[str, Any]:
         """All fields except the leans, for JSON."""
         live = None if self.live is None else asdict(self.live)
-        remarks = {name: as_data(said) for name, said in self.notices.items()}
+        remarks = {name: as_data(notices) for name, notices in self.notices.items()}
         return {"clocks": asdict(self.clocks), "live": live, "smoothed": asdict(self.smoothed), "remarks": remarks}
 
 
@@ -96,7 +97,7 @@ def compare_rides(
 ) -> Agreement:
     """Compare two recordings of one ride by two devices. The clocks of the devices may differ by any time.
 
-    a, b: see read_log. progress: called with (done, total) of the first reading. Raises InputError, also if the
+    a, b: see read_log. progress: called with (done, total) of the samples, ride by ride. Raises InputError, also if the
     recordings are of different rides.
 
     >>> from kickstand_tools.api import Log, simulate_ride
@@ -106,30 +107,28 @@ def compare_rides(
     >>> compare_rides(log, log, calibration, calibration).smoothed.rms_deg
     0.0
     """
-    a, b = read_twice(a), read_twice(b)
-    notices: dict[str, list[Message]] = {"a": [], "b": []}
-    motion_a, motion_b = (motion(one, progress, said) for one, said in zip((a, b), notices.values()))
+    checked = [read_ride(source, calibration) for source, calibration in ((a, calibration_a), (b, calibration_b))]
     try:
-        found = clocks(motion_a, motion_b, calibration_a, calibration_b)
+        relation = clocks(motion(checked[0]), motion(checked[1]), calibration_a, calibration_b)
     except InputError as error:
         raise InputError(f"{name_of(a)}, {name_of(b)}: {error}") from error
-    rides = [smooth(one, calibration) for one, calibration in ((a, calibration_a), (b, calibration_b))]
-    shown = [replay(one, calibration) for one, calibration in ((a, calibration_a), (b, calibration_b))]
-    for said, ride in zip(notices.values(), rides):
-        said[:] = distinct([*said, *ride.notices])
+    pairs = list(zip(checked, (calibration_a, calibration_b)))
+    rides = [smooth_checked(*pair, progress) for pair in pairs]
+    displayed = [replay_checked(*pair) for pair in pairs]
     t_s = np.arange(0.0, rides[0].t_s[-1], STEP_S)
-    at = t_s, found.of_b(t_s)
+    times_s = t_s, relation.of_b(t_s)
     riding = np.ones(len(t_s), dtype=bool)
-    for ride, when in zip(rides, at):
-        riding &= _interpolated(ride.t_s, ride.speed_mps, when) > _RIDING_MPS  # False for NaN
-    smoothed = [_lean_while_riding(ride, when, riding) for ride, when in zip(rides, at)]
-    live = [_lean_while_riding(ride, when, riding) for ride, when in zip(shown, at)]
+    for ride, time_s in zip(rides, times_s):
+        riding &= _interpolated(ride.t_s, ride.speed_mps, time_s) > _RIDING_MPS  # False for NaN
+    smoothed = [_lean_while_riding(ride, time_s, riding) for ride, time_s in zip(rides, times_s)]
+    live = [_lean_while_riding(lean, time_s, riding) for lean, time_s in zip(displayed, times_s)]
     difference = _difference(*smoothed)
     if difference is None:
         raise InputError(f"{name_of(a)}, {name_of(b)}: under {_LEAST_S:.0f} s of riding in common")
     names = ("live A", "live B", "smoothed A", "smoothed B")
     leans: dict[str, Array] = dict(zip(names, (lean for lean, _ in (*live, *smoothed))))
-    return Agreement(found, _difference(*live), difference, t_s, leans, notices, (name_of(a), name_of(b)))
+    notices = {name: ride.notices for name, ride in zip("ab", rides)}
+    return Agreement(relation, _difference(*live), difference, t_s, leans, notices, (name_of(a), name_of(b)))
 
 
 def words(found: Agreement) -> Iterator[str]:
@@ -141,24 +140,24 @@ def words(found: Agreement) -> Iterator[str]:
         f"of the rates {of.correlation:.2f}, B's clock {abs(of.drift) * 1e6:.0f} ppm "
         f"{'slow' if of.drift > 0.0 else 'fast'})"
     )
-    for name, one in (("live", found.live), ("smoothed", found.smoothed)):
-        if one is None:
+    for name, part in (("live", found.live), ("smoothed", found.smoothed)):
+        if part is None:
             yield f"{name}: hardly anywhere is a lean shown by both"
             continue
         yield (
-            f"{name}: they differ by {one.rms_deg:.2f} degrees rms over {one.seconds / 60.0:.1f} minutes of riding: B "
-            f"leans {abs(one.constant_deg):.2f} more to the {'right' if one.constant_deg > 0.0 else 'left'} all the "
-            f"time, and the rest moves by {one.moving_deg:.2f} rms (95 % under {one.p95_deg:.1f}, worst "
-            f"{one.worst_deg:.1f})"
+            f"{name}: they differ by {part.rms_deg:.2f} degrees rms over {part.seconds / 60.0:.1f} minutes of riding: "
+            f"B leans {abs(part.constant_deg):.2f} more to the {'right' if part.constant_deg > 0.0 else 'left'} all "
+            f"the time, and the rest moves by {part.moving_deg:.2f} rms (95 % under {part.p95_deg:.1f}, worst "
+            f"{part.worst_deg:.1f})"
         )
-        if one.slope is not None and one.delay_s is not None:
+        if part.slope is not None and part.delay_s is not None:
             yield (
-                f"    B's lean is {one.slope:.3f} times A's, and {abs(one.delay_s) * 1e3:.0f} ms "
-                f"{'later' if one.delay_s >= 0.0 else 'earlier'}"
+                f"    B's lean is {part.slope:.3f} times A's, and {abs(part.delay_s) * 1e3:.0f} ms "
+                f"{'later' if part.delay_s >= 0.0 else 'earlier'}"
             )
-        shares = f"{100.0 * one.within_1:.0f} % of the differences are within one of it, {100.0 * one.within_2:.0f} %"
+        shares = f"{100.0 * part.within_1:.0f} % of the differences are within one of it, {100.0 * part.within_2:.0f} %"
         yield (
-            f"    both expect {one.expected_deg:.2f} rms by their own standard deviations: {shares} within two (if "
+            f"    both expect {part.expected_deg:.2f} rms by their own standard deviations: {shares} within two (if "
             "both are right: 68 and 95 %)"
         )
     yield (
@@ -201,32 +200,32 @@ def draw(path: Path, found: Agreement) -> None:
 
 def _interpolated(t_s: Array, values: Array, at_s: Array) -> Array:
     """Interpolate values at other times. NaN outside the known times, in gaps, and beside values that are NaN."""
-    after = np.clip(np.searchsorted(t_s, at_s), 1, len(t_s) - 1)
-    near = (at_s >= t_s[0]) & (at_s <= t_s[-1]) & (t_s[after] - t_s[after - 1] < _GAP_S)
+    following = np.clip(np.searchsorted(t_s, at_s), 1, len(t_s) - 1)
+    near = (at_s >= t_s[0]) & (at_s <= t_s[-1]) & (t_s[following] - t_s[following - 1] < _GAP_S)
     return np.where(near, np.interp(at_s, t_s, values), np.nan)
 
 
-def _lean_while_riding(ride: SmoothedRide | Any, at_s: Array, riding: Bools) -> tuple[Array, Array]:
+def _lean_while_riding(ride: SmoothedRide | LeanTable, at_s: Array, riding: Bools) -> tuple[Array, Array]:
     """Return the lean and its standard deviation in degrees, both of shape (n). Both are NaN if the lean or the
     standard deviation is unknown, or the bike is not riding."""
     lean, sigma = (_interpolated(ride.t_s, values, at_s) for values in (ride.lean_deg, ride.lean_sigma_deg))
-    known = riding & ~np.isnan(sigma)
-    return np.where(known, lean, np.nan), np.where(known, sigma, np.nan)
+    valid = riding & ~np.isnan(sigma)
+    return np.where(valid, lean, np.nan), np.where(valid, sigma, np.nan)
 
 
 def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | None:
     """The Difference of two leans with their standard deviations; None if they have under _LEAST_S in common."""
-    both = ~np.isnan(a[0]) & ~np.isnan(b[0])
-    if np.count_nonzero(both) * STEP_S < _LEAST_S:
+    valid = ~np.isnan(a[0]) & ~np.isnan(b[0])
+    if np.count_nonzero(valid) * STEP_S < _LEAST_S:
         return None
-    one, other = a[0][both], b[0][both]
-    off, expected = other - one, np.hypot(a[1][both], b[1][both])
-    constant = float(off.mean())
-    rest, share = off - constant, np.abs(off) / np.maximum(expected, 1e-9)
-    slope, delay_s = _slope_and_delay(a[0], b[0], both)
+    lean_a, lean_b = a[0][valid], b[0][valid]
+    difference, expected = lean_b - lean_a, np.hypot(a[1][valid], b[1][valid])
+    constant = float(difference.mean())
+    rest, share = difference - constant, np.abs(difference) / np.maximum(expected, 1e-9)
+    slope, delay_s = _slope_and_delay(a[0], b[0], valid)
     return Difference(
-        float(len(off) * STEP_S),
-        _rms(off),
+        float(len(difference) * STEP_S),
+        _rms(difference),
         constant,
         _rms(rest),
         float(np.percentile(np.abs(rest), 95.0)),
@@ -242,14 +241,16 @@ def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | 
 def _slope_and_delay(a: Array, b: Array, both: Bools) -> tuple[float | None, float | None]:
     """Slope and delay of B's lean relative to A's. Both leans are treated as equally exact: the slope is the slope of
     the principal axis, and the delay is fitted to the mean of both roll rates."""
-    one, other = a[both] - a[both].mean(), b[both] - b[both].mean()
-    if _rms(one) < _LEANED_DEG or _rms(other) < _LEANED_DEG:
+    lean_a, lean_b = a[both] - a[both].mean(), b[both] - b[both].mean()
+    if _rms(lean_a) < _LEANED_DEG or _rms(lean_b) < _LEANED_DEG:
         return None, None
-    axis = np.linalg.eigh(np.cov(one, other))[1][:, -1]
+    axis = np.linalg.eigh(np.cov(lean_a, lean_b))[1][:, -1]
     rate = np.gradient(0.5 * (a + b), STEP_S)
-    known = both & ~np.isnan(rate)
-    off = b - a - np.mean((b - a)[both])
-    return float(axis[1] / axis[0]), float(-(rate[known] @ off[known]) / max(float(rate[known] @ rate[known]), 1e-9))
+    valid = both & ~np.isnan(rate)
+    difference = b - a - np.mean((b - a)[both])
+    return float(axis[1] / axis[0]), float(
+        -(rate[valid] @ difference[valid]) / max(float(rate[valid] @ rate[valid]), 1e-9)
+    )
 
 
 def _rms(values: Array) -> float:

@@ -4,7 +4,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
 from ..signals import Array, moving_mean
-from .motion import STEP_S, CellMotion
+from .motion import STEP_S, BinMotion
 from .track import Course, Segments, without_trend
 
 _MOST_SINE = 0.87  # largest sine of the lean; over 60 degrees, the speed or the rate is wrong
@@ -17,16 +17,18 @@ class Comparison:
     given: the segments of the track that are within the ride for every shift within margin_s.
     """
 
-    def __init__(self, motion: CellMotion, course: Course, segments: Segments, shift_s: float, margin_s: float) -> None:
+    def __init__(self, motion: BinMotion, course: Course, segments: Segments, shift_s: float, margin_s: float) -> None:
         begin_s, end_s = segments.begin_s[:, 0] - shift_s, segments.end_s[:, -1] - shift_s
         within = (begin_s > margin_s) & (end_s < motion.seconds - margin_s)
-        missing = np.append(0, np.cumsum(~motion.there))
-        first, last = (np.clip(np.rint(at / STEP_S).astype(int), 0, len(motion.there)) for at in (begin_s, end_s))
+        missing = np.append(0, np.cumsum(~motion.valid))
+        first, last = (
+            np.clip(np.rint(limit_s / STEP_S).astype(int), 0, len(motion.valid)) for limit_s in (begin_s, end_s)
+        )
         within &= missing[last] - missing[first] <= 0.05 * (last - first)
         self.given = segments.part(within)
         self.middle_s = float(self.given.middle_s.mean()) if np.any(within) else 0.0
         self._sums = _double_sums(motion, course, shift_s)
-        self._edges_s = np.arange(len(motion.there) + 1) * STEP_S
+        self._edges_s = np.arange(len(motion.valid) + 1) * STEP_S
 
     def turned(self, shift_s: float, drift: float = 0.0, axes: int = 3) -> Array:
         """Return the ride's rotation about its up and about two axes across it, in degrees, shape (axes, p, STEPS).
@@ -41,18 +43,18 @@ class Comparison:
         return self._means(range(3, 6), shift_s, drift, self.given.speed_weight)
 
     def _means(self, columns: range, shift_s: float, drift: float, weight: Array) -> Array:
-        given = self.given
-        shift = shift_s + drift * (given.middle_s - self.middle_s)
-        begin_s, end_s = given.begin_s - shift, given.end_s - shift
+        track = self.given
+        shift = shift_s + drift * (track.middle_s - self.middle_s)
+        begin_s, end_s = track.begin_s - shift, track.end_s - shift
         means = []
         for column in columns:
             sums = self._sums[:, column]
             mean = np.interp(end_s, self._edges_s, sums) - np.interp(begin_s, self._edges_s, sums)
-            means.append(without_trend(mean / (end_s - begin_s), weight, given.middle_s))
+            means.append(without_trend(mean / (end_s - begin_s), weight, track.middle_s))
         return np.array(means)
 
 
-def _double_sums(motion: CellMotion, course: Course, shift_s: float) -> Array:
+def _double_sums(motion: BinMotion, course: Course, shift_s: float) -> Array:
     """Return six integrals over time, shape (n + 1, 6). Their differences give means between two times.
 
     Columns 0 to 2 integrate the rotation about up and about two axes across it, in degrees. Columns 3 to 5 integrate
@@ -79,6 +81,6 @@ def _double_sums(motion: CellMotion, course: Course, shift_s: float) -> Array:
 def _sums(values: Array) -> Array:
     """Integrate each column from the first edge to each edge.
 
-    values: one row per cell, shape (n, k). Returns one row per edge, shape (n + 1, k).
+    values: one row per bin, shape (n, k). Returns one row per edge, shape (n + 1, k).
     """
     return np.vstack((np.zeros(values.shape[1]), np.cumsum(values * STEP_S, axis=0)))

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..signals import Array
 from .compare import Comparison
-from .motion import CellMotion
+from .motion import BinMotion
 from .track import Course, Segments
 
 AROUND_S = 6.0  # largest distance from the rough shift, including the drift at the ends of the ride
@@ -53,7 +53,7 @@ class TrackFit:
     segments: int
 
 
-def fitted(motion: CellMotion, course: Course, segments: Segments, rough_s: float) -> TrackFit | None:
+def fitted(motion: BinMotion, course: Course, segments: Segments, rough_s: float) -> TrackFit | None:
     """The best fit within AROUND_S of a rough shift. None if ride and track hardly overlap at these shifts."""
     compared = Comparison(motion, course, segments, rough_s, AROUND_S + 1.0)
     if len(compared.given.begin_s) < _FEWEST:
@@ -62,39 +62,39 @@ def fitted(motion: CellMotion, course: Course, segments: Segments, rough_s: floa
     return _refine(Comparison(motion, course, segments, shift_s, 2.0), shift_s, drift, evidence)
 
 
-def cost_of_one_shift(motion: CellMotion, course: Course, segments: Segments, fit: TrackFit) -> float:
+def cost_of_one_shift(motion: BinMotion, course: Course, segments: Segments, fit: TrackFit) -> float:
     """Return by how much the cost per segment falls if each segment gets its own shift. The unit is the mean cost of
     one error.
 
     The result is under 2 if the track belongs to the ride, and over 4 for the same road at another time.
     """
     compared = Comparison(motion, course, segments, fit.shift_s, AROUND_S + 1.0)
-    given = compared.given
+    track = compared.given
     shift_s = fit.shift_s * (1.0 - fit.drift) + fit.drift * compared.middle_s
     costs = _costs(compared, shift_s, fit.drift, np.append(1.0, fit.tilt))
     together = float(costs[len(_SHIFTS) // 2].sum())
-    usual = max(together / np.count_nonzero(given.course_weight), _LEAST_COST)
-    return (together - float(costs.min(axis=0).sum())) / len(given.begin_s) / usual
+    usual = max(together / np.count_nonzero(track.course_weight), _LEAST_COST)
+    return (together - float(costs.min(axis=0).sum())) / len(track.begin_s) / usual
 
 
 def _try_shifts(compared: Comparison, rough_s: float) -> tuple[float, float, float]:
     """The best of the tried shifts and drifts, and its evidence (see TrackFit)."""
-    given, middle_s = compared.given, compared.middle_s
+    track, middle_s = compared.given, compared.middle_s
     costs = _costs(compared, rough_s, 0.0, np.ones(1))
-    since_s = given.middle_s.mean(axis=1) - middle_s
+    since_s = track.middle_s.mean(axis=1) - middle_s
     best = (np.inf, 0.0, 0.0)
     for drift in _DRIFTS:
         # With a drift, the shift differs between segments. For each shift in the middle of the ride, interpolate the
         # cost of each segment at its own shift.
-        at = np.clip((_SHIFTS[:, None] + drift * since_s + AROUND_S) / _TRIED_S, 0.0, len(_SHIFTS) - 1.001)
-        low = at.astype(int)
+        index = np.clip((_SHIFTS[:, None] + drift * since_s + AROUND_S) / _TRIED_S, 0.0, len(_SHIFTS) - 1.001)
+        low = index.astype(int)
         column = np.arange(len(since_s))
-        there = costs[low, column] * (low + 1 - at) + costs[low + 1, column] * (at - low)
-        total = there.sum(axis=1) + 0.5 * (drift / USUAL_DRIFT) ** 2
+        cost_at = costs[low, column] * (low + 1 - index) + costs[low + 1, column] * (index - low)
+        total = cost_at.sum(axis=1) + 0.5 * (drift / USUAL_DRIFT) ** 2
         best = min(best, (float(total.min()), float(_SHIFTS[np.argmin(total)]), float(drift)))
     cost, shift, drift = best
-    steps = np.count_nonzero(given.course_weight)
-    without = float(_cost(given, given.turned_deg).sum())
+    steps = np.count_nonzero(track.course_weight)
+    without = float(_cost(track, track.turned_deg).sum())
     evidence = 0.5 * steps / _STEPS_ALIKE * np.log(without / max(cost, 1e-9))
     return rough_s + shift, drift, float(evidence)
 
@@ -102,10 +102,10 @@ def _try_shifts(compared: Comparison, rough_s: float) -> tuple[float, float, flo
 def _costs(compared: Comparison, shift_s: float, drift: float, along: Array) -> Array:
     """Return the cost of each segment at each of _SHIFTS around a shift, shape (shifts, p). along: coefficients of the
     ride's rotations about the three axes."""
-    given = compared.given
+    track = compared.given
     return np.array(
         [
-            _cost(given, given.turned_deg - np.tensordot(along, compared.turned(shift_s + by, drift, len(along)), 1))
+            _cost(track, track.turned_deg - np.tensordot(along, compared.turned(shift_s + by, drift, len(along)), 1))
             for by in _SHIFTS
         ]
     )
@@ -136,8 +136,8 @@ class _Step:
 
 def _refine(compared: Comparison, shift_s: float, drift: float, evidence: float) -> TrackFit:
     """The best fit by Gauss-Newton steps. Each step down-weights outliers."""
-    given = compared.given
-    forward = _least(compared.sped_up(shift_s, drift), given.speed_mps, given.speed_weight)
+    track = compared.given
+    forward = _least(compared.sped_up(shift_s, drift), track.speed_mps, track.speed_weight)
     now = np.array([shift_s, drift, 0.0, 0.0, *forward])
     step = _step(compared, now)
     for _ in range(_ROUNDS):
@@ -149,21 +149,21 @@ def _refine(compared: Comparison, shift_s: float, drift: float, evidence: float)
 
 
 def _step(compared: Comparison, now: Array) -> _Step:
-    given, shift_s, drift, along, forward = compared.given, now[0], now[1], np.append(1.0, now[2:4]), now[4:]
+    track, shift_s, drift, along, forward = compared.given, now[0], now[1], np.append(1.0, now[2:4]), now[4:]
     turned, sped_up = compared.turned(shift_s, drift), compared.sped_up(shift_s, drift)
     later = compared.turned(shift_s + _TRIED_S, drift) - compared.turned(shift_s - _TRIED_S, drift)
     faster = compared.sped_up(shift_s + _TRIED_S, drift) - compared.sped_up(shift_s - _TRIED_S, drift)
     model_deg = np.tensordot(along, turned, 1)
-    course_error, speed_error = given.turned_deg - model_deg, given.speed_mps - np.tensordot(forward, sped_up, 1)
+    course_error, speed_error = track.turned_deg - model_deg, track.speed_mps - np.tensordot(forward, sped_up, 1)
     course_slope, speed_slope = (
         np.tensordot(axes, change, 1) / (2.0 * _TRIED_S) for axes, change in ((along, later), (forward, faster))
     )
-    since_s = given.middle_s - compared.middle_s
+    since_s = track.middle_s - compared.middle_s
     none = np.zeros_like(since_s)
     by_course = np.array([course_slope, course_slope * since_s, turned[1], turned[2], none, none, none])
     by_speed = np.array([speed_slope, speed_slope * since_s, none, none, *sped_up])
-    course_weights = _robust_weights(course_error, given.course_weight)
-    speed_weights = _robust_weights(speed_error, given.speed_weight)
+    course_weights = _robust_weights(course_error, track.course_weight)
+    speed_weights = _robust_weights(speed_error, track.speed_weight)
     curvature = np.einsum("ips,jps,ps->ij", by_course, by_course, course_weights)
     curvature += np.einsum("ips,jps,ps->ij", by_speed, by_speed, speed_weights) + np.diag(_PRIOR + 1e-9)
     pulls = np.einsum("ips,ps->pi", by_course, course_weights * course_error)
@@ -174,18 +174,18 @@ def _step(compared: Comparison, now: Array) -> _Step:
 def _with_sigma(compared: Comparison, evidence: float, now: Array, step: _Step) -> TrackFit:
     """The TrackFit with its standard deviation. Errors within a segment may be correlated, so the variance is computed
     from the scatter of the segments' gradients at the solution."""
-    given, count, drift = compared.given, len(step.pulls), float(now[1])
+    track, count, drift = compared.given, len(step.pulls), float(now[1])
     spread = step.pulls.T @ step.pulls * count / max(count - 2, 1) + np.diag(_PRIOR)
     covariance = (step.inverse @ spread @ step.inverse)[:2, :2]
-    ends_s = np.array([given.begin_s.min(), given.end_s.max()]) - compared.middle_s
+    ends_s = np.array([track.begin_s.min(), track.end_s.max()]) - compared.middle_s
     variance = max(float(np.array([1.0, end]) @ covariance @ np.array([1.0, end])) for end in ends_s)
-    weight = given.course_weight
-    size = np.sqrt((weight * given.turned_deg**2).sum() * (weight * step.model_deg**2).sum())
+    weight = track.course_weight
+    size = np.sqrt((weight * track.turned_deg**2).sum() * (weight * step.model_deg**2).sum())
     return TrackFit(
         (float(now[0]) - drift * compared.middle_s) / (1.0 - drift),
         drift,
         float(np.hypot(np.sqrt(variance), _SAME_TRACK_S)),
-        float((weight * given.turned_deg * step.model_deg).sum() / max(size, 1e-9)),
+        float((weight * track.turned_deg * step.model_deg).sum() / max(size, 1e-9)),
         evidence,
         now[2:4],
         count,
@@ -198,8 +198,8 @@ def _least(columns: Array, values: Array, weight: Array) -> Array:
     columns: shape (k, p, STEPS). Returns the coefficient of each column, shape (k).
     """
     root = np.sqrt(weight)
-    found = np.linalg.lstsq((columns * root).reshape(len(columns), -1).T, (values * root).ravel(), rcond=None)[0]
-    return np.asarray(found, dtype=float)
+    coefficients = np.linalg.lstsq((columns * root).reshape(len(columns), -1).T, (values * root).ravel(), rcond=None)[0]
+    return np.asarray(coefficients, dtype=float)
 
 
 def _robust_weights(error: Array, weight: Array) -> Array:

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 from kickstand.units import LOST_US
 
+from ..checks.log import check_log
 from ..common.errors import InputError
 from ..common.messages import Message
 from ..common.output import write_packed
 from ..logs.csv_lines import write_log
-from ..logs.log import Block, Log
-from ..logs.reader import Source, read_blocks, read_twice
-from ..logs.source import Progress, name_of
+from ..logs.log import Log, Source
+from ..logs.reader import read_log, text_rows
+from ..logs.source import File, Progress, name_of
 from ..signals import Array, Ints
 from .match import Match, match
 from .motion import motion
@@ -27,9 +28,12 @@ _FORMAT = {SPEED: "%.3f", "lat_deg": "%.7f", "lon_deg": "%.7f", "utc_s": "%.3f"}
 
 @dataclass
 class Joined:
-    """A ride, its track, and their Match. own_speed: True if the log already has a speed. Then this speed is kept."""
+    """A ride, its track, and their Match.
 
-    ride: Source
+    own_speed: True if the log already has a speed. Then this speed is kept.
+    """
+
+    ride: File | Log
     track: Track
     match: Match
     own_speed: bool
@@ -60,17 +64,18 @@ def join_track(ride: Source, track: Path | str | Track, progress: Progress | Non
     >>> round(joined.match.start_utc_s - 1.7e9)
     0
     """
-    given = track if isinstance(track, Track) else read_track(track)
-    ride = read_twice(ride)
-    notices: list[Message] = []
-    moved = motion(ride, progress, notices)
-    if moved.positions:
+    track = track if isinstance(track, Track) else read_track(track)
+    checked = check_log(read_log(ride, progress=progress))
+    moved = motion(checked)
+    if moved.has_positions:
         raise InputError(f"{name_of(ride)} has positions already: join adds positions to a ride without any")
     try:
-        found = match(moved, given)
+        best = match(moved, track)
     except InputError as error:
-        raise InputError(f"{name_of(ride)}, {given.name}: {error}") from error
-    return Joined(ride, given, found, moved.speed, notices)
+        raise InputError(f"{name_of(ride)}, {track.name}: {error}") from error
+    # The lines of a file are written again. An open file has been read, and a stretch is written as a log.
+    source = ride if isinstance(ride, (Path, str)) else checked.log
+    return Joined(source, track, best, moved.has_speed, checked.notices)
 
 
 def write_joined(out: Path | str, joined: Joined, progress: Progress | None = None) -> int:
@@ -89,43 +94,47 @@ def write_joined(out: Path | str, joined: Joined, progress: Progress | None = No
     ...     print(Path(f"{directory}/ride.csv").read_text().splitlines()[1].partition(",0.000000,9")[2])
     .000,48.0000000,11.0000000,1700000000.000
     """
-    out, columns = Path(out), joined.columns
-    at_us = np.rint(joined.match.ride_s(joined.track.utc_s) * 1e6).astype(np.int64)
-    if isinstance(joined.ride, Log):
-        log = joined.ride
-        rows, points = _nearest(log.time_us, at_us)
+    out, columns, log = Path(out), joined.columns, read_log(joined.ride)
+    rows, points = _nearest(log.time_us, np.rint(joined.match.ride_s(joined.track.utc_s) * 1e6).astype(np.int64))
+    if not isinstance(joined.ride, (Path, str)):
         values = {name: _placed(column[points], rows, len(log.t_s)) for name, column in columns.items()}
         write_log(out, replace(log, **values))
         return len(points)
-    count = 0
+    ends = {}
+    for row, values in zip(rows.tolist(), zip(*(column[points].tolist() for column in columns.values()))):
+        ends[row] = ",".join([_FORMAT[name] % value for name, value in zip(columns, values)]).replace("nan", "")
+    write_packed(out, _lines(joined.ride, list(columns), len(log.t_s), ends, progress))
+    return len(points)
 
-    def lines() -> Iterator[bytes]:
-        nonlocal count
-        kept: list[str] = []
-        for block in read_blocks(joined.ride, 2, progress):
-            if not kept:
-                kept = [name for name in block.names if name not in columns]
-                yield (",".join([*kept, *columns]) + "\n").encode()
-            rows, points = _nearest(block.time_us, at_us)
-            ends = ["," * len(columns)] * len(block.lines)
-            for row, values in zip(rows.tolist(), zip(*(column[points].tolist() for column in columns.values()))):
-                cells = [_FORMAT[name] % value for name, value in zip(columns, values)]
-                ends[row] = "," + ",".join(cells).replace("nan", "")
-            count += len(points)
-            own = block.lines if len(kept) == len(block.names) else _with_columns(block, kept)
-            yield "".join([f"{line}{end}\n" for line, end in zip(own, ends)]).encode()
 
-    write_packed(out, lines())
-    return count
+def _lines(
+    file: Path | str, columns: list[str], count: int, ends: dict[int, str], progress: Progress | None
+) -> Iterator[bytes]:
+    """Yield the lines of a log with the new columns at their end.
+
+    count: number of samples.
+    ends: the cells of the new columns, by the number of the sample.
+    """
+    begin, empty = 0, "," * (len(columns) - 1)
+    for names, lines in text_rows(file, progress):
+        own = [k for k, name in enumerate(names) if name not in columns]
+        if not begin:
+            yield (",".join([*(names[k] for k in own), *columns]) + "\n").encode()
+        lines = lines[: count - begin]  # without a last row that was cut
+        if len(own) < len(names):
+            cells = (next(csv.reader([line])) if '"' in line else line.split(",") for line in lines)
+            lines = [",".join([row[k] for k in own]) for row in cells]
+        yield "".join([f"{line},{ends.get(k, empty)}\n" for k, line in enumerate(lines, begin)]).encode()
+        begin += len(lines)
 
 
 def _nearest(time_us: Ints, at_us: Ints) -> tuple[Ints, Ints]:
     """Rows, and the index of the point for each. Only points within the log's time, and not in a gap, are used."""
     points = np.flatnonzero((at_us >= time_us[0]) & (at_us <= time_us[-1]))
-    after = np.clip(np.searchsorted(time_us, at_us[points]), 1, max(len(time_us) - 1, 1))
+    following = np.clip(np.searchsorted(time_us, at_us[points]), 1, max(len(time_us) - 1, 1))
     if len(time_us) < 2:
         return np.zeros(len(points), dtype=int), points
-    rows = after - (at_us[points] - time_us[after - 1] < time_us[after] - at_us[points])
+    rows = following - (at_us[points] - time_us[following - 1] < time_us[following] - at_us[points])
     near = np.abs(time_us[rows] - at_us[points]) <= LOST_US
     rows, last = np.unique(rows[near][::-1], return_index=True)  # if a row has two points, use the later point
     return rows, points[near][::-1][last]
@@ -135,10 +144,3 @@ def _placed(values: Array, rows: Ints, count: int) -> Array:
     placed = np.full(count, np.nan)
     placed[rows] = values
     return placed
-
-
-def _with_columns(block: Block, kept: list[str]) -> list[str]:
-    """The block's lines with only these columns."""
-    places = [block.names.index(name) for name in kept]
-    rows = (next(csv.reader([line])) if '"' in line else line.split(",") for line in block.lines)
-    return [",".join([cells[place] for place in places]) for cells in rows]

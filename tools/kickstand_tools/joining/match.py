@@ -9,7 +9,7 @@ from ..common.errors import InputError
 from ..common.messages import OPPOSITE_SIGN
 from ..signals import Array, Bools, correlations, log_likelihood_ratio, moving_mean, peaks
 from .fit import AROUND_S, TrackFit, cost_of_one_shift, fitted
-from .motion import STEP_S, CellMotion
+from .motion import STEP_S, BinMotion
 from .track import LONGEST_S, SLOWEST_MPS, STEPS, Course, Track, course, segments
 
 _GRID_S = 0.5
@@ -51,23 +51,23 @@ class Match:
         return (utc_s - self.start_utc_s) * (1.0 - self.drift)
 
 
-def match(motion: CellMotion, track: Track) -> Match:
+def match(motion: BinMotion, track: Track) -> Match:
     """The Match of a track with a ride. Raises InputError if the track does not belong to the ride, or if this is
     uncertain. Callers put both names in front of the error's text."""
     track = track.once_a_second()
     steps = course(track)
     parts = segments(steps)
     _check_turns(motion, steps)
-    found: list[TrackFit] = []
+    fits: list[TrackFit] = []
     mirrored, rough = _rough_shifts(motion, steps)
     for shift_s in rough:
         fit = fitted(motion, steps, parts, shift_s)
         if fit is not None:
-            found.append(fit)
-    if not found:
+            fits.append(fit)
+    if not fits:
         raise InputError(f"they have less than {LEAST_S:.0f} s of riding in common: {_OTHER}")
-    found.sort(key=lambda fit: -fit.evidence)
-    best = found[0]
+    fits.sort(key=lambda fit: -fit.evidence)
+    best = fits[0]
     if best.evidence < LEAST_EVIDENCE or best.correlation < _LEAST_CORRELATION:
         if mirrored:
             raise InputError("the ride turns left where the track turns right: " + OPPOSITE_SIGN)
@@ -75,7 +75,7 @@ def match(motion: CellMotion, track: Track) -> Match:
             common_s = best.segments * STEPS
             raise InputError(f"they have {common_s} s with too few bends in common to be sure: {_LONGER}")
         raise InputError(f"at no time does the ride turn like the track: {_OTHER}")
-    others = [fit for fit in found if abs(fit.shift_s - best.shift_s) > AROUND_S]
+    others = [fit for fit in fits if abs(fit.shift_s - best.shift_s) > AROUND_S]
     if others and others[0].evidence > best.evidence - LEAST_LEAD:
         far_s = abs(others[0].shift_s - best.shift_s)
         raise InputError(f"the track fits at two times, {far_s:.0f} s apart, as its bends are alike: {_LONGER}")
@@ -87,17 +87,17 @@ def match(motion: CellMotion, track: Track) -> Match:
     if best.sigma_s > _MOST_SIGMA_S:
         raise InputError(f"the track fits only to {best.sigma_s:.1f} s, not to {_MOST_SIGMA_S} s: {_LONGER}")
     start_utc_s = float(track.utc_s[0]) + best.shift_s
-    made = Match(start_utc_s, best.drift, best.sigma_s, best.correlation, 0.0)
-    begin_s, end_s = made.ride_s(track.utc_s[[0, -1]])
-    made.common_s = float(min(end_s, motion.seconds) - max(begin_s, 0.0))
-    return made
+    result = Match(start_utc_s, best.drift, best.sigma_s, best.correlation, 0.0)
+    begin_s, end_s = result.ride_s(track.utc_s[[0, -1]])
+    result.common_s = float(min(end_s, motion.seconds) - max(begin_s, 0.0))
+    return result
 
 
 _LONGER = "a longer ride with more bends is needed, or a track with a point every second"
 _OTHER = "is it the track of another ride or another day?"
 
 
-def _check_turns(motion: CellMotion, steps: Course) -> None:
+def _check_turns(motion: BinMotion, steps: Course) -> None:
     if motion.seconds < LEAST_S:
         raise InputError(f"the ride lasts {motion.seconds:.0f} s: at least {LEAST_S:.0f} s with bends are needed")
     moving_s = float((steps.end_s - steps.begin_s)[steps.good].sum())
@@ -112,17 +112,17 @@ def _check_turns(motion: CellMotion, steps: Course) -> None:
         raise InputError(f"the ride turns by {turned_deg:.0f} degrees in all: too few bends to match a track")
 
 
-def _rough_shifts(motion: CellMotion, steps: Course) -> tuple[bool, list[float]]:
+def _rough_shifts(motion: BinMotion, steps: Course) -> tuple[bool, list[float]]:
     """Return True if the ride would fit better with the opposite sign of yaw, and the shifts that fit best."""
     of_track, track_good = _changes_of_track(steps)
     of_ride, ride_good = _changes_of_ride(motion)
-    found, count = correlations(of_track, track_good, of_ride, ride_good)
-    found = np.where(count * _GRID_S >= LEAST_S / 2.0, found, 0.0)
-    likely = log_likelihood_ratio(found, count, _GRID_S / _SPAN_S)
-    other = log_likelihood_ratio(-found, count, _GRID_S / _SPAN_S)
-    found_at = [p for p in peaks(likely, round(_APART_S / _GRID_S), _CANDIDATES) if likely[p] > _WORTH * likely.max()]
-    shifts = [(place - (len(of_ride) - 1)) * _GRID_S for place in found_at]
-    return bool(other.max() > LEAST_EVIDENCE and other.max() > 2.0 * likely.max()), shifts
+    correlation, count = correlations(of_track, track_good, of_ride, ride_good)
+    correlation = np.where(count * _GRID_S >= LEAST_S / 2.0, correlation, 0.0)
+    likely = log_likelihood_ratio(correlation, count, _GRID_S / _SPAN_S)
+    mirrored_ratio = log_likelihood_ratio(-correlation, count, _GRID_S / _SPAN_S)
+    indices = [p for p in peaks(likely, round(_APART_S / _GRID_S), _CANDIDATES) if likely[p] > _WORTH * likely.max()]
+    shifts = [(index - (len(of_ride) - 1)) * _GRID_S for index in indices]
+    return bool(mirrored_ratio.max() > LEAST_EVIDENCE and mirrored_ratio.max() > 2.0 * likely.max()), shifts
 
 
 def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
@@ -136,17 +136,17 @@ def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
     speed = np.interp(at_s, middle_s, np.where(steps.good, steps.speed_mps, 0.0))
     bad = np.append(0, np.cumsum(~steps.good))
     first, last = np.searchsorted(steps.end_s, at_s - half), np.searchsorted(steps.begin_s, at_s + half)
-    known = (bad[last] == bad[first]) & (at_s >= half) & (at_s <= steps.end_s[-1] - half)
-    return change * np.cos(np.arctan(speed * np.radians(change / _SPAN_S) / STANDARD_GRAVITY)), known
+    valid = (bad[last] == bad[first]) & (at_s >= half) & (at_s <= steps.end_s[-1] - half)
+    return change * np.cos(np.arctan(speed * np.radians(change / _SPAN_S) / STANDARD_GRAVITY)), valid
 
 
-def _changes_of_ride(motion: CellMotion) -> tuple[Array, Bools]:
+def _changes_of_ride(motion: BinMotion) -> tuple[Array, Bools]:
     """Return two arrays with a value every _GRID_S: the rotation of the ride about its up within _SPAN_S, in degrees,
     and True where it is known."""
     at_s, half = np.arange(0.0, motion.seconds, _GRID_S), _SPAN_S / 2.0
-    edges_s = np.arange(len(motion.there) + 1) * STEP_S
+    edges_s = np.arange(len(motion.valid) + 1) * STEP_S
     turned = np.append(0.0, np.cumsum(motion.rate_dps @ motion.up)) * STEP_S
     change = np.interp(at_s + half, edges_s, turned) - np.interp(at_s - half, edges_s, turned)
-    missing = np.append(0, np.cumsum(~motion.there)) * STEP_S
+    missing = np.append(0, np.cumsum(~motion.valid)) * STEP_S
     gap_s = np.interp(at_s + half, edges_s, missing) - np.interp(at_s - half, edges_s, missing)
     return change, (gap_s < 0.1 * _SPAN_S) & (at_s >= half) & (at_s <= motion.seconds - half)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..logs.log import Table
-from ..signals import Array, Bools, distance_m, stretches
+from ..signals import Array, Bools, distance_m, intervals
 
 LONGEST_S = 6.0  # longest time between two points of a course; watches write points this far apart on straights
 SLOWEST_MPS = 2.5  # in slower steps, the errors of the positions dominate
@@ -50,8 +50,8 @@ class Track(Table):
         way_m = np.append(0.0, np.cumsum(np.hypot(*self.steps_m())))
         span_s = self.utc_s[2 * _AROUND :] - self.utc_s[: -2 * _AROUND]
         mean = (way_m[2 * _AROUND :] - way_m[: -2 * _AROUND]) / span_s
-        known = (span_s <= LONGEST_S) & (mean > SLOWEST_MPS) & (mean < FASTEST_MPS)
-        speed[_AROUND:-_AROUND] = np.where(known, mean, np.nan)
+        valid = (span_s <= LONGEST_S) & (mean > SLOWEST_MPS) & (mean < FASTEST_MPS)
+        speed[_AROUND:-_AROUND] = np.where(valid, mean, np.nan)
         return speed
 
     def once_a_second(self) -> "Track":
@@ -98,9 +98,9 @@ def course(track: Track) -> Course:
     good = (speed > SLOWEST_MPS) & (speed < FASTEST_MPS) & (step_s <= LONGEST_S)
     direction = np.degrees(np.arctan2(north, east))
     turn = (np.diff(direction, prepend=direction[:1]) + 180.0) % 360.0 - 180.0
-    both = good & np.append(False, good[:-1])
+    consecutive = good & np.append(False, good[:-1])
     sigma = np.hypot(np.degrees(STEP_ERROR_M / np.maximum(length_m, 0.1)), COURSE_ERROR_DEG)
-    return Course(since_s[:-1], since_s[1:], sigma, speed, good, np.where(both, turn, 0.0))
+    return Course(since_s[:-1], since_s[1:], sigma, speed, good, np.where(consecutive, turn, 0.0))
 
 
 @dataclass
@@ -134,21 +134,21 @@ def segments(course: Course) -> Segments:
     """The segments of a course."""
     rows = [
         np.arange(start, min(start + STEPS, end))
-        for begin, end in stretches(course.good)
+        for begin, end in intervals(course.good)
         for start in range(begin, end, STEPS)
     ]
     rows = [row for row in rows if len(row) >= _FEWEST]
-    place, there = np.zeros((len(rows), STEPS), dtype=int), np.zeros((len(rows), STEPS))
+    index, valid = np.zeros((len(rows), STEPS), dtype=int), np.zeros((len(rows), STEPS))
     for k, row in enumerate(rows):
-        place[k, : len(row)], place[k, len(row) :], there[k, : len(row)] = row, row[-1], 1.0
-    turn = course.turn_deg[place] * there
+        index[k, : len(row)], index[k, len(row) :], valid[k, : len(row)] = row, row[-1], 1.0
+    turn = course.turn_deg[index] * valid
     turn[:, :1] = 0.0
-    weight = there / course.sigma_deg[place] ** 2
-    begin_s, end_s = course.begin_s[place], course.end_s[place]
-    made = Segments(begin_s, end_s, np.cumsum(turn, axis=1), weight, course.speed_mps[place], there)
-    made.turned_deg = without_trend(made.turned_deg, weight, made.middle_s)
-    made.speed_mps = without_trend(made.speed_mps, there, made.middle_s)
-    return made
+    weight = valid / course.sigma_deg[index] ** 2
+    begin_s, end_s = course.begin_s[index], course.end_s[index]
+    result = Segments(begin_s, end_s, np.cumsum(turn, axis=1), weight, course.speed_mps[index], valid)
+    result.turned_deg = without_trend(result.turned_deg, weight, result.middle_s)
+    result.speed_mps = without_trend(result.speed_mps, valid, result.middle_s)
+    return result
 
 
 def without_trend(values: Array, weight: Array, at_s: Array) -> Array:

@@ -112,11 +112,11 @@ def _fit(path: Path, progress: Progress | None) -> Iterator[Point]:
             for frame in frames:
                 if not isinstance(frame, fitdecode.FitDataMessage) or frame.name != "record":
                     continue
-                at, lat, lon, plain, speed = (frame.get_value(name, fallback=None) for name in _FIT_FIELDS)
+                time, lat, lon, plain, speed = (frame.get_value(name, fallback=None) for name in _FIT_FIELDS)
                 speed = plain if speed is None else speed
-                if isinstance(at, datetime) and isinstance(lat, int) and isinstance(lon, int):
+                if isinstance(time, datetime) and isinstance(lat, int) and isinstance(lon, int):
                     mps = float(speed) if isinstance(speed, (int, float)) else np.nan
-                    yield _utc_s(at), lat * _DEGREES, lon * _DEGREES, mps
+                    yield _utc_s(time), lat * _DEGREES, lon * _DEGREES, mps
                 if progress:
                     progress(min(file.tell(), total), total)
     except (fitdecode.FitError, TypeError, ValueError) as error:

@@ -75,8 +75,8 @@ def _made_from(log: str) -> str:
         for path in Path(log).parent.glob("*.cal.json")
         for ending in (".csv", ".csv.gz")
     ]
-    found = [path for path in rides if path.is_file() and path != Path(log)]
-    return f", {found[0]}" if len(found) == 1 else ""
+    logs = [path for path in rides if path.is_file() and path != Path(log)]
+    return f", {logs[0]}" if len(logs) == 1 else ""
 
 
 def plausible(table: Array, names: list[str], before_us: int | None) -> bool:
@@ -106,7 +106,7 @@ def read(log: str, text: str, width: int, places: dict[str, int], lines_before: 
     Returns the columns in the order of places, shape (n, number of places). Raises InputError for the first mistake
     and names its line.
     """
-    columns = [(place, name, _LIMITS[name]) for name, place in places.items()]
+    columns = [(index, name, _LIMITS[name]) for name, index in places.items()]
     values = []
     for number, line in enumerate(text.split("\n"), lines_before + 1):
         if not line.strip():
@@ -115,11 +115,11 @@ def read(log: str, text: str, width: int, places: dict[str, int], lines_before: 
             cells = cells_of(line)
             if len(cells) != width:
                 raise _Mistake(f"{len(cells)} values under {width} column names: is the line cut?")
-            value = [_number(cells[place], name, limit) for place, name, limit in columns]
+            value = [_number(cells[index], name, limit) for index, name, limit in columns]
             now = round(value[0] * 1e6)
             if before_us is not None and now < before_us:
-                at = cells[places["t_s"]].strip()
-                raise _Mistake(f"time goes back from {before_us / 1e6:.6f} at {at} s: it must increase")
+                text_s = cells[places["t_s"]].strip()
+                raise _Mistake(f"time goes back from {before_us / 1e6:.6f} at {text_s} s: it must increase")
         except csv.Error as error:
             raise InputError(f"{log}, line {number}: not CSV ({error}): is it a log?") from error
         except _Mistake as mistake:

@@ -10,13 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.messages import Message
 from ..common.output import write_packed
 from ..signals import Array
 from .cells import COLUMNS, OPTIONAL
-from .log import Block, Log, Stretch
-from .reader import read_blocks
-from .source import File, Progress
+from .log import Log
+from .reader import read_log, text_rows
+from .source import Progress
 
 _DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
 _ROWS = 15_000  # rows formatted at once; their text fits into a processor's cache
@@ -58,13 +57,13 @@ def number_cells(values: Array, digits: int, nan: str = "nan") -> Letters:
     scaled = np.where(missing, 0.0, scaled)
     if not np.all(scaled < _MOST):  # also for infinity
         return text_cells([nan if value != value else f"{value:.{digits}f}" for value in values.tolist()])
-    whole = np.rint(scaled)
+    integers = np.rint(scaled)
     # Rounding of the product can put a value that is almost halfway between two texts on the wrong side. Python's
     # format() decides these values.
-    for k in np.flatnonzero(np.abs(np.abs(scaled - whole) - 0.5) <= scaled * 2.0**-52).tolist():
-        whole[k] = int(f"{abs(values[k]):.{digits}f}".replace(".", ""))
-    most = int(np.max(whole, initial=0.0))
-    letters = _letters(whole.astype(np.uint32 if most < 2**32 else np.uint64), digits, len(str(most)), len(nan))
+    for k in np.flatnonzero(np.abs(np.abs(scaled - integers) - 0.5) <= scaled * 2.0**-52).tolist():
+        integers[k] = int(f"{abs(values[k]):.{digits}f}".replace(".", ""))
+    most = int(np.max(integers, initial=0.0))
+    letters = _letters(integers.astype(np.uint32 if most < 2**32 else np.uint64), digits, len(str(most)), len(nan))
     letters[0] = np.where(np.signbit(values), _MINUS, 0)
     if np.any(missing):
         letters[:, missing] = np.array([*nan.encode(), *bytes(len(letters) - len(nan))], dtype=np.uint8)[:, None]
@@ -79,16 +78,16 @@ def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, least_
 
     The first row of the result stays empty, because it is for the sign.
     """
-    places = max(most, digits + 1)
-    letters = np.zeros((max(places + 2, least_rows), len(number)), dtype=np.uint8)
+    rows_needed = max(most, digits + 1)
+    letters = np.zeros((max(rows_needed + 2, least_rows), len(number)), dtype=np.uint8)
     row = len(letters) - 1
-    for place in range(places):
-        if place == digits > 0:
+    for power in range(rows_needed):
+        if power == digits > 0:
             letters[row] = _POINT
             row -= 1
         rest = number // 10
         letter = (number - 10 * rest).astype(np.uint8) + np.uint8(_ZERO)
-        letters[row] = letter if place <= digits else np.where(number > 0, letter, 0)  # no leading zeros
+        letters[row] = letter if power <= digits else np.where(number > 0, letter, 0)  # no leading zeros
         number, row = rest, row - 1
     return letters
 
@@ -98,12 +97,15 @@ def write_lines(path: Path, names: Sequence[str], lines: Iterable[bytes]) -> Non
     write_packed(path, itertools.chain([(",".join(names) + "\n").encode()], lines))
 
 
-def write_lean(out: Path, columns: Sequence[str], digits: Sequence[int], rows: Iterable[tuple[Block, Array]]) -> int:
+def write_lean(
+    out: Path, columns: Sequence[str], digits: Sequence[int], times: Iterator[str], parts: Iterable[Array]
+) -> int:
     """Write a LEAN.csv with the log's own times as the first column.
 
     columns: names of the other columns.
     digits: number of decimals of each of these columns.
-    rows: blocks of the log, each with its values, shape (n, number of columns).
+    times: the log's own time of each sample, as text.
+    parts: values of successive samples, shape (n, number of columns).
 
     Returns the number of samples. Raises InputError.
     """
@@ -111,10 +113,10 @@ def write_lean(out: Path, columns: Sequence[str], digits: Sequence[int], rows: I
 
     def lines() -> Iterator[bytes]:
         nonlocal count
-        for block, found in rows:
-            count += len(found)
-            cells = [number_cells(column, digit) for column, digit in zip(found.T, digits, strict=True)]
-            yield joined_cells([text_cells(block.time_text), *cells])
+        for values in parts:
+            count += len(values)
+            cells = [number_cells(column, digit) for column, digit in zip(values.T, digits, strict=True)]
+            yield joined_cells([text_cells(list(itertools.islice(times, len(values)))), *cells])
 
     write_lines(out, ("t_s", *columns), lines())
     return count
@@ -141,12 +143,11 @@ def write_log(path: Path | str, log: Log) -> None:
 
 
 def cut_log(
-    source: File,
+    source: Path | str,
     out: Path,
     from_s: float | None = None,
     to_s: float | None = None,
     progress: Progress | None = None,
-    notices: list[Message] | None = None,
 ) -> tuple[int, float]:
     """Copy the lines of a stretch of a log to the file `out`, gzipped if its name ends in .gz. Raises InputError.
 
@@ -154,11 +155,9 @@ def cut_log(
 
     Args:
         from_s, to_s: limits of the stretch, see Stretch.
-        progress, notices: see read_blocks().
+        progress: called with the bytes read and the bytes of the file.
 
-    Returns:
-        count: number of samples.
-        duration: time from the first to the last sample, in s.
+    Returns the number of samples, and the time from the first to the last sample in s.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as directory:
@@ -167,18 +166,24 @@ def cut_log(
     ...     cut_log(log, Path(directory, "cut.csv"), from_s=0.5)
     (1, 0.0)
     """
-    count, seconds = 0, 0.0
-    blocks = read_blocks(Stretch(source, from_s, to_s), 1, progress, notices)
-    first = next(blocks)
+    log = read_log(source, 1, progress)
+    rows = log.rows_between(from_s, to_s)
+    copy_rows(source, out, rows)
+    return rows.stop - rows.start, float(log.t_s[rows.stop - 1] - log.t_s[rows.start])
+
+
+def copy_rows(source: Path | str, out: Path, rows: slice) -> None:
+    """Copy the lines of some samples of a log to the file `out`, as cut_log()."""
+    texts = text_rows(source)
+    names, first = next(texts)
 
     def lines() -> Iterator[bytes]:
-        nonlocal count, seconds
-        for block in itertools.chain([first], blocks):
-            count, seconds = count + len(block.lines), float(block.t_s[-1])
-            yield "".join(f"{line}\n" for line in block.lines).encode()
+        begin, end = rows.start, rows.stop
+        for many in itertools.chain([first], (many for _, many in texts)):
+            yield "".join(f"{line}\n" for line in many[max(0, begin) : max(0, end)]).encode()
+            begin, end = begin - len(many), end - len(many)
 
-    write_lines(out, first.names, lines())
-    return count, seconds
+    write_lines(out, names, lines())
 
 
 def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:

@@ -68,10 +68,10 @@ def numbers_in(text: bytes, count: int) -> Array | None:
     for empty in (b",,", b",,", b",\n", b"\n,"):  # b",,": replaced twice, because adjacent empty cells share a comma
         filled_up = filled_up.replace(empty, empty[:1] + b"nan" + empty[1:])
     try:
-        found = np.loadtxt(io.BytesIO(filled_up), delimiter=",", comments=None, ndmin=2)
+        table = np.loadtxt(io.BytesIO(filled_up), delimiter=",", comments=None, ndmin=2)
     except ValueError:
         return None
-    return found if found.shape == (text.count(b"\n"), count) else None  # loadtxt skips empty lines
+    return table if table.shape == (text.count(b"\n"), count) else None  # loadtxt skips empty lines
 
 
 def columns_of_text(text: str, separator: str, width: int, most: int = 0) -> tuple[list[Cells], int]:

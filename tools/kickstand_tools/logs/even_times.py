@@ -6,16 +6,14 @@ and some are 0. This module replaces each time by the mean of the recorded times
 about half a tick of the recorder's clock.
 """
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..common.errors import InputError
-from ..common.messages import Message
+from ..common.messages import kind
 from ..signals import Array, Ints, window_means
-from .log import Block
 
 COARSE = 0.05  # share of the time between samples; times with a smaller tick are not changed
 # If more than this share of the times repeats the previous time, the recorder writes one time for several samples
@@ -34,27 +32,14 @@ CROWD = 50
 # the mean is less exact.
 ALLOWED = 0.6
 SHORTEST_S = 2e-6  # shortest step, in s, which stays over 0 if times are rounded to microseconds
-CONTEXT = 2000  # number of samples before and after a block that are used to compute its times
-REPORTED_S = 0.002  # smallest change of a time, in s, that is reported in a notice
 
 
-class TimesSpread(Message):
-    """The recorder rounded the times.
-
-    repeated: number of times that equal the previous time.
-    samples: number of all times.
-    shift_s: largest change of a time, in s.
-    """
-
-    repeated: int
-    samples: int
-    shift_s: float
-
-    code = "times-spread"
-    text = (
-        "the times are rounded ({repeated} of {samples} repeat the previous one): they are spread evenly, by up to "
-        "{shift_s:.3f} s"
-    )
+TimesSpread = kind(
+    "times-spread",
+    "repeated samples shift_s",  # number of times that equal the previous one, number of all times, largest change in s
+    "the times are rounded ({repeated} of {samples} repeat the previous one): they are spread evenly, by up to "
+    "{shift_s:.3f} s",
+)
 
 
 def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
@@ -82,27 +67,27 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
     if not np.all(np.isfinite(recorded)):
         raise InputError(f"{name}: some times are not numbers")
     time_us = np.rint(recorded * 1e6).astype(np.int64)
-    steps_us = np.diff(time_us)
-    if np.any(steps_us < 0):
-        at = recorded[int(np.argmax(steps_us < 0)) + 1]
-        raise InputError(f"{name}: time goes back at {at:g} s: it must increase")
+    between_us = np.diff(time_us)
+    if np.any(between_us < 0):
+        time_s = recorded[int(np.argmax(between_us < 0)) + 1]
+        raise InputError(f"{name}: time goes back at {time_s:g} s: it must increase")
+    if np.all(between_us > 0) and _is_even(between_us, float(np.median(between_us))):
+        return recorded  # the usual log, without further arrays
     starts = np.flatnonzero(np.diff(time_us, prepend=time_us[0] - 1))  # first sample of each time
     if len(starts) == 1:
         raise InputError(f"{name}: the time is the same in all samples: it must increase")
     counts = np.diff(np.append(starts, len(recorded)))
     between_us = np.diff(time_us[starts])
     usual_us = float(np.median(between_us))
-    whole = between_us <= 5.0 * usual_us
-    period_us = float(np.sum(between_us[whole])) / float(np.sum(counts[:-1][whole]))
+    near = between_us <= 5.0 * usual_us
+    period_us = float(np.sum(between_us[near])) / float(np.sum(counts[:-1][near]))
     repeated = len(recorded) - len(starts)
     tick_us = float(np.gcd.reduce(between_us))
     if repeated > OFTEN * len(recorded):
         tick_us = max(tick_us, usual_us)
     if np.any((counts > CROWD) & (counts > CROWDED * tick_us / period_us)):
-        at = recorded[starts[int(np.argmax(counts))]]
-        raise InputError(f"{name}: time stands still at {at:g} s, in {np.max(counts)} samples: it must increase")
-    if not repeated and (tick_us < COARSE * period_us or _one_step(between_us)):
-        return recorded
+        time_s = recorded[starts[int(np.argmax(counts))]]
+        raise InputError(f"{name}: time stands still at {time_s:g} s, in {np.max(counts)} samples: it must increase")
     times = _spread_repeated(recorded, starts, counts, period_us * 1e-6)
     if tick_us >= COARSE * period_us:
         times = _smooth(recorded, times, tick_us * 1e-6, period_us * 1e-6)
@@ -110,8 +95,13 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
     return np.asarray(np.maximum.accumulate(times - order) + order, dtype=float)
 
 
-def _one_step(between_us: Ints) -> bool:
-    return bool(np.count_nonzero(between_us == np.median(between_us)) >= EXACT * len(between_us))
+def _is_even(between_us: Ints, usual_us: float) -> bool:
+    """Return True if the steps between different times need no change: the clock's tick is fine, or nearly all steps
+    are equal."""
+    if np.count_nonzero(between_us == usual_us) >= EXACT * len(between_us):
+        return True
+    near = between_us <= 5.0 * usual_us
+    return bool(np.gcd.reduce(between_us) < COARSE * np.sum(between_us, where=near) / np.count_nonzero(near))
 
 
 def _spread_repeated(recorded: Array, starts: Ints, counts: Ints, period_s: float) -> Array:
@@ -137,13 +127,13 @@ def _smooth(recorded: Array, times: Array, tick_s: float, period_s: float) -> Ar
     """
     half = max(AROUND, round(TICKS * tick_s / period_s)) // 2
     cuts = np.flatnonzero(np.diff(recorded) > GAP * period_s + tick_s) + 1
-    found = times.copy()
+    result = times.copy()
     for begin, end in zip([0, *cuts], [*cuts, len(times)]):
         part = recorded[begin:end]
         if len(part) > 1:
             mean = _mean(_mean(part, half), half)
-            found[begin:end] = np.clip(mean, part - ALLOWED * tick_s, part + ALLOWED * tick_s)
-    return found
+            result[begin:end] = np.clip(mean, part - ALLOWED * tick_s, part + ALLOWED * tick_s)
+    return result
 
 
 def _mean(values: Array, half: int) -> Array:
@@ -154,9 +144,9 @@ def _mean(values: Array, half: int) -> Array:
     first, last = _line(k[:span], values[:span]), _line(k[-span:], values[-span:])
     if n <= 2 * half:
         return first(k)
-    before, after = first(np.arange(-half, 0.0)), last(np.arange(n, n + half, dtype=float))
+    head, tail = first(np.arange(-half, 0.0)), last(np.arange(n, n + half, dtype=float))
     base = values[0]  # subtracted before summing, because sums of small numbers have smaller rounding errors
-    return base + window_means(np.concatenate((before, values, after)) - base, 2 * half + 1)
+    return base + window_means(np.concatenate((head, values, tail)) - base, 2 * half + 1)
 
 
 def _line(k: Array, values: Array) -> Callable[[Array], Array]:
@@ -165,96 +155,3 @@ def _line(k: Array, values: Array) -> Callable[[Array], Array]:
     away = k - middle
     slope = float(away @ (values - mean)) / max(float(away @ away), 1e-12)
     return lambda at: mean + slope * (at - middle)
-
-
-def even_blocks(blocks: Iterator[Block], name: str, remarks: list[Message]) -> Iterator[Block]:
-    """Yield the blocks of a log with even, increasing times, as even_times() makes them.
-
-    name: the log's name in messages.
-    remarks: a notice about changed times is appended.
-
-    A block whose times need no change is returned as it is. The last samples of other blocks are moved to the next
-    block, because their times depend on it.
-    """
-    spread = _Spread(name)
-    held: Block | None = None
-    for block in blocks:
-        whole = block if held is None else _joined(held, block)
-        ready, held = spread.take(whole)
-        if ready is not None:
-            yield ready
-    if held is not None:
-        yield spread.rest(held)
-    remarks += spread.notices()
-
-
-def _joined(first: Block, second: Block) -> Block:
-    """Join two successive blocks."""
-    return replace(
-        second,
-        lines=first.lines + second.lines,
-        own_times=first.own_times and second.own_times,
-        **{name: np.concatenate((rows, getattr(second, name))) for name, rows in first.columns().items()},
-    )
-
-
-class _Spread:
-    """Makes the times of a log even, block by block. name: the log's name in messages."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-        self._before_s = np.zeros(0)  # recorded times of the last samples that were returned
-        self._from_us: int | None = None  # new time of the first sample
-        self._last_us = -1
-        self._samples = self._repeated = 0
-        self._shift_s = 0.0
-
-    def take(self, block: Block) -> tuple[Block | None, Block | None]:
-        """Process one block.
-
-        Returns:
-            ready: the part with final times, or None.
-            held: the part that must be joined with the next block, or None.
-        """
-        recorded = np.concatenate((self._before_s, block.t_s))
-        steady = not np.any(np.diff(block.time_us) == 0)
-        if not steady and len(block.time_us) < 2 * CONTEXT:
-            return None, block
-        times = even_times(recorded, self._name)
-        if np.array_equal(times, recorded):
-            return self._ready(block, block.t_s), None
-        if len(block.time_us) < 2 * CONTEXT:
-            return None, block
-        wait = len(block.time_us) - CONTEXT
-        held = block.part(slice(wait, None))
-        return self._ready(block.part(slice(0, wait)), times[len(self._before_s) :][:wait]), held
-
-    def rest(self, block: Block) -> Block:
-        """Return the last block of the log with even times."""
-        times = even_times(np.concatenate((self._before_s, block.t_s)), self._name)
-        return self._ready(block, times[len(self._before_s) :])
-
-    def notices(self) -> list[Message]:
-        """The notices about the times."""
-        if not self._repeated and self._shift_s < REPORTED_S:
-            return []
-        return [TimesSpread(self._repeated, self._samples, self._shift_s)]
-
-    def _ready(self, block: Block, times: np.ndarray) -> Block:
-        recorded = block.t_s
-        self._samples += len(times)
-        self._repeated += int(np.count_nonzero(np.diff(recorded, prepend=self._before_s[-1:]) == 0.0))
-        self._shift_s = max(self._shift_s, float(np.max(np.abs(times - recorded))))
-        self._before_s = np.concatenate((self._before_s, recorded))[-CONTEXT:]
-        own = bool(np.array_equal(times, recorded))
-        if own and not self._from_us:
-            self._from_us = 0
-            self._last_us = int(block.time_us[-1])
-            return block
-        time_us = np.rint(times * 1e6).astype(np.int64)
-        if self._from_us is None:
-            self._from_us = int(time_us[0])
-        order = np.arange(1, len(times) + 1)
-        time_us = np.maximum.accumulate(np.maximum(time_us - self._from_us, self._last_us + 1) - order) + order
-        self._last_us = int(time_us[-1])
-        return replace(block, time_us=time_us, start_s=block.start_s + self._from_us / 1e6, own_times=own)

@@ -1,7 +1,7 @@
-"""Defines a log in memory (Log), some successive rows of a log (Block), and a part of a log between two times
-(Stretch)."""
+"""Defines a log in memory (Log), and a part of a log between two times (Stretch)."""
 
 from collections.abc import Container, Iterator, Mapping
+from copy import copy
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Self
 
@@ -13,13 +13,13 @@ from ..common.errors import InputError, extra
 from ..common.messages import Message
 from ..signals import Array, Bools, Ints
 from .cells import TRACK
-from .csv_reader import cells_of
 from .source import File, name_of
 
 if TYPE_CHECKING:
     from pandas import DataFrame
     from pyarrow import Schema
 
+PART_SAMPLES = 60_000  # most samples in a part of Log.parts()
 ROOM_TEMP_C = 25.0  # temperature for the firmware's modules if a log has no temperature
 
 FirmwareRow = tuple[int, list[float], float]
@@ -39,8 +39,7 @@ class Table:
 
         which: a slice, or an array of n booleans. With a slice, the result's arrays are views of this table's arrays.
         """
-        # Call Table.columns(), because Log.columns() uses the names of the CSV columns, not of the fields.
-        return replace(self, **{name: values[which] for name, values in Table.columns(self).items()})
+        return replace(self, **{name: values[which] for name, values in self.columns().items()})
 
     def to_pandas(self) -> "DataFrame":
         """A data frame of columns(). Raises InputError if pandas is not installed."""
@@ -69,19 +68,6 @@ def float_schema(units: Mapping[str, str], fine: Container[str], about: dict[str
     )
 
 
-def firmware_rows(time_us: Ints, readings: Array, speed_mps: Array) -> Iterator[FirmwareRow]:
-    """Yield each sample for a replay by the firmware's modules.
-
-    Yields:
-        time: in us.
-        reading: list of acceleration (3 values, g), temperature (deg C) and rate (3 values, deg/s). A missing
-            temperature is replaced by ROOM_TEMP_C.
-        speed: in m/s, NaN if missing.
-    """
-    readings = np.column_stack((readings[:, :3], np.nan_to_num(readings[:, 3], nan=ROOM_TEMP_C), readings[:, 4:]))
-    return zip(time_us.tolist(), readings.tolist(), speed_mps.tolist())
-
-
 @dataclass(eq=False)
 class Log(Table):
     """One recording of n samples, in the sensor's own axes.
@@ -96,6 +82,7 @@ class Log(Table):
     notices: remarks about the log.
     lat_deg, lon_deg: latitude and longitude in degrees, shape (n), optional.
     utc_s: Universal Time in s since 1970, shape (n), optional.
+    own_times: False if reading the log has changed its times.
 
     Optional arrays are NaN in samples without a new value.
 
@@ -120,6 +107,7 @@ class Log(Table):
     lat_deg: Array = field(default_factory=lambda: np.zeros(0))
     lon_deg: Array = field(default_factory=lambda: np.zeros(0))
     utc_s: Array = field(default_factory=lambda: np.zeros(0))
+    own_times: bool = True
 
     def __post_init__(self) -> None:
         self.t_s = np.asarray(self.t_s, dtype=float)
@@ -158,15 +146,68 @@ class Log(Table):
         return np.column_stack((self.accel_g, self.temperature_c, self.gyro_dps))
 
     @property
+    def has_temperature(self) -> bool:
+        """True if a sample has a temperature."""
+        return bool(np.any(~np.isnan(self.temperature_c)))
+
+    @property
     def start_utc_s(self) -> float | None:
         """Universal Time at the first sample in s, None if unknown. The median is used, because the receiver sends some
         times late."""
-        starts = (self.utc_s - self.t_s)[np.isfinite(self.utc_s)]
-        return float(np.median(starts)) if len(starts) else None
+        has_time = np.isfinite(self.utc_s)
+        return float(np.median((self.utc_s - self.t_s)[has_time])) if np.any(has_time) else None
+
+    def part(self, which: slice | Bools) -> Self:
+        """Select samples. Their times still count from this log's first sample, unlike those of between()."""
+        part = copy(self)
+        vars(part).update({name: values[which] for name, values in Table.columns(self).items()})
+        return part
+
+    def rows_between(self, from_s: float | None, to_s: float | None) -> slice:
+        """Return the rows of a stretch (see Stretch). Raises InputError if it has no sample."""
+        length_s = float(self.t_s[-1]) if len(self.t_s) else 0.0
+        begin_s, end_s = (None if t is None else t if t >= 0.0 else length_s + t for t in (from_s, to_s))
+        begin_us, end_us = round(1e6 * (begin_s or 0.0)), np.inf if end_s is None else round(1e6 * end_s)
+        if end_us <= begin_us:
+            raise InputError(f"{self.name}: the stretch ends before it begins: give --from the smaller time")
+        # Half a microsecond, because the limits are compared with times rounded to microseconds
+        begin, end = np.searchsorted(self.t_s, ((begin_us - 0.5) / 1e6, (end_us + 0.5) / 1e6)).tolist()
+        if begin == end:
+            raise InputError(f"{self.name}: no samples in this stretch: the log is {length_s:.1f} s long")
+        return slice(begin, end)
+
+    def between(self, from_s: float | None, to_s: float | None) -> "Log":
+        """Return a stretch as a log of its own, whose times count from its first sample. See rows_between()."""
+        part = self.part(self.rows_between(from_s, to_s))
+        return replace(part, t_s=(part.time_us - part.time_us[0]) * 1e-6, start_s=self.start_s + float(part.t_s[0]))
+
+    def parts(
+        self, selected: Bools, rows: slice = slice(None), most: int = PART_SAMPLES
+    ) -> Iterator[tuple[slice, Self]]:
+        """Yield the log in parts of at most `most` samples, so that memory does not grow with the log.
+
+        selected: True for the samples to use, shape (n).
+        rows: the part of the log to yield.
+        Yields the rows of each part in the log, and the selected samples of these rows.
+        """
+        begin, end, _ = rows.indices(len(self.t_s))
+        for start in range(begin, end, most):
+            span = slice(start, min(start + most, end))
+            part = self.part(span)
+            yield span, part if np.all(selected[span]) else part.part(selected[span])
 
     def rows(self) -> Iterator[FirmwareRow]:
-        """Yield the samples for a replay by the firmware's modules. See firmware_rows()."""
-        return firmware_rows(self.time_us, self.readings, self.speed_mps)
+        """Yield each sample for a replay by the firmware's modules.
+
+        Yields:
+            time: in us.
+            reading: list of acceleration (3 values, g), temperature (deg C) and rate (3 values, deg/s). A missing
+                temperature is replaced by ROOM_TEMP_C.
+            speed: in m/s, NaN if missing.
+        """
+        readings = self.readings
+        readings[:, 3] = np.nan_to_num(readings[:, 3], nan=ROOM_TEMP_C)
+        return zip(self.time_us.tolist(), readings.tolist(), self.speed_mps.tolist())
 
     def columns(self) -> dict[str, Array]:
         """The log's arrays, by the names of the columns in a CSV."""
@@ -178,63 +219,6 @@ class Log(Table):
     def _optional(self, values: ArrayLike) -> Array:
         array = np.asarray(values, dtype=float)
         return array if array.size else np.full(len(self.t_s), np.nan)
-
-
-@dataclass
-class Block(Table):
-    """Some successive rows of a log, in the units of the firmware's modules.
-
-    time_us: time in us since the log's first sample, shape (n).
-    readings: acceleration (3 columns, g), temperature (deg C) and rate (3 columns, deg/s), shape (n, 7).
-    speed_mps, lat_deg, lon_deg, utc_s: as in a Log. Missing values are NaN.
-    frozen: True for repeated readings (see frozen.py), shape (n).
-    has_temp: True if the log has temperatures.
-    start_s: the recorder's own time at the log's first sample, in s.
-    """
-
-    time_us: Ints
-    readings: Array
-    speed_mps: Array
-    lat_deg: Array
-    lon_deg: Array
-    utc_s: Array
-    frozen: Bools
-    has_temp: bool
-    start_s: float
-    done: int  # bytes read of the file before unpacking; for a log in memory, number of samples
-    lines: list[str] = field(default_factory=list)  # the rows as CSV, empty for a log in memory
-    names: tuple[str, ...] = ()  # names of the columns in lines
-    own_times: bool = True  # False if even_times.py changed the times, so they differ from the times in `lines`
-
-    def rows(self) -> Iterator[FirmwareRow]:
-        """Yield the samples for a replay by the firmware's modules. See firmware_rows()."""
-        return firmware_rows(self.time_us, self.readings, self.speed_mps)
-
-    @property
-    def t_s(self) -> Array:
-        """The time since the log's first sample in s, shape (n)."""
-        return self.time_us.astype(float) * 1e-6
-
-    @property
-    def time_text(self) -> list[str]:
-        """The times in s as texts. Unchanged times are copied from the file."""
-        if not self.lines or not self.own_times:
-            return [f"{self.start_s + t:.6f}" for t in self.t_s.tolist()]
-        place = self.names.index("t_s")
-        return [cells_of(line)[place].strip() for line in self.lines]
-
-    def part(self, which: slice | Bools) -> "Block":
-        """Select rows. See Table.part()."""
-        if isinstance(which, slice):
-            lines = self.lines[which]
-        else:
-            lines = [line for line, wanted in zip(self.lines, which.tolist()) if wanted]
-        return replace(super().part(which), lines=lines)
-
-    @property
-    def measured(self) -> "Block":
-        """The block without frozen rows."""
-        return self.part(~self.frozen) if np.any(self.frozen) else self
 
 
 @dataclass
@@ -265,51 +249,5 @@ class Stretch:
         """The log's name."""
         return name_of(self.source)
 
-    def of_length(self, length_s: float) -> "Stretch":
-        """The same stretch, with both limits counted from the log's start. length_s: duration of the log."""
-        times = [None if t is None else t if t >= 0.0 else length_s + t for t in (self.from_s, self.to_s)]
-        return Stretch(self.source, *times)
 
-    def holds(self, block: Block) -> Bools:
-        """Return True for each sample of a block that is in the stretch, shape (n).
-
-        The block's times and both limits of the stretch must count from the start of the whole log.
-        """
-        begin_us, end_us = self._ends_us()
-        return (block.time_us >= begin_us) & (block.time_us <= end_us)
-
-    def _ends_us(self) -> tuple[float, float]:
-        return round(1e6 * (self.from_s or 0.0)), float("inf") if self.to_s is None else round(1e6 * self.to_s)
-
-    def cut(self, blocks: Iterator[Block]) -> Iterator[Block]:
-        """Yield the samples of the stretch. blocks: the whole log. Raises InputError if the stretch has no sample."""
-        begin_us, end_us = self._ends_us()
-        if end_us <= begin_us:
-            raise InputError(f"{self.name}: the stretch ends before it begins: give --from the smaller time")
-        from_us, length_s = None, 0.0
-        for block in blocks:
-            length_s = float(block.t_s[-1])
-            if block.time_us[0] > end_us:
-                break
-            within = self.holds(block)
-            if not within.any():
-                continue
-            part = block if within.all() else block.part(within)
-            from_us = int(part.time_us[0]) if from_us is None else from_us
-            yield replace(part, time_us=part.time_us - from_us, start_s=part.start_s + from_us / 1e6)
-        if from_us is None:
-            raise InputError(f"{self.name}: no samples in this stretch: the log is {length_s:.1f} s long")
-
-
-def within(stretch: Stretch | None, block: Block, values: Array) -> Iterator[tuple[Block, Array]]:
-    """Yield the rows of a block that are in the stretch, and the values of these rows. Yield nothing if the block has
-    no such rows.
-
-    stretch: None selects all rows.
-    block: a block of the whole log.
-    values: one row per row of the block, shape (n, ...).
-    """
-    if stretch is None:
-        yield block, values
-    elif (which := stretch.holds(block)).any():
-        yield block.part(which), values[which]
+Source = File | Log | Stretch  # everything that can be read as a log

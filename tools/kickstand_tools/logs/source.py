@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import IO, Any, cast
 
 from ..common.errors import InputError, cause
-from ..common.messages import Message, Remedy
+from ..common.messages import Message, Remedy, kind
 
 # Limit in bytes for one line, and for the NUL bytes that a file system may leave at the end of a file after a power cut
 LONGEST_LINE = 16_000_000
@@ -20,21 +20,12 @@ File = Path | str | IO[bytes] | IO[str]
 Progress = Callable[[int, int], None]  # called with (done, total) in the same unit; total is 0 if unknown
 
 
-class NulEnd(Message):
-    """The file ends in NUL bytes. count: number of NUL bytes."""
-
-    count: int
-
-    code = "nul-end"
-    text = "its end is {count} NUL bytes, as after a loss of power: they are left out"
-
-
-class CutGzip(Message):
-    """The end of a gzip file is missing."""
-
-    code = "cut-gzip"
-    text = "the file was cut: the readings at its end are lost"
-    todo = Remedy("copy it again if you can")
+NulEnd = kind("nul-end", "count", "its end is {count} NUL bytes, as after a loss of power: they are left out")
+CutGzip = kind(
+    "cut-gzip",
+    text="the file was cut: the readings at its end are lost",
+    todo=Remedy("copy it again if you can"),
+)
 
 
 def open_input(path: Path | str) -> IO[bytes]:
@@ -134,29 +125,29 @@ def _pieces(name: str, file: Any, packed: Any, size: int, remarks: list[Message]
             if cut:
                 yield _with_line_feeds(pending[:cut]), read if packed is file else packed.tell()
                 pending = pending[cut:]
-    kept = pending.rstrip(b"\0")
-    if remarks is not None and len(kept) < len(pending):
-        remarks.append(NulEnd(len(pending) - len(kept)))
-        pending = kept
+    stripped = pending.rstrip(b"\0")
+    if remarks is not None and len(stripped) < len(pending):
+        remarks.append(NulEnd(len(pending) - len(stripped)))
+        pending = stripped
     if pending:
         yield _with_line_feeds(pending), read if packed is file else packed.tell()
 
 
 def _data(file: Any, size: int, remarks: list[Message] | None) -> Iterator[bytes]:
     """Yield the content of the file. A cut gzip file ends at the cut, if anything could be unpacked."""
-    packed, there = isinstance(file, gzip.GzipFile), False
+    packed, has_data = isinstance(file, gzip.GzipFile), False
     while True:
         try:
             # read1() returns the data before a cut. read() would raise EOFError and lose that data.
             data = file.read1(size) if packed else file.read(size)
         except EOFError:
-            if remarks is None or not there:
+            if remarks is None or not has_data:
                 raise
             remarks.append(CutGzip())
             return
         if not data:
             return
-        there = True
+        has_data = True
         yield data.encode() if isinstance(data, str) else data
 
 

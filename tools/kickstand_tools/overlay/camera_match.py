@@ -6,7 +6,7 @@ The magnitude does not depend on the direction in which the camera points.
 import numpy as np
 
 from ..common.errors import InputError
-from ..joining.motion import STEP_S, CellMotion
+from ..joining.motion import STEP_S, BinMotion
 from ..signals import Array, correlations, log_likelihood_ratio, moving_mean, peak_offset, peaks
 from .video import Telemetry
 
@@ -18,7 +18,7 @@ _LEAST_EVIDENCE, _LEAST_LEAD, _LEAST_CORRELATION = 15.0, 6.0, 0.5
 _APART_S = 2.0
 
 
-def camera_offset_s(ride: CellMotion, camera: Telemetry) -> tuple[float, float]:
+def camera_offset_s(ride: BinMotion, camera: Telemetry) -> tuple[float, float]:
     """Find the ride's time at the video's first picture.
 
     A camera on the bike turns with the bike. A camera on a helmet also turns with the head, and may not match.
@@ -33,7 +33,7 @@ def camera_offset_s(ride: CellMotion, camera: Telemetry) -> tuple[float, float]:
     count = np.bincount(cell)
     rate = np.column_stack([np.bincount(cell, axis) for axis in camera.rate_dps.T]) / np.maximum(count, 1)[:, None]
     filmed, ridden = _turning(rate - np.median(rate[count > 0], axis=0)), _turning(ride.rate_dps)
-    correlation, common = correlations(ridden, ride.there, filmed, count > 0)
+    correlation, common = correlations(ridden, ride.valid, filmed, count > 0)
     correlation = np.where(common * STEP_S >= _LEAST_S, correlation, 0.0)
     likely = log_likelihood_ratio(correlation, common, STEP_S / _ALIKE_S)
     best = peaks(likely, round(_APART_S / STEP_S), 2)

@@ -8,12 +8,13 @@ import numpy as np
 
 from ..analysis.ride import open_ride
 from ..calibration.file import CalibrationFile
+from ..checks.log import CheckedLog
 from ..common.errors import InputError
 from ..common.messages import Message
 from ..common.output import whole_file
 from ..joining.motion import motion
-from ..logs.reader import Source, read_twice
-from ..logs.source import File, Progress, name_of
+from ..logs.log import Source
+from ..logs.source import File, Progress
 from .camera_match import camera_offset_s
 from .shown import Shown, shown
 from .video import Video, ffmpeg, input_of, open_video, telemetry, write_video
@@ -90,12 +91,12 @@ def overlay(
     """
     out = Path(out)
     filmed = _check(out, video, offset_s, height)
-    opened = open_ride(read_twice(ride), calibration, smoothed=not live)
+    opened = open_ride(ride, calibration, smoothed=not live, progress=progress)
     correlation = None
     if filmed and offset_s is None:
-        offset_s, correlation = _found_offset(opened.log, filmed, progress)
-    notices: list[Message] = []
-    values = shown(opened, progress, notices)
+        offset_s, correlation = _found_offset(opened.checked, filmed)
+    reading = opened.read(progress)
+    values = shown(reading)
     begin_s, end_s = _part(values, filmed, offset_s, from_s, to_s, opened.name)
     rate = fps or (filmed.fps if filmed else _FPS)
     count = max(1, round((end_s - begin_s) * rate))
@@ -125,7 +126,7 @@ def overlay(
     with whole_file(out) as temporary:
         temporary.touch()  # if this fails, the system gives the reason; ffmpeg would not report the reason
         write_video(temporary, arguments, pictures(), drawn)
-    return Overlaid(count, rate, begin_s, end_s, offset_s, correlation, notices)
+    return Overlaid(count, rate, begin_s, end_s, offset_s, correlation, reading.notices())
 
 
 def _check(out: Path, video: Path | str | None, offset_s: float | None, height: int | None) -> Video | None:
@@ -144,15 +145,15 @@ def _check(out: Path, video: Path | str | None, offset_s: float | None, height: 
     return open_video(Path(video))
 
 
-def _found_offset(log: Source, video: Video, progress: Progress | None) -> tuple[float, float]:
+def _found_offset(ride: CheckedLog, video: Video) -> tuple[float, float]:
     todo = "give --offset, the ride's time in seconds at the video's first picture"
     measured = telemetry(video)
     if measured is None:
         raise InputError(f"{video.path}: it has no gyro readings of a GoPro that show when it was filmed: {todo}")
     try:
-        return camera_offset_s(motion(log, progress), measured)
+        return camera_offset_s(motion(ride), measured)
     except InputError as error:
-        raise InputError(f"{video.path}, {name_of(log)}: {error}: {todo}") from error
+        raise InputError(f"{video.path}, {ride.log.name}: {error}: {todo}") from error
 
 
 def _part(

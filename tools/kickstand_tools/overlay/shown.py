@@ -4,10 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis.ride import Ride
+from ..analysis.ride import RideReading
 from ..analysis.summary import HELD_S
-from ..common.messages import Message
-from ..logs.source import Progress
 from ..signals import Array, Ints, smoothed
 
 _FORCE_S = 0.3  # averaging time of the forces, because engine and road shake the sensor
@@ -62,15 +60,12 @@ class Shown:
         return Shown(t_s, lean, forward, left, speed, most_left, most_right)
 
 
-def shown(ride: Ride, progress: Progress | None = None, notices: list[Message] | None = None) -> Shown:
-    """Compute the values of a whole ride. open_ride() has selected the live or the smoothed lean.
-
-    progress, notices: see Ride.blocks(). Raises InputError.
-    """
+def shown(reading: RideReading) -> Shown:
+    """Compute the values of a ride. open_ride() has selected the live or the smoothed lean. Raises InputError."""
     columns: list[Array] = []
-    for block in ride.blocks(progress, notices):
-        lean = np.where(block.trusted, block.lean_deg, np.nan)
-        columns.append(np.array([block.t_s, lean, block.forward_g, block.lateral_g, block.speed_mps]))
+    for part in reading.parts():
+        lean = np.where(part.trusted, part.lean_deg, np.nan)
+        columns.append(np.array([part.t_s, lean, part.forward_g, part.lateral_g, part.speed_mps]))
     t_s, lean, forward, left, speed = np.hstack(columns)
     forward, left = (smoothed(values, t_s, _FORCE_S) for values in (forward, left))
     return Shown(t_s, lean, forward, left, speed, _maximum(t_s, -lean), _maximum(t_s, lean))

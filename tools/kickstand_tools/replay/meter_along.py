@@ -1,6 +1,6 @@
-"""Replays blocks of a log on this Python, and computes Nicolae's formula on arrays.
+"""Replays parts of a log on this Python, and computes Nicolae's formula on arrays.
 
-numpy computes all values that do not depend on earlier samples, for a whole block at once. So a log of an hour at 200
+numpy computes all values that do not depend on earlier samples, for a whole part at once. So a log of an hour at 200
 Hz takes 4.0 s instead of 7.2 s with Replay.step(). A test compares the results of this module with those of
 Replay.step().
 """
@@ -12,8 +12,8 @@ import numpy as np
 from kickstand.lean.meter import LeanMeter
 
 from ..calibration.file import CalibrationFile
-from ..common.messages import Message, Remedy, is_explained
-from ..logs.log import Block
+from ..common.messages import Message, Remedy, is_explained, kind
+from ..logs.log import Log
 from ..signals import Array, Bools
 from .replay_engine import NOT_SHOWN, ODD, Replay
 
@@ -22,28 +22,28 @@ TOO_SMALL = 0.01
 
 
 class MeterAlong(Replay):
-    """A Replay of whole blocks. Pass all blocks of a ride in order to columns() or to after_each()."""
+    """A Replay of parts of a log. Pass all parts in order to columns() or to after_each()."""
 
     def __init__(self, calibration: CalibrationFile) -> None:
         super().__init__(calibration.to_firmware(), delay_s=calibration.delay_s())
 
-    def in_vehicle(self, block: Block) -> tuple[list[Array], list[Array]]:
+    def in_vehicle(self, log: Log) -> tuple[list[Array], list[Array]]:
         """Return force in g and rate in rad/s along left, up and forward. Each is a list of three arrays, shape (n)."""
         force, rate = [np.zeros(0)] * 3, [np.zeros(0)] * 3
-        self.meter.in_vehicle(block.readings.T, force, rate)
+        self.meter.in_vehicle(log.readings.T, force, rate)
         return force, rate
 
-    def after_each(self, block: Block, force: list[Array], rate: list[Array]) -> Iterator[LeanMeter]:
-        """Yield the meter, always the same object, after each sample of the block. force, rate: from in_vehicle()."""
+    def after_each(self, log: Log, force: list[Array], rate: list[Array]) -> Iterator[LeanMeter]:
+        """Yield the meter, always the same object, after each sample of a part. force, rate: from in_vehicle()."""
         # Use the tuples of zip(), not lists of lists: they save time in Python's garbage collector
         forces, rates = (zip(*(axis.tolist() for axis in vector)) for vector in (force, rate))
-        return self.follow(zip(block.time_us.tolist(), forces, rates, block.speed_mps.tolist()))
+        return self.follow(zip(log.time_us.tolist(), forces, rates, log.speed_mps.tolist()))
 
-    def columns(self, block: Block) -> Array:
-        """Return the results of Replay.step() for all samples of the block, one column per replay_engine.COLUMNS."""
-        force, rate = self.in_vehicle(block)
+    def columns(self, log: Log) -> Array:
+        """Return the results of Replay.step() for all samples of a part, one column per replay_engine.COLUMNS."""
+        force, rate = self.in_vehicle(log)
         leans, variances = [], []
-        for meter in self.after_each(block, force, rate):
+        for meter in self.after_each(log, force, rate):
             leans.append(meter.lean_deg)
             variances.append(meter.filter.variance if meter.trusted else ODD if meter.odd else NOT_SHOWN)
         variance = np.array(variances)
@@ -60,22 +60,13 @@ class MeterAlong(Replay):
         )
 
 
-class ReadingsMisfit(Message):
-    """The meter repeatedly reported readings that contradict each other.
-
-    seconds: Total duration of the reports.
-    first_s: Time of the first report.
-    """
-
-    seconds: float
-    first_s: float
-
-    code = "readings-misfit"
-    text = (
-        "the readings repeatedly contradict each other, first at {first_s:.0f} s, {seconds:.0f} s in all; the board "
-        "shows no lean there"
-    )
-    todo = Remedy("is the sensor's mount loose, or the sensor faulty?")
+ReadingsMisfit = kind(
+    "readings-misfit",
+    "seconds first_s",  # total duration of the meter's reports, time of the first one
+    "the readings repeatedly contradict each other, first at {first_s:.0f} s, {seconds:.0f} s in all; the board shows "
+    "no lean there",
+    Remedy("is the sensor's mount loose, or the sensor faulty?"),
+)
 
 
 @dataclass
@@ -99,10 +90,10 @@ class Misfit:
             self.first_s = self.first_s if self.seconds else float(t_s[np.argmax(odd)])
             self.seconds += float(np.sum(np.diff(t_s, prepend=t_s[0])[odd])) or 1e-6
 
-    def remarks(self, known: Iterable[Message]) -> list[Message]:
-        """Return the notice about contradicting readings. The list is empty if a notice in `known` explains the
+    def remarks(self, notices: Iterable[Message]) -> list[Message]:
+        """Return the notice about contradicting readings. The list is empty if one of the notices explains the
         readings."""
-        if not self.seconds or is_explained(known):
+        if not self.seconds or is_explained(notices):
             return []
         return [ReadingsMisfit(self.seconds, self.first_s)]
 

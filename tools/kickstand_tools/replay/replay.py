@@ -1,10 +1,10 @@
-"""Replays a recorded log with the firmware's own LeanMeter on one of several engines, block by block."""
+"""Replays a recorded log with the firmware's own LeanMeter on one of several engines, part by part."""
 
 import contextlib
 import struct
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -12,12 +12,14 @@ from typing import IO
 import numpy as np
 
 from ..calibration.file import CalibrationFile
+from ..calibration.mount import read_ride
+from ..checks.log import CheckedLog
 from ..common import plugins, unix_port
 from ..common.errors import InputError
-from ..common.messages import Message
+from ..common.messages import Message, kind
 from ..logs.csv_lines import write_lean
-from ..logs.log import Block, Table, within
-from ..logs.reader import Source, read_blocks, read_twice, split_stretch
+from ..logs.log import Source, Table
+from ..logs.reader import time_texts
 from ..logs.source import Progress
 from ..signals import Array
 from . import replay_engine
@@ -64,14 +66,11 @@ class LeanTable(Table):
     notices: list[Message]
 
 
-class CarReplayed(Message):
-    """The log is from a car. A car's display shows no lean."""
-
-    code = "car-replayed"
-    text = (
-        "the calibration is a car's, whose display shows no lean: lean_deg is that of a motorcycle with the same "
-        "readings, and lean_sigma_deg is nan"
-    )
+CarReplayed = kind(
+    "car-replayed",
+    text="the calibration is a car's, whose display shows no lean: lean_deg is that of a motorcycle with the same "
+    "readings, and lean_sigma_deg is nan",
+)
 
 
 def replay(
@@ -94,10 +93,16 @@ def replay(
     >>> float(abs(lean.lean_deg - ride.truth["lean_deg"]).max()) < 10.0
     True
     """
-    notices: list[Message] = []
-    blocks = [(block.t_s, results) for block, results in replay_blocks(log, calibration, engine, progress, notices)]
-    time_s, columns = (np.concatenate(parts) for parts in zip(*blocks))
-    return LeanTable(time_s, *columns.T, notices=notices)
+    return replay_checked(read_ride(log, calibration), calibration, engine, progress)
+
+
+def replay_checked(
+    ride: CheckedLog, calibration: CalibrationFile, engine: str = "cpython", progress: Progress | None = None
+) -> LeanTable:
+    """Run replay() over a checked log."""
+    run = _Replay(ride, calibration, engine, progress)
+    columns = np.concatenate(list(run.parts()))
+    return LeanTable(ride.log.t_s[ride.rows], *columns.T, notices=run.notices())
 
 
 def replay_to_csv(
@@ -105,70 +110,74 @@ def replay_to_csv(
 ) -> tuple[int, list[Message]]:
     """Replay a log and write LEAN.csv. Its columns are the log's own times, then replay_engine.COLUMNS.
 
-    Memory does not grow with the length of the log, except with the engine rp2040, which is too slow for long logs.
-
     Returns the number of samples and the notices. Raises InputError if the log cannot be used.
     """
-    notices: list[Message] = []
-    rows = replay_blocks(log, calibration, engine, progress, notices)
-    return write_lean(out, replay_engine.COLUMNS, [5] * len(replay_engine.COLUMNS), rows), notices
+    ride = read_ride(log, calibration)
+    run, times = _Replay(ride, calibration, engine, progress), time_texts(log, ride.log, ride.rows)
+    count = write_lean(out, replay_engine.COLUMNS, [5] * len(replay_engine.COLUMNS), times, run.parts())
+    return count, run.notices()
 
 
-def replay_blocks(
-    log: Source, calibration: CalibrationFile, engine: str, progress: Progress | None, notices: list[Message]
-) -> Iterator[tuple[Block, Array]]:
-    """Yield each block of the log with the engine's results, one column per replay_engine.COLUMNS.
+class _Replay:
+    """Runs an engine over a ride part by part. Call parts(), and at its end notices()."""
 
-    Frozen readings are a gap for the engine, and their results are NaN. For a car, lean_sigma_deg is always NaN,
-    because a car's display shows no lean. At the end, remarks are appended to notices.
-    """
-    car = calibration.vehicle == "car"
-    whole, stretch = split_stretch(log)
-    misfit = Misfit()
-    for block, results in _replayed(whole, calibration, engine, progress, notices):
-        if not car:
-            misfit.add(block.t_s[~block.frozen], results[:, _SIGMA] == replay_engine.ODD)
-        found = _with_frozen(block, results)
-        if car:
-            found[:, _SIGMA] = np.nan
-        yield from within(stretch, block, found)
-    notices += [CarReplayed()] if car else misfit.remarks(notices)
+    def __init__(self, ride: CheckedLog, calibration: CalibrationFile, engine: str, progress: Progress | None) -> None:
+        self._ride, self._calibration, self._engine, self._progress = ride, calibration, engine, progress
+        self._car, self._misfit = calibration.vehicle == "car", Misfit()
 
+    def parts(self) -> Iterator[Array]:
+        """Yield the results of successive samples of the stretch, one column per replay_engine.COLUMNS.
 
-def _replayed(
-    log: Source, calibration: CalibrationFile, engine: str, progress: Progress | None, notices: list[Message]
-) -> Iterator[tuple[Block, Array]]:
-    """Yield each block with the results for its rows that are not frozen, one column per replay_engine.COLUMNS."""
-    log = read_twice(log) if engine in _BY_RECORDS else log
-    shown = None if engine == "rp2040" else progress
-    blocks = read_blocks(log, 2, shown, notices, calibration=calibration)
-    if engine == "cpython":
-        meter = MeterAlong(calibration)
-        return ((block, meter.columns(block.measured)) for block in blocks)
-    run = _BY_RECORDS[engine] or plugins.part(plugins.ENGINES, engine)
-    return _by_records(run(_records(read_blocks(log, lines=False), calibration), progress), blocks)
+        Frozen readings are a gap for the engine, and their results are NaN. For a car, lean_sigma_deg is always NaN,
+        because a car's display shows no lean.
+        """
+        log, measured = self._ride.log, self._ride.measured
+        first, last, _ = self._ride.rows.indices(len(log.t_s))
+        for (span, part), values in zip(log.parts(measured), self._results()):
+            if not self._car:
+                self._misfit.add(part.t_s, values[:, _SIGMA] == replay_engine.ODD)
+            results = np.full((span.stop - span.start, len(replay_engine.COLUMNS)), np.nan)
+            results[measured[span]] = values
+            sigma = results[:, _SIGMA]
+            sigma[(sigma < 0.0) | self._car] = np.nan
+            if first < span.stop and span.start < last:
+                yield results[max(0, first - span.start) : last - span.start]
+            if self._progress and self._engine != "rp2040":
+                self._progress(span.stop, len(log.t_s))
 
+    def notices(self) -> list[Message]:
+        """Return the remarks about the ride."""
+        notices = self._ride.notices
+        return [*notices, *([CarReplayed()] if self._car else self._misfit.remarks(notices))]
 
-def _with_frozen(block: Block, results: Array) -> Array:
-    """Add rows of NaN for the frozen rows of the block. results: the results of all other rows."""
-    found = np.full((len(block.time_us), len(replay_engine.COLUMNS)), np.nan)
-    found[~block.frozen] = results
-    sigma = found[:, _SIGMA]
-    sigma[sigma < 0.0] = np.nan
-    return found
+    def _results(self) -> Iterator[Array]:
+        """Yield the results for the measured readings of each part."""
+        parts = self._ride.log.parts(self._ride.measured)
+        if self._engine == "cpython":
+            meter = MeterAlong(self._calibration)
+            yield from (meter.columns(part) for _, part in parts)
+            return
+        run = _BY_RECORDS[self._engine] or plugins.part(plugins.ENGINES, self._engine)
+        with run(self._records(), self._progress) as file:
+            for _, part in parts:
+                size = _RESULT_BYTES * len(part.t_s)
+                data = file.read(size)
+                if len(data) < size:
+                    words = _last_words(data + file.read())
+                    raise InputError(f"MicroPython stopped ({words}): use --engine cpython")
+                yield np.frombuffer(data, dtype="<f8").reshape(-1, len(replay_engine.COLUMNS))
 
-
-def _by_records(
-    run: contextlib.AbstractContextManager[IO[bytes]], blocks: Iterator[Block]
-) -> Iterator[tuple[Block, Array]]:
-    """Yield each block with its results. Another Python reads records and writes results with replay_engine.run()."""
-    with run as results:
-        for block in blocks:
-            wanted = _RESULT_BYTES * int(np.count_nonzero(~block.frozen))
-            found = results.read(wanted)
-            if len(found) < wanted:
-                raise InputError(f"MicroPython stopped ({_last_words(found + results.read())}): use --engine cpython")
-            yield block, np.frombuffer(found, dtype="<f8").reshape(-1, len(replay_engine.COLUMNS))
+    def _records(self) -> Iterator[bytes]:
+        """Yield the bytes that replay_engine.run() reads."""
+        calibration = self._calibration
+        numbers = *calibration.parameters(), *calibration.matrices(), calibration.delay_s()
+        yield struct.pack(replay_engine.CALIBRATION, *numbers)
+        for _, part in self._ride.log.parts(self._ride.measured):
+            for time_us, reading, speed in part.rows():
+                has_speed = speed >= 0.0  # False for NaN
+                yield struct.pack(
+                    replay_engine.RECORD, time_us, *reading, speed if has_speed else replay_engine.NO_SPEED
+                )
 
 
 @contextlib.contextmanager
@@ -195,13 +204,3 @@ _BY_RECORDS: dict[str, Engine | None] = {"micropython": micropython, "rp2040": N
 def _last_words(traceback: bytes) -> str:
     """Return the last line of MicroPython's traceback. MicroPython prints the traceback to standard output."""
     return traceback.decode(errors="replace").strip().rpartition("\n")[2]
-
-
-def _records(blocks: Iterable[Block], calibration: CalibrationFile) -> Iterator[bytes]:
-    """Yield the bytes that replay_engine.run() reads."""
-    numbers = *calibration.parameters(), *calibration.matrices(), calibration.delay_s()
-    yield struct.pack(replay_engine.CALIBRATION, *numbers)
-    for block in blocks:
-        for time_us, reading, speed in block.measured.rows():
-            given = speed if speed >= 0.0 else replay_engine.NO_SPEED  # NaN is not >= 0 either
-            yield struct.pack(replay_engine.RECORD, time_us, *reading, given)

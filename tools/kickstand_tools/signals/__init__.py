@@ -1,11 +1,11 @@
 """Functions on arrays of samples, for all other packages. The functions use only numpy, neither logs nor files.
 
-This module has moving means, standard deviations and integrals, means over cells of time, lag and correlation of two
+This module has moving means, standard deviations and integrals, means over bins of time, lag and correlation of two
 signals, rotation vectors and matrices, standstills, and distances. leaning.py relates a motorcycle's lean to its yaw
 rate.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -86,45 +86,41 @@ def integral(time_s: Array, values: Array) -> Array:
 
 
 def _padded(values: Array, n: int) -> Array:
-    before, after = np.repeat(values[:1], n // 2, 0), np.repeat(values[-1:], n - 1 - n // 2, 0)
-    return np.concatenate((before, values, after))
+    head, tail = np.repeat(values[:1], n // 2, 0), np.repeat(values[-1:], n - 1 - n // 2, 0)
+    return np.concatenate((head, values, tail))
 
 
-# Means of samples over cells of time, block by block. Such means remove vibration and need little memory.
+# Means of samples over bins of time. Such means remove vibration and need little memory.
 
 
-def cell_numbers(time_s: Array, cell_s: float) -> Ints:
-    """Return the number of the cell that contains each time, shape (n).
+def bin_numbers(time_s: Array, bin_s: float) -> Ints:
+    """Return the number of the bin that contains each time, shape (n).
 
-    A time on the border of two cells belongs to the later cell, even if rounding made it slightly smaller.
+    A time on the border of two bins belongs to the later bin, even if rounding made it slightly smaller.
     """
-    return np.floor(time_s / cell_s + 1e-6).astype(np.int64)
+    number = time_s / bin_s  # in place from here on: a log has millions of samples
+    number += 1e-6
+    return np.floor(number, out=number).astype(np.int32)
 
 
 def runs(values: NDArray[np.generic]) -> Ints:
-    """Return the first index of each run of equal values. There must be at least one value.
-
-    Returns one index per run, shape (m).
-    """
+    """Return the first index of each run of equal values, shape (m). There must be at least one value."""
     return np.flatnonzero(np.append(True, values[1:] != values[:-1]))
 
 
-def stretches(true: Bools) -> Ints:
-    """Find the runs of True.
-
-    Returns the first index of each of the m runs and the index after its end, shape (m, 2).
-    """
+def intervals(true: Bools) -> Ints:
+    """Find the runs of True: the first index of each of m runs, and the index after its end, shape (m, 2)."""
     return np.flatnonzero(np.diff(np.concatenate(([False], true, [False])))).reshape(-1, 2)
 
 
 @dataclass
-class EvenCells:
-    """n successive cells. Some may have no samples.
+class Bins:
+    """n successive bins of time. Some may have no samples.
 
-    first: number of the first cell.
-    count: number of samples in each cell, shape (n).
-    means: averaged values of each cell, shape (n, k); NaN in a cell without samples. See Cells.add().
-    latest: last values of each cell, shape (n, j); NaN in a cell without this value. See Cells.add().
+    first: number of the first bin.
+    count: number of samples in each bin, shape (n).
+    means: averaged values of each bin, shape (n, k); NaN in a bin without samples.
+    latest: last values of each bin, shape (n, j); NaN in a bin without this value.
     """
 
     first: int
@@ -132,17 +128,16 @@ class EvenCells:
     means: Array
     latest: Array
 
-    def merged(self, by: int) -> "EvenCells":
-        """Merge the cells into longer cells.
+    def merged(self, by: int) -> "Bins":
+        """Merge the bins into bins that are `by` times as long, and begin at multiples of `by`.
 
-        The new cells are `by` times as long, and begin at multiples of `by`. `latest` of a new cell is the first value
-        in it.
+        `latest` of a new bin is the first value in it.
         """
-        before = self.first % by
-        after = -(before + len(self.count)) % by
+        lead = self.first % by
+        trail = -(lead + len(self.count)) % by
 
         def grouped(values: Array, fill: float) -> Array:
-            width = ((before, after), *[(0, 0)] * (values.ndim - 1))
+            width = ((lead, trail), *[(0, 0)] * (values.ndim - 1))
             return np.pad(values, width, constant_values=fill).reshape(-1, by, *values.shape[1:])
 
         count = grouped(self.count, 0.0)
@@ -150,67 +145,41 @@ class EvenCells:
         sums = np.sum(np.nan_to_num(grouped(self.means, 0.0)) * count[:, :, None], axis=1)
         means = np.divide(sums, total[:, None], out=np.full_like(sums, np.nan), where=total[:, None] > 0.0)
         latest = grouped(self.latest, np.nan)
-        place = np.argmax(~np.isnan(latest), axis=1)[:, None]
-        return EvenCells(self.first // by, total, means, np.take_along_axis(latest, place, axis=1)[:, 0])
+        row = np.argmax(~np.isnan(latest), axis=1)[:, None]
+        return Bins(self.first // by, total, means, np.take_along_axis(latest, row, axis=1)[:, 0])
 
 
-class Cells:
-    """Averages samples over cells of time. Call add() block by block, in chronological order.
+def binned(
+    time_s: Array, bin_s: float, means: Sequence[Array], latest: Sequence[Array], most: int, longest: int
+) -> Bins | None:
+    """Average n samples over bins of bin_s. The columns are used one by one, to save memory.
 
-    cell_s: length of a cell, in s.
-    most: number of cells with samples to keep, the last ones; 0 to keep all.
+    time_s: increasing, shape (n), in s.
+    means: the k columns to average, each of shape (n).
+    latest: j other columns, each of shape (n). Each bin keeps the last value that is not NaN.
+    most: number of bins with samples to use, the last ones.
+    longest: largest number of all bins.
+    Returns None without samples, or if gaps make more than `longest` bins.
     """
-
-    def __init__(self, cell_s: float, most: int = 0) -> None:
-        self.cell_s, self._most = cell_s, most
-        # Each part has the shape (m, 2 + k + j). Its columns are number of the cell, count of samples, sums, and latest
-        # values.
-        self._parts: list[Array] = []
-        self._means = 0
-
-    def add(self, time_s: Array, means: Array, latest: Array) -> None:
-        """Add n samples.
-
-        time_s: times of the samples, shape (n), in s.
-        means: values to average, shape (n, k).
-        latest: other values, shape (n, j). Each cell keeps the last value of each column that is not NaN.
-        """
-        if not len(time_s):
-            return
-        number = cell_numbers(time_s, self.cell_s)
-        starts = runs(number)
-        self._means, after = means.shape[1], 2 + means.shape[1]
-        new = np.full((len(starts), after + latest.shape[1]), np.nan)
-        new[:, 0] = number[starts]
-        new[:, 1] = np.diff(np.append(starts, len(number)))
-        new[:, 2:after] = np.add.reduceat(means, starts, axis=0)
-        for column, values in enumerate(latest.T, after):
-            there = np.flatnonzero(~np.isnan(values))
-            new[np.searchsorted(starts, there, side="right") - 1, column] = values[there]
-        if self._parts and self._parts[-1][-1, 0] == new[0, 0]:  # the previous block ended within this cell
-            begun = self._parts[-1][-1]
-            new[0, 1:after] += begun[1:after]
-            new[0, after:] = np.where(np.isnan(new[0, after:]), begun[after:], new[0, after:])
-            self._parts[-1] = self._parts[-1][:-1]
-        self._parts.append(new)
-        if self._most:
-            self._parts = [np.vstack(self._parts)[-self._most :]]
-
-    def evenly(self, longest: int) -> EvenCells | None:
-        """Return the cells from the first to the last cell with samples.
-
-        Returns None if no cell has samples, or if there are more than `longest` cells.
-        """
-        table = np.vstack(self._parts) if self._parts else np.zeros((0, 2))
-        place = (table[:, 0] - table[:1, 0]).astype(np.int64)
-        if not len(place) or place[-1] >= longest:
-            return None
-        even = np.full((place[-1] + 1, table.shape[1] - 1), np.nan)
-        even[:, 0] = 0.0
-        even[place] = table[:, 1:]
-        means = even[:, 1 : 1 + self._means]
-        means /= np.maximum(even[:, :1], 1.0)
-        return EvenCells(int(table[0, 0]), even[:, 0], means, even[:, 1 + self._means :])
+    if not len(time_s):
+        return None
+    number = bin_numbers(time_s, bin_s)
+    starts = runs(number)[-most:]
+    used = slice(int(starts[0]), None)
+    number, starts = number[used], starts - starts[0]
+    row = number[starts] - number[0]
+    if row[-1] >= longest:
+        return None
+    count = np.zeros(row[-1] + 1)
+    count[row] = np.diff(np.append(starts, len(number)))
+    averages, last = np.full((len(count), len(means)), np.nan), np.full((len(count), len(latest)), np.nan)
+    for k, values in enumerate(means):
+        averages[row, k] = np.add.reduceat(values[used], starts) / count[row]
+    for k, values in enumerate(latest):
+        values = values[used]
+        valid = np.flatnonzero(~np.isnan(values))
+        last[number[valid] - number[0], k] = values[valid]
+    return Bins(int(number[0]), count, averages, last)
 
 
 # The lag of one signal behind another. For example, the speed of a satellite receiver is later than the force.
@@ -239,8 +208,8 @@ def correlation(effect: Array, cause: Array, whole: bool = False) -> Correlation
         `direction`. The value is then smaller if the cause also varies in other directions.
     """
     effect, cause = effect - np.mean(effect), cause - np.mean(cause, axis=0)
-    both = effect @ cause
-    direction = both / max(float(np.linalg.norm(both)), 1e-12)
+    covariance = effect @ cause
+    direction = covariance / max(float(np.linalg.norm(covariance)), 1e-12)
     along = cause @ direction
     size = float(np.sqrt((effect @ effect) * (np.sum(cause * cause) if whole else along @ along)))
     return Correlation(float(effect @ along) / size if size > 0.0 else 0.0, direction)
@@ -272,16 +241,16 @@ def best_lag(
     Returns None if pair_at returns None for all lags.
     """
     tried = [(lag_s, pair_at(lag_s)) for lag_s in lags_s]
-    found = [(lag_s, correlation(*pair, whole)) for lag_s, pair in tried if pair is not None]
-    if not found:
+    candidates = [(lag_s, correlation(*pair, whole)) for lag_s, pair in tried if pair is not None]
+    if not candidates:
         return None
-    values = np.array([each.value for _, each in found])
+    values = np.array([each.value for _, each in candidates])
     best = int(np.argmax(values))
-    lag_s, at = found[best]
-    inside = 0 < best < len(found) - 1
+    lag_s, peak = candidates[best]
+    inside = 0 < best < len(candidates) - 1
     if inside:
-        lag_s += peak_offset(values[best - 1 : best + 2] ** 2) * (found[best + 1][0] - lag_s)
-    return Lag(at.value, at.direction, float(lag_s), inside)
+        lag_s += peak_offset(values[best - 1 : best + 2] ** 2) * (candidates[best + 1][0] - lag_s)
+    return Lag(peak.value, peak.direction, float(lag_s), inside)
 
 
 def peak_offset(three: Array) -> float:
@@ -289,9 +258,9 @@ def peak_offset(three: Array) -> float:
 
     Returns its distance from the middle value, in steps, from -0.5 to 0.5.
     """
-    before, here, after = three
-    bend = before - 2.0 * here + after
-    return float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
+    first, middle, last = three
+    bend = first - 2.0 * middle + last
+    return float(np.clip(0.5 * (first - last) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
 
 
 def correlations(first: Array, first_good: Bools, second: Array, second_good: Bools) -> tuple[Array, Array]:
@@ -311,14 +280,14 @@ def correlations(first: Array, first_good: Bools, second: Array, second_good: Bo
     a, b = np.where(first_good, first, 0.0), np.where(second_good, second, 0.0)
 
     def crossed(x: Array, y: Array) -> Array:
-        whole = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
-        return np.concatenate((whole[size - len(second) + 1 :], whole[: len(first)]))
+        products = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
+        return np.concatenate((products[size - len(second) + 1 :], products[: len(first)]))
 
-    there, other = first_good.astype(float), second_good.astype(float)
-    count = np.maximum(np.rint(crossed(there, other)), 0.0)
+    mask, second_mask = first_good.astype(float), second_good.astype(float)
+    count = np.maximum(np.rint(crossed(mask, second_mask)), 0.0)
     # The transforms have rounding errors, about 1e-9 of the total sum of squares or less. A sum below this is only
     # rounding error, so it is replaced by the limit.
-    square = np.maximum(crossed(a * a, other), 1e-9 * (a @ a)) * np.maximum(crossed(there, b * b), 1e-9 * (b @ b))
+    square = np.maximum(crossed(a * a, second_mask), 1e-9 * (a @ a)) * np.maximum(crossed(mask, b * b), 1e-9 * (b @ b))
     return crossed(a, b) / np.sqrt(np.maximum(square, 1e-30)), count
 
 
@@ -340,12 +309,12 @@ def peaks(values: Array, apart: int, most: int) -> list[int]:
 
     Returns their indices, the largest maximum first.
     """
-    left, found = values.copy(), []
-    while len(found) < most and np.max(left) > 0.0:
-        place = int(np.argmax(left))
-        found.append(place)
-        left[max(0, place - apart) : place + apart + 1] = 0.0
-    return found
+    remaining, indices = values.copy(), []
+    while len(indices) < most and np.max(remaining) > 0.0:
+        index = int(np.argmax(remaining))
+        indices.append(index)
+        remaining[max(0, index - apart) : index + apart + 1] = 0.0
+    return indices
 
 
 # Rotation vectors and rotation matrices. A rotation vector is the axis times the angle in rad. The functions convert

@@ -15,10 +15,10 @@ from . import Array, Bools, moving_mean, moving_spread
 WINDOW_S = 0.2  # length of the windows over which rates and forces are averaged
 SMOOTH_S = 0.6  # length of the moving mean that smooths rates before their changes are compared
 SLOW_S = 12.0  # a slower change of lean cannot be distinguished from the gyro's drift
-# If share, sigmas and likeness of a Leaning exceed these limits, its rates are in rad/s. In simulated and recorded
+# If share, sigmas and correlation of a Leaning exceed these limits, its rates are in rad/s. In simulated and recorded
 # rides, the share was 1.0 to 1.6 for rates in deg/s. It was 57 to 92 for rates in rad/s, at over 5 sigmas. Cars had a
-# likeness under 0.6.
-SHARE, SIGMAS, LIKENESS = 15.0, 4.5, 0.65
+# correlation under 0.6.
+SHARE, SIGMAS, CORRELATION = 15.0, 4.5, 0.65
 # Smallest rms of the lean, in rad, for a ride that is not nearly straight. The limit is this small, because a lean of
 # 2 degrees looks like 2 / 57.3 degrees if rates in rad/s are read as deg/s.
 LEAST_LEAN = np.radians(2.0 / 57.3)
@@ -31,7 +31,7 @@ class Leaning:
     matrix: rough rotation from sensor to vehicle axes, shape (3, 3). The rows are left, up and forward.
     rolled: lean without its slow changes (see without_drift()), shape (n), in rad.
     turned: yaw rate without its slow changes, positive to the left, shape (n), in rad/s.
-    likeness: correlation of rolled and -turned while riding.
+    correlation: correlation of rolled and -turned while riding.
     speed: speed at which yaw rate and lean balance, by regression, in m/s.
     share: ratio of the rate about left to yaw rate x sin(lean), by regression. It is 1 if the axes are right-handed and
         the rates in deg/s.
@@ -41,7 +41,7 @@ class Leaning:
     matrix: Array
     rolled: Array
     turned: Array
-    likeness: float
+    correlation: float
     speed: float
     share: float
     sigmas: float
@@ -63,8 +63,8 @@ def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
     left = np.cross(up, forward)
     rolled, yaw = without_drift(np.cumsum(rate @ forward) * WINDOW_S), rate @ up
     turned = without_drift(yaw)
-    both, squared = -float(rolled[riding] @ turned[riding]), float(turned[riding] @ turned[riding])
-    speed = both / max(squared, 1e-30) * STANDARD_GRAVITY
+    covariance, squared = -float(rolled[riding] @ turned[riding]), float(turned[riding] @ turned[riding])
+    speed = covariance / max(squared, 1e-30) * STANDARD_GRAVITY
     expected = (yaw * np.sin(leaned(rolled, yaw, speed)))[riding]
     expected -= expected.mean()
     about_left = (rate @ left)[riding]
@@ -76,26 +76,26 @@ def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
         np.array([left, up, forward]),
         rolled,
         turned,
-        both / float(np.sqrt(max(float(rolled[riding] @ rolled[riding]) * squared, 1e-30))),
+        covariance / float(np.sqrt(max(float(rolled[riding] @ rolled[riding]) * squared, 1e-30))),
         speed,
         share,
         abs(share) / max(float(noise), 1e-12),
     )
 
 
-def speed_in_radians(found: Leaning) -> float | None:
+def speed_in_radians(leaning: Leaning) -> float | None:
     """Detect rates in rad/s that are labelled deg/s, so they are 57 times too small.
 
     Returns the impossible speed in bends, in m/s, that these rates would mean in deg/s. Returns None if the rates are
     not surely in rad/s.
     """
-    wrong = found.share > SHARE and found.sigmas > SIGMAS and found.likeness > LIKENESS
-    return float(np.degrees(found.speed)) if wrong and leans(found) else None
+    wrong = leaning.share > SHARE and leaning.sigmas > SIGMAS and leaning.correlation > CORRELATION
+    return float(np.degrees(leaning.speed)) if wrong and leans(leaning) else None
 
 
-def leans(found: Leaning) -> bool:
+def leans(leaning: Leaning) -> bool:
     """True if the bike leans at all: the rms of the lean is over LEAST_LEAN."""
-    return float(np.sqrt(np.mean(found.rolled**2))) > LEAST_LEAN
+    return float(np.sqrt(np.mean(leaning.rolled**2))) > LEAST_LEAN
 
 
 def leaned(rolled: Array, yaw: Array, speed: Array | float) -> Array:
@@ -118,7 +118,7 @@ def without_drift(values: Array) -> Array:
     return values - averaged(averaged(values, SLOW_S), SLOW_S)
 
 
-def unrest(values: Array, over_s: float) -> Array:
+def moving_deviation(values: Array, over_s: float) -> Array:
     """Compute the moving standard deviation of three components over over_s seconds.
 
     values: three components at each time, shape (n, 3).

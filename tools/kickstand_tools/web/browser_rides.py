@@ -20,8 +20,8 @@ import numpy as np
 from ..analysis import report
 from ..analysis.overview import overview
 from ..analysis.plot.page import page
-from ..analysis.ride import Ride, open_ride
-from ..calibration.file import calibration_path, write_calibration
+from ..analysis.ride import open_ride
+from ..calibration.file import calibration_path, read_calibration, write_calibration
 from ..common.errors import InputError
 from ..estimation.alignment import fit_ride
 from ..estimation.smooth import COLUMNS, DIGITS, smooth_to_csv
@@ -29,12 +29,13 @@ from ..imports import mapped
 from ..imports.importing import import_recording, write_imported
 from ..joining.joined import join_track, write_joined
 from ..logs.csv_lines import write_lean
-from ..logs.reader import read_blocks
+from ..logs.reader import read_log, time_texts
+from ..logs.source import log_stem
 from .ride_files import sorted_out
 
 PLOTLY = "./plotly/plotly.min.js"  # the page of a ride loads plotly from the site
 MADE = Path("../made")  # results are not written beside the given files, because names could collide
-_smoothed: dict[str, list] = {}  # {name of the last shown ride: results of smooth_blocks(), one per block}
+_smoothed: dict[str, list] = {}  # {name of the last shown ride: its smoothed lean, one array per part}
 TOO_LONG = "this ride is too long for the memory of a browser: give a part of it"
 
 
@@ -141,15 +142,6 @@ def take(log, is_log, columns, units, track, progress):
     return {"log": out, "warnings": warnings, "words": words} | entry
 
 
-class _Keeping(Ride):
-    """A ride whose smoothed lean is kept for smooth(), because computing it takes long."""
-
-    def _read(self, log, progress, notices):
-        for block, smoothed in super()._read(log, progress, notices):
-            _smoothed.setdefault(self.name, []).append(smoothed)
-            yield block, smoothed
-
-
 @in_json
 def look(log, calibration, progress):
     """Compute the results of `report` and `plot`.
@@ -164,10 +156,9 @@ def look(log, calibration, progress):
         plotly: address of the script that this HTML loads.
         stem: name of the ride without suffixes.
     """
-    opened = open_ride(Path(log), Path(calibration), smoothed=True)
     _smoothed.clear()
-    ride = _Keeping(opened.log, opened.calibration, opened.smoothed)
-    ride_overview = overview(ride, progress)
+    ride = open_ride(Path(log), Path(calibration), smoothed=True)
+    ride_overview = overview(ride, progress, _smoothed.setdefault(log, []).append)
     table = {"units": report.STOPS_UNITS, "title": report.STOPS_TITLE, "terms": report.STOPS_TERMS}
     return {
         "words": asdict(report.words(ride_overview, on_page=True)) | table,
@@ -185,25 +176,13 @@ def smooth(log, calibration, progress):
 
     Returns {"path": path of LEAN.csv}.
     """
-    ride = open_ride(Path(log), Path(calibration))
-    out = _result_path(log, f"{ride.stem}.lean.csv")
-    parts = _smoothed.get(ride.name, [None])
-    if any(part is None for part in parts):
-        smooth_to_csv(Path(log), ride.calibration, out, progress)
+    file, out = Path(log), _result_path(log, f"{log_stem(log)}.lean.csv")
+    smoothed = _smoothed.get(log)
+    if smoothed:
+        write_lean(out, COLUMNS, DIGITS, time_texts(file, read_log(file)), smoothed)
     else:
-        write_lean(out, COLUMNS, DIGITS, _blocks_with(np.concatenate(parts), ride, progress))
+        smooth_to_csv(file, read_calibration(Path(calibration)), out, progress)
     return {"path": str(out)}
-
-
-def _blocks_with(values, ride, progress):
-    """Yield each block of the ride's log with its rows of values.
-
-    values: shape (number of samples, number of columns).
-    """
-    end = 0
-    for block in read_blocks(ride.log, 2, progress, calibration=ride.calibration):
-        end, begin = end + len(block.time_us), end
-        yield block, values[begin:end]
 
 
 @in_json

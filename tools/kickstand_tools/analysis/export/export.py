@@ -2,22 +2,18 @@
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
 from ...common.errors import InputError, extra
-from ...common.messages import Message
+from ...common.messages import Message, kind
 from ...common.output import whole_file
-from ...logs.log import Stretch
-from ...logs.reader import Source, read_blocks, read_twice
 from ...logs.source import Progress
-from ...signals import Array
 from ..channels import Channels, downsampled, rounded_to
 from ..ride import Ride
-from ..track import LogTrack, joined, track
+from ..track import track
 from . import export_columns, export_gpx, export_racechrono, export_vbo
 
 STEP_S = {"csv": 0.0, "gpx": 0.0, "parquet": 0.0, "racechrono": 0.001, "vbo": 0.01}  # resolution of the time
@@ -33,32 +29,16 @@ _DATED = ("gpx", "racechrono", "vbo")  # formats that need date and time
 _CLOCK_S = 1e8  # a time in a log is Unix time if it is larger than this (March 1973)
 
 
-class RowsShare(Message):
-    """Several samples have the same time in the format."""
-
-    samples: int
-    rows: int
-    step_s: float
-
-    code = "rows-share"
-    text = (
-        "this format holds times to {step_s:g} s: {samples} samples became {rows} rows, those with the same time their "
-        "mean"
-    )
+RowsShare = kind(
+    "rows-share",
+    "samples rows step_s",
+    "this format holds times to {step_s:g} s: {samples} samples became {rows} rows, those with the same time their "
+    "mean",
+)
 
 
-def export(
-    ride: Ride, form: str, out: Path | str, progress: Progress | None = None, notices: list[Message] | None = None
-) -> int:
-    """Write a ride of open_ride() to a file. After an error, no incomplete file remains.
-
-    The format gpx needs positions. The formats gpx, racechrono and vbo need date and time, which a satellite receiver
-    gives. A board without a receiver has no clock. Its ride is assumed to end when the log's file was last written.
-
-    form: "csv" (gzipped if `out` ends in .gz), "gpx", "parquet", "racechrono" or "vbo".
-    progress: called with (done, total) of the log.
-    notices: remarks about the log are appended to this list.
-    Returns the number of rows. Raises InputError.
+def export(ride: Ride, form: str, out: Path | str, progress: Progress | None = None) -> int:
+    """Write a ride of open_ride() to a file. Returns the number of rows. See export_with_notices().
 
     >>> import tempfile
     >>> import numpy as np
@@ -68,82 +48,65 @@ def export(
     ...     export(open_ride(log, CalibrationFile(aligned=True)), "csv", f"{directory}/ride.csv")
     300
     """
+    return export_with_notices(ride, form, out, progress)[0]
+
+
+def export_with_notices(
+    ride: Ride, form: str, out: Path | str, progress: Progress | None = None
+) -> tuple[int, list[Message]]:
+    """Write a ride of open_ride() to a file. After an error, no incomplete file remains.
+
+    The format gpx needs positions. The formats gpx, racechrono and vbo need date and time, which a satellite receiver
+    gives. A board without a receiver has no clock. Its ride is assumed to end when the log's file was last written.
+
+    form: "csv" (gzipped if `out` ends in .gz), "gpx", "parquet", "racechrono" or "vbo".
+    progress: called with (done, total) of the log's samples.
+    Returns the number of rows, and remarks about the log. Raises InputError.
+    """
     name, library = _NEEDS.get(form, ("", ""))
     if library and not find_spec(library):
         raise InputError(f"{name} needs {library}: " + extra("rides"))
-    ride = replace(ride, log=read_twice(ride.log))
-    log = ride.log.source if isinstance(ride.log, Stretch) else ride.log
-    extent = _first_pass(log)
-    start_s = extent.start_s
-    if form == "gpx" and not len(extent.places.t_s):
+    log, positions = ride.log, track(ride.log)
+    has_speed = ~np.isnan(log.speed_mps)
+    if form == "gpx" and not len(positions.t_s):
         raise InputError(f"{ride.name} has no positions (lat_deg, lon_deg), so there is no track to write")
-    if form in _DATED and extent.utc_s is not None:
-        start_s = extent.utc_s
+    start_s = log.start_s
+    if form in _DATED and log.start_utc_s is not None:
+        start_s = log.start_utc_s
     elif form in _DATED and start_s < _CLOCK_S:
-        written_s = Path(log).stat().st_mtime if isinstance(log, (Path, str)) else time.time()
-        start_s = float(max(0, int(written_s - extent.seconds)))
+        file = Path(ride.name)
+        written_s = file.stat().st_mtime if file.is_file() else time.time()
+        start_s = float(max(0, int(written_s - log.t_s[-1])))
     step_s = STEP_S[form]
     if step_s:  # start and times are both rounded, so that different times stay different
         start_s = round(start_s / step_s) * step_s
     count = sample_count = 0
+    reading = ride.read(progress)
 
     def measured() -> Iterator[Channels]:
         nonlocal sample_count
-        for block in ride.blocks(progress, notices):
-            sample_count += len(block.t_s)
-            yield block
+        for part in reading.parts():
+            sample_count += len(part.t_s)
+            yield part
 
     def rows() -> Iterator[Channels]:
         nonlocal count
-        for block in downsampled(measured(), step_s, rounded=True) if step_s else measured():
+        for part in downsampled(measured(), step_s, rounded=True) if step_s else measured():
             if form == "gpx":
-                block = block.part(np.isfinite(block.lat_deg) & np.isfinite(block.lon_deg))
-            if form in ("gpx", "vbo") and len(extent.speeds):
+                part = part.part(np.isfinite(part.lat_deg) & np.isfinite(part.lon_deg))
+            if form in ("gpx", "vbo") and np.any(has_speed):
                 # Every row of a VBO file needs a speed. Without interpolation, rows between two speeds would have a
                 # speed of 0.
-                block.speed_mps = np.interp(block.t_s, *extent.speeds.T)
+                part.speed_mps = np.interp(part.t_s, log.t_s[has_speed], log.speed_mps[has_speed])
             if form == "vbo":
-                block.lat_deg, block.lon_deg = extent.places.at(block.t_s)
-            block.lean_sigma_deg = np.where(block.trusted, block.lean_sigma_deg, np.nan)  # as in the output of `replay`
+                part.lat_deg, part.lon_deg = positions.at(part.t_s)
+            part.lean_sigma_deg = np.where(part.trusted, part.lean_sigma_deg, np.nan)  # as in the output of `replay`
             if step_s:
-                block.t_s = rounded_to(block.t_s, step_s)
-            count += len(block.t_s)
-            yield block
+                part.t_s = rounded_to(part.t_s, step_s)
+            count += len(part.t_s)
+            yield part
 
     with whole_file(Path(out)) as temporary:
         _WRITE[form](temporary, rows(), start_s)
-    if notices is not None and step_s and count < sample_count:
-        notices.append(RowsShare(sample_count, count, step_s))
-    return count
-
-
-@dataclass
-class _Extent:
-    """The data that the first pass finds in a log.
-
-    start_s: time of the first sample, in the log's own time.
-    seconds: duration of the log.
-    speeds: time since the first sample in s, and speed in m/s, shape (n, 2).
-    places: the positions.
-    utc_s: Universal Time of the first sample; None if unknown. The median over the rows is used, because some values
-        are late.
-    """
-
-    start_s: float
-    seconds: float
-    speeds: Array
-    places: LogTrack
-    utc_s: float | None
-
-
-def _first_pass(log: Source) -> _Extent:
-    start_s, seconds, speeds, tracks, starts_utc_s = 0.0, 0.0, [], [], []
-    for block in read_blocks(log, lines=False):
-        start_s, seconds = block.start_s, float(block.t_s[-1])
-        valid = ~np.isnan(block.speed_mps)
-        speeds.append(np.column_stack((block.t_s[valid], block.speed_mps[valid])))
-        tracks.append(track(block))
-        starts_utc_s.append((block.utc_s - block.t_s)[np.isfinite(block.utc_s)])
-    offsets_s = np.concatenate(starts_utc_s)
-    utc_s = float(np.median(offsets_s)) if len(offsets_s) else None
-    return _Extent(start_s, seconds, np.concatenate(speeds), joined(tracks), utc_s)
+    shared = [RowsShare(sample_count, count, step_s)] if step_s and count < sample_count else []
+    return count, [*reading.notices(), *shared]

@@ -23,7 +23,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from ...signals import STANDING_MPS, Array, integral, smoothed, stretches
+from ...signals import STANDING_MPS, Array, integral, intervals, smoothed
 from ..channels import Channels, thinned
 from .speed_fit import fitted_speed, speed_delay_s
 from .standstill import standing
@@ -115,7 +115,7 @@ def stops_of(ride: Channels, still: NDArray[np.bool_]) -> list[Stop]:
     """
     delay_s = speed_delay_s(ride)
     stops, earlier_end = [], 0
-    for start, end in stretches(still):
+    for start, end in intervals(still):
         first = max(earlier_end, int(np.searchsorted(ride.t_s, ride.t_s[start] - LONGEST_S)))
         last = min(int(end), int(np.searchsorted(ride.t_s, ride.t_s[start] + REST_S, side="right")))
         gaps = np.flatnonzero(np.diff(ride.t_s[first:last]) > GAP_S)

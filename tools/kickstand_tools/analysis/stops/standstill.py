@@ -8,7 +8,7 @@ find 91 %.
 
 import numpy as np
 
-from ...signals import STANDING_MPS, Array, Bools, smoothed, stretches, window_means, window_spreads
+from ...signals import STANDING_MPS, Array, Bools, intervals, smoothed, window_means, window_spreads
 from ..channels import Channels, spacing_s
 
 STALE_S = 3.0  # an older speed is not used
@@ -70,10 +70,10 @@ def _rests_of_filter(ride: Channels) -> Bools:
     """
     still = ride.resting > 0.5
     forward = smoothed(ride.forward_g, ride.t_s, ENGINE_S)
-    for start, _ in stretches(still):
+    for start, _ in intervals(still):
         weight = np.median(forward[start : start + 10])
-        off = np.flatnonzero(np.abs(forward[:start] - weight) > 2 * STILL_G)
-        still[(int(off[-1]) + 1 if len(off) else 0) : start] = True
+        moving = np.flatnonzero(np.abs(forward[:start] - weight) > 2 * STILL_G)
+        still[(int(moving[-1]) + 1 if len(moving) else 0) : start] = True
     return still
 
 

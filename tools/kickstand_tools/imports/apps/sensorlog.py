@@ -18,7 +18,6 @@ from ..recording import (
     RecordedSensor,
     Sheet,
     names_in,
-    plain,
     read_sheet,
     sensor_of,
     track_of,
@@ -55,8 +54,8 @@ def read(files: list[RecordingFile], name: str) -> AppRecording:
 
 
 def _is_ours(file: RecordingFile) -> bool:
-    head = {plain(cell) for cell in names_in(next(iter(file.first_lines(1)), ""))}
-    return bool(head & {plain(_ACCEL[0]), plain(_USER[0])})
+    head = names_in(next(iter(file.first_lines(1)), ""))
+    return any(cell.startswith((_ACCEL[0], _USER[0])) for cell in head)
 
 
 def _axis_columns(sheet: Sheet, names: list[str]) -> list[int]:

@@ -4,6 +4,7 @@ bench() measures, and tables() formats the result.
 """
 
 import ast
+import re
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -164,6 +165,7 @@ def tables(result: dict[str, Any]) -> Table:
         ),
         *((f"while {name}", _mode_text(mode)) for name, mode in result["modes"].items()),
         ("reset to first lean", f"{starts['py']['lean_s']:.2f} s from .py, {starts['mpy']['lean_s']:.2f} s from .mpy"),
+        ("names, of 1260", str(result["names"])),
         ("size on flash", f"{size['py'] / 1000:.1f} kB as .py, {size['mpy'] / 1000:.1f} kB as .mpy"),
     ):
         figures.add_row(name, text)
@@ -207,6 +209,7 @@ def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = Non
         "collection_pause_us": _spread(run["pauses"]),
         "free_heap_bytes": figures["free_before"],
         "free_heap_at_end_bytes": figures["free_after"],
+        "names": run["names"],
     }
 
 
@@ -244,7 +247,8 @@ def _run(chip: str, seconds: int, chosen: dict[str, Any] | None = None) -> dict[
         code = f"{device.SINK}import bench_guest\nbench_guest.run({seconds}, Sink(), {chosen})\n"
         output = device.exec(code, limit_s=2.0 * seconds + 30.0)
         # The figures follow the output of a Sink
-        result["figures"] = ast.literal_eval(output.rpartition("\x02")[2].strip())
+        result["figures"] = ast.literal_eval(output.rpartition("\x02")[2].strip().splitlines()[-1])
+        result["names"] = int(re.findall(r"n_qstr=(\d+)", output)[-1])
     turns = result["figures"]["turns"]
     result["took"] = arrays[0][:turns]
     asked_for = arrays[1][: result["figures"]["collections_by_app"]]

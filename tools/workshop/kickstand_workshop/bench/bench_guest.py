@@ -10,6 +10,7 @@ from kickstand import app as app_module
 from kickstand.devices import open_lcd, open_sensor
 from kickstand.settings import Settings
 from machine import mem16
+from micropython import qstr_info
 from uctypes import addressof, bytearray_at
 
 SETTLE_TURNS = 150  # number of passes of the loop before the first pass that is recorded
@@ -190,6 +191,7 @@ def run(seconds, out, chosen):
     }
     if app.live:
         figures["sent"] = app.live.radio._ble.sent
+    qstr_info()
     for data in (app.took, app.pauses):
         out.write(bytearray_at(addressof(data), 2 * len(data)))
     print(figures)

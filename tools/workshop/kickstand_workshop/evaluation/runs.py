@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.calibration.mount import read_ride
 from kickstand_tools.calibration.poses import fit_six_positions, fit_two_positions
 from kickstand_tools.calibration.procedure import fit_procedure
-from kickstand_tools.checks.log import remarks
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.common.messages import Message
 from kickstand_tools.estimation.alignment import fit_ride
@@ -67,7 +67,7 @@ def score_recording(path: Path) -> RecordingScores:
         name: RealScore(rms((lean - reference)[riding]), slope(lean[riding], reference[riding], _LEANED_DEG))
         for name, lean in leans.items()
     }
-    notices = [*log.notices, *remarks(log, calibration, axes=False)]
+    notices = read_ride(log, calibration).notices
     return RecordingScores(path.name, scores, {"time": time, "reference": reference, **leans}, notices)
 
 

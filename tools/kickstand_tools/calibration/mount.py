@@ -16,13 +16,18 @@ In simulated and recorded rides with a correct calibration, up is found within 8
 import numpy as np
 from kickstand.units import AXES, STANDARD_GRAVITY
 
-from ..calibration.file import CalibrationFile
-from ..common.messages import AT_REST, OPPOSITE_SIGN, Message, Remedy, WrongMount
+from ..checks.bins import BIN_S, LogBins
+from ..checks.log import CheckedLog, read_checked
+from ..common.messages import AT_REST, OPPOSITE_SIGN, Message, Remedy, WrongMount, kind
+from ..logs.log import Source
+from ..logs.source import Progress
 from ..signals import Array, Lag, best_lag, correlation, rotated, rotation_vector
-from .cells import CELL_S, LogCells
+from .file import CalibrationFile
 
 MEAN_S = 0.5  # means over this time are used to judge up and the bends
-UP_DEG, FORWARD_DEG = 15.0, 25.0  # if up or forward differs by more, the calibration belongs to another mount
+# If up or forward differs by more, the calibration belongs to another mount. FEW_FORWARD_DEG is for under two
+# minutes of bends
+UP_DEG, FORWARD_DEG, FEW_FORWARD_DEG = 15.0, 25.0, 40.0
 # If the two poses were swapped, "up" is the up axis of the bike on the kickstand. That axis leans by up to LEANED_DEG.
 LEANED_DEG = 25.0
 BACKWARD_DEG = 150.0  # if forward differs by more than this, forward and backward are exchanged
@@ -40,8 +45,6 @@ SURE_SPEED, SURE_BENDS = 0.8, 0.55
 SURE_REVERSED = -0.6
 UPSIDE_DOWN = 0.87  # cosine of 30 degrees: an axis closer than this to straight down points down
 ANOTHER_MOUNT_DEG = 10.0  # if two alignments differ by more than this, they belong to different mounts
-
-
 SWAPPED_DEG = 4.0  # an upright pose is hardly ever this far from upright, but a pose on the kickstand always is
 UPSIDE_DOWN_DEG = 150.0  # if up differs by more than this, the accelerations may have the opposite sign
 # The remedies for a motorcycle, and for a car
@@ -55,145 +58,124 @@ AGAIN_CAR = Remedy(
 )
 
 
-class UpOff(WrongMount):
-    """Up differs between the calibration and the ride."""
-
-    angle_deg: float
-    car: bool
-
-    code = "up-off"
-    text = "the calibration's up is {angle_deg:.0f} degrees off, so nothing computed with it is right"
-
-    def remedy(self) -> Remedy:
-        """See Message."""
-        again = AGAIN_CAR if self.car else AGAIN
-        return again.followed(f". Or {OPPOSITE_SIGN}") if self.angle_deg > UPSIDE_DOWN_DEG else again
+def _again(message) -> Remedy:
+    return AGAIN_CAR if message.car else AGAIN
 
 
-class ForwardOff(WrongMount):
-    """Forward differs between the calibration and the ride.
-
-    angle_deg: angle from the calibration's forward to the ride's forward; positive to the left.
-    by: how forward was found in the ride, "speed" or "bends".
-    car: True for a car, False for a motorcycle.
-    """
-
-    angle_deg: float
-    by: str
-    car: bool
-
-    code = "forward-off"
-
-    def sentence(self) -> str:
-        """See Message."""
-        side = "left" if self.angle_deg > 0.0 else "right"
-        wrong = "braking and cornering are" if self.car else "lean, braking and cornering are"
-        return (
-            f"by the {self.by} of this ride forward is {abs(self.angle_deg):.0f} degrees to the {side} of the "
-            f"calibration's, so {wrong} wrong"
-        )
-
-    def remedy(self) -> Remedy:
-        """See Message."""
-        return AGAIN_CAR if self.car else AGAIN
+def _up_off_remedy(message) -> Remedy:
+    again = _again(message)
+    return again.followed(f". Or {OPPOSITE_SIGN}") if message.angle_deg > UPSIDE_DOWN_DEG else again
 
 
-class ForwardExchanged(WrongMount):
-    """Forward and backward are exchanged.
-
-    car: True for a car, False for a motorcycle.
-    side: side of the kickstand in the calibration by two poses; "" if unknown.
-    roll_deg: roll error of up; None if unknown. It shows whether the two poses were swapped.
-    """
-
-    car: bool
-    side: str
-    roll_deg: float | None
-
-    code = "forward-exchanged"
-    text = "forward and backward are exchanged"
-    judged = True
-
-    def remedy(self) -> Remedy:
-        """See Message."""
-        if self.car:
-            found = Remedy("calibrate drive again?", "was it aligned while driving backwards?")
-        elif self.roll_deg is not None and abs(self.roll_deg) > SWAPPED_DEG:
-            found = Remedy("were the poses swapped?")
-        else:
-            other = {"left": "--side right", "right": "--side left"}.get(self.side, "with the other --side")
-            found = Remedy(
-                f"calibrate two {other}?",
-                "does the kickstand lean the bike to the other side than SIDE in config.py says?",
-            )
-            found = found if self.roll_deg is not None else found.followed(" Or were the poses swapped?")
-        return found.followed(f" Or, if no board wrote this log, {OPPOSITE_SIGN}")
-
-
-class UpsideDown(WrongMount):
-    """The sensor is upside down, or its accelerations have the opposite sign.
-
-    axis: the axis that points down.
-    """
-
-    axis: str
-
-    code = "upside-down"
-    text = "the sensor's {axis} points down"
-    todo = Remedy(
-        "if it is not mounted upside down, all accelerations are of the opposite sign, and left and right get "
-        f"exchanged: reverse them ({AT_REST})"
+def _forward_off_words(message) -> str:
+    side = "left" if message.angle_deg > 0.0 else "right"
+    wrong = "braking and cornering are" if message.car else "lean, braking and cornering are"
+    return (
+        f"by the {message.by} of this ride forward is {abs(message.angle_deg):.0f} degrees to the {side} of the "
+        f"calibration's, so {wrong} wrong"
     )
 
 
-class AnotherMount(WrongMount):
-    """The earlier calibration belongs to another mount. The new calibration uses only its offset and slope."""
+def _exchanged_remedy(message) -> Remedy:
+    if message.car:
+        remedy = Remedy("calibrate drive again?", "was it aligned while driving backwards?")
+    elif message.roll_deg is not None and abs(message.roll_deg) > SWAPPED_DEG:
+        remedy = Remedy("were the poses swapped?")
+    else:
+        option = {"left": "--side right", "right": "--side left"}.get(message.side, "with the other --side")
+        remedy = Remedy(
+            f"calibrate two {option}?",
+            "does the kickstand lean the bike to the other side than SIDE in config.py says?",
+        )
+        remedy = remedy if message.roll_deg is not None else remedy.followed(" Or were the poses swapped?")
+    return remedy.followed(f" Or, if no board wrote this log, {OPPOSITE_SIGN}")
 
-    angle_deg: float
 
-    code = "another-mount"
-    text = "the calibration given is of a mount {angle_deg:.0f} degrees from this one: its offset and slope are used"
+# car: True for a car, False for a motorcycle
+UpOff = kind(
+    "up-off",
+    "angle_deg car",
+    "the calibration's up is {angle_deg:.0f} degrees off, so nothing computed with it is right",
+    _up_off_remedy,
+    WrongMount,
+)
+# angle_deg: angle from the calibration's forward to the ride's, positive to the left; by: "speed" or "bends"
+ForwardOff = kind("forward-off", "angle_deg by car", _forward_off_words, _again, WrongMount)
+# side: side of the kickstand in the calibration by two poses, or ""; roll_deg: roll error of up, or None if unknown. It
+# shows whether the two poses were swapped.
+ForwardExchanged = kind(
+    "forward-exchanged",
+    "car side roll_deg",
+    "forward and backward are exchanged",
+    _exchanged_remedy,
+    WrongMount,
+    judged=True,
+)
+UpsideDown = kind(
+    "upside-down",
+    "axis",
+    "the sensor's {axis} points down",
+    Remedy(
+        "if it is not mounted upside down, all accelerations are of the opposite sign, and left and right get "
+        f"exchanged: reverse them ({AT_REST})"
+    ),
+    WrongMount,
+)
+AnotherMount = kind(
+    "another-mount",
+    "angle_deg",
+    "the calibration given is of a mount {angle_deg:.0f} degrees from this one: its offset and slope are used",
+    base=WrongMount,
+)
 
 
-def contradiction(cells: LogCells, calibration: CalibrationFile) -> Message | None:
+def read_ride(source: Source, calibration: CalibrationFile, progress: Progress | None = None) -> CheckedLog:
+    """Read and check a ride, as read_checked(). The notices also say how the ride contradicts its calibration."""
+    ride = read_checked(source, progress)
+    problem = contradiction(ride.bins, calibration)
+    ride.notices += [problem] if problem else []
+    return ride
+
+
+def contradiction(bins: LogBins | None, calibration: CalibrationFile) -> Message | None:
     """Return a notice that says how a log contradicts a calibration.
 
     Returns None without a contradiction, or if the calibration is not aligned.
     """
-    if not calibration.aligned:
+    if bins is None or not calibration.aligned:
         return None
-    ride = _Ride(cells, calibration)
+    ride = _Ride(bins, calibration)
     car = calibration.vehicle == "car"
-    up, found, by = ride.up_deg(), ride.forward_by_speed(), "speed"
-    if found is None and (ride.speed_correlation() or 0.0) < SURE_REVERSED:
-        found = 180.0
-    if found is None and not car:
-        found, by = ride.forward_by_bends(), "bends"
-    exchanged = found is not None and abs(found) > BACKWARD_DEG
+    up, forward, by = ride.up_deg(), ride.forward_by_speed(), "speed"
+    if forward is None and (ride.speed_correlation() or 0.0) < SURE_REVERSED:
+        forward = 180.0
+    if forward is None and not car:
+        forward, by = ride.forward_by_bends(), "bends"
+    exchanged = forward is not None and abs(forward) > BACKWARD_DEG
     if up is not None and up > (LEANED_DEG if exchanged else UP_DEG):
         return UpOff(up, car)
     if exchanged:
         return ForwardExchanged(car, calibration.kickstand_side, None)  # None: the error of up is unknown
-    return None if found is None or abs(found) < FORWARD_DEG else ForwardOff(found, by, car)
+    return None if forward is None or abs(forward) < FORWARD_DEG else ForwardOff(forward, by, car)
 
 
-def of_calibration(found: CalibrationFile, before: CalibrationFile | None = None) -> list[Message]:
+def of_calibration(new: CalibrationFile, earlier: CalibrationFile | None = None) -> list[Message]:
     """Return notices about a new alignment.
 
     Accelerations of the opposite sign look like a sensor upside down. A log does not show which of the two it is, so
     the user is asked. An x axis that points down gives no notice, because a phone can lie on its side.
 
-    found: the calibration with the new alignment.
-    before: the earlier calibration, whose offset and slope are used. If the earlier calibration belongs to another
+    new: the calibration with the new alignment.
+    earlier: the earlier calibration, whose offset and slope are used. If the earlier calibration belongs to another
         mount, a notice says so.
     """
     notices: list[Message] = []
-    up = found.vehicle_from_sensor[1]
+    up = new.vehicle_from_sensor[1]
     axis = int(np.argmax(np.abs(up)))
     if up[axis] < -UPSIDE_DOWN and AXES[axis] != "x":
         notices.append(UpsideDown(AXES[axis]))
-    if before is not None and before.aligned:
-        turn = rotation_vector(found.vehicle_from_sensor @ before.vehicle_from_sensor.T)
+    if earlier is not None and earlier.aligned:
+        turn = rotation_vector(new.vehicle_from_sensor @ earlier.vehicle_from_sensor.T)
         turned_deg = float(np.degrees(np.linalg.norm(turn)))
         if turned_deg > ANOTHER_MOUNT_DEG:
             notices.append(AnotherMount(turned_deg))
@@ -203,7 +185,7 @@ def of_calibration(found: CalibrationFile, before: CalibrationFile | None = None
 class _Ride:
     """A log, expressed in the axes of a calibration."""
 
-    def __init__(self, cells: LogCells, calibration: CalibrationFile) -> None:
+    def __init__(self, bins: LogBins, calibration: CalibrationFile) -> None:
         def along(over_s: float) -> tuple[Array, Array, Array]:
             """Average n stretches of over_s seconds.
 
@@ -212,7 +194,7 @@ class _Ride:
                 rate: mean rate minus its median over the ride, shape (n, 3), in deg/s.
                 speed: first speed, shape (n), in m/s.
             """
-            accel, gyro, speed = cells.means(round(over_s / CELL_S))
+            accel, gyro, speed = bins.means(round(over_s / BIN_S))
             force, rate = rotated(calibration.vehicle_from_sensor, *calibration.in_sensor(accel, gyro))
             return force, rate - np.nanmedian(rate, axis=0), speed
 
@@ -237,18 +219,18 @@ class _Ride:
         Returns None if it is uncertain.
         """
         straight = np.linalg.norm(self._second_rate, axis=1) < STRAIGHT_DPS
-        found = self._pushed(np.where(straight[:, None], self._second_force[:, [0, 2]], np.nan))
-        return _angle_deg(found.direction) if found and found.value > SURE_SPEED else None
+        lag = self._lag_of_speed(np.where(straight[:, None], self._second_force[:, [0, 2]], np.nan))
+        return _angle_deg(lag.direction) if lag and lag.value > SURE_SPEED else None
 
     def speed_correlation(self) -> float | None:
         """Correlate the force along the calibration's forward with the changes of speed.
 
         Returns -1 to 1; None without enough speeds.
         """
-        found = self._pushed(self._second_force[:, 2:])
-        return found.value * float(found.direction[0]) if found else None
+        lag = self._lag_of_speed(self._second_force[:, 2:])
+        return lag.value * float(lag.direction[0]) if lag else None
 
-    def _pushed(self, force: Array) -> Lag | None:
+    def _lag_of_speed(self, force: Array) -> Lag | None:
         """Find the Lag of the changes of speed behind the force; None if there are too few changes.
 
         force: shape (n, k); NaN where it must not be used.
@@ -256,10 +238,10 @@ class _Ride:
 
         def earlier(by: float) -> tuple[Array, Array] | None:
             change = self._change_g[int(by) :]
-            there = ~np.isnan(change) & ~np.isnan(force[: len(change), 0])
-            change = change[there]
+            valid = ~np.isnan(change) & ~np.isnan(force[: len(change), 0])
+            change = change[valid]
             enough = len(change) >= SPEEDS and np.std(change) * STANDARD_GRAVITY >= SPEED_MPS
-            return (change, force[: len(there)][there]) if enough else None
+            return (change, force[: len(valid)][valid]) if enough else None
 
         return best_lag(LATE_S, earlier, whole=True)
 
@@ -267,13 +249,15 @@ class _Ride:
         """Find forward from the way a motorcycle leans into bends. For the result see forward_by_speed()."""
         if len(self._rate) < BENDS:
             return None
-        turned = _smooth(self._rate[2:, 1] - self._rate[:-2, 1])
-        rolled = _smooth(self._rate[1:-1])[:, [0, 2]]
-        there = ~np.isnan(turned + rolled[:, 0])
-        if np.count_nonzero(there) < BENDS or np.std(turned[there]) < BENDS_DPS:
+        yaw_change = _smooth(self._rate[2:, 1] - self._rate[:-2, 1])
+        roll_rate = _smooth(self._rate[1:-1])[:, [0, 2]]
+        valid = ~np.isnan(yaw_change + roll_rate[:, 0])
+        if np.count_nonzero(valid) < BENDS or np.std(yaw_change[valid]) < BENDS_DPS:
             return None
-        found = correlation(-turned[there], rolled[there], whole=True)
-        return _angle_deg(found.direction) if found.value > SURE_BENDS else None
+        lean = correlation(-yaw_change[valid], roll_rate[valid], whole=True)
+        angle_deg = _angle_deg(lean.direction)
+        unsure = np.count_nonzero(valid) < 2 * BENDS and FORWARD_DEG < abs(angle_deg) < FEW_FORWARD_DEG
+        return angle_deg if lean.value > SURE_BENDS and not unsure else None
 
 
 def _angle_deg(direction: Array) -> float:
