@@ -170,11 +170,13 @@ def test_status_equals_the_output_of_the_command(line, page, board, monkeypatch)
 
 
 def test_after_its_first_use_the_page_works_without_a_network(line, page, board):
-    look(line, board)
-    line.rider.context.set_offline(True)
-    page.reload()
-    assert "is there" in look(line, board)
-    page.wait_for_function("document.querySelector('.wired img').naturalWidth > 0")
+    """The pictures are kept when they are first seen with the service worker ready."""
+    page.evaluate("async () => { await navigator.serviceWorker.ready }")
+    for offline in (False, True):
+        line.rider.context.set_offline(offline)
+        page.reload()
+        assert "is there" in look(line, board)
+        page.wait_for_function("document.querySelector('.wired img').naturalWidth > 0")
     line.rider.context.set_offline(False)
 
 
