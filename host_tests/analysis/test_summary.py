@@ -152,9 +152,9 @@ def test_channels_and_maxima_are_those_of_the_display(tmp_path):
     assert (total.brake_g.value, total.accel_g.value) == (meter.max_brake_g, meter.max_accel_g)
 
 
-def test_a_smoothed_ride_differs_only_in_its_lean(short_ride):
+def test_a_smoothed_ride_differs_in_lean_and_standstills(short_ride):
     live, smoothed = (joined(open_ride(short_ride, None, smoothed=smooth).read().parts()) for smooth in (False, True))
     names = {field.name for field in fields(Channels)}
-    equal = {name for name in names if np.array_equal(getattr(smoothed, name), getattr(live, name), equal_nan=True)}
-    assert names - equal == {"lean_deg", "lean_sigma_deg", "lateral_g", "sure"}
+    equal = {name for name in names if np.allclose(getattr(smoothed, name), getattr(live, name), 0, 1e-12, True)}
+    assert names - equal == {"lean_deg", "lean_sigma_deg", "lateral_g", "sure", "resting", "rolling"}
     assert np.array_equal(smoothed.sure > 0.0, smoothed.lean_sigma_deg <= 3.0) and np.any(smoothed.trusted)

@@ -33,8 +33,8 @@ class Channels(Table):
     speed_mps, temp_c: speed and temperature in the log.
     shown_g: forward force in g, smoothed as on the display.
     lean_sigma_deg: standard deviation of the lean.
-    resting: 1 if the meter has detected a standstill, otherwise 0.
-    rolling: 1 if the speed that the meter estimates is surely not 0, otherwise 0.
+    resting: 1 if the meter or the smoothing has detected a standstill, otherwise 0.
+    rolling: 1 if the speed that they estimate is surely not 0, otherwise 0.
     sure: 1 if the meter trusts its lean, otherwise 0.
     doubtful: 1 if smooth() doubts the lean, otherwise 0. It is 0 if the lean is not smoothed.
     lat_deg, lon_deg: degrees north and east. NaN in a sample without a new position.
