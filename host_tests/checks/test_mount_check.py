@@ -74,7 +74,7 @@ def test_wrong_calibrations_are_reported(profile, speed):
         assert line in said(log, other(calibration, "", **turns)), turns
     for angle, side in (90.0, "left"), (-90.0, "right"):
         notice = contradiction(bins_of(log), other(calibration, up=angle))
-        assert isinstance(notice, ForwardOff)
+        assert notice is not None and isinstance(notice, ForwardOff)
         assert (notice.angle_deg, notice.by, notice.car) == (pytest.approx(angle, abs=8.0), by, False)
         assert f" degrees to the {side} of the calibration's" in sentence(notice)
     upside_down = Log(log.t_s, -log.accel_g, log.gyro_dps, log.speed_mps)

@@ -29,7 +29,7 @@ BOARDS = {
 # Messages of pyright that are ignored, because code for a board has no type annotations. The messages are about names
 # that are first None or NoRecorder, settings made by setattr(), pointers in viper functions, and ticks, which are
 # numbers.
-UNTYPED = '"None"', 'for class "NoRec', 'for class "Settings', 'of type "ptr', "Variable not allowed in", '"_Ticks'
+UNTYPED = '"None"', 'for class "type[NoRec', 'for class "Settings', 'of type "ptr', "Variable not allowed in", '"_Ticks'
 
 
 @pytest.fixture(scope="module", params=["rp2", "esp32"])

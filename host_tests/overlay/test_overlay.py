@@ -15,7 +15,7 @@ from support.recordings import gopro
 
 @pytest.fixture(scope="module")
 def lean(ride):
-    return shown(api.open_ride(ride, smoothed=True))
+    return shown(api.open_ride(ride, smoothed=True).read())
 
 
 @pytest.fixture(scope="module")

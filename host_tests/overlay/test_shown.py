@@ -45,20 +45,20 @@ def test_a_speed_is_shown_between_speeds_up_to_3_s_apart():
 
 
 def test_shown_values_are_those_of_the_display(ride):
-    values, lean = shown(api.open_ride(ride)), api.vehicle_channels(ride)
+    values, lean = shown(api.open_ride(ride).read()), api.vehicle_channels(ride)
     assert np.array_equal(values.t_s, lean.t_s) and values.has_speed
     assert np.array_equal(values.lean_deg, np.where(lean.trusted, lean.lean_deg, NAN), equal_nan=True)
     assert values.right_deg[-1] == pytest.approx(np.nanmax(values.lean_deg), abs=0.5)
     assert values.at(values.t_s[-1:] - 6.0).forward_g[0] < -0.2  # it brakes
     turning = np.abs(values.lean_deg) > 25.0
     assert np.all(np.sign(values.left_g[turning]) == -np.sign(values.lean_deg[turning]))
-    smoothed = shown(api.open_ride(ride, smoothed=True))
+    smoothed = shown(api.open_ride(ride, smoothed=True).read())
     assert np.nanmax(np.abs(smoothed.lean_deg - values.lean_deg)) > 0.5  # only smoothing uses later readings
 
 
 def test_contradicted_calibration_is_noticed(ride):
     turned_deg = api.CalibrationFile(vehicle_from_sensor=np.diag([-1.0, 1.0, -1.0]), aligned=True)
     for calibration, codes in ((api.CalibrationFile(aligned=True), []), (turned_deg, ["forward-exchanged"])):
-        notices: list[api.Message] = []
-        shown(api.open_ride(ride, calibration), notices=notices)
-        assert [notice.code for notice in notices] == codes
+        reading = api.open_ride(ride, calibration).read()
+        shown(reading)
+        assert [notice.code for notice in reading.notices()] == codes

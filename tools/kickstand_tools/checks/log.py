@@ -75,10 +75,11 @@ class CheckedLog:
     bins: LogBins | None = None
 
 
-def check_log(log: Log, axes: bool = True) -> CheckedLog:
+def check_log(log: Log, axes: bool = True, sensor: bool = True) -> CheckedLog:
     """Check units, sensor, axes and speed of a log. It has at most one remark about its axes.
 
     axes: check that rates and accelerations fit each other. This check takes most of the time.
+    sensor: look for readings that the sensor has not measured.
     Raises InputError for accelerations without gravity or in m/s2, and for times in ms. Raises its subclass
     RefusedInput for a speed that is not in m/s.
 
@@ -91,7 +92,7 @@ def check_log(log: Log, axes: bool = True) -> CheckedLog:
     ['left-handed']
     """
     _check_units(log)
-    faulty, notices = find_faulty(log)
+    faulty, notices = find_faulty(log) if sensor else (np.zeros(len(log.t_s), bool), [])
     measured = ~faulty
     bins = _bins(log, measured)
     if bins is not None:
@@ -112,10 +113,12 @@ def read_checked(source: Source, progress: Progress | None = None) -> CheckedLog
 
 
 def read_with_notices(source: Source, axes: bool = True) -> Log:
-    """Read and check a log, or a stretch as a log of its own. Its notices include those of check_log()."""
+    """Read and check a log, or a stretch as a log of its own. Its notices include those of check_log().
+
+    The sensor is not checked, because the log keeps all readings."""
     log = read_log(source)
     log = log.part(slice(None))  # a copy, because the source may be the user's own Log
-    log.notices = check_log(log, axes).notices
+    log.notices = check_log(log, axes, sensor=False).notices
     return log
 
 

@@ -83,7 +83,7 @@ class ImportTurned(Message):
     """The sign of the accelerations of a table is changed, because the track shows that it is -1 g up."""
 
     code = "import-turned"
-    text = "by the turns of the track, up reads -1 g, so the sign of the accelerations is changed"
+    text = "by the turns of the track, up reads minus 1 g, so the sign of the accelerations is changed"
     todo = Remedy("if latitude and longitude are exchanged or without their sign, the lean is mirrored: leave them out")
 
 
