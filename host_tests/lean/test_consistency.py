@@ -188,6 +188,15 @@ def test_a_turned_sensor_is_named_and_hidden():
     assert shown.trusted and shown.odd is None
 
 
+@pytest.mark.parametrize(("yaw_rate", "odd"), [(0.0, None), (0.1, "mount-moved")])
+def test_a_shaking_bike_on_its_kickstand_has_not_slipped(yaw_rate, odd):
+    """Its engine hides that it stands. Only bends prove that a bike is in balance."""
+    judged = Consistency()
+    for _ in range(100):
+        judged.add(0.0, 0.0, -0.21, 0.0, 0.0, -0.21, yaw_rate, 0.2)
+    assert (judged.odd, judged.doubt) == (odd, odd is not None)
+
+
 def test_an_impossible_lean_does_not_last():
     """After a blow the gyro shows a roll of 150 degrees within 0.1 s, but the bike has not rolled."""
     lean_meter = riding()
