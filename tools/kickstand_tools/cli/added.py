@@ -12,6 +12,7 @@ the text of the module, because importing a package takes long.
 """
 
 import ast
+import functools
 import traceback
 from importlib.machinery import PathFinder
 from importlib.metadata import EntryPoint
@@ -68,18 +69,20 @@ def _written_help(entry_point: EntryPoint) -> click.Command | None:
     file = Path(folders[0], *names).with_suffix(".py") if folders and names else Path((spec and spec.origin) or "")
     if not file.is_file():
         return None
-    for node in ast.parse(file.read_bytes()).body:
-        if isinstance(node, ast.FunctionDef) and node.name == entry_point.attr:
-            calls = [
-                call for call in node.decorator_list if ast.unparse(call).startswith(("click.command(", "click.group("))
-            ]
-            keywords = [word for call in calls if isinstance(call, ast.Call) for word in call.keywords]
-            texts = {word.arg: ast.literal_eval(word.value) for word in keywords if word.arg in ("help", "short_help")}
-            if calls:
-                return click.Command(
-                    node.name, help=texts.get("help", ast.get_docstring(node)), short_help=texts.get("short_help")
-                )
-    return None
+    node = _functions(file.read_bytes()).get(entry_point.attr)
+    if node is None:
+        return None
+    calls = [call for call in node.decorator_list if ast.unparse(call).startswith(("click.command(", "click.group("))]
+    if not calls:
+        return None
+    keywords = [word for call in calls if isinstance(call, ast.Call) for word in call.keywords]
+    texts = {word.arg: ast.literal_eval(word.value) for word in keywords if word.arg in ("help", "short_help")}
+    return click.Command(node.name, help=texts.get("help", ast.get_docstring(node)), short_help=texts.get("short_help"))
+
+
+@functools.cache  # most modules define several commands
+def _functions(text: bytes) -> dict[str, ast.FunctionDef]:
+    return {node.name: node for node in ast.parse(text).body if isinstance(node, ast.FunctionDef)}
 
 
 def owner(error: Exception) -> str:
