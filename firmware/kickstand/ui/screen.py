@@ -230,6 +230,7 @@ class Screen:
         """Cancel the guided calibration because the sensor has failed, unless the wizard can continue."""
         if self.wizard and not self.wizard.bears(self._app.sensor.fault):
             self.wizard = None
+            self._update()  # state() may ask before the display changes
             self._app.notices.append(Notice("stopped"))
 
     # The wizards are imported only when needed, because with their own imports they take 12 KB of heap. Garbage is
