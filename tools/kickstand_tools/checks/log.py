@@ -112,13 +112,14 @@ def read_checked(source: Source, progress: Progress | None = None) -> CheckedLog
     return checked
 
 
-def read_with_notices(source: Source, axes: bool = True) -> Log:
+def read_with_notices(source: Source, axes: bool = True, sensor: bool = False) -> Log:
     """Read and check a log, or a stretch as a log of its own. Its notices include those of check_log().
 
-    The sensor is not checked, because the log keeps all readings."""
+    sensor: True if the caller leaves out the readings that the sensor has not measured; the log keeps them.
+    """
     log = read_log(source)
     log = log.part(slice(None))  # a copy, because the source may be the user's own Log
-    log.notices = check_log(log, axes, sensor=False).notices
+    log.notices = check_log(log, axes, sensor).notices
     return log
 
 

@@ -144,7 +144,7 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
     """
     if phone is not None and phone not in PHONES:
         raise InputError(f"no phone is mounted {phone}: there are {', '.join(PHONES)}")
-    log = without_frozen(read_with_notices(log))
+    log = without_frozen(read_with_notices(log, sensor=True))
     misfit = next((notice for notice in log.notices if isinstance(notice, (LeftHanded, RatesMisfit, AxesMisfit))), None)
     if misfit:
         raise RefusedInput(misfit, log.name)
