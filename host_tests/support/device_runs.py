@@ -17,6 +17,11 @@ from kickstand_tools.simulation.scripted import script, sensor_errors
 from support import sd_cards, simulated_phones
 from support.page_turner import PageTurner
 
+if sys.implementation.name == "cpython":
+    from support import earlier_names
+
+    earlier_names.install()
+
 FRAME_S = 0.1
 PRESS_EVERY_S = 0.4  # time between two presses while a page is searched
 

@@ -15,6 +15,10 @@ from kickstand_tools.deploy.bytecode import PICO
 from mpremote.transport import Transport, TransportError, TransportExecError
 from serial.tools import list_ports
 
+from support import earlier_names
+
+earlier_names.install()
+
 PICO_PORT = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
 
 

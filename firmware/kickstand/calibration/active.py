@@ -18,6 +18,7 @@ class ActiveCalibration:
 
     Args:
         meter: the LeanMeter that uses the Calibration.
+        _changed: not used. Programs for an earlier version give a function here.
 
     Attributes:
         value: the Calibration in use. Until the first chip has started, this is the Calibration of the new meter.
@@ -27,7 +28,7 @@ class ActiveCalibration:
 
     REFINED, REPLACED = 1, 2
 
-    def __init__(self, meter):
+    def __init__(self, meter, _changed=None):
         self._meter = meter
         self.value = meter.calibration
         self.changed = None
