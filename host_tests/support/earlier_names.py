@@ -2,6 +2,7 @@
 
 import importlib.util
 import sys
+from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 
@@ -9,24 +10,24 @@ STATUS = "kickstand.status_report"  # support/status_report.py
 PATHS = "kickstand.rides.ride_paths"  # kickstand.rides.ride_files
 
 
-class _Finder:
-    @staticmethod
-    def find_spec(name, path=None, target=None):
-        if name == STATUS:
-            return importlib.util.spec_from_file_location(name, Path(__file__).with_name("status_report.py"))
-        return ModuleSpec(name, _Finder) if name == PATHS else None
+class _Finder(MetaPathFinder, Loader):
+    def find_spec(self, fullname, path, target=None):
+        if fullname == STATUS:
+            return importlib.util.spec_from_file_location(fullname, Path(__file__).with_name("status_report.py"))
+        return ModuleSpec(fullname, self) if fullname == PATHS else None
 
-    @staticmethod
-    def create_module(spec):
+    def create_module(self, spec):
         from kickstand.rides import ride_files
 
         return ride_files
 
-    @staticmethod
-    def exec_module(module):
+    def exec_module(self, module):
         pass
 
 
+_FINDER = _Finder()
+
+
 def install():
-    if _Finder not in sys.meta_path:
-        sys.meta_path.append(_Finder)
+    if _FINDER not in sys.meta_path:
+        sys.meta_path.append(_FINDER)
