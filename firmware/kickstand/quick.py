@@ -58,7 +58,7 @@ def load(name, *trials):
 
 
 def _source(name):
-    """Run a module's source as plain Python. Return its names and their values."""
+    """Run a module's source as plain Python. Return its names and their values. Raises ImportError without a source."""
     folder = __file__.replace("\\", "/").rpartition("/")[0] or "."
     names = dict.fromkeys(_POINTERS)
     names["const"] = lambda value: value
@@ -69,6 +69,8 @@ def _source(name):
             break
         except OSError:
             pass
+    else:
+        raise ImportError("no module named " + name)
     for words in _SKIPPED:
         text = text.replace(words, "")
     exec(text, names)

@@ -105,7 +105,7 @@ def test_a_log_that_cannot_show_the_mount_gets_no_remark():
 
 
 def test_the_commands_say_so_in_one_line(tmp_path):
-    """The messages of report and plot are tested in test_cli_report.py."""
+    """The messages of report and plot are tested in analysis/test_report.py."""
     legs = [script.upright(4)]
     for side in (-1, 1, -1, 1):
         legs += [script.accelerate(15, 5), script.turn(30 * side, 5), script.straight(2), script.brake(5, 3)]

@@ -103,7 +103,7 @@ def plug_in(monkeypatch, root, stream):
 
 
 def streamed(block):
-    """Return one block as usb_stream prints it."""
+    """Return one block as the board streams it."""
     pieces = [block[begin : begin + 256] for begin in range(0, len(block), 256)]
     return b"".join(base64.b64encode(piece) + b"\r\n" for piece in pieces) + b".\r\n"
 

@@ -1,6 +1,6 @@
 """The page Rides in Chromium: it shows what the commands print, accepts files in any order, and sends none to a server.
 
-test_rides_given.py tests the same code without a browser. Python starts once, because all tests use one page. The
+test_ride_files.py tests the same code without a browser. Python starts once, because all tests use one page. The
 content security policy is enforced.
 """
 

@@ -27,7 +27,7 @@ class SixWizard(Wizard):
         self._poses, self._turns = [], []  # the arguments of SensorFit
         self._fitted = None  # offset and slope; None until all six poses are taken
         self._turn.running = False
-        self._told = False  # True once the rider was told that the current turn cannot be used
+        self._warned = False  # True after the rider was warned that the current turn cannot be used
         bias = [0.0] * 3  # sum of the gyro's readings in all poses
         fit = lines = None
         while not fit or fit.unproved:
@@ -104,7 +104,7 @@ class SixWizard(Wizard):
             turn.end()
             self._turns.append(None if spoilt else (turn.packed(pose.gyro), turn.seconds))
         turn.start(pose.gyro)
-        self._told = False
+        self._warned = False
         self._poses.append(pose.accel)
 
     def _keep_side(self):
@@ -134,8 +134,8 @@ class SixWizard(Wizard):
     def tick(self, now_ms):
         """Also tell the rider if the turn was too fast, or readings were lost. Readings at the end of the range are
         lost too, so one message is enough."""
-        if self._spoilt_turn and not self._told and self.step in (TAKE, NOTICE):
-            self._told = True
+        if self._spoilt_turn and not self._warned and self.step in (TAKE, NOTICE):
+            self._warned = True
             self._now_ms = now_ms
             self._flows.throw(CaptureError("turned-fast"))
         else:

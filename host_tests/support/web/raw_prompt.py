@@ -70,7 +70,7 @@ class RawPrompt:
 
 
 def said(blocks):
-    """Return the output of usb_stream for these blocks."""
+    """Return the output of a board that streams these blocks."""
     return b"".join(
         b"".join(base64.b64encode(block[offset : offset + 256]) + b"\r\n" for offset in range(0, len(block), 256))
         + b".\r\n"
