@@ -194,6 +194,10 @@ def test_a_shaking_bike_on_its_kickstand_has_not_slipped():
         judge = Consistency()
         windows(judge, 20.0, sideways=-0.21, lean=-0.21, yaw_rate=yaw_rate)
         assert (judge.odd, judge.doubt) == (odd, odd is not None)
+    windows(judge, 4.0, sideways=-0.21, yaw_rate=0.0)
+    assert judge.doubt
+    windows(judge, 20.0, yaw_rate=0.0)  # a long straight in balance
+    assert (judge.odd, judge.doubt) == (None, False)
 
 
 def test_an_impossible_lean_does_not_last():

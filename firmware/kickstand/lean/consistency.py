@@ -66,8 +66,8 @@ _SLIP_S = const(0.3)
 # standard deviations: limit of a single innovation of the force to the left while the sum of the roll rate is above its
 # limit. Larger: exchanged sides and wrong roll rates are hidden later. Largest without a fault: 1.1
 _WRONG_ROLL = const(1.8)
-# s: time after a bend for which the sum grows. A bike on its kickstand is not in balance either, and if its engine
-# shakes it, only its missing bends prove that it stands. Larger: a bike is said to have slipped when it is parked.
+# s: time after a bend for which the sum grows; it shrinks at any time. A bike on its kickstand is not in balance either,
+# and if its engine shakes it, only its missing bends prove that it stands. Larger: a parked bike is said to have slipped.
 _BEND_S = const(3.0)
 _MOST_SLIP_S = const(0.45)  # s: largest sum, which names the slip. Larger: the slip is named, and forgotten, later.
 # Limits of the two sums that show exchanged sides. Without a fault at most a fifth of one of them is exceeded by both.
@@ -197,10 +197,11 @@ class Consistency:
         self._left_long += long_gain * (left - self._left_long)
         self._up_long += long_gain * (up - self._up_long)
         self._straight_s = 0.0 if abs(yaw_rate) > _TURNING else self._straight_s + seconds
-        if sideways is not None and self._straight_s < _BEND_S:
+        if sideways is not None:
             side_s = self._side_s + max(-_MOST_SIDEWAYS, min(_MOST_SIDEWAYS, sideways)) * seconds
             side_s = max(0.0, side_s - _UNBALANCED * seconds) + min(0.0, side_s + _UNBALANCED * seconds)
-            self._side_s = max(-_MOST_SLIP_S, min(_MOST_SLIP_S, side_s))
+            if self._straight_s < _BEND_S or abs(side_s) < abs(self._side_s):
+                self._side_s = max(-_MOST_SLIP_S, min(_MOST_SLIP_S, side_s))
         self._pitch += long_gain * (pitch - self._pitch)
         # `square` is pitch * pitch if the forward force confirms none of the pitch
         square = -pitch * max(-abs(pitch), min(abs(pitch), push))
