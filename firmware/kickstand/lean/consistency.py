@@ -66,8 +66,9 @@ _SLIP_S = const(0.3)
 # standard deviations: limit of a single innovation of the force to the left while the sum of the roll rate is above its
 # limit. Larger: exchanged sides and wrong roll rates are hidden later. Largest without a fault: 1.1
 _WRONG_ROLL = const(1.8)
-# s: time after a bend for which the sum grows; it shrinks at any time. A bike on its kickstand is not in balance either,
-# and if its engine shakes it, only its missing bends prove that it stands. Larger: a parked bike is said to have slipped.
+# s: time after a bend for which the sum grows; it shrinks at any time. A bike on its kickstand is not in balance
+# either, and if its engine shakes it, only its missing bends prove that it stands. Larger: a parked bike is said to
+# have slipped.
 _BEND_S = const(3.0)
 _MOST_SLIP_S = const(0.45)  # s: largest sum, which names the slip. Larger: the slip is named, and forgotten, later.
 # Limits of the two sums that show exchanged sides. Without a fault at most a fifth of one of them is exceeded by both.
