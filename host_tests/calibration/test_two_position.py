@@ -5,7 +5,7 @@ import pytest
 from kickstand.calibration.parameters import Calibration
 from kickstand.calibration.two_position import align
 from kickstand.errors import Refusal
-from kickstand_tools.simulation.ride import random_rotation
+from kickstand_sim.simulation.ride import random_rotation
 from motions import leaned
 from numpy.testing import assert_allclose
 from support import engines

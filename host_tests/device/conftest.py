@@ -4,9 +4,9 @@ import io
 from contextlib import redirect_stdout
 
 import pytest
+from kickstand_sim.simulated_board.simulator import Board
 from kickstand_tools.deploy import status_words
 from kickstand_tools.deploy.connection import WIRINGS
-from kickstand_tools.simulated_board.simulator import Board
 from support import device_plans, device_runs
 from support.board_access import rough
 

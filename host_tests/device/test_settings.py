@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from kickstand import console
 from kickstand.errors import Notice, SettingsError
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.simulator import Board
 from support.board_access import level
 
 # {name: (values within the limits, values beyond them)}

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kickstand_tools.simulated_board import simulator
+from kickstand_sim.simulated_board import simulator
 from kickstand_tools.web import site
 from kickstand_workshop.pictures import displays, page, rides, terminal
 from support.device_runs import FreshFirmware

@@ -8,7 +8,7 @@ import warnings
 from typing import Any
 
 import pytest
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.simulator import Board
 from support.board_access import level, on_board, write
 
 SENSOR = 0x68

@@ -3,7 +3,7 @@
 import gc
 import sys
 
-from kickstand_tools.simulated_board.lcd import Lcd
+from kickstand_sim.simulated_board.lcd import Lcd
 from other_displays import Mcp23008, OwnI2c
 from support.board_access import on_board
 

@@ -5,10 +5,10 @@ import types
 
 import framebuf  # pyright: ignore[reportMissingImports] the simulated board has it
 import pytest
-from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.contacts import Button as Contact
-from kickstand_tools.simulated_board.fakes.fake_machine import SPI, Pin
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.clock import Clock
+from kickstand_sim.simulated_board.contacts import Button as Contact
+from kickstand_sim.simulated_board.fakes.fake_machine import SPI, Pin
+from kickstand_sim.simulated_board.simulator import Board
 from support.board_access import level, on_board
 
 SHORT, LONG = "short", "long"
