@@ -38,10 +38,9 @@ FIRMWARE = {
     },
     "app": {
         *("board", "calibration", "drive_alignment", "imu", "lean"),
-        *("rides", "speed", "state", "ui"),
+        *("rides", "speed", "ui"),
         "user_code",
     },
-    "state": set(),
     "user_code": set(),
     "start": {*("app", "board", "console", "live", "settings"), "ui.messages"},
     "__init__": {"facts"},

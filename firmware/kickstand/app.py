@@ -188,12 +188,6 @@ class App:
         """True if there is a lean to show."""
         return self.lean_deg is not None
 
-    def state(self):
-        """Return the state of the app as data, see state.py."""
-        from .state import state  # imported only for programs that use it
-
-        return state(self)
-
     def _plan_collection(self):
         """Set the number of passes until the next garbage collection."""
         small = self.drive or self.lcd.draws or self.live or self.user
