@@ -117,16 +117,15 @@ class Screen:
         page = self._page
         if view == "own":
             return page()
-        if page is pages.drive:
+        if view == "drive":
             return page(app.drive, now_ms)
-        if page is pages.live:
-            return page(app.live)
-        if page is pages.recording:
+        if view == "live":
+            return app.live.lines()
+        if view == "recording":
             return page(app.rides.recorder)
-        if page is pages.not_aligned:
-            return page(
-                app.meter, now_ms // 1000, "drive and brake" if pages.drive in self._ring() else "On stand: press"
-            )
+        if view == "not_aligned":
+            todo = "drive and brake" if pages.drive in self._ring() else "On stand: press"
+            return page(app.meter, now_ms // 1000, todo)
         return self._readings(page)
 
     def _readings(self, page):
