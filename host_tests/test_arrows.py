@@ -153,10 +153,8 @@ TOOLS = {
         "simulated_board",
         "simulation",
         "demo",
-        "deploy",
         "web",
         "cli",
-        "kickstand_emulator",
     },
 }
 
