@@ -27,27 +27,26 @@ FIRMWARE = {
     "drive_alignment": set(),  # the app passes the calibrations to it
     "speed": {"board"},
     "rides": {"board", "calibration"},  # each block of a ride contains the record of its calibration
-    "live": {"calibration.transform"},
+    "live": {"calibration.parameters"},
     "ui": {"board.button", "lean", "calibration", "drive_alignment"},
-    "settings": {"setting_table"},
-    "setting_table": {"board", "imu.mpu6050"},  # for the ranges and pins that can be set
-    "devices": {"board", "imu", "diagnosis"},
+    "settings": {"setting_table", "board", "imu", "diagnosis"},  # also opens the parts
+    "setting_table": {"board", "imu.mpu6050"},  # for the ranges that can be set
     "diagnosis": {"imu"},
     "facts": {
-        *("board.display", "calibration", "console", "devices", "diagnosis", "imu", "rides", "settings", "speed"),
+        *("board.display", "calibration", "console", "diagnosis", "imu", "rides", "settings", "speed"),
         "ui.messages",
     },
     "app": {
-        *("board", "calibration", "devices", "drive_alignment", "imu", "lean"),
+        *("board", "calibration", "drive_alignment", "imu", "lean"),
         *("rides", "speed", "state", "ui"),
         "user_code",
     },
     "state": set(),
     "user_code": set(),
-    "start": {*("app", "board", "console", "devices", "live", "settings"), "ui.messages"},
+    "start": {*("app", "board", "console", "live", "settings"), "ui.messages"},
     "__init__": {"facts"},
 }
-DRIVERS = {"board", "imu", "speed", "devices", "diagnosis", "start", "live.radio"}
+DRIVERS = {"board", "imu", "speed", "settings", "diagnosis", "start", "live.radio"}
 
 CORE = {"kickstand_tools", "kickstand_sim"}
 LEAVES = {"kickstand_fleet", "kickstand_emulator", "kickstand_workshop"}

@@ -4,8 +4,8 @@ import functools
 
 import numpy as np
 import pytest
+from kickstand.calibration.poses import Turn
 from kickstand.calibration.sensor_fit import SensorFit
-from kickstand.calibration.turn import Turn
 from kickstand_sim.simulation import hands
 from kickstand_sim.simulation.physics.chip import Chip
 from kickstand_tools.calibration.procedure import fit_procedure

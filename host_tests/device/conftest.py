@@ -91,10 +91,9 @@ def with_app(on_board):
 
     def with_app(use, config=None, **fitted):
         def built(board, settings):
-            from kickstand import devices
             from kickstand.app import App
 
-            return use(board, App(settings, devices.open_lcd(settings), devices.open_sensor(settings)))
+            return use(board, App(settings, settings.open_lcd(), settings.open_sensor()))
 
         return on_board(built, config, **fitted)
 
