@@ -151,10 +151,8 @@ TOOLS = {
         "simulated_board",
         "simulation",
         "demo",
-        "deploy",
         "web",
         "cli",
-        "kickstand_emulator",
     },
 }
 
