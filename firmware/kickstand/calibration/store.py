@@ -172,11 +172,11 @@ def plausible(calibration):
     errors = [calibration.accel_matrix[i] - one for i, one in enumerate(matrix())]
     errors += [calibration.gyro_matrix[i] - one for i, one in enumerate(matrix())]
     return (  # each comparison also rejects NaN
-        all([abs(value) < MAX_OFFSET_G for value in calibration.accel_offset])
-        and all([MIN_SLOPE < value < MAX_SLOPE for value in calibration.accel_slope])
-        and all([abs(value) < MAX_BIAS_DPS for value in calibration.gyro_bias])
-        and all([abs(value) <= MAX_MATRIX_ERROR for value in errors])
-        and all([0.0 <= value <= MAX_GYRO_SIGMA for value in calibration.gyro_sigma])
+        all(abs(value) < MAX_OFFSET_G for value in calibration.accel_offset)
+        and all(MIN_SLOPE < value < MAX_SLOPE for value in calibration.accel_slope)
+        and all(abs(value) < MAX_BIAS_DPS for value in calibration.gyro_bias)
+        and all(abs(value) <= MAX_MATRIX_ERROR for value in errors)
+        and all(0.0 <= value <= MAX_GYRO_SIGMA for value in calibration.gyro_sigma)
         and is_rotation(calibration.vehicle_from_sensor, 1e-4)
         and abs(calibration.trim_deg) <= MAX_TRIM_DEG
     )
