@@ -22,7 +22,7 @@ from .errors import report
 from .imu.sensor import SampleClock
 from .lean.meter import LeanMeter
 from .rides.rides import Rides
-from .ui.screen import Screen
+from .ui.pages import Screen
 from .units import const
 
 LOOP_US = 10_000  # length of a pass of the loop in us; the chip's FIFO can keep samples for much longer

@@ -119,7 +119,7 @@ class Device:
     def turn_to(self, at_s, name):
         """Press the button from at_s on, until the view with this name appears.
 
-        The names are in kickstand/ui/screen.py. run() raises AssertionError if the view never appears.
+        The names are in kickstand/ui/pages.py. run() raises AssertionError if the view never appears.
         """
         self.board.at(at_s, lambda: self._turner.turn_to(name))
 
