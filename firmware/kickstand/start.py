@@ -29,7 +29,7 @@ _CHARGE_MS = const(100)
 # list with the import statements.
 STEPS = (
     "calibration.parameters calibration.store calibration.active calibration.transform lean.bike_model lean.kalman "
-    "lean.measurements lean.rest lean.upright_trim lean.dive lean.lean_filter lean.meter ui.pages ui.screen rides.rides"
+    "lean.measurements lean.lean_filter lean.meter ui.pages ui.screen rides.rides"
 ).split()
 
 
