@@ -27,8 +27,9 @@ from .ui.screen import Screen
 from .units import const
 
 LOOP_US = 10_000  # length of a pass of the loop in us; the chip's FIFO can keep samples for much longer
-# Largest number of passes of the loop between two garbage collections
-_COLLECT_TURNS = const(60)
+# Bytes of heap that a pass of the loop uses, the second while aligning by driving
+_PASS_BYTES = const(2200)
+_PASS_BYTES_DRIVING = const(2700)
 _PLAN_EVERY = const(8)  # number of collections between two checks of the free heap; a check takes 3 to 7 ms
 SINGLE_GAPS = 120  # number of free heap blocks that lie alone after a collection
 _PAGE_MS = const(100)
@@ -192,7 +193,8 @@ class App:
     def _plan_collection(self):
         """Set the number of passes until the next garbage collection."""
         if self._collections % _PLAN_EVERY == 0:
-            self._planned_turns = port.turns_to_collect(_COLLECT_TURNS)
+            used = _PASS_BYTES_DRIVING if self.drive else _PASS_BYTES
+            self._planned_turns = port.turns_to_collect(used)
         self._collections += 1
         self._turns_left = self._planned_turns
 

@@ -21,7 +21,6 @@ ONLY_MS_YIELD = IS_ESP32  # there sleep_us() gives no time to the radio and the 
 _ESP32_HZ = 240_000_000
 # Largest clock of SoftI2C, with half a period of 2 us. At 400 kHz, half a period is 1 us, but the MPU6050 needs 1.3 us
 _SOFT_I2C_HZ = 250_000
-_TURN_BYTES = 2200  # bytes of heap that one pass of the app's loop uses while aligning by driving
 _FEWEST_TURNS = 3
 
 _WATCHDOG_MS = 8000  # the watchdog of a Pico allows at most 8388 ms
@@ -62,18 +61,22 @@ def open_i2c(controller, sda, scl, frequency, timeout_us):
     return machine.I2C(controller, sda=sda, scl=scl, freq=frequency, timeout=timeout_us)
 
 
-def turns_to_collect(most):
-    """Return the number of passes of the app's loop between two garbage collections, at most `most`.
+def turns_to_collect(turn_bytes):
+    """Return the number of passes of the app's loop between two garbage collections.
 
-    These passes use three quarters of the free heap. If they used it up, a collection would run in the middle of a
-    pass. An ESP32's heap starts with 64 KB and grows only after a collection that frees too little."""
+    These passes use most of the free heap. If they used it up, a collection would run in the middle of a pass. An
+    ESP32's heap starts with 64 KB and grows only after a collection that frees too little.
+
+    Args:
+        turn_bytes: bytes of heap that a pass uses.
+    """
     free = gc.mem_free()
     if IS_ESP32:
         import esp32  # type: ignore[import-not-found]
 
         # mem_free() also counts the possible growth of the heap, which is the largest block of ESP-IDF's heap
         free -= max(region[2] for region in esp32.idf_heap_info(esp32.HEAP_DATA))
-    return max(_FEWEST_TURNS, min(most, free * 3 // (4 * _TURN_BYTES)))
+    return max(_FEWEST_TURNS, free * 5 // (6 * turn_bytes))
 
 
 def start_watchdog():

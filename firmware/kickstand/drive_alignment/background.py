@@ -25,7 +25,7 @@ from .alignment import (
 )
 
 # Number of passes of the loop whose counts are added up before they are converted to floats, to save time
-_FEED_TURNS = const(2)
+_FEED_TURNS = const(4)
 _GAP_MS = const(300)  # a longer time between two readings means that readings were lost
 _LOOK_MS = const(1000)  # time between two calls of _look()
 _FRESH_MS = const(3000)  # an older speed proves no standstill
