@@ -16,8 +16,8 @@ from types import ModuleType
 
 import hypothesis
 import pytest
+from kickstand_sim.simulated_board.fakes import cpython
 from kickstand_tools.deploy import bytecode, literals
-from kickstand_tools.simulated_board.fakes import cpython
 
 cpython.supplement()
 

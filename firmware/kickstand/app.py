@@ -18,7 +18,6 @@ from .board import port
 from .board.display import STOPPED
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
-from .devices import open_button
 from .errors import report
 from .imu.sensor import SampleClock
 from .lean.meter import LeanMeter
@@ -65,7 +64,7 @@ class App:
 
     Args:
         settings: a Settings.
-        lcd, sensor: results of devices.open_lcd() and devices.open_sensor().
+        lcd, sensor: results of Settings.open_lcd() and Settings.open_sensor().
         writer: see Rides.
 
     Attributes:
@@ -80,7 +79,7 @@ class App:
     def __init__(self, settings, lcd, sensor, writer=None):
         self.settings = settings
         self.lcd = lcd
-        self.button = open_button(settings)
+        self.button = settings.open_button()
         self.sensor = sensor
         self.notices = []
         self.meter = LeanMeter(Calibration(), settings.leans, sensor.chip.gyro_delay_s)

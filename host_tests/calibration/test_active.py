@@ -3,7 +3,7 @@
 import pytest
 from kickstand.calibration.parameters import Calibration
 from kickstand.calibration.store import FILES, Store
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.simulator import Board
 
 
 class Meter:

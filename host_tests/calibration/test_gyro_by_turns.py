@@ -4,13 +4,13 @@ import functools
 
 import numpy as np
 import pytest
+from kickstand.calibration.poses import Turn
 from kickstand.calibration.sensor_fit import SensorFit
-from kickstand.calibration.turn import Turn
+from kickstand_sim.simulation import hands
+from kickstand_sim.simulation.physics.chip import Chip
 from kickstand_tools.calibration.procedure import fit_procedure
 from kickstand_tools.common.errors import InputError, RefusedInput
 from kickstand_tools.logs.log import Log
-from kickstand_tools.simulation import hands
-from kickstand_tools.simulation.physics.chip import Chip
 from support.mpy import run_mpy
 
 HZ = 200.0

@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import pytest
 from kickstand.calibration.store import Store
+from kickstand_sim.simulation.scripted.script import Ride, accelerate, turn, wait
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.rides import block_reader, ride_log
-from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, wait
 from support import command, emulated_port
 from support.emulated import PART, calibrated, esp32, firmware, leaning, modules, pico
 

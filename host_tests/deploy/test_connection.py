@@ -178,7 +178,7 @@ def test_status_keeps_what_the_firmware_has_noticed(port, answer, labels):
     ("error", "message"),
     [
         (b"x\r\nOSError: [Errno 5] EIO", "P: the board's file system is damaged (OSError: [Errno 5] EIO)"),
-        (b"x\r\nCardError: card: [Errno 5] EIO", "P: card: [Errno 5] EIO"),
+        (b"x\r\nRefusal: card: [Errno 5] EIO", "P: card: [Errno 5] EIO"),
         (b"x\r\nSettingsError: wrong: DLPF", "P: wrong: DLPF"),
         (b"ImportError: no module named 'kickstand'", "Kickstand is not on the board at P: install it with"),
         (b"ImportError: no module named 'kickstand.x'", "the firmware on the board at P is of another version"),

@@ -66,7 +66,7 @@ def test_wheel_carries_firmware_pages_and_documents(wheel):
     assert {f"kickstand_tools/web/{path.relative_to(web).as_posix()}" for path in pages} <= names
     texts = [*documents.PATHS, *(f"tools/pictures/{path.name}" for path in (ROOT / "tools" / "pictures").iterdir())]
     assert {f"kickstand_tools/documents/{path}" for path in texts} <= names
-    packages = {"kickstand", "kickstand_tools", "kickstand_fleet", "kickstand_emulator"}
+    packages = {"kickstand", "kickstand_tools", "kickstand_sim", "kickstand_fleet", "kickstand_emulator"}
     assert {name.split("/")[0] for name in names} == packages | {f"kickstand_lean-{VERSION}.dist-info"}
     assert "fleet = kickstand_fleet." in commands and "emulate = kickstand_emulator." in commands
     assert "kickstand = " in commands and "workshop" not in commands  # the wheel has no modules of the workshop

@@ -4,9 +4,9 @@ import io
 from contextlib import redirect_stdout
 
 import pytest
+from kickstand_sim.simulated_board.simulator import Board
 from kickstand_tools.deploy import status_words
 from kickstand_tools.deploy.connection import WIRINGS
-from kickstand_tools.simulated_board.simulator import Board
 from support import device_plans, device_runs
 from support.board_access import rough
 
@@ -91,10 +91,9 @@ def with_app(on_board):
 
     def with_app(use, config=None, **fitted):
         def built(board, settings):
-            from kickstand import devices
             from kickstand.app import App
 
-            return use(board, App(settings, devices.open_lcd(settings), devices.open_sensor(settings)))
+            return use(board, App(settings, settings.open_lcd(), settings.open_sensor()))
 
         return on_board(built, config, **fitted)
 

@@ -104,6 +104,7 @@ def test_how_right_it_is_stands_in_both_places_alike():
 PACKAGES = (
     "firmware/kickstand",
     "tools/kickstand_tools",
+    "tools/kickstand_sim",
     "tools/kickstand_fleet",
     "tools/workshop/kickstand_workshop",
 )

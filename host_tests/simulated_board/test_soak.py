@@ -3,7 +3,7 @@
 import gc
 
 import pytest
-from kickstand_tools.simulation.scripted import script
+from kickstand_sim.simulation.scripted import script
 from kickstand_workshop.soak import soak as soaking
 from kickstand_workshop.soak.__main__ import table
 from kickstand_workshop.soak.soak import soak

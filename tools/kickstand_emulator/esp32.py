@@ -16,10 +16,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from kickstand_sim.simulated_board.clock import Clock, to_us
+from kickstand_sim.simulated_board.i2c import Bus
+from kickstand_sim.simulated_board.simulator import Board
 from kickstand_tools.deploy import bytecode
-from kickstand_tools.simulated_board.clock import Clock, to_us
-from kickstand_tools.simulated_board.i2c import Bus
-from kickstand_tools.simulated_board.simulator import Board
 
 from . import esp32_library, flash_image
 from .device import LEVEL, EmulatedDevice

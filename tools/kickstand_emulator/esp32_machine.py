@@ -26,7 +26,7 @@ import sys
 import threading
 import time
 
-from kickstand_tools.simulated_board.i2c import Bus
+from kickstand_sim.simulated_board.i2c import Bus
 
 from .i2c_wires import Wires
 

@@ -6,7 +6,7 @@ wires.
 
 from collections.abc import Callable
 
-from kickstand_tools.simulated_board.i2c import Bus
+from kickstand_sim.simulated_board.i2c import Bus
 from rp2040py.peripherals.i2c import (
     ENABLE,
     IC_ENABLE,

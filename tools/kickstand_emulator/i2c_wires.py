@@ -6,7 +6,7 @@ SoftI2C and for writes of length 0, as in I2C.scan(). The firmware drives the pi
 
 from collections.abc import Callable
 
-from kickstand_tools.simulated_board.i2c import Bus
+from kickstand_sim.simulated_board.i2c import Bus
 
 _IDLE, _LISTENS, _SENDS = 0, 1, 2
 

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from typing import Any
 
+from kickstand_sim.simulated_board.i2c import Bus
+from kickstand_sim.simulated_board.simulator import Board
 from kickstand_tools.deploy import bytecode
-from kickstand_tools.simulated_board.i2c import Bus
-from kickstand_tools.simulated_board.simulator import Board
 from rp2040py.gpio_pin import GPIOPinState
 from rp2040py.memory_map import RAM_START_ADDRESS
 from rp2040py.peripherals.peripheral import BasePeripheral

@@ -14,10 +14,10 @@ numbers) is factorised in place (A.-L. Cholesky).
 from array import array
 from math import degrees
 
-from ..errors import GyroError
+from ..errors import SickSensor
 from ..rotation import matrix
 from ..units import AXES, const
-from .turn import rotated
+from .poses import rotated
 
 _UNKNOWNS = const(18)
 _GYRO = 9  # index of the gyro's first unknown; it follows offset (3), slope (3) and N (3, in the order yz, xz, xy)
@@ -82,7 +82,7 @@ class SensorFit:
 
     def run(self):
         """Fit, as a generator of short steps. On a board the whole fit takes longer than the chip's FIFO can keep the
-        samples. Raises GyroError if a working gyro cannot have measured these turns."""
+        samples. Raises SickSensor if a working gyro cannot have measured these turns."""
         self._check_gross()
         for _ in range(_STEPS):
             yield from self._accumulate()
@@ -242,19 +242,19 @@ class SensorFit:
         self.unproved = [AXES[i] for i in range(3) if self.gyro_sigma[4 * i] > _PROOF_SIGMA]
 
     def _check_gross(self):
-        """Raise GyroError if a turn by the gyro differs much from the turn that gravity shows."""
+        """Raise SickSensor if a turn by the gyro differs much from the turn that gravity shows."""
         worst = self._cost([0.0] * 9)[1]
         if worst > _GROSS_MISFIT**2:
             raise self._ill(worst)
 
     def _ill(self, worst):
-        """Return the GyroError for turns that do not fit. The error names an axis if that axis alone explains the
+        """Return the SickSensor for turns that do not fit. The error names an axis if that axis alone explains the
         misfits."""
         x = [0.0] * 9
         best, fault = self._cost(x)[0] / 4, None
         for axis in range(3):
             if self._turned(axis) < _DEAD_RAD:
-                return GyroError("dead-gyro", AXES[axis])
+                return SickSensor("dead-gyro", AXES[axis])
             for reads in _READS:
                 x[4 * axis] = 1.0 / reads - 1.0
                 cost = self._cost(x)[0]
@@ -262,11 +262,11 @@ class SensorFit:
                     best, fault = cost, (axis, reads)
             x[4 * axis] = 0.0
         if fault is None:
-            return GyroError("gyro-misfit", degrees(worst**0.5))
+            return SickSensor("gyro-misfit", degrees(worst**0.5))
         axis, reads = fault
         if reads < 0.0:
-            return GyroError("gyro-reversed", AXES[axis])
-        return GyroError("gyro-scale", AXES[axis], 100.0 * (reads - 1.0))
+            return SickSensor("gyro-reversed", AXES[axis])
+        return SickSensor("gyro-scale", AXES[axis], 100.0 * (reads - 1.0))
 
     def _turned(self, axis):
         """Return the largest rotation about an axis that the gyro measured in any turn, in rad."""
@@ -289,7 +289,7 @@ class SensorFit:
         return total, largest
 
     def _check(self):
-        """Raise GyroError if the gyro's errors exceed those of a working chip, or a turn does not fit."""
+        """Raise SickSensor if the gyro's errors exceed those of a working chip, or a turn does not fit."""
         p = self._p
         worst = self._cost(p[_GYRO:])[1]
         if not worst < _MAX_MISFIT**2:
@@ -297,6 +297,6 @@ class SensorFit:
         for i in range(9):
             error = p[_GYRO + i]
             if i % 4 == 0 and not abs(error) < _MAX_SCALE_ERROR:
-                raise GyroError("gyro-scale", AXES[i // 4], -100.0 * error)
+                raise SickSensor("gyro-scale", AXES[i // 4], -100.0 * error)
             if not abs(error) < _MAX_CROSS_ERROR + 2 * self.gyro_sigma[i]:
-                raise GyroError("gyro-misfit", degrees(abs(error)))
+                raise SickSensor("gyro-misfit", degrees(abs(error)))

@@ -11,7 +11,7 @@ result.
 
 from math import acos, degrees
 
-from ..errors import CalibrationError
+from ..errors import Refusal
 from ..units import AXES, const
 from .parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE
 
@@ -49,7 +49,7 @@ def tilt_deg(force):
 
 
 def closed_form(poses):
-    """Compute offset and slope by equations 16-17. Raises CalibrationError for an axis that does not change.
+    """Compute offset and slope by equations 16-17. Raises Refusal for an axis that does not change.
 
     Args:
         poses: six mean readings of the accelerometer, each of 3 values in g, in the order of SIDES.
@@ -62,7 +62,7 @@ def closed_form(poses):
     for i in range(3):
         high, low = poses[2 * i][i], poses[2 * i + 1][i]
         if not high - low > 0.5:
-            raise CalibrationError("dead-axis", AXES[i], high - low)
+            raise Refusal("dead-axis", AXES[i], high - low)
         offset[i] = -(high + low) / (high - low)
         slope[i] = 2.0 / (high - low)
     return offset, slope
@@ -71,7 +71,7 @@ def closed_form(poses):
 def fit(poses):
     """Compute the offset and slope for which all six calibrated readings have a length of 1 g.
 
-    Arguments and results are those of closed_form(). Raises CalibrationError."""
+    Arguments and results are those of closed_form(). Raises Refusal."""
     offset, slope = closed_form(poses)
     rows = [[0.0] * 7 for _ in range(6)]
     for _ in range(8):  # more than enough: 3 to 5 steps suffice
@@ -84,7 +84,7 @@ def fit(poses):
                 row[3 + i] = 2.0 * value * pose[i]
             row[6] = 1.0 - square
         if not _solve(rows):
-            raise CalibrationError("unclear")
+            raise Refusal("unclear")
         for i in range(3):
             offset[i] += rows[i][6]
             slope[i] += rows[3 + i][6]
@@ -95,15 +95,15 @@ def fit(poses):
 
 
 def check_plausible(offset, slope, poses):
-    """Raise CalibrationError unless offset and slope are plausible, and in each pose one axis was within _MAX_TILT_DEG
+    """Raise Refusal unless offset and slope are plausible, and in each pose one axis was within _MAX_TILT_DEG
     of the vertical."""
     for i in range(3):
         if not (abs(offset[i]) < MAX_OFFSET_G and MIN_SLOPE < slope[i] < MAX_SLOPE):
-            raise CalibrationError("odd-axis", AXES[i], offset[i], slope[i])
+            raise Refusal("odd-axis", AXES[i], offset[i], slope[i])
     for k in range(6):
         tilt = tilt_deg([slope[i] * poses[k][i] + offset[i] for i in range(3)])
         if tilt > _MAX_TILT_DEG:
-            raise CalibrationError("side-tilted", SIDES[k], tilt, _MAX_TILT_DEG)
+            raise Refusal("side-tilted", SIDES[k], tilt, _MAX_TILT_DEG)
 
 
 def check_free_pose(offset, slope, accel):
@@ -115,12 +115,12 @@ def check_free_pose(offset, slope, accel):
         accel: mean reading of the accelerometer in the seventh pose, 3 values in g.
 
     Raises:
-        CalibrationError: the force differs from 1 g by more than _FREE_MAX_G.
+        Refusal: the force differs from 1 g by more than _FREE_MAX_G.
     """
     force = [slope[i] * accel[i] + offset[i] for i in range(3)]
     error = sum(f * f for f in force) ** 0.5 - 1.0
     if not abs(error) <= _FREE_MAX_G:
-        raise CalibrationError("free-pose-off", 1.0 + error)
+        raise Refusal("free-pose-off", 1.0 + error)
     return error
 
 

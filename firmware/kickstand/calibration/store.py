@@ -15,7 +15,7 @@ import struct
 from binascii import crc32
 from errno import ENOENT
 
-from ..errors import StoreError
+from ..errors import Refusal
 from ..rotation import is_rotation
 from ..units import const
 from .parameters import MAX_GYRO_SIGMA, MAX_MATRIX_ERROR, MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE, Calibration
@@ -80,7 +80,7 @@ class Store:
 
     def save(self, calibration):
         """Write a Calibration over the older record and read it back. The record in use is never damaged. Raises
-        StoreError."""
+        Refusal."""
         sequence, _, _ = self._newest()
         record = self._pack(calibration, sequence + 1)
         path = self._path(FILES[(sequence + 1) % 2])
@@ -90,9 +90,9 @@ class Store:
             with open(path, "rb") as file:
                 written = file.read()
         except OSError as error:
-            raise StoreError("not-written", str(error))
+            raise Refusal("not-written", str(error))
         if written != record:
-            raise StoreError("read-back")
+            raise Refusal("read-back")
         sequence, _, problems = self._newest()
         self.newest = sequence, problems
 

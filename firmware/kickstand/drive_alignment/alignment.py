@@ -17,7 +17,7 @@ fits. Memory is fixed, and each call does a short step of the work.
 
 from math import atan2, degrees
 
-from ..errors import AlignmentError
+from ..errors import Refusal
 from ..rotation import angle_deg, dot, frame, vector
 from ..units import GAP_US, const
 from .events import BIN_US, DrivingEvents, Fit, ForceHistory
@@ -113,20 +113,20 @@ class DriveAlignment:
 
     @property
     def problem(self):
-        """The fault of the speed or of the mount that more driving cannot resolve, an AlignmentError, or None."""
+        """The fault of the speed or of the mount that more driving cannot resolve, a Refusal, or None."""
         if self._speed_check.problem is None and self.standing.moved and not self._leans:
-            return AlignmentError("mount-moved", "between-stops", MAX_CHANGE_DEG)
+            return Refusal("mount-moved", "between-stops", MAX_CHANGE_DEG)
         if self.counted < self.needed:
             return self._speed_check.problem
         return self._speed_check.problem or self.quality.mount_problem or self.quality.speed_problem
 
     @property
     def reason(self):
-        """The reason why matrix() gives no alignment, an AlignmentError: `problem`, or else the result of missing()."""
+        """The reason why matrix() gives no alignment, a Refusal: `problem`, or else the result of missing()."""
         return self.problem or self.missing(self.counted, self.needed, self.turned)
 
     def missing(self, counted, needed, turned):
-        """Return an AlignmentError that says which driving is still needed. The drive must not have a problem.
+        """Return a Refusal that says which driving is still needed. The drive must not have a problem.
 
         Args:
             counted: number of counted events.
@@ -134,17 +134,17 @@ class DriveAlignment:
             turned: number of braking events that did not count because of a bend.
         """
         if self._speed_mps < 0.0:
-            return AlignmentError("no-speed")
+            return Refusal("no-speed")
         if self._top_mps < MOVED_MPS:
-            return AlignmentError("not-driven", needed)
+            return Refusal("not-driven", needed)
         if not (self._leans or self.standing.stops):
-            return AlignmentError("not-stopped", SETTLE_S + COUNTS_S)
+            return Refusal("not-stopped", SETTLE_S + COUNTS_S)
         if counted < needed:
-            return AlignmentError("few-events", counted, needed, turned)
+            return Refusal("few-events", counted, needed, turned)
         quality = self.quality
         if not quality.agree and quality.quality_deg < 180.0:
-            return AlignmentError("parts-differ", max(quality.parts.forward_deg, quality.halves_deg))
-        return AlignmentError("uncertain", min(quality.quality_deg, 180.0), self.events.braking_count)
+            return Refusal("parts-differ", max(quality.parts.forward_deg, quality.halves_deg))
+        return Refusal("uncertain", min(quality.quality_deg, 180.0), self.events.braking_count)
 
     def update(self, force, rate, dt_us):
         """Take a sample and do a step of the work.
@@ -202,7 +202,7 @@ class DriveAlignment:
         self.events.measure_speed(speed_mps, self._history.now + self._sums_us - age_us)
 
     def matrix(self, out):
-        """Write the rotation from sensor axes to vehicle axes into out. Raises AlignmentError while not ready.
+        """Write the rotation from sensor axes to vehicle axes into out. Raises Refusal while not ready.
 
         Args:
             out: array of 9 for the rotation matrix, with the rows left, up, forward.

@@ -7,7 +7,7 @@ Flash is written only at standstill.
 
 from time import ticks_add, ticks_diff
 
-from ..errors import Notice, StoreError
+from ..errors import Notice, Refusal
 from ..rotation import matrix
 from ..units import const
 from .alignment import (
@@ -55,8 +55,8 @@ class BackgroundAlignment:
         drive: the current DriveAlignment, read-only.
         state: the state to show (see alignment.py).
         shown: True if the progress has its own page (ui/pages.py).
-        result: the Notice or AlignmentError at the end of the last drive, or None.
-        message: an AlignmentError, StoreError or Notice to show before everything else, or None. The message is shown
+        result: the Notice or Refusal at the end of the last drive, or None.
+        message: a Refusal or Notice to show before everything else, or None. The message is shown
             until answer() is called or the vehicle drives off.
     """
 
@@ -271,7 +271,7 @@ class BackgroundAlignment:
         bias = [used.gyro_bias[i] + self.drive.standing.bias[i] for i in range(3)]
         try:
             self._active.refine(current.with_alignment(vehicle_from_sensor, bias, trim_deg, True))
-        except StoreError as problem:
+        except Refusal as problem:
             self._say(problem)
             return False
         return True

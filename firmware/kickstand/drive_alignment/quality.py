@@ -8,7 +8,7 @@ between two blocks. DriveParts tries every boundary.
 from array import array
 from math import atan2, degrees, pi, sqrt
 
-from ..errors import AlignmentError
+from ..errors import Refusal
 from ..rotation import angle_deg, cross, dot, norm, normalize, vector
 from ..units import const
 from .events import BLOCKS, Fit
@@ -158,23 +158,23 @@ MAX_LAG_S = 1.9
 
 
 def speed_unit_problem(force_ratio):
-    """Return the AlignmentError for changes of speed that do not fit the force.
+    """Return the Refusal for changes of speed that do not fit the force.
 
     Args:
         force_ratio: change of force per change of speed.
     """
-    return AlignmentError("speed-unit", min(1.0 / max(force_ratio, 0.01), 99.9))
+    return Refusal("speed-unit", min(1.0 / max(force_ratio, 0.01), 99.9))
 
 
 def fit_problem(lag_s, force_ratio):
-    """Return an AlignmentError if the regression of force on change of speed shows a fault of the speed, else None.
+    """Return a Refusal if the regression of force on change of speed shows a fault of the speed, else None.
 
     Args:
         lag_s: lag of the speed in seconds.
         force_ratio: change of force per change of speed.
     """
     if lag_s >= MAX_LAG_S:
-        return AlignmentError("speed-late", lag_s)
+        return Refusal("speed-late", lag_s)
     if not MIN_FORCE_RATIO < force_ratio < MAX_FORCE_RATIO:
         return speed_unit_problem(force_ratio)
     return None
@@ -184,7 +184,7 @@ class SpeedCheck:
     """Finds a negative or stuck speed. The check does not need to know forward.
 
     Attributes:
-        problem: an AlignmentError, or None.
+        problem: a Refusal, or None.
     """
 
     def __init__(self):
@@ -203,7 +203,7 @@ class SpeedCheck:
     def measure(self, speed_mps):
         """Take a new value of the speed source."""
         if not speed_mps >= _NEGATIVE_MPS:  # also rejects NaN
-            self.problem = AlignmentError("speed-negative", speed_mps)
+            self.problem = Refusal("speed-negative", speed_mps)
         if speed_mps != self._speed:
             self._speed = speed_mps
             self._start_count()
@@ -245,7 +245,7 @@ class SpeedCheck:
         if sqrt(d0 * d0 + d1 * d1 + d2 * d2) > _LIVELY_G:
             self._lively_seconds += 1
         if self._lively_seconds >= _STUCK_S and self._lively_seconds >= _STUCK_SHARE * self._seconds:
-            self.problem = AlignmentError("speed-stuck", self._speed)
+            self.problem = Refusal("speed-stuck", self._speed)
 
 
 MIN_EVENTS = 5  # number of straight braking and acceleration events needed for an alignment
@@ -288,9 +288,9 @@ class DrivingQuality:
         parts: the DriveParts.
         agree: True if forward is the same in both halves and in all parts, within the limits.
         good: True if the quality is good enough for an alignment.
-        speed_problem: an AlignmentError for a fault of the speed, or None.
+        speed_problem: a Refusal for a fault of the speed, or None.
         speed_confirmed: True if enough events agree with the speed.
-        mount_problem: an AlignmentError for a fault of the mount, or None.
+        mount_problem: a Refusal for a fault of the mount, or None.
     """
 
     def __init__(self, events, vertical):
@@ -378,17 +378,17 @@ class DrivingQuality:
         self.good = self._precise and self.agree
 
     def _find_mount_problem(self, level_change_deg):
-        """Return an AlignmentError if the mount has moved, else None."""
+        """Return a Refusal if the mount has moved, else None."""
         parts = self.parts
         if level_change_deg > MAX_CHANGE_DEG:
-            return AlignmentError("mount-moved", "vertical", level_change_deg)
+            return Refusal("mount-moved", "vertical", level_change_deg)
         problem = self._vertical.problem(self.fit.level)
         if problem is not None:
             return problem
         if self._vertical.is_car and (parts.roll_deg > ROLL_DEG or parts.pitch_deg > PITCH_DEG):
-            return AlignmentError("mount-moved", "parts")
+            return Refusal("mount-moved", "parts")
         if self._is_last_event_off() or (parts.forward_deg > _MOVED_DEG and parts.sigmas > STAY_AGREE_SIGMAS):
-            return AlignmentError("mount-moved", "forward")
+            return Refusal("mount-moved", "forward")
         return None
 
     def _is_last_event_off(self):

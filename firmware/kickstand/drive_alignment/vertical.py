@@ -10,7 +10,7 @@ from its stops and from driving straight. The camber and slope of the road distu
 amount.
 """
 
-from ..errors import AlignmentError
+from ..errors import Refusal
 from ..rotation import angle_deg, norm, normalize, vector
 from ..units import const
 
@@ -189,7 +189,7 @@ class Vertical:
         return True
 
     def problem(self, level):
-        """Return an AlignmentError if the vertical of straight driving is wrong for the stops or the upright pose, else
+        """Return a Refusal if the vertical of straight driving is wrong for the stops or the upright pose, else
         None.
 
         Args:
@@ -198,5 +198,5 @@ class Vertical:
         standing_up = self._standing.up if self.is_car else self._from_pose
         change_deg = 0.0 if standing_up is None else angle_deg(standing_up, level)
         if change_deg > MAX_CHANGE_DEG:
-            return AlignmentError("mount-moved", "since-standing" if self.is_car else "since-upright", change_deg)
+            return Refusal("mount-moved", "since-standing" if self.is_car else "since-upright", change_deg)
         return None

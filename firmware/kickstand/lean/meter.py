@@ -2,7 +2,7 @@
 
 from math import degrees, radians
 
-from ..calibration.transform import Transform
+from ..calibration.parameters import Transform
 from ..units import GAP_US, LOST_US, const
 from .consistency import MILD
 from .lean_filter import DELAY_S, LeanFilter

@@ -6,7 +6,7 @@ calibrate the gyro: see calibration/sensor_fit.py.
 
 from ..calibration import six_position
 from ..calibration.parameters import six_position_calibration
-from ..errors import CaptureError, GyroError
+from ..errors import CaptureError, SickSensor
 from ..units import const
 from .pages import DEGREE
 from .wizard import COMPUTE, NOTICE, RESULT, TAKE, Wizard, words
@@ -47,7 +47,7 @@ class SixWizard(Wizard):
             for _ in fit.run():
                 yield
             if fit.unproved and len(self._poses) == _MAX_POSES:
-                raise GyroError("unproved-gyro", fit.unproved[0])
+                raise SickSensor("unproved-gyro", fit.unproved[0])
         bias = [value / len(self._poses) for value in bias]
         self._calibration.save(six_position_calibration(fit.offset, fit.slope, bias, fit.matrices()))
         lines = "Saved, err %d mg" % round(abs(error) * 1000), "Now align it"
@@ -109,7 +109,7 @@ class SixWizard(Wizard):
 
     def _keep_side(self):
         """Keep the side of the last pose, and fit the accelerometer after the sixth side. Return two lines. Raises
-        CalibrationError."""
+        Refusal."""
         if self._sides[self._side] < 0:
             self._sides[self._side] = len(self._poses) - 1
         if -1 not in self._sides:

@@ -10,9 +10,8 @@ the two poses.
 from time import ticks_add, ticks_diff, ticks_ms
 
 from ..board.button import LONG
-from ..calibration.still_pose import StillPose
-from ..calibration.turn import Turn
-from ..errors import CaptureError, GyroError, Refusal, SickSensor, report
+from ..calibration.poses import StillPose, Turn
+from ..errors import CaptureError, Refusal, SickSensor, report
 from ..units import const
 from .messages import lines
 from .pages import DEGREE, progress_bar
@@ -185,9 +184,8 @@ class Wizard:
 
 
 def words(refusal):
-    """Return the lines for a Refusal. A fault of the sensor is also printed, because its remedy is too long for the
-    display."""
-    if isinstance(refusal, (GyroError, SickSensor)):
+    """Return the lines for a Refusal. A fault of the sensor is also printed."""
+    if isinstance(refusal, SickSensor):
         report(refusal)
     return lines(refusal)
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
+from kickstand_sim.simulation.ride import random_rotation
 from kickstand_tools.logs.log import Log
 from kickstand_tools.signals import Array, rotation_vector
-from kickstand_tools.simulation.ride import random_rotation
 
 from .route import Handling, Route, balance_lean
 

@@ -12,14 +12,13 @@ def begin():
     import gc
     import sys
 
-    from kickstand.devices import open_button, open_lcd, open_sensor
     from kickstand.settings import load
 
     class Parts:
         settings = load()
-        lcd = open_lcd(settings)
-        button = open_button(settings)
-        sensor = open_sensor(settings)
+        lcd = settings.open_lcd()
+        button = settings.open_button()
+        sensor = settings.open_sensor()
         version = sys.modules["kickstand"].__version__
         errors = 0  # number of failed transfers in fetch()
 
@@ -407,10 +406,9 @@ def loop(parts, seconds):
     from time import ticks_diff, ticks_ms
 
     from kickstand import app as app_module
-    from kickstand.devices import open_sensor
 
     gc.collect()
-    app = app_module.App(parts.settings, parts.lcd, open_sensor(parts.settings))
+    app = app_module.App(parts.settings, parts.lcd, parts.settings.open_sensor())
     turn, begun, faults, turns = app.turn, ticks_ms(), [], [0]
     overflows, restarts = app.sensor.chip.overflows, app.sensor.restarts
 

@@ -20,10 +20,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from kickstand_sim.simulated_board.simulator import Board
+
 from ..common import firmware_path
 from ..common.errors import InputError
 from ..common.messages import Remedy
-from ..simulated_board.simulator import Board
 from . import bytecode
 from .config_text import cleaned
 

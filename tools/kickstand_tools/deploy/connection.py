@@ -158,10 +158,9 @@ print(repr((worst, judge and judge.last_odd)))
 # only the number of the display's real wiring.
 WIRINGS = """
 from time import sleep_ms
-from kickstand.devices import open_lcd
 from kickstand.settings import load
 for number in range(1, 5):
-    lcd = open_lcd(load(), number)
+    lcd = load().open_lcd(number)
     lcd.show("This is readable", "LCD_WIRING = %d" % number)
     lcd.flush()
     print("%13sLCD_WIRING = %d is shown for 4 s" % ("", number))
@@ -342,9 +341,10 @@ def printed(transport: SerialTransport, name: str, code: str, what: str) -> byte
     output, error = transport.exec_raw(code, timeout=_PROGRAM_S)
     if error:
         reason = last_line(error.decode(errors="replace"))
-        if damaged(reason) and "CardError" not in reason:
+        refused = any(name in reason for name in ("Refusal", "SettingsError", "CardError"))  # up to 0.4.0 CardError
+        if damaged(reason) and not refused:
             raise InputError(f"{name}: the board's file system is damaged ({reason}): erase its flash: {_NUKE}")
-        if "CardError" in reason or "SettingsError" in reason:
+        if refused:
             raise InputError(f"{name}: {reason.partition(': ')[2]}")
         refuse_unfit_firmware(reason, name)
         raise InputError(NoAnswer(name, what, reason))

@@ -11,7 +11,7 @@ def stream():
     from errno import ETIMEDOUT
     from time import ticks_diff, ticks_ms
 
-    from kickstand import devices, settings
+    from kickstand import settings
     from kickstand.app import App
     from kickstand.board import port
     from kickstand.console import say
@@ -64,6 +64,6 @@ def stream():
     chosen = settings.load()
     print("vehicle", chosen.VEHICLE)
     try:
-        App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen), RideStream()).run()
+        App(chosen, chosen.open_lcd(), chosen.open_sensor(), RideStream()).run()
     except KeyboardInterrupt:
         port.rest_watchdog()

@@ -42,16 +42,16 @@ _LICENCES = "info/licenses/"
 
 
 class _ToolsFinder(ModuleFinder):
-    """Finds only modules of kickstand_tools, because the folder of an installed kickstand_tools has other packages."""
+    """Finds only modules of these packages, because the folder of an installed kickstand_tools has other packages."""
 
     def find_module(self, name: str, path: Any, parent: Any = None) -> Any:
-        if path is None and name != "kickstand_tools":
+        if path is None and name not in ("kickstand_tools", "kickstand_sim"):
             raise ImportError(name)
         return super().find_module(name, path, parent)
 
 
 def tools(*modules: str) -> dict[str, Path]:
-    """Find the files of some modules of kickstand_tools and of all its modules that they import, also in functions.
+    """Find the files of some modules of kickstand_tools and of all modules that they import, also in functions.
 
     modules: paths in kickstand_tools, such as "web/device.py".
     Returns {path below tools/: file}, also with the templates, scripts and style sheets in the modules' folders.

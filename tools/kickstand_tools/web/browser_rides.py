@@ -26,6 +26,7 @@ from ..common.errors import InputError
 from ..estimation.alignment import fit_ride
 from ..estimation.smooth import COLUMNS, DIGITS, smooth_to_csv
 from ..imports import mapped
+from ..imports.findings import Findings
 from ..imports.importing import import_recording, write_imported
 from ..joining.joined import join_track, write_joined
 from ..logs.csv_lines import write_lean
@@ -81,7 +82,7 @@ def rides(folder, names):
     return {"rides": rides, "kinds": inputs.kinds, "why": refused}
 
 
-def asked_for(table: mapped.MappedTable) -> dict[str, Any]:
+def asked_for(findings: Findings) -> dict[str, Any]:
     """Prepare the page's questions about the columns and units of a table.
 
     Returns:
@@ -90,9 +91,8 @@ def asked_for(table: mapped.MappedTable) -> dict[str, Any]:
         units: list of [key, words, choices, probable unit, reason]. The choices are a list of [unit, words].
         lacking: the missing columns in words.
         certain: true if all required columns are certain.
-        picture: result of MappedTable.first_seconds().
+        picture: result of Findings.first_seconds().
     """
-    findings = table.findings
     keys = [[key, words, key in mapped.REQUIRED, findings.columns.get(key, "")] for key, words in mapped.WORDS.items()]
     units = []
     for key, words in (("t", "time"), ("a", "acceleration"), ("g", "rates"), ("speed", "speed")):
@@ -102,8 +102,8 @@ def asked_for(table: mapped.MappedTable) -> dict[str, Any]:
             choices.insert(0, likely)
         units.append([key, f"unit of the {words}", [[unit, unit] for unit in choices], likely, reason])
     units[1][2] += [[f"-{unit}", f"{unit}, all of the opposite sign"] for unit, _ in list(units[1][2])]
-    words = {"lacking": table.lacking, "certain": findings.decided, "picture": table.first_seconds()}
-    return {"columns": table.sheet.columns, "keys": keys, "units": units} | words
+    words = {"lacking": findings.lacking_words, "certain": findings.decided, "picture": findings.first_seconds()}
+    return {"columns": findings.sheet.columns, "keys": keys, "units": units} | words
 
 
 @in_json

@@ -10,12 +10,12 @@ The module runs on MicroPython (in the browser and elsewhere) and on CPython.
 
 import json
 
-from ..demo.hand_bike import HandBike
-from ..simulated_board.clock import PowerOff, Reset, to_us
-from ..simulated_board.lcd import shown_lean
-from ..simulated_board.oled import Oled
-from ..simulated_board.simulator import Board
-from ..simulation.scripted.sensor_errors import Sensor
+from kickstand_sim.demo.hand_bike import HandBike
+from kickstand_sim.simulated_board.clock import PowerOff, Reset, to_us
+from kickstand_sim.simulated_board.lcd import shown_lean
+from kickstand_sim.simulated_board.oled import Oled
+from kickstand_sim.simulated_board.simulator import Board
+from kickstand_sim.simulation.scripted.sensor_errors import Sensor
 
 PART_SEED = 1
 PART_SHARE = 0.5  # the simulated sensor's errors, as a share of the data sheet's limits

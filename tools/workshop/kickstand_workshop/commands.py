@@ -6,13 +6,13 @@ from typing import Any
 
 import click
 from kickstand_emulator.commands import CHIP, ready_emulator
+from kickstand_sim.simulation.physics.mount import MOUNTS
+from kickstand_sim.simulation.physics.road import CLASSES
+from kickstand_sim.simulation.profiles import MAIN, check_profile
 from kickstand_tools.cli.common import JSON, PATH, warn
 from kickstand_tools.cli.simulated import LINES_S, PROFILE_NAMES, pose_options, seconds_option
 from kickstand_tools.common.errors import extra
 from kickstand_tools.common.progress import Bar
-from kickstand_tools.simulation.physics.mount import MOUNTS
-from kickstand_tools.simulation.physics.road import CLASSES
-from kickstand_tools.simulation.profiles import MAIN, check_profile
 from rich.console import Console
 
 from .evaluation import bands, integrity, report, runs

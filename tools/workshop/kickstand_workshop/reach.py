@@ -17,6 +17,7 @@ TESTS = ROOT / "host_tests"
 PRODUCT = {
     "kickstand": ROOT / "firmware",
     "kickstand_tools": ROOT / "tools",
+    "kickstand_sim": ROOT / "tools",
     "kickstand_fleet": ROOT / "tools",
     "kickstand_emulator": ROOT / "tools",
     "kickstand_workshop": ROOT / "tools" / "workshop",

@@ -14,10 +14,10 @@ import numpy as np
 from kickstand.calibration.parameters import Calibration
 from kickstand_emulator import flash_image
 from kickstand_emulator.emulate import Kind, device_class
+from kickstand_sim.simulated_board.mpu6050 import ACCEL_XOUT_H, Mpu6050
+from kickstand_sim.simulation.scripted.script import Ride, accelerate, turn, upright
+from kickstand_sim.simulation.scripted.sensor_errors import Sensor
 from kickstand_tools.deploy.bytecode import architecture, cross_compiled
-from kickstand_tools.simulated_board.mpu6050 import ACCEL_XOUT_H, Mpu6050
-from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, upright
-from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from rich.table import Table
 
 _LIMIT_S = 10.0

@@ -7,7 +7,6 @@ from array import array
 from time import ticks_diff, ticks_us
 
 from kickstand import app as app_module
-from kickstand.devices import open_lcd, open_sensor
 from kickstand.settings import Settings
 from machine import mem16
 from micropython import qstr_info
@@ -156,7 +155,7 @@ def run(seconds, out, chosen):
     for name in chosen:
         setattr(Config, name, chosen[name])
     settings = Settings(Config)
-    app = MeasuredApp(settings, open_lcd(settings), open_sensor(settings))
+    app = MeasuredApp(settings, settings.open_lcd(), settings.open_sensor())
     if settings.LIVE:
         _attach(app)
     app.prepare(seconds, out)

@@ -3,12 +3,12 @@
 from pathlib import Path
 
 import numpy as np
+from kickstand_sim.simulation.ride import ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.simulation.ride import ride
 from numpy.typing import NDArray
 from rich import box
 from rich.table import Table

@@ -20,13 +20,13 @@ import numpy as np
 from kickstand.lean import kalman, measurements
 from kickstand.lean.bike_model import BIAS_LEFT
 from kickstand.units import STANDARD_GRAVITY
+from kickstand_sim.simulation.physics.chip import CALIBRATED_C, GYRO_DPS_PER_G
+from kickstand_sim.simulation.ride import SimulatedRide
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.estimation.smooth import smooth
 from kickstand_tools.logs.log import Log
 from kickstand_tools.replay import replay_engine
 from kickstand_tools.replay.replay import replay
-from kickstand_tools.simulation.physics.chip import CALIBRATED_C, GYRO_DPS_PER_G
-from kickstand_tools.simulation.ride import SimulatedRide
 from numpy.typing import NDArray
 
 AVERAGE_S = 0.3  # averaging time of the formula's lean

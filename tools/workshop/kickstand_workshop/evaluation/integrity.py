@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 from kickstand.lean.meter import FALLEN_DEG
+from kickstand_sim.simulation.physics.mount import MOUNTS
+from kickstand_sim.simulation.physics.road import CLASSES
+from kickstand_sim.simulation.ride import SimulatedRide, ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.replay.replay_engine import NO_SPEED, Replay
-from kickstand_tools.simulation.physics.mount import MOUNTS
-from kickstand_tools.simulation.physics.road import CLASSES
-from kickstand_tools.simulation.ride import SimulatedRide, ride
 from numpy.typing import NDArray
 from rich import box
 from rich.table import Table

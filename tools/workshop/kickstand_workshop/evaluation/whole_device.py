@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 from kickstand.calibration.store import Store
+from kickstand_sim.simulated_board.lcd import shown_lean
+from kickstand_sim.simulated_board.simulator import Board
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.simulated_board.lcd import shown_lean
-from kickstand_tools.simulated_board.simulator import Board
 from numpy.typing import NDArray
 
 from .faults import ACCEL_RANGE_G

@@ -19,9 +19,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from kickstand_tools.simulated_board.lcd import shown_lean
-from kickstand_tools.simulated_board.simulator import Board
-from kickstand_tools.simulation.scripted.sensor_errors import Sensor
+from kickstand_sim.simulated_board.lcd import shown_lean
+from kickstand_sim.simulated_board.simulator import Board
+from kickstand_sim.simulation.scripted.sensor_errors import Sensor
 
 from .trip import QUIET_S, SENSOR, Trip, make_trip
 

@@ -4,7 +4,7 @@ import random
 from dataclasses import dataclass, field
 from typing import Any
 
-from kickstand_tools.simulation.scripted import script
+from kickstand_sim.simulation.scripted import script
 
 SHORT_S, LONG_S = 0.15, 1.2
 KICKSTAND_S, UPRIGHT_S = 14.0, 12.0  # time in each pose, long enough for an alignment through the menu

@@ -1,10 +1,10 @@
-"""Finds the unit of a gyro's rates from the turns of gravity, by least squares.
+"""Finds units from what the vehicle does: of a gyro's rates from the turns of gravity, of a speed from the positions.
 
-At rest and in a hand, the direction u of gravity turns in the sensor's axes by du/dt = u x rate. So over a window of
-WINDOW_S, the change of u has two parts: the integral of u x reading, times the unit's factor, and the effect of a
-constant bias. In a vehicle the force is not only gravity. Then the rates explain the turns of the force less well, and
-the factor is too small or not found. All 48 signed permutations of the gyro's axes are tried: exchanged axes are
-another mistake, which is checked later.
+The rates are fitted by least squares. At rest and in a hand, the direction u of gravity turns in the sensor's axes by
+du/dt = u x rate. So over a window of WINDOW_S, the change of u has two parts: the integral of u x reading, times the
+unit's factor, and the effect of a constant bias. In a vehicle the force is not only gravity. Then the rates explain the
+turns of the force less well, and the factor is too small or not found. All 48 signed permutations of the gyro's axes
+are tried: exchanged axes are another mistake, which is checked later.
 """
 
 from collections.abc import Mapping
@@ -13,7 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..checks.axes import PERMUTATIONS
-from ..signals import Array
+from ..common.messages import Message, Remedy, kind
+from ..signals import Array, distance_m
+from .recording import SECOND_NS, Sheet
+from .units import SPEEDS, Nanoseconds, factor
 
 CELL_S = 0.05  # readings are averaged over cells of this length
 MOST_CELLS = 12_000  # ten minutes are enough to find a unit
@@ -28,6 +31,21 @@ FEWEST = 8  # least number of windows
 # mean rate across gravity must not amount to a turn of over MOST_TURNED degrees in this time. The data sheet's largest
 # bias, 20 deg/s per axis, amounts to less.
 TURNED_S, KEPT_DIRECTION, MOST_TURNED = 2.0, 0.97, 120.0
+_NEAR = 1.25  # largest factor between the speed and the speed from positions; units differ by 1.6 or more
+_FAR = 4.0  # positions whose speed differs by this factor are wrong: of degrees and minutes, or radians
+
+ImportSpeedUnit = kind(
+    "import-speed-unit",
+    "column",
+    "{column} has no unit, and the positions do not show it, so the speed is left out",
+    Remedy("add --units speed=km/h, mph or m/s", "write it in brackets behind that name, as in Speed (km/h)"),
+)
+ImportPositions = kind(
+    "import-positions",
+    "columns why",
+    "the positions in {columns} are left out: {why}",
+    Remedy("name them with --columns lat=...,lon=... if they are right", "export them in degrees"),
+)
 
 
 @dataclass
@@ -165,14 +183,86 @@ def _in_cells(seconds: Array, force: Array, rates: Array) -> tuple[Array, Array]
     return means[0], means[1]
 
 
-def _levi_civita() -> Array:
-    """Return e (3, 3, 3). e[i, l, a] is component a of the cross product of the unit vectors of axis l (of gravity) and
-    axis i (of the rate), in this order."""
-    e = np.zeros((3, 3, 3))
-    for first, second, third in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        e[second, first, third] = 1.0
-        e[first, second, third] = -1.0
-    return e
+# e[i, l, a] is component a of the cross product of the unit vectors of axis l (of gravity) and axis i (of the rate)
+_LEVI_CIVITA = np.cross(np.eye(3)[None, :, :], np.eye(3)[:, None, :])
 
 
-_LEVI_CIVITA = _levi_civita()
+# The unit of a speed
+
+
+def doubt_of_positions(time_ns: Nanoseconds, speed_mps: Array, lat: Array, lon: Array) -> str:
+    """Return why positions are wrong, or "".
+
+    They must move as fast as the speed says. If latitude and longitude are exchanged, the ratio of both speeds changes
+    with the direction. speed_mps: NaN if unknown."""
+    if np.any(np.abs(lat) > 90.0) or np.any(np.abs(lon) > 180.0):
+        return "they are no degrees"
+
+    def ratios(north: Array, east: Array) -> Array:
+        course_mps = _course_mps(time_ns, north, east)
+        return course_mps[(course_mps > 0.0) & (speed_mps > 3.0)] / speed_mps[(course_mps > 0.0) & (speed_mps > 3.0)]
+
+    def spread(ratio: Array) -> float:
+        return float(np.median(np.abs(np.log(ratio / np.median(ratio))))) if len(ratio) > 20 else np.nan
+
+    own, exchanged = ratios(lat, lon), ratios(lon, lat)
+    if np.all(np.abs(lon[np.isfinite(lon)]) <= 90.0) and spread(exchanged) < 0.5 * spread(own) > 0.025:
+        return "latitude and longitude are exchanged"
+    factor_off = float(np.median(own)) if len(own) > 20 else 1.0
+    return "" if 1.0 / _FAR < factor_off < _FAR else "they do not move as fast as the speed says: are they degrees?"
+
+
+def unit_by_positions(
+    sheet: Sheet,
+    time_ns: Nanoseconds,
+    speed: int,
+    lat: int | None,
+    lon: int | None,
+    per_degree: tuple[float, float] = (1.0, 1.0),
+) -> str:
+    """Return the unit in which the speeds fit the changes of position, or "" if several units or none fit.
+
+    speed, lat, lon: numbers of columns. per_degree: factors from the columns to degrees of latitude and longitude.
+    """
+    if lat is None or lon is None:
+        return ""
+    course_mps = _course_mps(time_ns, sheet.numbers(lat) * per_degree[0], sheet.numbers(lon) * per_degree[1])
+    speeds = sheet.numbers(speed)
+    fast = np.isfinite(course_mps) & np.isfinite(speeds) & (course_mps > 3.0)
+    if np.count_nonzero(fast) < 20:
+        return ""
+    ratio = float(np.median(speeds[fast] / course_mps[fast]))
+    near = {name: max(ratio * factor(name, SPEEDS, ""), 1.0 / (ratio * SPEEDS[name])) for name in SPEEDS if ratio > 0.0}
+    best = min(near, key=lambda name: near[name]) if near else ""
+    return best if best and near[best] < _NEAR else ""
+
+
+def speed_of(
+    sheet: Sheet,
+    time_ns: Nanoseconds,
+    speed: int | None,
+    stated: str,
+    lat: int | None,
+    lon: int | None,
+    per_degree: tuple[float, float] = (1.0, 1.0),
+) -> tuple[int | None, str, list[Message]]:
+    """Return the number of the speed's column, its unit, and notices.
+
+    stated: the unit in the column's name or of the user. If it is no unit of speed, the unit is found from the
+    positions. If they do not show it, the speed is left out: the number is None. See unit_by_positions()."""
+    if speed is None:
+        return None, "m/s", []
+    speed_unit = stated if stated in SPEEDS else unit_by_positions(sheet, time_ns, speed, lat, lon, per_degree)
+    if not speed_unit:
+        return None, "m/s", [ImportSpeedUnit(sheet.columns[speed])]
+    return speed, speed_unit, []
+
+
+def _course_mps(time_ns: Nanoseconds, lat: Array, lon: Array) -> Array:
+    """Return the mean speed from the positions over about a second before each row, shape (n). NaN if unknown."""
+    steps = np.diff(time_ns)
+    rows = max(1, round(SECOND_NS / max(float(np.median(steps)), 1.0))) if len(steps) else 1
+    apart_s = np.full(len(time_ns), np.nan)
+    apart_s[rows:] = (time_ns[rows:] - time_ns[:-rows]) / SECOND_NS
+    east, north = distance_m(np.roll(lat, rows), np.roll(lon, rows), lat, lon)
+    return np.where((apart_s > 0.5) & (apart_s < 2.0), np.hypot(east, north) / np.maximum(apart_s, 0.5), np.nan)

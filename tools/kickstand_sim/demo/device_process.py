@@ -10,7 +10,8 @@ import tempfile
 import threading
 from pathlib import Path
 
-from ..common import firmware_path, unix_port
+from kickstand_tools.common import firmware_path, unix_port
+
 from .score import State
 
 
@@ -38,7 +39,7 @@ class DeviceProcess:
             command, environment = unix_port.command(str(script), *arguments), unix_port.environment()
             environment["MICROPYPATH"] += ":" + self._directory.name
         else:
-            command = [sys.executable, "-m", "kickstand_tools.demo.device", *arguments]
+            command = [sys.executable, "-m", "kickstand_sim.demo.device", *arguments]
             folders = [firmware_path.search_path(), self._directory.name, os.environ.get("PYTHONPATH")]
             path = os.pathsep.join(filter(None, folders))
             environment = os.environ | {"PYTHONPATH": path}

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.output import check_directory, make_directory, whole_file
+from kickstand_tools.logs.cells import COLUMNS, TRACK
 from numpy.typing import NDArray
 
-from ..common.errors import InputError
-from ..common.output import check_directory, make_directory, whole_file
-from ..logs.cells import COLUMNS, TRACK
 from .profiles import check_profile
 from .ride import SimulatedRide, ride
 

@@ -1,6 +1,6 @@
 """Simulates motorcycle rides as an MPU6050 on the bike would log them. The true lean is known at every instant.
 
-    from kickstand_tools.simulation.files import simulate
+    from kickstand_sim.simulation.files import simulate
     simulate("hills", seed=3, out_dir="ride")
     # ride/POSE_1.csv to POSE_7.csv (the last one slanted), SIX.csv, KICKSTAND.csv, UPRIGHT.csv, RIDE.csv, TRUTH.csv
 

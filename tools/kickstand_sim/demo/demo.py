@@ -7,11 +7,11 @@ import sys
 import warnings
 from pathlib import Path
 
+from kickstand_tools.common import unix_port
+from kickstand_tools.common.errors import InputError
 from rich.console import Console
 from rich.live import Live
 
-from ..common import unix_port
-from ..common.errors import InputError
 from .device_process import DeviceProcess
 from .keyboard import BIKE_KEYS, keyboard
 from .score import Score, table

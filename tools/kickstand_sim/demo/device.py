@@ -18,12 +18,12 @@ import os
 import sys
 import time
 
-from kickstand_tools.demo.hand_bike import HandBike
-from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.oled import Oled
-from kickstand_tools.simulated_board.simulator import Board
-from kickstand_tools.simulation.scripted.script import Ride, accelerate, brake, kickstand, straight, turn, upright, wait
-from kickstand_tools.simulation.scripted.sensor_errors import Sensor
+from kickstand_sim.demo.hand_bike import HandBike
+from kickstand_sim.simulated_board.clock import Clock
+from kickstand_sim.simulated_board.oled import Oled
+from kickstand_sim.simulated_board.simulator import Board
+from kickstand_sim.simulation.scripted.script import Ride, accelerate, brake, kickstand, straight, turn, upright, wait
+from kickstand_sim.simulation.scripted.sensor_errors import Sensor
 
 TICK_S = 0.05
 PART_SEED = 1

@@ -1,7 +1,7 @@
 """Replaces micropython-lib's driver `sdcard`, with the same interface.
 
 write() and write_token() are left out. These two methods are faulty in that driver, and the firmware has its own
-(kickstand/board/spi_card.py).
+(kickstand/board/sd_card.py).
 """
 
 # pyright: reportAttributeAccessIssue=false
