@@ -28,7 +28,7 @@ from .units import const
 LOOP_US = 10_000  # length of a pass of the loop in us; the chip's FIFO can keep samples for much longer
 # Bytes of heap that a pass of the loop uses, the second while aligning by driving
 _PASS_BYTES = const(2200)
-_PASS_BYTES_DRIVING = const(2700)
+_PASS_BYTES_DRIVING = const(3000)
 _PLAN_EVERY = const(8)  # number of collections between two checks of the free heap; a check takes 3 to 7 ms
 SINGLE_GAPS = 120  # number of free heap blocks that lie alone after a collection
 _PAGE_MS = const(100)
