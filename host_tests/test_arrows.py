@@ -152,10 +152,8 @@ TOOLS = {
         "simulated_board",
         "simulation",
         "demo",
-        "deploy",
         "web",
         "cli",
-        "kickstand_emulator",
     },
 }
 

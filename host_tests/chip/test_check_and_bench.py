@@ -64,7 +64,7 @@ def test_defects_of_many_parts_are_found_at_once(chip):
 def test_the_loop_and_the_start_stay_within_their_limits():
     """No sample is lost, the heap does not shrink, and the first lean appears within 1.2 s."""
     pico()  # skips the test without the emulator
-    from kickstand_workshop.bench import bench
+    from kickstand_emulator import bench
 
     result = bench.loop(2)  # within only one second the number of garbage collections varies
     for spread in result["turn_us"], result["collection_pause_us"]:
@@ -92,7 +92,7 @@ def test_the_loop_and_the_start_stay_within_their_limits():
 def test_free_heap_and_names_of_each_mode(chosen, free_kb):
     """The 1,261st name takes 8 KB in one piece, for which a board that runs has no room."""
     pico()  # skips the test without the emulator
-    from kickstand_workshop.bench import bench
+    from kickstand_emulator import bench
 
     result = bench.loop(1, chosen=chosen)
     assert result["free_heap_bytes"] / 1024 == pytest.approx(free_kb, abs=2.0)

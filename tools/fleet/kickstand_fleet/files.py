@@ -12,7 +12,7 @@ from typing import IO, Any, cast
 from urllib.parse import quote
 
 from kickstand_tools.checks.log import read_with_notices
-from kickstand_tools.common.errors import InputError, cause, extra
+from kickstand_tools.common.errors import InputError, cause, leaf
 from kickstand_tools.common.output import whole_file
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.source import open_input
@@ -177,13 +177,13 @@ def _in_store(path: str, action: str) -> Iterator[tuple[Any, str]]:
 
 
 def _system(path: str):
-    try:
-        import fsspec
+    import fsspec
 
+    try:
         return fsspec.core.url_to_fs(path)
     except ImportError as error:
-        name = "s3" if path.startswith("s3:") else "fleet"
-        raise InputError(f"{path}: its library is not installed: {extra(name)}") from error
+        install = leaf("fleet[s3]") if path.startswith("s3:") else cause(error)
+        raise InputError(f"{path}: its library is not installed: {install}") from error
     except ValueError as error:
         raise InputError(f"{path}: {error}") from error
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from kickstand_tools.common.errors import InputError, cause, extra
+from kickstand_tools.common.errors import InputError, cause
 from kickstand_tools.common.output import check_directory, make_directory, whole_file
 from kickstand_tools.logs.csv_lines import write_table
 from kickstand_tools.logs.log import Log
@@ -185,11 +185,9 @@ def _write(path: Path, log: Log, broken: str) -> None:
 
 def log_bytes(log: Log) -> bytes:
     """The bytes of a log as a CSV file."""
-    try:
-        import pyarrow
-        from pyarrow import csv
-    except ImportError as error:
-        raise InputError("a fleet needs pyarrow: " + extra("fleet")) from error
+    import pyarrow  # imported here, because it is slow to import
+    from pyarrow import csv
+
     values = [log.t_s.round(3), *log.accel_g.T.round(5), *log.gyro_dps.T.round(4)]
     names = ["t_s", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps"]
     columns = [pyarrow.array(column) for column in values]

@@ -20,7 +20,7 @@ _EMULATED_S = 1e6  # limit of the emulated time in s, longer than the replay of 
 def rp2040(records: Iterator[bytes], progress: Progress | None) -> Iterator[IO[bytes]]:
     """Replay on an emulated Pico, with 32-bit floats and the board's own interpreter.
 
-    Yields a file with the results. Raises InputError if something is not installed, and GuestError if the replay fails
+    Yields a file with the results. Raises InputError if the image is missing, and GuestError if the replay fails
     on the Pico.
 
     records: The records of replay_engine.py.
@@ -28,7 +28,7 @@ def rp2040(records: Iterator[bytes], progress: Progress | None) -> Iterator[IO[b
     """
     from . import image, native
 
-    image.find()  # called before the imports below: raises InputError if something is not installed
+    image.find()
     native.build()
     from . import flash_image
     from .pico import GUEST, HostLink, Pico

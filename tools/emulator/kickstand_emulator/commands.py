@@ -1,9 +1,13 @@
-"""The command `kickstand emulate`, which the entry point in pyproject.toml adds."""
+"""The commands `kickstand emulate` and `bench`, which the entry points in pyproject.toml add."""
+
+import json
 
 import click
-from kickstand_tools.cli.common import DISPLAY
+from kickstand_tools.cli.common import DISPLAY, JSON
 from kickstand_tools.common.progress import spinner
+from rich.console import Console
 
+_WIDTH = 110  # width in columns of a table that is not printed to a terminal
 CHIP = click.option(
     "--chip",
     type=click.Choice(["rp2040", "esp32"]),
@@ -26,6 +30,23 @@ def emulate_command(port: int, chip: str, display: str) -> None:
     from .emulate import emulate
 
     emulate(port, click.echo, chip, display)
+
+
+@click.command()
+@click.option("--seconds", type=click.IntRange(1, 600), default=10, help="Emulated time of each run.")
+@CHIP
+@JSON
+def bench_command(seconds: int, chip: str, as_json: bool) -> None:
+    """Measure what the firmware costs on an emulated board: time, memory, flash."""
+    ready_emulator(chip)
+    from .bench import bench, tables
+
+    result = bench(seconds, chip)
+    if as_json:
+        click.echo(json.dumps(result))
+    else:
+        console = Console()
+        (console if console.is_terminal else Console(width=_WIDTH)).print(tables(result))
 
 
 def ready_emulator(chip: str) -> None:

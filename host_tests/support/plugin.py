@@ -1,5 +1,5 @@
-"""Make the firmware's drivers importable in every test, and find recorded data. Tests that need missing recordings are
-skipped."""
+"""Pytest's plugin for all tests, which pyproject.toml names. It makes the firmware's drivers importable, finds recorded
+data, and leaves out the long tier."""
 
 import gc
 import hashlib
@@ -31,7 +31,7 @@ hypothesis.settings.register_profile(
 )
 hypothesis.settings.load_profile("unhurried")
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 COMPILED = ROOT / ".pytest_cache" / "mpy"
 _cross_compiled = bytecode.cross_compiled
 
@@ -55,7 +55,7 @@ def _compiled_once(source: Path, architecture: str = "armv6m") -> bytes:
 bytecode.cross_compiled = _compiled_once  # replaced here, before any module imports the function by name
 
 # Features that depend on the machine: fixtures, markers, and modules that use programs, boards or pages.
-SLOW_FOLDERS = {"chip", "web", "fleet", "device"}
+SLOW_FOLDERS = {"chip", "web", "fleet", "emulator", "device"}
 ASKED_FOR = {"chromium", "files", "shared_data"}
 OF_THE_MACHINE = (
     "subprocess",
@@ -112,7 +112,7 @@ class SlowFoldersFirst:
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, items: list[pytest.Function]) -> None:
-        items.sort(key=lambda item: item.path.parent.name not in SLOW_FOLDERS)
+        items.sort(key=lambda item: _folder(item) not in SLOW_FOLDERS)
 
 
 TESTS_PER_COLLECTION = 200
@@ -145,8 +145,12 @@ def pytest_runtest_protocol(item: pytest.Item):
     try:
         return (yield)
     finally:
-        folder = item.path.relative_to(ROOT / "host_tests").parts[0]
-        _seconds_of_tests.update({folder: _processor_s() - begin_s})  # pyright: ignore[reportCallIssue, reportArgumentType]
+        _seconds_of_tests.update({_folder(item): _processor_s() - begin_s})  # pyright: ignore[reportCallIssue, reportArgumentType]
+
+
+def _folder(item: pytest.Item) -> str:
+    """Return the name of the folder below host_tests or tools that a test is in."""
+    return item.path.relative_to(ROOT).parts[1] if item.path.is_relative_to(ROOT) else item.path.parent.name
 
 
 def _processor_s() -> float:

@@ -1,6 +1,6 @@
 """An emulated Raspberry Pi Pico that runs the official MicroPython image, wired to the models of simulated_board.
 
-The tests in host_tests/chip, `kickstand emulate`, `bench` and `replay --engine rp2040` use it. For example:
+The tests, `kickstand emulate`, `bench` and `replay --engine rp2040` use it. For example:
 
     with Pico(world, files=flash_image.firmware()) as pico:
         pico.run(2.0)

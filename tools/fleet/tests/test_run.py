@@ -2,7 +2,6 @@
 
 import errno
 import os
-import sys
 from pathlib import Path
 
 import pytest
@@ -122,12 +121,6 @@ def test_a_full_store_keeps_the_row_and_ends_the_run(periods, workers, results, 
     second = run_fleet(periods[:1], OUT, with_signals=signals)
     assert (second.new, second.seen.errors, second.seen.statuses["aligned"]) == (1, 0, 1)
     assert run_fleet(periods[:1], OUT, with_signals=signals).new == 0
-
-
-def test_without_pyarrow_the_extra_is_named(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(InputError, match=r"a fleet needs pyarrow: .*\[fleet\]"):
-        run_fleet(absent(1), tmp_path)
 
 
 def test_the_command_says_what_it_found(periods, results, workers, fleet, tmp_path):

@@ -45,6 +45,6 @@ def test_without_its_library_an_esp32_is_refused(words, tmp_path, monkeypatch):
 def test_an_esp32_needs_no_emulator_of_the_pico():
     """The modules for an ESP32 are imported without rp2040py."""
     script = "import sys; sys.modules['rp2040py'] = None\nfrom kickstand_emulator.emulate import device_class\n"
-    script += "import kickstand_workshop.bench.bench\nprint(device_class('esp32').NAME)"
+    script += "import kickstand_emulator.bench\nprint(device_class('esp32').NAME)"
     process = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert (process.stdout, process.stderr) == ("ESP32\n", "")

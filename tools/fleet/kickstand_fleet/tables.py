@@ -7,8 +7,6 @@ import contextlib
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
-from kickstand_tools.common.errors import InputError, extra
-
 from . import files
 from .period import PeriodResult, Row
 
@@ -96,14 +94,6 @@ def schema(table: str) -> "pyarrow.Schema":
         ],
         metadata={"made_by": "kickstand fleet"},
     )
-
-
-def require_pyarrow() -> None:
-    """Raise InputError if Parquet cannot be written."""
-    try:
-        import pyarrow.parquet  # noqa: F401
-    except ImportError as error:
-        raise InputError("a fleet needs pyarrow: " + extra("fleet")) from error
 
 
 def write_tables(directory: str, results: Iterable[PeriodResult]) -> None:
