@@ -7,9 +7,8 @@ from math import cos, degrees, radians, sin
 
 import pytest
 from bike_motion import GRAVITY_MPS2
-from kickstand.lean.dive import PRIOR_SHARE, Dive
-from kickstand.lean.measurements import gyro_variances
-from kickstand.lean.rest import RestDetector
+from kickstand.lean.bike_model import PRIOR_SHARE, Dive
+from kickstand.lean.measurements import RestDetector, gyro_variances
 
 WINDOW_S = 0.25
 NONE = (0.0, 0.0, 0.0)

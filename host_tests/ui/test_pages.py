@@ -8,7 +8,7 @@ from kickstand.drive_alignment import alignment
 from kickstand.errors import Notice, Refusal
 from panel import Panel, pages, reading
 
-D = pages.DEGREE
+D = "\xdf"
 
 
 def meter(**values) -> Any:

@@ -23,15 +23,13 @@ from .bike_model import (
     SPEED,
     STATES,
     YAW_ERROR,
+    Dive,
     Linearisation,
     possible_pitch,
     predict,
 )
 from .consistency import Consistency
-from .dive import Dive
-from .kalman import Covariance
-from .rest import MAX_BIAS_RADPS, RestDetector
-from .upright_trim import UprightTrim
+from .kalman import Covariance, UprightTrim
 
 _WINDOW_US = const(200_000)
 _FIRST_WINDOW_US = const(50_000)
@@ -90,7 +88,7 @@ class LeanFilter:
         self._x = x
         self._p = None
         self._upright = self.trim.angle  # value of the state LEAN while the bike is upright
-        self._rest = RestDetector(not self._kept)
+        self._rest = measurements.RestDetector(not self._kept)
         # _speed: the latest measured speed, until a window uses it. _last_speed: the measured speed that a window used
         # last. _speed_s: seconds since the use of _last_speed. _straight_s: seconds since straight_or_prior_speed() was
         # used.
@@ -322,7 +320,7 @@ class LeanFilter:
         fx, fy, fz = means[5:8]
         x, p = self._x, self._p
         rates = [abs(means[2 + i] + x[BIAS_LEFT + i]) for i in range(3)]
-        if max(rates) > MAX_BIAS_RADPS:
+        if max(rates) > measurements.MAX_BIAS_RADPS:
             # Either the bias has changed much since the calibration, or the bike is in a long, smooth bend
             self.consistency.gap(False)
         x[LEAN] = atan2(fx, fy)
@@ -333,7 +331,7 @@ class LeanFilter:
         p.set_variance(PITCH, measurements.SIGMA_STAND**2)
         p.set_variance(SPEED, measurements.SIGMA_REST_SPEED**2)
         for i in range(3):
-            if abs(means[2 + i]) > MAX_BIAS_RADPS:
+            if abs(means[2 + i]) > measurements.MAX_BIAS_RADPS:
                 x[BIAS_LEFT + i] += means[2 + i]
                 p.set_variance(BIAS_LEFT + i, measurements.SIGMA_START[BIAS_LEFT] ** 2)
 

@@ -11,11 +11,11 @@ import gc
 from time import ticks_add, ticks_diff
 
 from ..board.button import LONG, SHORT
+from ..board.display import DEGREE
 from ..errors import Notice, attempt
 from ..rotation import vector
 from ..units import const
 
-DEGREE = "\xdf"  # code of the degree sign in the display's character ROM
 ARROW = "\x7e"  # code of an arrow in the display's character ROM
 RECORDING = "*"
 _BLOCK = 0xFF  # code of a full cell in the display's character ROM
@@ -79,12 +79,6 @@ def _cell(columns, first_glyph):
     if columns <= 0:
         return 0x20
     return _BLOCK if columns >= 5 else first_glyph + columns - 1
-
-
-def progress_bar(done, total):
-    """Return a bar that has 16 full cells when `done` reaches `total`."""
-    filled = 16 * done // total if total else 0
-    return "\xff" * min(16, filled)
 
 
 def side_name(lean_deg):

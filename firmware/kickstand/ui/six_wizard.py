@@ -4,11 +4,11 @@ In the six positions each side of the sensor is up once, in any order. The turns
 calibrate the gyro: see calibration/six_position.py.
 """
 
+from ..board.display import DEGREE
 from ..calibration import six_position
 from ..calibration.parameters import six_position_calibration
 from ..errors import CaptureError, SickSensor
 from ..units import const
-from .pages import DEGREE
 from .wizard import COMPUTE, NOTICE, RESULT, TAKE, Wizard, words
 
 _NOTICE_MS = const(1500)

@@ -61,7 +61,9 @@ class Update:
     moves: dict[str, str] = field(default_factory=dict)
 
 
-def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> Update:
+def plan(
+    wanted: dict[str, bytes], board: BoardFiles, replace_config: bool = False, moves: dict[str, str] | None = None
+) -> Update:
     """Plan the Update that gives the board the wanted files. The user's own files are kept.
 
     Files to replace are removed first, which frees their blocks. An interruption is harmless, because a board without
@@ -70,6 +72,7 @@ def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> U
     wanted: Contents of the wanted files, by path.
     board: The files that are on the board.
     replace_config: Also replace the user's config.py.
+    moves: See Update.
 
     Raises InputError if a file of the user is in the way.
     """
@@ -95,6 +98,7 @@ def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> U
         obsolete=[path for path in stale if _module(path) not in modules],
         keep=[path for path in wanted if path not in copy],
         config_differs=config_differs,
+        moves=moves or {},
     )
 
 

@@ -11,7 +11,16 @@ from pathlib import Path
 
 from ..common import firmware_path
 from ..common.errors import InputError
-from ..deploy import bytecode, check as board_check, config_check, config_text, connection, flash, others
+from ..deploy import (
+    bytecode,
+    check as board_check,
+    config_check,
+    config_text,
+    connection,
+    flash,
+    others,
+    status as board_status,
+)
 from ..deploy.firmware_files import CONFIG
 from .browser_serial import BrowserBoard
 
@@ -109,9 +118,8 @@ class Installation:
             result = flash.flash(board, replaces, progress, compiler=_compiled, judge=_judged)
         except InputError as error:
             return json.dumps({"refused": error.line(page=True)})
-        installed = result.installed
-        counts = {"copied": len(installed.copied), "kept": len(installed.kept)}
-        return json.dumps({"board": result.board, "config_kept": CONFIG not in installed.copied} | counts)
+        counts = {"copied": len(result.update.copy), "kept": len(result.update.keep)}
+        return json.dumps({"board": result.board, "config_kept": CONFIG not in result.update.copy} | counts)
 
 
 def status(line, name):
@@ -120,7 +128,7 @@ def status(line, name):
     Returns {"text": the output} or {"refused": reason}.
     """
     try:
-        return json.dumps({"text": connection.status(BrowserBoard(line, name))})
+        return json.dumps({"text": board_status.status(BrowserBoard(line, name))})
     except InputError as error:
         return json.dumps({"refused": error.line(page=True)})
 
