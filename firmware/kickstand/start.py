@@ -27,8 +27,8 @@ _CHARGE_MS = const(100)
 # step. MicroPython cannot run code between the imports of other modules, so this list repeats them. A test compares the
 # list with the import statements.
 STEPS = (
-    "calibration.parameters calibration.store calibration.active lean.bike_model lean.kalman "
-    "lean.measurements lean.rest lean.upright_trim lean.dive lean.lean_filter lean.meter ui.pages ui.screen rides.rides"
+    "calibration.parameters calibration.store calibration.active lean.bike_model lean.kalman lean.measurements "
+    "lean.lean_filter lean.meter ui.pages ui.screen rides.rides"
 ).split()
 
 

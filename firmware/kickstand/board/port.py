@@ -27,7 +27,6 @@ _HALF_PERIOD_US = 5  # half a period of SCL while a bus is freed, so SCL runs at
 # Time-out in bit times. On a Pico the time-out is for a whole transfer, which has at most 136 bytes. On an ESP32 the
 # time-out is for each bit. The default of 50 ms would stop the loop for too long.
 _TIMEOUT_BITS = 2000
-_TURN_BYTES = 2000  # bytes of heap that one pass of the app's loop uses; 3000 while aligning by driving
 _FEWEST_TURNS = 3
 
 _WATCHDOG_MS = 8000  # the watchdog of a Pico allows at most 8388 ms
@@ -100,18 +99,22 @@ def open_i2c(controller, sda_pin, scl_pin, frequency):
     return machine.I2C(controller, sda=sda, scl=scl, freq=frequency, timeout=timeout_us)
 
 
-def turns_to_collect(most):
-    """Return the number of passes of the app's loop between two garbage collections, at most `most`.
+def turns_to_collect(turn_bytes):
+    """Return the number of passes of the app's loop between two garbage collections.
 
-    An ESP32's heap starts with 64 KB and grows only after a collection that frees too little. In such a small heap,
-    `most` passes would use up the heap, and collections would often run in the middle of a pass."""
-    if not IS_ESP32:
-        return most
-    import esp32  # type: ignore[import-not-found]
+    These passes use most of the free heap. If they used it up, a collection would run in the middle of a pass. An
+    ESP32's heap starts with 64 KB and grows only after a collection that frees too little.
 
-    # mem_free() also counts the possible growth of the heap, which is the largest block of ESP-IDF's heap
-    grow = max(region[2] for region in esp32.idf_heap_info(esp32.HEAP_DATA))
-    return max(_FEWEST_TURNS, min(most, (gc.mem_free() - grow) // (2 * _TURN_BYTES)))
+    Args:
+        turn_bytes: bytes of heap that a pass uses.
+    """
+    free = gc.mem_free()
+    if IS_ESP32:
+        import esp32  # type: ignore[import-not-found]
+
+        # mem_free() also counts the possible growth of the heap, which is the largest block of ESP-IDF's heap
+        free -= max(region[2] for region in esp32.idf_heap_info(esp32.HEAP_DATA))
+    return max(_FEWEST_TURNS, free * 5 // (6 * turn_bytes))
 
 
 def start_watchdog():

@@ -33,7 +33,7 @@ WHOLE_BODY_LENGTH = BODY_LENGTH + struct.calcsize(_WHOLE)
 _HEAD_LENGTH = struct.calcsize(_HEAD)
 _LENGTHS = {_VERSION: _HEAD_LENGTH + BODY_LENGTH + 4, _WHOLE_VERSION: _HEAD_LENGTH + WHOLE_BODY_LENGTH + 4}
 MAX_BIAS_DPS = 60.0  # largest plausible bias of the gyro
-MAX_TRIM_DEG = 3.6  # MAX_TRIM of lean/upright_trim.py in degrees, plus a margin for 32-bit rounding
+MAX_TRIM_DEG = 3.6  # MAX_TRIM of lean/kalman.py in degrees, plus a margin for 32-bit rounding
 
 
 class Store:

@@ -68,8 +68,7 @@ class DriveAlignment:
         self._speed_check = SpeedCheck()
         self._bias_given = bias is not None
         self._judged = (0, 0)  # numbers of events and stops when the quality was last judged
-        self._sums = [0.0] * 6  # integrals of force and rate over the current bin
-        self._sums_us = 0
+        self._clear_bin()
         self._speed_mps = -1.0  # the last speed in m/s, negative before the first speed
         self._top_mps = 0.0
         self._silent_us = 0  # time since the last speed, in us
@@ -158,23 +157,26 @@ class DriveAlignment:
             self.interrupt()
             return
         sums = self._sums
-        sums[0] += force[0] * dt_us
-        sums[1] += force[1] * dt_us
-        sums[2] += force[2] * dt_us
-        sums[3] += rate[0] * dt_us
-        sums[4] += rate[1] * dt_us
-        sums[5] += rate[2] * dt_us
-        self._sums_us += dt_us
-        if self._sums_us >= BIN_US:
-            self._end_bin()
-            return
+        for i in range(3):
+            sums[i] += force[i] * dt_us
+            sums[3 + i] += rate[i] * dt_us
+        if self.elapse(dt_us):
+            means = [total / self._bin_us for total in sums]
+            self.end_bin(means[:3], means[3:])
+
+    def elapse(self, dt_us):
+        """Count the time of a sample. Return True at the end of a bin, when end_bin() must follow; else do a step of
+        the work."""
+        self._bin_us += dt_us
+        if self._bin_us >= BIN_US:
+            return True
         for _ in range(1 + dt_us // STEP_US):
             self._do_step()
+        return False
 
     def interrupt(self):
         """Drop the current braking event and the history, because samples are missing. Counted events are kept."""
-        self._sums = [0.0] * 6
-        self._sums_us = 0
+        self._clear_bin()
         self._history.clear()
         self._work = None
         self.events.interrupt()
@@ -199,7 +201,7 @@ class DriveAlignment:
             self.events.interrupt()
         self._silent_us = 0
         self._top_mps = max(self._top_mps, speed_mps)
-        self.events.measure_speed(speed_mps, self._history.now + self._sums_us - age_us)
+        self.events.measure_speed(speed_mps, self._history.now + self._bin_us - age_us)
 
     def matrix(self, out):
         """Write the rotation from sensor axes to vehicle axes into out. Raises Refusal while not ready.
@@ -226,24 +228,25 @@ class DriveAlignment:
         elif self.events.due:
             self._work = self._follow()
 
-    def _end_bin(self):
+    def end_bin(self, force, rate):
+        """Take the means over the time since the last bin. force, rate: two lists, as for update()."""
         if self._means is not None:
             self._do_step()
-        sums, n = self._sums, self._sums_us
+        n = self._bin_us
         seconds = n * 1e-6
-        means = [total / n for total in sums]
-        force, rate = means[:3], means[3:]
         self.vertical.update(force, seconds)
         axis, bias = self.vertical.turn_axis, self.standing.bias
         yaw_dps = (rate[0] - bias[0]) * axis[0] + (rate[1] - bias[1]) * axis[1] + (rate[2] - bias[2]) * axis[2]
-        self._history.add(sums, yaw_dps * seconds * 1e5, n)
+        self._history.add([f * n for f in force], yaw_dps * seconds * 1e5, n)
         if self._silent_us < STALE_US:  # a silent source must not be reported as a stuck source
             self._speed_check.update(force, yaw_dps, n)
         self._means = (force, rate, seconds)
         self._silent_us = min(STALE_US + 1, self._silent_us + n)
-        self._sums_us = 0
-        for i in range(6):
-            sums[i] = 0.0
+        self._clear_bin()
+
+    def _clear_bin(self):
+        self._sums = [0.0] * 6  # integrals of force and rate over the current bin
+        self._bin_us = 0
 
     def _follow(self):
         """Process the last interval between two speeds, as a generator of short steps."""

@@ -24,7 +24,7 @@ from .alignment import (
     turn_round,
 )
 
-# Number of passes of the loop whose counts are added up before they are converted to floats, to save time
+# Number of passes of the loop between two steps of the drive's work, to save time
 _FEED_TURNS = const(2)
 _GAP_MS = const(300)  # a longer time between two readings means that readings were lost
 _LOOK_MS = const(1000)  # time between two calls of _look()
@@ -69,7 +69,6 @@ class BackgroundAlignment:
         self._speed_mps = 0.0
         self._speed_ms = self._fed_ms = self._look_ms = None
         self._total = [0] * 7
-        self._force, self._rate = [0.0] * 3, [0.0] * 3
         self.begin()
 
     def begin(self, asked=False):
@@ -170,11 +169,14 @@ class BackgroundAlignment:
         self._n += n
         self._us += dt_us
         self._turns += 1
-        if self._turns >= _FEED_TURNS:
-            n = self._n
-            self._calibration.apply([t / n for t in total], self._force, self._rate)
-            self.drive.update(self._force, self._rate, self._us)
+        if self._turns < _FEED_TURNS:
+            return
+        if self.drive.elapse(self._us):
+            n, force, rate = self._n, [0.0] * 3, [0.0] * 3
+            self._calibration.apply([t / n for t in total], force, rate)
+            self.drive.end_bin(force, rate)
             self._clear_sums()
+        self._us = self._turns = 0
 
     def _begin_again(self):
         """Drop the sums, because readings are missing."""

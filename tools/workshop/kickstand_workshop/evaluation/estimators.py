@@ -17,7 +17,7 @@ from math import radians
 from unittest.mock import patch
 
 import numpy as np
-from kickstand.lean import measurements, upright_trim
+from kickstand.lean import kalman, measurements
 from kickstand.lean.bike_model import BIAS_LEFT
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_sim.simulation.physics.chip import CALIBRATED_C, GYRO_DPS_PER_G
@@ -203,7 +203,7 @@ def oracle(ride: SimulatedRide) -> NDArray[np.float64]:
 @contextmanager
 def _oracle_parameters() -> Iterator[None]:
     """A context that sets the filter's parameters to _ORACLE, in this process."""
-    with patch.multiple(measurements, **_ORACLE), patch.object(upright_trim, "MAX_TRIM", 0.0):
+    with patch.multiple(measurements, **_ORACLE), patch.object(kalman, "MAX_TRIM", 0.0):
         yield
 
 

@@ -1,8 +1,12 @@
-"""The words of `kickstand status` for the facts that kickstand.status() prints on a board."""
+"""`kickstand status`: the words for the facts that kickstand.status() prints on a board."""
 
 import ast
 from collections.abc import Iterator
 from typing import Any
+
+from mpremote.transport_serial import SerialTransport
+
+from .connection import Port, connected, describe, literal, printed, restart
 
 # For each code of the firmware's lean/consistency.py, the name of the reading that did not fit
 _MEASURED = {
@@ -16,17 +20,61 @@ _ROWS = "offset, g", "slope", "gyro bias, deg/s", "left", "up", "forward"  # of 
 _FULL_SCALE = 32768  # counts at the end of the range
 _SUPPORTED = 2  # kind of a sensor that the firmware supports, see diagnosis.py of the firmware
 
+# Prints what the running app noticed, which a soft reset removes: see App and lean/consistency.py of the firmware
+_NOTICED = """
+import sys
+app, judge = [sys.modules.get("kickstand." + name) for name in ("app", "lean.consistency")]
+worst = app and app.worst
+if worst:
+    worst = worst[0], worst[1], (tuple(worst[2][0]), worst[2][1])
+print(repr((worst, judge and judge.last_odd)))
+"""
+# Shows the number of each wiring on a character display. Each number is sent with its own wiring, so the user can read
+# only the number of the display's real wiring.
+WIRINGS = """
+from time import sleep_ms
+from kickstand.settings import load
+for number in range(1, 5):
+    lcd = load().open_lcd(number)
+    lcd.show("This is readable", "LCD_WIRING = %d" % number)
+    lcd.flush()
+    print("%13sLCD_WIRING = %d is shown for 4 s" % ("", number))
+    sleep_ms(4000)
+    lcd.show("", "")  # blank the display now, because it may not react to the next wiring
+    lcd.flush()
+print("%13sput the line that it has shown into config.py; if it has shown none: its contrast, or 5 V" % "")
+"""
+_WORST = (int, int, ((int, int, int), float))
+
 Devices = list[tuple[int, str, int]]  # address, name and kind of each device on a bus
 Noticed = tuple[Any, Any]  # what the app noticed: its `worst`, and the last misfit of its readings; each may be None
 
 
+def status(port: Port, wirings: bool = False) -> str:
+    """Run kickstand.status() on the board, restart the board, and return the report in words.
+
+    wirings: also try each wiring of an LCD backpack on the display. Raises InputError if the board returns no status.
+    """
+    noticed: list[Noticed] = []
+
+    def ask_first(transport: SerialTransport) -> None:
+        shapes = ((worst, odd) for worst in (_WORST, None) for odd in (str, None))
+        noticed.append(literal(transport.exec(_NOTICED), *shapes))
+
+    with connected(port, ask_first) as (transport, name):
+        describe(transport, name)
+        try:
+            code = "import kickstand\nkickstand.status()"
+            text = printed(transport, name, code + WIRINGS * wirings, "its status").decode(errors="replace")
+        finally:
+            restart(transport)
+    return words(text, *noticed[-1:])
+
+
 def words(text: str, noticed: Noticed = (None, None)) -> str:
-    """Return the report for the output of kickstand.status().
+    """Return the report for the output of kickstand.status(). Lines that are not facts stay.
 
-    A line that is not a fact stays, such as the report of an earlier firmware.
-
-    text: The output.
-    noticed: What the app noticed before a soft reset that removed it.
+    noticed: what the app noticed before a soft reset that removed it.
     """
     text = text.replace("\r\n", "\n").rstrip()
     facts, others = {}, []
