@@ -308,4 +308,6 @@ def run_device(plan, fit=None, made=None):
 
 if __name__ == "__main__":
     record = run_device(json.load(sys.stdin))
-    print("\n" + json.dumps(record))
+    print()
+    json.dump(record, sys.stdout)  # one text of all would need one piece of heap
+    print()

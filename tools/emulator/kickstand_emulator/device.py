@@ -124,7 +124,6 @@ class EmulatedDevice(ABC):
     # The display and the button
 
     def lcd(self) -> list[str]:
-        """The two lines of the display."""
         return self.board.lcd.text()
 
     def press(self, at_s: float | None = None, for_s: float = 0.15) -> None:
@@ -179,7 +178,6 @@ class EmulatedDevice(ABC):
         return output.decode(errors="replace").replace("\r\n", "\n")
 
     def _until_it_reads(self) -> None:
-        """Advance the time until the board reads its console."""
         self.run(0.1)
 
     def soft_reset(self) -> None:

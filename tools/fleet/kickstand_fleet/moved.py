@@ -163,8 +163,6 @@ def turn_between(first: Blocks, second: Blocks) -> tuple[Array, Array] | None:
 
 @dataclass
 class _PartAlignment:
-    """The alignment on one side of a comparison."""
-
     frame: Array  # rotation from sensor to vehicle axes, shape (3, 3)
     variance: Array  # variances of pitch, yaw and roll, shape (3), in degrees^2
     sway_deg: float  # direction of the sway, in degrees from forward

@@ -71,13 +71,11 @@ class Oled:
         self.changes += 1
 
     def power_off(self):
-        """Switch the power off. No pixel is lit then."""
         self.on = False
         self.changes += 1
 
     @property
     def backlight(self):
-        """Return True while pixels can be lit."""
         return self.on and self.pumped
 
     def pixels(self):
@@ -265,7 +263,6 @@ def _cells(line):
 
 
 def _small(pages, page):
-    """Return the letters of 8x8 pixels in a page, or None."""
     letters = [_LETTERS.get(cell, "") for cell in _cells(pages[page])]
     return "".join(letters) if all(letters) else None
 
@@ -280,7 +277,6 @@ def _tall(pages, page, inverted=0):
 
 
 def _digit(pages, page, x):
-    """Return the large digit at column x whose top is in this page, or None."""
     from kickstand.ui.glance import DIGITS
 
     pattern = b"".join([bytes(pages[page + row][x : x + _DIGIT_COLUMNS]) for row in range(_DIGIT_ROWS)])

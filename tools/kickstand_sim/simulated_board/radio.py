@@ -78,11 +78,9 @@ class Radio:
         return True
 
     def take_passkey(self, passkey):
-        """Receive the PIN of gap_passkey()."""
         self._passkey = passkey
 
     def drop(self):
-        """End the connection from the board's side."""
         phone = self.phone
         self.disconnect()
         if phone is not None:

@@ -101,7 +101,6 @@ class SdCard:
         return 0xFF
 
     def _obey(self, number, argument):
-        """Execute a command. Returns the answer."""
         now_us = self._clock.now_us
         if number == 0:
             self._ready_us = None if self._init_s is None else now_us + int(self._init_s * 1e6)
@@ -148,12 +147,10 @@ class SdCard:
     # For a computer's card reader: a block device for os.VfsFat
 
     def readblocks(self, number, buf):
-        """Fill buf with the sectors from this number on."""
         for i in range(len(buf) // SECTOR):
             buf[i * SECTOR : (i + 1) * SECTOR] = self.data.get(number + i, _EMPTY)
 
     def writeblocks(self, number, buf):
-        """Write buf."""
         for i in range(len(buf) // SECTOR):
             self._keep(number + i, bytes(buf[i * SECTOR : (i + 1) * SECTOR]))
 

@@ -104,11 +104,9 @@ class Board:
             self.fit_lcd()
 
     def install(self):
-        """Make `machine`, `time` and `os` act on this board, for all imported code."""
         self._fakes.install(self)
 
     def uninstall(self):
-        """Undo install()."""
         self.faults.restore("open", "print")
         self._fakes.uninstall()
 
@@ -151,19 +149,28 @@ class Board:
                     part.connect(None)
 
     def power_on(self):
-        """Switch on everything except the processor."""
         self._off = False
         self.sensor.power_on()
         self.lcd.power_on()
 
     def power_off(self):
-        """Switch off everything except the processor."""
         self._off = True
         if self.radio:
             self.radio.off()
         for bus in self.buses:
             bus.power_off()
         self.lcd.power_off()
+
+    def run_firmware(self, until_s, **config):
+        """Run the firmware with these settings of config.py, as run() does. Call it within the `with` statement."""
+        from kickstand import settings, start
+
+        load = settings.load
+        settings.load = lambda: settings.Settings(type("Config", (), config))
+        try:
+            return self.run(start.main, until_s)
+        finally:
+            settings.load = load
 
     def at(self, t_s, function):
         """Call function() when the clock reaches t_s."""
@@ -188,7 +195,6 @@ class Board:
         self.sensor_bus.attach(self.sensor)
 
     def remove_sensor(self):
-        """Disconnect the sensor."""
         self.sensor_bus.detach(self.sensor)
 
     def fit_lcd(self):

@@ -64,7 +64,6 @@ def simulate(
 
 
 def _cut(simulated: SimulatedRide, seconds: float) -> SimulatedRide:
-    """Return the first `seconds` of a ride."""
     n = min(len(simulated.time), round(seconds * simulated.rate_hz))
     truth = {name: values[:n] for name, values in simulated.truth.items()}
     return replace(

@@ -122,7 +122,6 @@ def procedure(
 
 
 def _turn_between(a: NDArray, b: NDArray) -> NDArray:
-    """Return the smallest rotation from the unit vector a to the unit vector b, shape (3, 3)."""
     axis = np.cross(a, b)
     size = np.linalg.norm(axis)
     if size < 1e-9:

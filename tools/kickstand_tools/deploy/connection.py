@@ -114,8 +114,7 @@ def connected(
 ) -> Iterator[tuple[ConnectedBoard, str]]:
     """A context that yields a board at its raw prompt, and the name of its port. The board's program is interrupted.
 
-    before: function that is called before the soft reset, which removes all modules. It may raise TransportError. It is
-        not called for a board that does not answer.
+    before: called before the soft reset, which removes all modules, if the board answers. It may raise TransportError.
 
     Errors of the connection, also inside the with block, are raised as InputError.
     """
@@ -221,12 +220,11 @@ def ask(transport: SerialTransport, expression: str, *shapes: Any) -> Any:
 
 
 def literal(text: bytes, *shapes: Any) -> Any:
-    """Convert a line of a board's output to the Python value that the line represents.
+    """Convert a line of a board's output to a Python value.
 
-    shapes: the allowed types of the value. Each is a type, or None, or a tuple with the types of a tuple's values.
-    Integers must be 0 or larger.
-
-    Raises InputError for other values. Another device at the port may send such values.
+    shapes: the allowed types. Each is a type, or None, or a tuple with the types of a tuple's values. Integers must be
+        0 or larger.
+    Raises InputError for other values, which another device at the port may send.
 
     >>> literal(b"('/rides', 3)", (str, int))
     ('/rides', 3)
@@ -261,11 +259,8 @@ def describe(transport: SerialTransport, name: str) -> str:
 
 
 def printed(transport: SerialTransport, name: str, code: str, what: str) -> bytes:
-    """Run a program that uses the firmware, and return its output.
-
-    name: Name of the board's port.
-    code: The program.
-    what: Name of the output in messages.
+    """Run a program that uses the firmware, and return its output. name: of the board's port. what: of the output, for
+    messages.
 
     Raises InputError if the program fails on the board.
     """
@@ -283,12 +278,9 @@ def printed(transport: SerialTransport, name: str, code: str, what: str) -> byte
 
 
 def refuse_unfit_firmware(reason: str, name: str) -> None:
-    """Raise InputError if an error on the board means that Kickstand or one of its modules is missing.
+    """Raise InputError if an exception on the board means that Kickstand or one of its modules is missing.
 
     Modules are missing in another version of the firmware, and after an interrupted update.
-
-    reason: The exception on the board.
-    name: Name of the board's port.
     """
     if "no module named 'kickstand'" in reason:
         install = Remedy("install it with kickstand flash", "install it with the page Install")
@@ -306,10 +298,7 @@ def last_line(text: str) -> str:
 def _enter_raw_prompt(
     transport: ConnectedBoard, name: str, before: Callable[[ConnectedBoard], None] | None = None
 ) -> None:
-    """Send Ctrl-C, then a soft reset into the raw prompt. This soft reset does not start main.py.
-
-    before: see connected().
-    """
+    """Send Ctrl-C, then a soft reset into the raw prompt, which does not start main.py. before: see connected()."""
     for limit_s in (_STARTING_S, ANSWER_S):  # a board may reset when its port is opened, and then needs time to start
         try:
             with contextlib.redirect_stdout(io.StringIO()):  # mpremote prints output that it cannot interpret
@@ -364,7 +353,7 @@ def _why_silent(name: str, heard: bytes) -> InputError:
 def damaged(text: str) -> bool:
     """True if a board's message means that its file system is damaged.
 
-    The message can come from MicroPython (inisetup.py of the ESP32), from littlefs, or from the flash. The number 84 is
-    EILSEQ and LFS_ERR_CORRUPT.
+    It comes from MicroPython (inisetup.py of the ESP32), from littlefs or from the flash. 84 is EILSEQ and
+    LFS_ERR_CORRUPT.
     """
     return any(mark in text for mark in _CORRUPT)

@@ -26,13 +26,12 @@ _CHUNK = 2048  # bytes per transfer. With mpremote's default of 256 bytes, copyi
 class FlashResult:
     """The result of flash().
 
-    board: Name of the board and its version of MicroPython.
-    port: Name of the port.
-    config: The config.py that was checked before copying, or None.
-    others: One line per file of another project that was kept under another name.
-    unused: Settings in the user's config.py that are behind a '#'.
-    why_sources: The reason why the firmware was not compiled, or None.
-    update: The steps that were carried out.
+    board, port: the board with its version of MicroPython, and its port.
+    config: the config.py that was checked before copying, or None.
+    others: one line per file of another project that was kept under another name.
+    unused: settings in the user's config.py that are behind a '#'.
+    why_sources: the reason why the firmware was not compiled, or None.
+    update: the steps that were carried out.
     """
 
     board: str
@@ -66,17 +65,13 @@ def flash(
 ) -> FlashResult:
     """Update a board's files, verify them, and restart the board.
 
-    Args:
-        port: The board's port.
-        replace_config: Also replace the user's config.py.
-        progress: Function that is called with the progress.
-        compiler: Function that compiles a module. None uses bytecode.cross_compiled().
-        judge: Function that checks a config.py. None uses config_check.judge(), which starts a process.
-        agree: Function that is called with one line per file of another project that will be renamed. It may raise
-            InputError.
+    replace_config: also replace the user's config.py.
+    progress: called with the progress.
+    compiler: compiles a module; None uses bytecode.cross_compiled().
+    judge: checks a config.py; None uses config_check.judge(), which starts a process.
+    agree: called with one line per file of another project that will be renamed. It may raise InputError.
 
-    Raises:
-        InputError: If the board cannot be updated. If the board has too little room, nothing is changed.
+    Raises InputError if the board cannot be updated. If the board has too little room, nothing is changed.
     """
     with connected(port) as (transport, name):
         board = describe_supported(transport, name)

@@ -53,9 +53,7 @@ Noticed = tuple[Any, Any]  # what the app noticed: its `worst`, and the last mis
 def status(port: Port, wirings: bool = False) -> str:
     """Run kickstand.status() on the board, restart the board, and return the report in words.
 
-    wirings: True to also try each wiring of an LCD backpack on the display.
-
-    Raises InputError if the board returns no status.
+    wirings: also try each wiring of an LCD backpack on the display. Raises InputError if the board returns no status.
     """
     noticed: list[Noticed] = []
 
@@ -74,12 +72,9 @@ def status(port: Port, wirings: bool = False) -> str:
 
 
 def words(text: str, noticed: Noticed = (None, None)) -> str:
-    """Return the report for the output of kickstand.status().
+    """Return the report for the output of kickstand.status(). Lines that are not facts stay.
 
-    A line that is not a fact stays, such as the report of an earlier firmware.
-
-    text: The output.
-    noticed: What the app noticed before a soft reset that removed it.
+    noticed: what the app noticed before a soft reset that removed it.
     """
     text = text.replace("\r\n", "\n").rstrip()
     facts, others = {}, []

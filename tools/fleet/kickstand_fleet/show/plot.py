@@ -90,7 +90,6 @@ class Panel:
         return element("g", *axes, *self._parts)
 
     def _positions(self, points: Sequence[Point]) -> list[Point]:
-        """The points in the picture's coordinates."""
         (x0, x1), (y0, y1) = self.across, self.along
         x_scale = (self._right - self._left) / ((x1 - x0) or 1.0)
         y_scale = (self._bottom - self._top) / ((y1 - y0) or 1.0)

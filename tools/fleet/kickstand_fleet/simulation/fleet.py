@@ -160,13 +160,11 @@ def _vehicle(
 
 
 def _turn(chance: np.random.Generator, degrees: float) -> Array:
-    """Return a rotation by this angle about a random axis, shape (3, 3)."""
     axis = chance.standard_normal(3)
     return rotation_matrix(np.radians(degrees) * axis / np.linalg.norm(axis))
 
 
 def _write(path: Path, log: Log, broken: str) -> None:
-    """Write a log. broken: the fault of the file, a key of TROUBLES, or ""."""
     content = log_bytes(log)
     if path.suffix == ".gz":
         content = gzip.compress(content, 1, mtime=0)

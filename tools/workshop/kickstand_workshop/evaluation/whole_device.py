@@ -72,15 +72,8 @@ def display_of(
     try:
         with tempfile.TemporaryDirectory() as flash, contextlib.chdir(flash):
             with board, contextlib.redirect_stdout(io.StringIO()):
-                from kickstand import settings, start
-
-                load = settings.load
-                settings.load = lambda: settings.Settings(type("Config", (), config))
                 Store(board.sensor.who_am_i, int(ACCEL_RANGE_G), os.curdir).save(calibration.to_firmware())
-                try:
-                    board.run(start.main, (last + 1) / rate_hz)
-                finally:
-                    settings.load = load
+                board.run_firmware((last + 1) / rate_hz, **config)
     finally:
         gc.unfreeze()
     return np.array(times), _read(leans), min(named, default=float("nan"))
