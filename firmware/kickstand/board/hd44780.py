@@ -119,16 +119,13 @@ class Lcd:
 
     def _put(self, number, text):
         line = self._wanted[number]
-        if isinstance(text, str):
-            if text == self._texts[number]:  # the text is usually the same, and skipping its conversion saves 0.2 ms
-                return
-            self._texts[number] = text
-            for i in range(_COLUMNS):
-                line[i] = ord(text[i]) & 0xFF if i < len(text) else 0x20
-        else:
-            self._texts[number] = _NO_TEXT
-            for i in range(_COLUMNS):
-                line[i] = text[i] if i < len(text) else 0x20
+        is_text = isinstance(text, str)
+        if is_text and text == self._texts[number]:  # usually so, and skipping its conversion saves 0.2 ms
+            return
+        self._texts[number] = text if is_text else _NO_TEXT
+        for i in range(_COLUMNS):
+            code = text[i] if i < len(text) else 0x20
+            line[i] = ord(code) & 0xFF if isinstance(code, str) else code
         self._changed = True
 
     def _initialise(self, step):
