@@ -109,9 +109,8 @@ class App:
         from .drive_alignment.background import BackgroundAlignment
         from .speed.source import open_speed
 
-        return BackgroundAlignment(
-            self.settings.leans, open_speed(self.settings, self.notices), self.meter, self.calibration
-        )
+        speed = open_speed(self.settings, self.notices)
+        return BackgroundAlignment(self.settings.leans, speed, self.meter, self.calibration)
 
     def run(self):
         """Run the loop until Ctrl-C, one pass per LOOP_US. At the end the display says that the firmware has stopped,
