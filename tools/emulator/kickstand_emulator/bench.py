@@ -25,8 +25,6 @@ _LIMIT_S = 10.0
 
 @dataclass(frozen=True)
 class Boot:
-    """The parts of a start. All times count from power-on."""
-
     micropython_s: float  # time at which main.py begins
     starting_s: float  # time at which the display says that Kickstand starts
     sampling_s: float  # time at which the sensor is set up and samples
@@ -122,7 +120,6 @@ def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
 
 
 def tables(result: dict[str, Any]) -> Table:
-    """Format the result of bench() for a terminal."""
     figures = Table(title=f"{result['sample_hz']} samples per second, {result['chip']}", show_header=False)
     turn = result["turn_us"]
     pause = result["collection_pause_us"]

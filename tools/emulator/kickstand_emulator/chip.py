@@ -94,11 +94,9 @@ class EmulatedClock:
 
     @property
     def now_us(self) -> int:
-        """The time since the emulation began, in microseconds."""
         return int(self._clock.nanos + 0.5) // 1000
 
     def at(self, due_us: float, function: Callable[[], None]) -> None:
-        """Call function() at the time due_us, or immediately if due_us is in the past."""
         self._clock.create_alarm(function).schedule(max(0.0, due_us * 1000.0 - self._clock.nanos))
 
 
@@ -124,7 +122,6 @@ class EmulatedChip:
         self.stopped = False  # execute_batch() reads the attributes stopped, rp2040 and clock
 
     def connect(self, number: int, bus: Bus) -> TimedI2C:
-        """Connect the I2C controller with this number to a bus."""
         irq = (IRQ.I2C0, IRQ.I2C1)[number]
         controller = TimedI2C(self.rp2040, f"I2C{number}", irq, bus)
         self.rp2040.i2c[number] = self.rp2040.peripherals[_I2C[number]] = controller
@@ -143,7 +140,6 @@ class EmulatedChip:
         self._reset(from_watchdog=False)
 
     def sleep(self, seconds: float) -> None:
-        """Advance the time while the processor has no power."""
         self.clock.tick(seconds * 1e9)
 
     def run(self, seconds: float, between: Callable[[], None] | None = None) -> None:
@@ -163,11 +159,9 @@ class EmulatedChip:
             end.cancel()
 
     def stop(self) -> None:
-        """Make run() return after the current instruction."""
         self.stopped = True
 
     def reset(self) -> None:
-        """Reset the chip, like machine.reset() or an expired watchdog."""
         self.rp2040.psm.write_uint32(psm.WDSEL, psm.PSM_BITS_MASK & ~_OSCILLATORS)
         self.rp2040.watchdog._reason |= TIMER
         self._reset(from_watchdog=True)

@@ -98,7 +98,6 @@ class EmulatedDevice(ABC):
         self.board.watch_pin(number, partial(self._set_pin, number))
 
     def fit_wheel(self, speed: Callable[[float], float], **kind: Any) -> None:
-        """Connect a wheel contact, as simulator.Board.fit_wheel() does."""
         self.board.fit_wheel(speed, **kind)
         self._wire(self.board.wheel_pin)
 
@@ -142,11 +141,9 @@ class EmulatedDevice(ABC):
     def file_system(self, system: bytes) -> None: ...
 
     def put_files(self, files: dict[str, bytes]) -> None:
-        """Replace the content of the file system with these files."""
         self.file_system = self.FLASH.build(files)
 
     def files(self) -> dict[str, bytes]:
-        """Return all files in the flash, as {path: content}."""
         return self.FLASH.read(self.file_system)
 
     # The console
@@ -181,7 +178,6 @@ class EmulatedDevice(ABC):
         self.run(0.1)
 
     def soft_reset(self) -> None:
-        """Do a soft reset, like Ctrl-D at the friendly prompt."""
         self.send(_CTRL_B + _CTRL_D)
         self._raw = False
 

@@ -96,7 +96,6 @@ class Sink:
 
     @property
     def reading(self) -> bool:
-        """True while the sensor sends data over I2C."""
         return self.board.sensor_bus.open and self._sends[0]
 
     def reset(self) -> None:
@@ -240,7 +239,6 @@ class Sink:
     # Optional parts
 
     def fit_gps(self, speed: Callable[[float], float], **kind: Any) -> None:
-        """Connect a GPS receiver, as simulator.Board.fit_gps() does."""
         self.board.fit_gps(speed, **kind)
         gps: Any = self.board.gps
         gps.connect(self._gps_sends)

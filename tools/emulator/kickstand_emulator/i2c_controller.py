@@ -36,11 +36,9 @@ class TimedI2C(i2c.RPI2C):
         self.on_stop = lambda: self._after(1, self._stopped)
 
     def reading(self) -> bool:
-        """True while a device sends a byte."""
         return self._then == self._received
 
     def let_go(self) -> None:
-        """Abandon the transfer. The controller becomes idle and releases the wires."""
         self._alarm.cancel()
         self._then = None
         self.bus.stop()

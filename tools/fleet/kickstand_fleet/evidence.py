@@ -290,8 +290,6 @@ _LEAST_BLOCKS = 4
 
 @dataclass
 class Forward:
-    """The alignment of a mount."""
-
     frame: Array  # rotation from sensor to vehicle axes, shape (3, 3). Its rows are left, up, forward.
     sigma_deg: float  # standard error of forward about up
     attitude_deg: float  # standard error of the whole rotation

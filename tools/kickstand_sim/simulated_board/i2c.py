@@ -91,7 +91,6 @@ class Bus:
             self._device = None
 
     def max_hz(self):
-        """Return the highest clock frequency that all devices allow."""
         return min([400_000] + [getattr(d, "max_hz", 400_000) for d in self.devices.values()])
 
     # For a controller

@@ -168,7 +168,6 @@ class Lcd:
     # The I2C side
 
     def start(self, address, read):
-        """Receive START and address. Returns True to acknowledge."""
         return True
 
     def write_byte(self, value):

@@ -98,11 +98,9 @@ class Oled:
 
     @property
     def rows(self):
-        """Return the number of driven rows, at most 64."""
         return self._mux + 1
 
     def pages(self):
-        """Return the visible part of the RAM, 128 bytes per page."""
         starts = [page * self._columns + self._first for page in range(PAGES)]
         return [self.ram[start : start + WIDTH] for start in starts]
 
@@ -116,7 +114,6 @@ class Oled:
     # The I2C side
 
     def start(self, address, read):
-        """Receive START and address. Returns True to acknowledge."""
         self._control = True
         return True
 
@@ -134,7 +131,6 @@ class Oled:
         return True
 
     def read_byte(self):
-        """Return the status."""
         return self.identity | (0 if self.on else _OFF)
 
     # The controller

@@ -52,7 +52,6 @@ class SdCard:
         self._selected = False
 
     def select(self, level):
-        """Set the level of the pin CS."""
         self._selected = not level
         self._command = b""
         if level:
@@ -155,5 +154,4 @@ class SdCard:
             self._keep(number + i, bytes(buf[i * SECTOR : (i + 1) * SECTOR]))
 
     def ioctl(self, op, argument):
-        """Answer the queries for the number of sectors and for their size."""
         return {4: self._sectors, 5: SECTOR}.get(op, 0)

@@ -173,11 +173,9 @@ class Board:
             settings.load = load
 
     def at(self, t_s, function):
-        """Call function() when the clock reaches t_s."""
         self.clock.at(to_us(t_s), function)
 
     def every(self, period_s, function):
-        """Call function() every period_s."""
         self.clock.every(to_us(period_s), function)
 
     def press(self, at_s=None, for_s=0.15):
@@ -190,7 +188,6 @@ class Board:
     # Parts that are connected and disconnected
 
     def fit_sensor(self):
-        """Connect the sensor and switch its supply on."""
         self.sensor.power_on()
         self.sensor_bus.attach(self.sensor)
 
@@ -198,7 +195,6 @@ class Board:
         self.sensor_bus.detach(self.sensor)
 
     def fit_lcd(self):
-        """Connect the display and switch its supply on."""
         self.lcd.power_on()
         self.lcd_bus.attach(self.lcd)
 
@@ -259,7 +255,6 @@ class Board:
         return Bus(self.clock, sda, scl)
 
     def set_up_pin(self, number, mode, pull, level):
-        """Execute Pin.init()."""
         self.touched.add(number)
         self._pins.setdefault(number, [0, 0, 0, self.clock.now_us])[:3] = mode, pull, level or 0
         self._drive_wire(number, 1 if mode == fake_machine.Pin.IN else level or 0)
@@ -273,7 +268,6 @@ class Board:
             self._drive_wire(number, level)
 
     def pin_level(self, number):
-        """Return the result of Pin.value()."""
         mode, pull = self._pins.get(number, (fake_machine.Pin.IN, -1))[:2]
         level = self._level(number)
         if number in self._high and mode == fake_machine.Pin.IN and pull == fake_machine.Pin.PULL_DOWN:

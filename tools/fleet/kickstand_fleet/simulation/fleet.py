@@ -49,8 +49,6 @@ MATRIX = tuple(f"{row}_{axis}" for row in ("left", "up", "forward") for axis in 
 
 @dataclass
 class MadeVehicle:
-    """A vehicle of the fleet."""
-
     name: str  # name of the vehicle in the manifest
     kind: str  # "car", "bus" or "motorcycle"
     trouble: str  # the vehicle's fault, a key of TROUBLES, or ""
@@ -182,7 +180,6 @@ def _write(path: Path, log: Log, broken: str) -> None:
 
 
 def log_bytes(log: Log) -> bytes:
-    """The bytes of a log as a CSV file."""
     import pyarrow  # imported here, because it is slow to import
     from pyarrow import csv
 

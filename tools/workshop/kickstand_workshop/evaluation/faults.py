@@ -36,8 +36,6 @@ class Part:
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault of the sensor."""
-
     name: str  # description of the fault
     kind: str  # SEEN, ILL or HARMLESS
     change: Callable[[Part], None]  # function that applies the fault to a Part
@@ -46,7 +44,6 @@ class Fault:
 
     @property
     def title(self) -> str:
-        """The name of the fault, and its duration or its beginning."""
         if self.from_start:
             return f"{self.name}, from power-on"
         return self.name if self.seconds is None else f"{self.name}, {self.seconds:g} s"
@@ -177,8 +174,6 @@ FAULTS: tuple[Fault, ...] = (
 
 @dataclass
 class Ill:
-    """The readings of a ride with a fault."""
-
     readings: Array  # readings in the chip's order, shape (n, 7)
     lost: NDArray[np.bool_]  # True for readings that never arrive, shape (n)
     first: int  # index of the first reading with the fault
@@ -198,11 +193,8 @@ def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: i
     The seed chooses the faulty axis, the sign, and whether the chip is mounted square. A square chip has the same axes
     as the bike.
 
-    fault: The fault.
     readings: Readings in the chip's order, shape (n, 7).
-    rate_hz: Number of readings per second.
     begin_s: Start of a fault that begins in mid-ride.
-    seed: The seed.
     vehicle_from_sensor: Rotation from sensor to bike axes, shape (3, 3).
     """
     chance = np.random.default_rng([seed, *fault.title.encode()])

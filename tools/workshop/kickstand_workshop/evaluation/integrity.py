@@ -45,8 +45,6 @@ CAPTION = (
 
 @dataclass(frozen=True)
 class FaultJob:
-    """A ride to simulate, with or without a fault."""
-
     fault: Fault | None  # the fault, or None
     seed: int  # seed of the ride and of the fault
     seconds: float = 120.0  # riding time
@@ -103,7 +101,6 @@ def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def judge(job: FaultJob, trace: Trace) -> Outcome:
-    """Judge the lean that the rider saw in a ride."""
     step = float(np.median(np.diff(trace.time)))
     off = int(np.argmax(trace.speed > 0.5)) if (trace.speed > 0.5).any() else 0
     error = np.abs(trace.lean - trace.true)
@@ -143,7 +140,6 @@ def _simulated(
 
 
 def follow(job: FaultJob) -> Trace:
-    """Simulate the job's ride, and return what the rider saw."""
     profile = job.profile or PROFILES[job.seed % len(PROFILES)]
     simulated, calibration = _simulated(profile, job.seed, job.seconds, job.road, job.mount)
     true, speed = simulated.truth["lean_deg"], simulated.truth["speed_mps"]
@@ -223,7 +219,6 @@ def trace_of(
 
 
 def run(job: FaultJob) -> Outcome:
-    """Simulate the job's ride, and judge the lean that the rider saw."""
     return judge(job, follow(job))
 
 

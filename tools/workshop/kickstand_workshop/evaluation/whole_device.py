@@ -33,12 +33,10 @@ def display_of(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Run the whole device, and read its display every LOOK_S.
 
-    Args:
-        readings: Readings in the chip's order, shape (m, 7).
-        rate_hz: Number of readings per second.
-        calibration: Calibration of the sensor.
-        lost: True for readings at which the sensor does not answer, shape (m).
-        speed: Function that returns the speed of a GPS receiver in m/s at a time in s. None for no receiver.
+    readings: Readings in the chip's order, shape (m, 7).
+    rate_hz: Number of readings per second.
+    lost: True for readings at which the sensor does not answer, shape (m).
+    speed: Function that returns the speed of a GPS receiver in m/s at a time in s. None for no receiver.
 
     Returns:
         times: shape (n), in s.
