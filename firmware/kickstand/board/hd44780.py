@@ -50,12 +50,8 @@ _STEPS = len(_NIBBLES) + 1 + _GLYPH_PARTS + 2
 def _bar_glyphs():
     """Return the patterns of characters 0 to 7 (64 bytes): 1 to 4 of 5 columns filled from the left, then from the
     right."""
-    rows = bytearray()
-    for columns in range(1, 5):
-        rows.extend(bytes([0x1F & ~(0x1F >> columns)] * 8))
-    for columns in range(1, 5):
-        rows.extend(bytes([(1 << columns) - 1] * 8))
-    return rows
+    rows = [0x1F & ~(0x1F >> columns) for columns in range(1, 5)] + [(1 << columns) - 1 for columns in range(1, 5)]
+    return b"".join([bytes([row] * 8) for row in rows])
 
 
 class Lcd:
