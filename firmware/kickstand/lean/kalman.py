@@ -84,7 +84,7 @@ class Covariance:
     variances: n initial variances of uncorrelated states.
     Attributes:
         rows        P, n rows of n floats
-        correction  n floats, which the owner adds to the states
+        correction  n floats, which the owner adds to the states and sets to 0
         misfit      the last innovation, in standard deviations
     """
 
@@ -179,12 +179,6 @@ class Covariance:
             if p[i] < _MIN_VARIANCE:
                 p[i] = _MIN_VARIANCE
         yield
-
-    def take_correction(self, i):
-        """Return the correction of state i and set it to 0."""
-        value = self.correction[i]
-        self.correction[i] = 0.0
-        return value
 
 
 class UprightTrim:

@@ -14,7 +14,7 @@ errors are not independent. Therefore the variance of the disturbance in windows
 parameters of the trim are in kalman.py, in the same form.
 """
 
-from math import radians
+from math import radians, sqrt
 
 from ..units import STANDARD_GRAVITY, const
 from .bike_model import BIAS_LEFT, LEAN, PITCH, SCALE_LEFT, SPEED, YAW_ERROR
@@ -285,23 +285,34 @@ def at_rest(model, means, speed, axis):
     )
 
 
+def lies(means):
+    """True if the force is gravity on a bike that lies on its side and does not turn. On a bike in balance the force
+    points to the bike's up axis, even if the estimated lean is wrong."""
+    force = sqrt(means[5] * means[5] + means[6] * means[6] + means[7] * means[7])
+    if abs(means[5]) < LYING_SIDE * force or abs(force - 1.0) > LYING_FORCE:
+        return False
+    return max(max(means[2:5]), -min(means[2:5])) < LYING_RATE
+
+
 class RestDetector:
     """Detects rest, for zero-velocity updates. update() takes the means of each window, in which an idling engine
     averages out.
 
     first: True if there was no rest since power-on, so the bias may be far off.
 
+    moving_s: time for which a measured speed proves that the bike moves.
     resting (read-only): True after _REST_S of stillness, or after _REST_ROLLING_S if the bike seems to move.
     """
 
     def __init__(self, first=True):
         self.resting = False
+        self.moving_s = 0.0
         self._still_s = 0.0
         self._not_rolling_s = 0.0  # time of stillness without a sign that the bike moves
         self._average = None  # averages of the rates, with the estimated bias included, and of the forces
         self._max_bias = _MAX_FIRST_BIAS_RADPS if first else MAX_BIAS_RADPS
 
-    def update(self, rates, force, bias, seconds, rolling=False, moving=False):
+    def update(self, rates, force, bias, seconds, rolling=False):
         """Take the means over a window.
 
         Args:
@@ -310,7 +321,6 @@ class RestDetector:
             bias: the estimated bias, 3 values in rad/s.
             seconds: duration of the window.
             rolling: True if other evidence suggests that the bike moves.
-            moving: True if a measured speed proves that the bike moves.
         """
         readings = [rates[i] + bias[i] for i in range(3)] + force
         if self._average is None:
@@ -329,7 +339,8 @@ class RestDetector:
                 near_calibration = near_calibration and abs(average[i]) < self._max_bias
             else:
                 still = still and abs(deviation) < _MAX_FORCE_G
-        still = still and (near_estimate or near_calibration) and not moving
+        still = still and (near_estimate or near_calibration) and self.moving_s <= 0.0
+        self.moving_s -= seconds
         self._still_s = self._still_s + seconds if still else 0.0
         # Steady braking looks still, so a second timer counts only stillness without a sign of rolling. With one timer,
         # braking would count as rest as soon as the estimated speed is low.

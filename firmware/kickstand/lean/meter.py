@@ -73,7 +73,7 @@ class LeanMeter:
 
     def restart(self):
         """Restart filter and smoothing after missing readings. Keep the maxima and the sensor's errors."""
-        self.filter.restart()
+        self.filter.start()
         self._fresh = True
         self.fallen = False
         self.lean_deg = 0.0

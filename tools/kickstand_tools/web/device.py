@@ -11,6 +11,7 @@ The module runs on MicroPython (in the browser and elsewhere) and on CPython.
 import json
 
 from kickstand_sim.demo.hand_bike import HandBike
+from kickstand_sim.simulated_board import app_state
 from kickstand_sim.simulated_board.clock import PowerOff, Reset, to_us
 from kickstand_sim.simulated_board.lcd import shown_lean
 from kickstand_sim.simulated_board.oled import Oled
@@ -200,10 +201,10 @@ class PageDevice:
         return [lean if aligned and meter.trusted else None, round(meter.smooth_force[2], 3) if aligned else None]
 
     def state(self):
-        """Return the entries of App.state() that STATE names. Without an App: the view "off", "starting" or "safe"."""
+        """Return the entries of STATE. Without an App: the view "off", "starting" or "safe"."""
         if not self._app:
             return {"view": "safe" if self._stopped else "starting" if self.powered else "off"}
-        state = self._app.state()
+        state = app_state.state(self._app)
         return {name: state[name] for name in STATE}
 
     def _hand_over(self, app):
