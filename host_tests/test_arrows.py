@@ -27,30 +27,29 @@ FIRMWARE = {
     "drive_alignment": set(),  # the app passes the calibrations to it
     "speed": {"board"},
     "rides": {"board", "calibration"},  # each block of a ride contains the record of its calibration
-    "live": {"calibration.transform"},
-    "ui": {"board.button", "lean", "calibration", "drive_alignment"},
-    "settings": {"setting_table"},
-    "setting_table": {"board", "imu.mpu6050"},  # for the ranges and pins that can be set
-    "devices": {"board", "imu", "diagnosis"},
+    "live": {"calibration.parameters"},
+    "ui": {"board.button", "board.display", "lean", "calibration", "drive_alignment"},
+    "settings": {"setting_table", "board", "imu", "diagnosis"},  # also opens the parts
+    "setting_table": {"board", "imu.mpu6050"},  # for the ranges that can be set
     "diagnosis": {"imu"},
     "facts": {
-        *("board.display", "calibration", "console", "devices", "diagnosis", "imu", "rides", "settings", "speed"),
+        *("board.display", "calibration", "console", "diagnosis", "imu", "rides", "settings", "speed"),
         "ui.messages",
     },
     "app": {
-        *("board", "calibration", "devices", "drive_alignment", "imu", "lean"),
-        *("rides", "speed", "state", "ui"),
+        *("board", "calibration", "drive_alignment", "imu", "lean"),
+        *("rides", "speed", "ui"),
         "user_code",
     },
-    "state": set(),
     "user_code": set(),
-    "start": {*("app", "board", "console", "devices", "live", "settings"), "ui.messages"},
+    "start": {*("app", "board", "console", "live", "settings"), "ui.messages"},
     "__init__": {"facts"},
 }
-DRIVERS = {"board", "imu", "speed", "devices", "diagnosis", "start", "live.radio"}
+DRIVERS = {"board", "imu", "speed", "settings", "diagnosis", "start", "live.radio"}
 
+CORE = {"kickstand_tools", "kickstand_sim"}
 LEAVES = {"kickstand_fleet", "kickstand_emulator", "kickstand_workshop"}
-# {part of the tools: the other parts that it may import}. A part is a folder or module of kickstand_tools, or a leaf.
+# {part of the tools: the other parts that it may import}. A part is a folder or module of the core, or a leaf.
 TOOLS = {
     "common": set(),
     "signals": set(),  # uses numpy only, no logs and no files
@@ -152,10 +151,8 @@ TOOLS = {
         "simulated_board",
         "simulation",
         "demo",
-        "deploy",
         "web",
         "cli",
-        "kickstand_emulator",
     },
 }
 
@@ -167,7 +164,7 @@ def graph():
 
 def shortened(module):
     """Return the name of a module as in the tables."""
-    short = module.removeprefix("kickstand_tools.").removeprefix("kickstand.")
+    short = module.removeprefix("kickstand_tools.").removeprefix("kickstand_sim.").removeprefix("kickstand.")
     return "__init__" if module == "kickstand" else short
 
 
@@ -178,7 +175,7 @@ def arrows(packages):
         part = shortened(module).partition(".")[0]
         inside = {shortened(target) for target in targets if target.partition(".")[0] in packages}
         if module.partition(".")[0] in packages:
-            pairs |= {(part, target) for target in inside if target.partition(".")[0] not in (part, "kickstand_tools")}
+            pairs |= {(part, target) for target in inside if target.partition(".")[0] not in (part, *CORE)}
     return pairs
 
 
@@ -186,7 +183,7 @@ def is_allowed(part, target, table, always=()):
     return any(f"{target}.".startswith(f"{allowed}.") for allowed in (*table[part], *always))
 
 
-FIRMWARE_PACKAGES, TOOL_PACKAGES = {"kickstand"}, {"kickstand_tools", *LEAVES}
+FIRMWARE_PACKAGES, TOOL_PACKAGES = {"kickstand"}, {*CORE, *LEAVES}
 TABLES = [(FIRMWARE_PACKAGES, FIRMWARE, ANY), (TOOL_PACKAGES, TOOLS, set())]
 
 
@@ -194,7 +191,7 @@ TABLES = [(FIRMWARE_PACKAGES, FIRMWARE, ANY), (TOOL_PACKAGES, TOOLS, set())]
 def test_each_part_imports_only_what_it_may(packages, table, always):
     imports = arrows(packages)
     parts = {shortened(module).partition(".")[0] for module in graph() if module.partition(".")[0] in packages}
-    assert parts - {"kickstand_tools"} == set(table)
+    assert parts - CORE == set(table)
     assert [(part, target) for part, target in imports if not is_allowed(part, target, table, always)] == []
     for part, targets in table.items():
         imported = [target for importer, target in imports if importer == part]

@@ -8,11 +8,12 @@ from kickstand_workshop.reach import reached_tests
     ("changed", "reached", "not_reached"),
     [
         ("host_tests/test_arrows.py", "host_tests/test_arrows.py", "signals"),
-        ("tools/kickstand_fleet/manifest.py", "host_tests/fleet", "host_tests/lean"),
+        ("tools/fleet/kickstand_fleet/manifest.py", "tools/fleet/tests", "host_tests/lean"),
         ("firmware/kickstand/ui/pages.py", "host_tests/ui", "host_tests/signals"),
         ("firmware/kickstand/lean/lean_filter.py", "host_tests/device", "host_tests/joining/test_none"),
         ("tools/kickstand_tools/web/page/shows.mjs", "host_tests/web", "host_tests/imu"),
         ("host_tests/support/fake_board.py", "host_tests/deploy", "host_tests/lean"),
+        ("host_tests/support/plugin.py", "tools/emulator/tests", None),
         ("pyproject.toml", "host_tests/signals", None),
     ],
 )

@@ -8,10 +8,11 @@
 
 Further arguments of `test` go to pytest.
 
-Each command creates .venv beside pyproject.toml, and installs the project in it. It installs again only if
-pyproject.toml has changed.
+Each command creates .venv beside pyproject.toml, and installs the project in it; `test` also installs the packages
+beside it, such as tools/fleet. It installs again only if a pyproject.toml has changed.
 """
 
+import glob
 import hashlib
 import os
 import subprocess
@@ -19,13 +20,16 @@ import sys
 import textwrap
 import time
 
-ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+TOOLS = os.path.dirname(os.path.abspath(__file__))
+ROOT = os.path.dirname(TOOLS)
 VENV = os.path.join(ROOT, ".venv")
 PYTHON = os.path.join(VENV, "Scripts", "python.exe") if os.name == "nt" else os.path.join(VENV, "bin", "python")
 STAMP = os.path.join(VENV, "installed.txt")
 LOG = os.path.join(VENV, "install.log")
 OLDEST = (3, 11)
-EXTRAS = ("", "test")  # extras of pyproject.toml; each contains the earlier ones
+# {name: what is installed}; each contains the earlier ones
+INSTALLATIONS = {"": ["."], "test": [".[test]", "tools/fleet[s3,test]", "tools/emulator"]}
+NAMES = list(INSTALLATIONS)
 REPORT_S = 5  # time between two lines of progress while installing
 COMPILE = "from kickstand_emulator import native; native.build()"  # compiled, the emulated Pico is twice as fast
 
@@ -118,25 +122,25 @@ def start(name, *arguments):
     return name, process
 
 
-def prepare(extra):
-    """Create .venv and install this extra of pyproject.toml, unless this is already done."""
+def prepare(name):
+    """Create .venv and make this one of INSTALLATIONS, unless this is already done."""
     place = "Python %s in %s" % (sys.version.split()[0], ROOT)
-    with open(os.path.join(ROOT, "pyproject.toml"), "rb") as file:
-        version = hashlib.sha256(file.read()).hexdigest()
+    projects = [os.path.join(ROOT, "pyproject.toml")] + sorted(glob.glob(os.path.join(TOOLS, "*", "pyproject.toml")))
+    version = hashlib.sha256("".join(map(read, projects)).encode()).hexdigest()
     stamp = (read(STAMP) + "\n\n").split("\n")
     if stamp[0] != place and stamp[0].endswith(" in " + ROOT) and has_pip():
         was, now = stamp[0].split(" in ")[0], place.split(" in ")[0]
         say(".venv has %s and is used as it is; for %s remove .venv first" % (was, now))
         place = stamp[0]
-    if stamp[0] == place and stamp[1] in [version + " " + e for e in EXTRAS[EXTRAS.index(extra) :]]:
+    if stamp[0] == place and stamp[1] in [version + " " + n for n in NAMES[NAMES.index(name) :]]:
         return
     if (stamp[0] and stamp[0] != place) or not has_pip():
         make_venv()
     if os.path.exists(STAMP):
         os.remove(STAMP)  # an interrupted installation starts again
-    install(extra)
+    install(name)
     with open(STAMP, "w", encoding="utf-8") as file:
-        file.write("%s\n%s %s\n" % (place, version, extra))
+        file.write("%s\n%s %s\n" % (place, version, name))
 
 
 def make_venv():
@@ -169,14 +173,14 @@ def has_pip():
     return subprocess.call(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) == 0
 
 
-def install(extra):
-    """Install the project in editable mode, with uv or pip.
+def install(name):
+    """Install one of INSTALLATIONS in editable mode, with uv or pip.
 
     uv takes a fifth of pip's time. If pip's settings name another index, pip is used, because uv does not read these
     settings. pip is also used if uv fails.
     """
-    say("installing %sinto .venv: a few minutes at most" % ("with the %s tools " % extra if extra else ""))
-    what = ["--editable", ".[%s]" % extra if extra else "."]
+    say("installing %sinto .venv: a few minutes at most" % ("with the %s tools " % name if name else ""))
+    what = [word for project in INSTALLATIONS[name] for word in ("--editable", project)]
     pip = [PYTHON, "-m", "pip", "install", "--no-input", "--disable-pip-version-check"]
     uv = [PYTHON, "-m", "uv", "pip", "install", "--python", PYTHON]
     quick = not own_index() and watched(pip + ["--only-binary", "uv", "uv>=0.8,<1"]) == 0 and watched(uv + what) == 0

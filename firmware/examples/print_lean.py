@@ -13,12 +13,11 @@ from time import sleep_ms
 
 from kickstand import settings
 from kickstand.calibration.store import Store
-from kickstand.devices import open_sensor
 from kickstand.imu.mpu6050 import GYRO_DELAY_S
 from kickstand.lean.meter import LeanMeter
 
 config = settings.load()
-sensor = open_sensor(config)
+sensor = config.open_sensor()
 sensor.set_up()  # from now on the chip samples on its own, SAMPLE_HZ times per second
 chip = sensor.chip
 

@@ -15,9 +15,8 @@ Ctrl-C ends mpremote. The program continues until `mpremote reset`, which starts
 from time import sleep_ms
 
 from kickstand import settings
-from kickstand.devices import open_sensor
 
-sensor = open_sensor(settings.load())  # pins and ranges as in the board's config.py
+sensor = settings.load().open_sensor()  # pins and ranges as in the board's config.py
 sensor.set_up()
 chip = sensor.chip
 print("Found an", chip.name)

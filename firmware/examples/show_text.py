@@ -16,9 +16,8 @@ starts the lean meter again.
 from time import sleep_ms, ticks_diff, ticks_ms
 
 from kickstand import settings
-from kickstand.devices import open_lcd
 
-lcd = open_lcd(settings.load())  # on the pins of the board's config.py
+lcd = settings.load().open_lcd()  # on the pins of the board's config.py
 start_ms = ticks_ms()
 
 while True:

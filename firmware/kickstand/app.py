@@ -18,24 +18,18 @@ from .board import port
 from .board.display import STOPPED
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
-from .devices import open_button
 from .errors import report
 from .imu.sensor import SampleClock
 from .lean.meter import LeanMeter
 from .rides.rides import Rides
-from .ui.screen import Screen
+from .ui.pages import Screen
 from .units import const
 
 LOOP_US = 10_000  # length of a pass of the loop in us; the chip's FIFO can keep samples for much longer
-# Passes of the loop between two garbage collections. The passes between two collections use 80 KB of heap. While
-# recording, 91 KB of heap are free
-_COLLECT_TURNS = const(40)
-# Passes between two garbage collections while aligning by driving, and with an OLED, a phone or user.py. The passes
-# between two collections use 46 KB of heap. While aligning by driving, 72 KB of heap are free
-_COLLECT_TURNS_DRIVING = const(23)
-# Number of collections between two checks of the free heap. A check takes 3 ms on an ESP32. If the drive, an OLED, a
-# phone or user.py also uses heap, the app checks after each collection.
-_PLAN_EVERY = const(4)
+# Bytes of heap that a pass of the loop uses, the second while aligning by driving
+_PASS_BYTES = const(2200)
+_PASS_BYTES_DRIVING = const(3000)
+_PLAN_EVERY = const(8)  # number of collections between two checks of the free heap; a check takes 3 to 7 ms
 SINGLE_GAPS = 120  # number of free heap blocks that lie alone after a collection
 _PAGE_MS = const(100)
 # A lean on the display must be at most half a second old. So a page shows no lean if its own delay plus the age of the
@@ -70,7 +64,7 @@ class App:
 
     Args:
         settings: a Settings.
-        lcd, sensor: results of devices.open_lcd() and devices.open_sensor().
+        lcd, sensor: results of Settings.open_lcd() and Settings.open_sensor().
         writer: see Rides.
 
     Attributes:
@@ -85,7 +79,7 @@ class App:
     def __init__(self, settings, lcd, sensor, writer=None):
         self.settings = settings
         self.lcd = lcd
-        self.button = open_button(settings)
+        self.button = settings.open_button()
         self.sensor = sensor
         self.notices = []
         self.meter = LeanMeter(Calibration(), settings.leans, sensor.chip.gyro_delay_s)
@@ -189,17 +183,11 @@ class App:
         """True if there is a lean to show."""
         return self.lean_deg is not None
 
-    def state(self):
-        """Return the state of the app as data, see state.py."""
-        from .state import state  # imported only for programs that use it
-
-        return state(self)
-
     def _plan_collection(self):
         """Set the number of passes until the next garbage collection."""
-        small = self.drive or self.lcd.draws or self.live or self.user
-        if small or self._collections % _PLAN_EVERY == 0:
-            self._planned_turns = port.turns_to_collect(_COLLECT_TURNS_DRIVING if small else _COLLECT_TURNS)
+        if self._collections % _PLAN_EVERY == 0:
+            used = _PASS_BYTES_DRIVING if self.drive else _PASS_BYTES
+            self._planned_turns = port.turns_to_collect(used)
         self._collections += 1
         self._turns_left = self._planned_turns
 

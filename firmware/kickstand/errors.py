@@ -78,7 +78,7 @@ def tried(function, *arguments):
 
     Returns:
         result: the function's result.
-        notice: None, or a Notice if memory is short or the firmware is incomplete, or the LiveError of the function.
+        notice: None, or a Notice if memory is short or the firmware is incomplete.
 
     After a failure, remove the modules that the function began to import, because MicroPython would keep a
     half-imported module."""
@@ -86,8 +86,6 @@ def tried(function, *arguments):
     try:
         before = tuple(sys.modules)
         return function(*arguments), None
-    except LiveError as error:
-        return None, error
     except (ImportError, MemoryError) as error:
         for name in [name for name in sys.modules if name not in before] if before else ():
             del sys.modules[name]
@@ -104,35 +102,12 @@ def unload(name):
 
 
 class CaptureError(Refusal):
-    """A pose was not still, or its readings cannot come from a still sensor."""
+    """A pose was not still, or its readings cannot come from a still sensor. The rider repeats the pose."""
 
 
 class SickSensor(CaptureError):
-    """Readings in a pose can only come from a defective sensor."""
-
-
-class CalibrationError(Refusal):
-    """Six poses give no plausible calibration."""
-
-
-class GyroError(Refusal):
-    """The gyro's rates do not fit the sensor's turns between its poses."""
-
-
-class AlignmentError(Refusal):
-    """Two poses, or a drive, do not show how the sensor is mounted."""
-
-
-class StoreError(Refusal):
-    """A record could not be written and read back."""
-
-
-class CardError(Refusal):
-    """There is no writable SD card, or no driver for it."""
-
-
-class LiveError(Refusal):
-    """Live cannot send to a phone."""
+    """Readings can only come from a defective sensor. The console also says so, because the remedy is too long for the
+    display."""
 
 
 class SettingsError(Refusal):

@@ -11,7 +11,6 @@ from time import sleep_ms, ticks_diff, ticks_ms
 from .board.display import LCD_HZ
 from .calibration.store import Store
 from .console import sentence
-from .devices import open_bus, open_button, open_lcd, open_sensor
 from .diagnosis import MOTION_ADDRESSES, fifo_fault, scan
 from .errors import SettingsError
 from .imu.mpu6050 import UnknownChip
@@ -32,12 +31,12 @@ def report():
         print("settings", (settings.__dict__,))
         chip = _sensor(settings)
         print("sensor_bus", bus(settings, "SENSOR", MOTION_ADDRESSES))
-        lcd = open_lcd(settings)
+        lcd = settings.open_lcd()
         lcd.show("Kickstand", "status: console")
         lcd.flush()
         print("display", (lcd.address, lcd.draws))
         print("display_bus", bus(settings, "LCD", settings.LCD_ADDRESSES))
-        print("button", (open_button(settings).held(),))
+        print("button", (settings.open_button().held(),))
         print("speed", speed(settings))
     except SettingsError as error:
         print("refused", (sentence(error),))
@@ -60,7 +59,7 @@ def board():
 
 def slow_functions():
     """Return the names of the functions that do not run as machine code, separated by commas."""
-    from .calibration import transform  # noqa: F401 loads a function
+    from .calibration import parameters  # noqa: F401 loads a function
     from .quick import plain
     from .rides import block  # noqa: F401 loads a function
 
@@ -81,13 +80,13 @@ def bus(settings, name, addresses):
     """
     sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
     hz = getattr(settings, name + "_BUS_HZ") or LCD_HZ
-    notice, devices = scan(sda, scl, lambda: open_bus(settings, name, hz), addresses)
+    notice, devices = scan(sda, scl, lambda: settings.open_bus(name, hz), addresses)
     return sda, scl, devices, sentence(notice) if notice else ""
 
 
 def _sensor(settings):
     """Print the facts about the sensor. Return its Mpu6050, or None without a usable sensor."""
-    sensor = open_sensor(settings)
+    sensor = settings.open_sensor()
     chip = sensor.chip
     try:
         sensor.set_up()

@@ -11,13 +11,12 @@ from time import sleep_ms, ticks_ms
 
 import machine
 
-from . import settings
 from .board import port
 
 port.begin()  # before the other imports, which make lasting objects
+from . import settings  # noqa: E402
 from .board.display import STOPPED  # noqa: E402
-from .devices import open_button, open_lcd, open_sensor  # noqa: E402
-from .errors import LiveError, SettingsError, report, tried  # noqa: E402
+from .errors import Notice, Refusal, SettingsError, report, tried  # noqa: E402
 from .units import __version__, const  # noqa: E402
 
 # A capacitor for debouncing between pin and ground looks like a press at power-on, until the pin's weak pull-up has
@@ -28,8 +27,8 @@ _CHARGE_MS = const(100)
 # step. MicroPython cannot run code between the imports of other modules, so this list repeats them. A test compares the
 # list with the import statements.
 STEPS = (
-    "calibration.parameters calibration.store calibration.active calibration.transform lean.bike_model lean.kalman "
-    "lean.measurements lean.rest lean.upright_trim lean.dive lean.lean_filter lean.meter ui.pages ui.screen rides.rides"
+    "calibration.parameters calibration.store calibration.active lean.bike_model lean.kalman lean.measurements "
+    "lean.lean_filter lean.meter ui.pages rides.rides"
 ).split()
 
 
@@ -51,9 +50,9 @@ def main(loop=None, closed_ms=5000):
     lcd = None
     try:
         chosen = settings.load()
-        lcd = open_lcd(chosen)
+        lcd = chosen.open_lcd()
         if machine.reset_cause() == machine.PWRON_RESET:
-            button = open_button(chosen)
+            button = chosen.open_button()
             if button.held():
                 sleep_ms(_CHARGE_MS)
             if button.held():
@@ -109,7 +108,7 @@ def _last_words(lcd, line1, line2, chosen=None):
         if lcd is None:
             sys.modules.pop("config", None)  # config.py itself may have used up the memory
             gc.collect()
-            lcd = open_lcd(chosen or settings.Settings())
+            lcd = (chosen or settings.Settings()).open_lcd()
         _show(lcd, line1, line2)
     except Exception:  # wrong pins, short memory or a missing file; the console already has the message
         pass
@@ -121,19 +120,21 @@ def _open_radio(pin):
     return Radio(pin)
 
 
-def _attach(radio, app):
+def _open_live(radio, app):
     from .live.live import Live
 
-    app.live = Live(radio, app)
+    return Live(radio, app)
 
 
 def _live(notices, function, *arguments):
     """Do a step of LIVE and return its result. Report an error: the lean meter continues in any case."""
-    result, notice = tried(function, *arguments)
+    try:
+        result, notice = tried(function, *arguments)
+    except Refusal as error:
+        result, notice = None, error
     if notice:
-        if notice.code == "no-memory":
-            notice = LiveError("live-memory", *notice.values)
-        report(notice, notices)
+        memory = notice.code == "no-memory"
+        report(Notice("live-memory", *notice.values) if memory else notice, notices)
     return result
 
 
@@ -148,7 +149,7 @@ def run(chosen, lcd, loop=None):
     notices = []
     # The radio comes first, because an ESP32-C3 may crash if its radio is switched on after 40 KB are allocated
     radio = _live(notices, _open_radio, chosen.LIVE_PIN) if chosen.LIVE else None
-    sensor = open_sensor(chosen)
+    sensor = chosen.open_sensor()
     for name in STEPS + ["app"]:
         now_ms = ticks_ms()
         lcd.tick(now_ms)
@@ -159,7 +160,7 @@ def run(chosen, lcd, loop=None):
     print("Kickstand %s. Ctrl-C stops it." % __version__)
     app = App(chosen, lcd, sensor)
     if radio:
-        _live(notices, _attach, radio, app)
+        app.live = _live(notices, _open_live, radio, app)
         if not app.live:
             radio.stop()
     app.notices.extend(notices)

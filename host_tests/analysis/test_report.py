@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kickstand_sim.simulation.scripted import script
 from kickstand_tools.analysis import report
 from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.plot import picture
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.mount import ForwardExchanged, UpOff
-from kickstand_tools.simulation.scripted import script
 from rich.console import Console
 from small_rides import STOP, overview_of, samples
 from support import command

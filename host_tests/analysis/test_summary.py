@@ -4,7 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from kickstand.lean.upright_trim import MAX_TRIM
+from kickstand.lean.kalman import MAX_TRIM
 from kickstand_tools.analysis.alignment_quality import LeanCost, lean_cost, quality, yaw_cost_deg
 from kickstand_tools.analysis.channels import Channels, downsampled, joined, rounded_to, spacing_s, thinned
 from kickstand_tools.analysis.ride import open_ride

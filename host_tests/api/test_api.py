@@ -3,6 +3,7 @@
 import doctest
 import functools
 import gzip
+import importlib
 import inspect
 import io
 import pydoc
@@ -11,9 +12,10 @@ import sys
 
 import numpy as np
 import pytest
+from kickstand_sim.simulated_board import simulator
+from kickstand_sim.simulation.files import simulate
 from kickstand_tools import api
 from kickstand_tools.calibration.refusals import SamePose
-from kickstand_tools.simulation.files import simulate
 from support import command
 
 FUNCTIONS = [name for name, public in vars(api).items() if inspect.isfunction(public)]
@@ -36,6 +38,11 @@ def test_example_in_each_docstring_runs(name):
     assert tests, f"{name} has no example"
     for test in tests:
         assert doctest.DocTestRunner().run(test).failed == 0
+
+
+def test_the_simulated_board_has_its_earlier_name_too():
+    assert importlib.import_module("kickstand_tools.simulated_board.simulator") is simulator
+    assert simulator.__spec__ and simulator.__spec__.name == simulator.__name__
 
 
 def test_pydoc_lists_the_promised_functions():

@@ -6,7 +6,7 @@ from array import array
 
 import numpy as np
 import pytest
-from kickstand.calibration.transform import Transform
+from kickstand.calibration.parameters import Transform
 from kickstand_tools.calibration.file import CalibrationFile, calibration_path, read_calibration, write_calibration
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.replay.replay_engine import ReplayMeter

@@ -5,7 +5,7 @@ import shutil
 
 import numpy as np
 import pytest
-from kickstand_tools.simulation.ride import random_rotation
+from kickstand_sim.simulation.ride import random_rotation
 from motions import leaned, tipped
 from support import command
 

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from kickstand.calibration.still_pose import StillPose
+from kickstand.calibration.poses import StillPose
 from kickstand.errors import CaptureError
 
 LEVEL = (100, -200, 8192, -521, 65, -131, 655)

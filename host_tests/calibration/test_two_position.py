@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from kickstand.calibration.parameters import Calibration
 from kickstand.calibration.two_position import align
-from kickstand.errors import AlignmentError
-from kickstand_tools.simulation.ride import random_rotation
+from kickstand.errors import Refusal
+from kickstand_sim.simulation.ride import random_rotation
 from motions import leaned
 from numpy.testing import assert_allclose
 from support import engines
@@ -67,7 +67,7 @@ def test_after_the_six_positions_a_pose_reads_1_g_more_closely(spoilt, size):
     calibration = Calibration()
     aligned_by(forces, "left", calibration)
     calibration.six_done = True
-    with pytest.raises(AlignmentError) as refusal:
+    with pytest.raises(Refusal) as refusal:
         aligned_by(forces, "left", calibration)
     assert refusal.value.values[0] == ("kickstand", "upright")[spoilt]
 

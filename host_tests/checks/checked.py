@@ -3,11 +3,11 @@
 import functools
 
 import numpy as np
+from kickstand_sim.simulation.ride import SimulatedRide, ride
 from kickstand_tools.checks.bins import LogBins, log_bins
 from kickstand_tools.common.messages import sentence
 from kickstand_tools.logs.log import Log
 from kickstand_tools.signals import rotation_matrix
-from kickstand_tools.simulation.ride import SimulatedRide, ride
 
 
 def bins_of(log: Log, accel=None, gyro=None, speed=True) -> LogBins:

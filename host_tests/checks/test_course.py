@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from checked import bins_of, made_up
+from kickstand_sim.simulation.files import positions
 from kickstand_tools import api
 from kickstand_tools.checks.axes import course_agrees
 from kickstand_tools.checks.log import check_log
 from kickstand_tools.logs.log import Log
-from kickstand_tools.simulation.files import positions
 
 
 @functools.cache

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 from checked import bins_of, hand, simulated, words
+from kickstand_sim.simulation.profiles import PROFILES
+from kickstand_sim.simulation.ride import random_rotation
 from kickstand_tools.checks.axes import PERMUTATIONS, handedness, is_wrong, likeliest
 from kickstand_tools.checks.bins import BIN_S
 from kickstand_tools.checks.log import check_log
 from kickstand_tools.checks.turning import TurningFit, bias_dps
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.simulation.profiles import PROFILES
-from kickstand_tools.simulation.ride import random_rotation
 
 MINUS = -np.eye(3)
 EITHER, INSTEAD = "either the accelerations", "and instead of gx, gy, gz right would be"

@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from checked import bins_of, made_up, simulated, words
+from kickstand_sim.simulation.profiles import PROFILES
+from kickstand_sim.simulation.scripted import script
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.calibration.mount import ForwardOff, contradiction
 from kickstand_tools.common.messages import sentence
@@ -15,8 +17,6 @@ from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.signals import rotation_matrix
-from kickstand_tools.simulation.profiles import PROFILES
-from kickstand_tools.simulation.scripted import script
 from kickstand_workshop.evaluation.runs import calibrated_by_poses
 from support import command
 from support.recordings import analysis_rides

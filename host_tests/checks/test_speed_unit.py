@@ -5,12 +5,12 @@ import functools
 import numpy as np
 import pytest
 from checked import bins_of, simulated, words
+from kickstand_sim.simulation.profiles import PROFILES
+from kickstand_sim.simulation.scripted.sensor_errors import random_mounting
 from kickstand_tools.checks.log import check_log, speed_unit
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.simulation.profiles import PROFILES
-from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 from support import driving_runs
 
 MOUNT = random_mounting(3)

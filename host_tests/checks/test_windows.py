@@ -6,6 +6,9 @@ import functools
 
 import numpy as np
 import pytest
+from kickstand_sim.simulation.files import positions
+from kickstand_sim.simulation.profiles import PROFILES
+from kickstand_sim.simulation.ride import ride
 from kickstand_tools.checks.axes import PERMUTATIONS
 from kickstand_tools.checks.log import check_log
 from kickstand_tools.common.errors import RefusedInput
@@ -13,9 +16,6 @@ from kickstand_tools.estimation.alignment import mounted_windows
 from kickstand_tools.estimation.first_guess import axes
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.simulation.files import positions
-from kickstand_tools.simulation.profiles import PROFILES
-from kickstand_tools.simulation.ride import ride
 
 MOUNTINGS = [exchange for exchange in PERMUTATIONS if np.linalg.det(exchange) > 0.0]
 NOT_ENOUGH = {"ride-short", "no-bends", "side-unsure"}  # refusals that accuse nothing

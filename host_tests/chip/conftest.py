@@ -8,7 +8,7 @@ import os
 import traceback
 
 import pytest
-from kickstand_tools.simulated_board.lcd import shown_lean
+from kickstand_sim.simulated_board.lcd import shown_lean
 from support.emulated import CHIPS, calibrated, firmware, leaning, modules, pico
 
 COPIED = {"riding", "at_prompt"}

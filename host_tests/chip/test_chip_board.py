@@ -7,10 +7,10 @@ import re
 from typing import Any
 
 import pytest
-from kickstand_tools.simulated_board.lcd import shown_lean
-from kickstand_tools.simulation.scripted.script import Ride, kickstand, upright
-from kickstand_tools.simulation.scripted.sensor_errors import Sensor
-from kickstand_workshop.bench.bench import SampleCount
+from kickstand_emulator.bench import SampleCount
+from kickstand_sim.simulated_board.lcd import shown_lean
+from kickstand_sim.simulation.scripted.script import Ride, kickstand, upright
+from kickstand_sim.simulation.scripted.sensor_errors import Sensor
 from support import device_runs
 from support.emulated import CHIPS, calibrated, firmware, leaning, reset_in_a_read, shows
 

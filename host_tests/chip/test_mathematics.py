@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from kickstand.drive_alignment import alignment
 from kickstand.drive_alignment.quality import MIN_EVENTS
+from kickstand_sim.simulation.scripted.script import Ride, accelerate, turn
+from kickstand_sim.simulation.scripted.sensor_errors import random_mounting
 from kickstand_tools.common import unix_port
 from kickstand_tools.deploy import bytecode
 from kickstand_tools.replay import replay_engine
 from kickstand_tools.signals import rotation_vector
-from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn
-from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 from support.emulated import PART, esp32, modules, pico
 
 pytestmark = pytest.mark.chip

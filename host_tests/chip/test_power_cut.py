@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import pytest
 from kickstand.calibration.store import Store
+from kickstand_sim.simulation.scripted.script import Ride, accelerate, turn, wait
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.rides import block_reader, ride_log
-from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, wait
 from support import command, emulated_port
 from support.emulated import PART, calibrated, esp32, firmware, leaning, modules, pico
 
@@ -252,7 +252,7 @@ def on_lean(lean_deg, trusted, meter):
 
 @pytest.mark.long
 def test_recording_loses_no_sample_and_marks_the_display(at_prompt):
-    from kickstand_workshop.bench.bench import SampleCount
+    from kickstand_emulator.bench import SampleCount
 
     begin_s, world = at_prompt.time_s, PART.world(RIDE.motion)
     at_prompt.board.sensor.world = lambda t_s: world(t_s - begin_s)

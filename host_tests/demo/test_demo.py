@@ -5,11 +5,11 @@ import re
 import sys
 
 import pytest
+from kickstand_sim.demo.demo import demo
+from kickstand_sim.demo.device_process import DeviceProcess
+from kickstand_sim.simulated_board.lcd import shown_lean
 from kickstand_tools.common import unix_port
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.demo.demo import demo
-from kickstand_tools.demo.device_process import DeviceProcess
-from kickstand_tools.simulated_board.lcd import shown_lean
 from support import command
 from support.terminal import Terminal
 
@@ -90,7 +90,7 @@ def test_without_micropython_it_says_so(monkeypatch, capsys, tmp_path):
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 def test_in_a_terminal_by_hand():
     """The keys press the button, raise the bike, set it off and lean it left. The ride is six times as fast."""
-    code = "from kickstand_tools.demo import demo; demo.HAND_SPEED = 6.0; demo.demo(True, True)"
+    code = "from kickstand_sim.demo import demo; demo.HAND_SPEED = 6.0; demo.demo(True, True)"
     clock = r"(\d+\.\d) s\s"
     with Terminal([sys.executable, "-c", code]) as terminal:
         terminal.wait_for("On stand: press")

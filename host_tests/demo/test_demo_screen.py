@@ -4,11 +4,11 @@ import os
 from typing import Any
 
 import pytest
+from kickstand_sim.demo import demo
+from kickstand_sim.demo.score import Score, State, table
+from kickstand_sim.demo.screen import bike, oled_lines, screen
 from kickstand_tools.common import unix_port
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.demo import demo
-from kickstand_tools.demo.score import Score, State, table
-from kickstand_tools.demo.screen import bike, oled_lines, screen
 from rich.console import Console
 
 STATE: State = {

@@ -3,7 +3,7 @@
 from math import cos, exp, radians, sin, tan
 
 import pytest
-from kickstand_tools.demo.hand_bike import HandBike
+from kickstand_sim.demo.hand_bike import HandBike
 
 G = 9.80665
 

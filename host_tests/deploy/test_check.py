@@ -4,10 +4,10 @@ import contextlib
 from types import SimpleNamespace
 
 import pytest
+from kickstand_sim.simulated_board.i2c import OPEN, Registers
+from kickstand_sim.simulated_board.mpu6050 import FIFO_COUNTH, FIFO_COUNTL, Fifo
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.deploy import check
-from kickstand_tools.simulated_board.i2c import OPEN, Registers
-from kickstand_tools.simulated_board.mpu6050 import FIFO_COUNTH, FIFO_COUNTL, Fifo
 from support import command
 from support.checked_board import CheckedBoard, part
 

@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 import pytest
+from kickstand_sim.simulated_board.fakes import chips
 from kickstand_tools.deploy import config_check
-from kickstand_tools.simulated_board.fakes import chips
 from support import command
 from support.mpy import run_mpy
 
@@ -149,7 +149,7 @@ def test_pins_that_the_chip_itself_needs_are_refused(machine, pins, tmp_path):
 
 _LOAD = """
 import sys
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.simulator import Board
 Board(lambda t_s: (0, 0, 1, 0, 0, 0)).install()
 sys.path.insert(0, DIRECTORY)
 from kickstand import settings

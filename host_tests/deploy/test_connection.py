@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.deploy import connection
+from kickstand_tools.deploy import connection, status
 from mpremote.transport import TransportError
 from serial.tools import list_ports
 from support import command
@@ -83,7 +83,7 @@ def test_restarting_board_is_waited_for(monkeypatch, port):
 )
 def test_port_that_cannot_be_opened_is_explained(port, error, name, message):
     port.refusal = error
-    assert words(connection.status, name).startswith(message)
+    assert words(status.status, name).startswith(message)
 
 
 def test_port_that_opens_at_the_second_attempt_is_reported(port):
@@ -150,10 +150,10 @@ def test_only_answers_of_the_expected_shape_are_accepted(text, shapes, fits):
         assert "makes no sense" in words(connection.literal, text, *shapes)
 
 
-@pytest.mark.parametrize(("wirings", "end"), [(False, b""), (True, connection.WIRINGS.encode())])
+@pytest.mark.parametrize(("wirings", "end"), [(False, b""), (True, status.WIRINGS.encode())])
 def test_status_is_printed_and_the_board_restarts(port, wirings, end):
     port.answers = [NOTHING, (PICO_NAME, b""), (b"a \xc2\xb0\r\nb\r\n\r\n", b""), (b"", b"")]
-    assert connection.status("P", wirings) == "a \u00b0\nb"
+    assert status.status("P", wirings) == "a \u00b0\nb"
     assert port.programs[2] == b"import kickstand\nkickstand.status()" + end and b"machine.reset()" in port.programs[3]
     assert port.now_s == pytest.approx(2.0, abs=0.2) and port.closed == 1  # until the board's port is back
 
@@ -170,7 +170,7 @@ def test_status_is_printed_and_the_board_restarts(port, wirings, end):
 def test_status_keeps_what_the_firmware_has_noticed(port, answer, labels):
     """A soft reset removes the firmware's modules, so the command asks before it. An older firmware has nothing."""
     port.answers = [answer, (PICO_NAME, b""), (b"noticed (None, None)\r\nSensor none", b""), (b"", b"")]
-    *lines, last = connection.status("P").splitlines()
+    *lines, last = status.status("P").splitlines()
     assert [line[:12].strip() for line in lines] == labels and last == "Sensor none"
 
 
@@ -178,7 +178,7 @@ def test_status_keeps_what_the_firmware_has_noticed(port, answer, labels):
     ("error", "message"),
     [
         (b"x\r\nOSError: [Errno 5] EIO", "P: the board's file system is damaged (OSError: [Errno 5] EIO)"),
-        (b"x\r\nCardError: card: [Errno 5] EIO", "P: card: [Errno 5] EIO"),
+        (b"x\r\nRefusal: card: [Errno 5] EIO", "P: card: [Errno 5] EIO"),
         (b"x\r\nSettingsError: wrong: DLPF", "P: wrong: DLPF"),
         (b"ImportError: no module named 'kickstand'", "Kickstand is not on the board at P: install it with"),
         (b"ImportError: no module named 'kickstand.x'", "the firmware on the board at P is of another version"),
@@ -188,7 +188,7 @@ def test_status_keeps_what_the_firmware_has_noticed(port, answer, labels):
 )
 def test_failing_status_is_explained_and_the_board_restarts(port, error, message):
     port.answers = [NOTHING, (PICO_NAME, b""), (b"", error), (b"", b"")]
-    assert words(connection.status, "P").startswith(message)
+    assert words(status.status, "P").startswith(message)
     assert b"machine.reset()" in port.programs[-1]
 
 
@@ -196,9 +196,9 @@ def test_other_python_and_failing_programs_are_refused(port, tmp_path):
     port.answers = [(b"('circuitpython', '9', 'Pico')", b"")]
     command.refused(tmp_path, "check", "--port", "P", words="P runs circuitpython: put MicroPython on the board first")
     port.answers = [(b"", b"Traceback\r\nValueError: x\r\n")]
-    assert words(connection.status, "P") == "P: the board reports ValueError: x: try again"
+    assert words(status.status, "P") == "P: the board reports ValueError: x: try again"
     port.answers = [(b"", b"OSError: [Errno 84]\r\nOSError: [Errno 5] EIO\r\n")]
-    assert words(connection.status, "P").startswith("P: the board's file system is damaged (OSError: [Errno 5] EIO)")
+    assert words(status.status, "P").startswith("P: the board's file system is damaged (OSError: [Errno 5] EIO)")
 
 
 # The lines of a running program

@@ -42,8 +42,9 @@ class Project:
                 path.write_text(_PYTHON.replace("ROOT", str(self.root)).replace("FAULT", fault))
                 path.chmod(0o755)
 
-    def require(self, package):
-        (self.root / "pyproject.toml").write_text(f'[project]\nname = "{package}"\n')
+    def require(self, package, folder=""):
+        (self.root / folder).mkdir(exist_ok=True)
+        (self.root / folder / "pyproject.toml").write_text(f'[project]\nname = "{package}"\n')
 
     def steps(self, *extras):
         """Prepare these extras one after another. Return what was run, without pip's options."""
@@ -66,13 +67,15 @@ def project(tmp_path, monkeypatch):
 
 
 UV = "pip install uv"
+TESTED = "pip install .[test] tools/fleet[s3,test] tools/emulator"
 
 
 def test_dev_installs_again_only_if_needed(project):
     assert project.steps("", "") == ["venv .venv", UV, "pip install ."]
-    assert project.steps("test", "", "test", "") == [UV, "pip install .[test]"]
-    project.require("two")
-    assert project.steps("test") == [UV, "pip install .[test]"]
+    assert project.steps("test", "", "test", "") == [UV, TESTED]
+    for changed in "", "tools/fleet":
+        project.require("two", changed)
+        assert project.steps("test") == [UV, TESTED]
 
 
 def test_interrupted_installation_starts_again(project):

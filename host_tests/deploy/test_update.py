@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from kickstand.rides import ride_files
 from kickstand_tools.deploy import bytecode, firmware_files, flash, update
-from kickstand_tools.deploy.board_files import BoardFiles, fingerprint
+from kickstand_tools.deploy.board_files import BoardFiles, fingerprint, survey
 from kickstand_tools.deploy.update import needed_blocks, plan, refuse_without_room
 from littlefs_board import BLOCK, PORTS, LittlefsBoard
 from support import command, fake_board
@@ -102,12 +102,13 @@ def cut_before(board, number):
 
 
 def test_interrupted_update_starts_nothing_and_is_repeatable():
-    number, cut, config, result = 0, True, b"", None
+    number, cut, config, steps = 0, True, b"", None
     while cut:
         board = board_with(SMALL_OLD | NOTES)
         cut_before(board, number)
         try:
-            result = flash.install(board, flash.prepare(board, SMALL_NEW, replace_config=True))
+            steps = plan(SMALL_NEW, survey(board), True)
+            flash.install(board, steps)
             cut = False
         except PowerCut:
             board.power_cycle()
@@ -116,17 +117,17 @@ def test_interrupted_update_starts_nothing_and_is_repeatable():
         if cut:
             assert ("/main.py" in files) == (number == 0) and NOTES.items() <= files.items()
             board.before_change = lambda: None
-            flash.install(board, flash.prepare(board, SMALL_NEW))
+            flash.install(board, plan(SMALL_NEW, survey(board)))
         # config.py is complete; the repetition keeps it, because it has no --config
         config = files.get("/config.py", SMALL_NEW["/config.py"])
         assert config in (SMALL_OLD["/config.py"], SMALL_NEW["/config.py"])
         assert board.files() == SMALL_NEW | NOTES | {"/config.py": config}, f"after a cut before change {number}"
         assert board.folders() == {"/kickstand", "/kickstand/lean"}
         number += 1
-    assert result and number > 25 and config == SMALL_NEW["/config.py"]
-    assert sorted(result.removed) == ["/kickstand/empty/old.py", "/kickstand/lean.mpy", "/kickstand/lean_filter.py"]
-    assert result.kept == ["/kickstand/errors.mpy"] and result.copied[-1] == "/main.py"
-    assert result.copied_bytes == 3 + 3000 + 3 + 3000 + 3000 and not result.config_differs
+    assert steps and number > 25 and config == SMALL_NEW["/config.py"]
+    assert sorted(steps.obsolete) == ["/kickstand/empty/old.py", "/kickstand/lean.mpy", "/kickstand/lean_filter.py"]
+    assert steps.keep == ["/kickstand/errors.mpy"] and list(steps.copy)[-1] == "/main.py" and not steps.config_differs
+    assert sum(map(len, steps.copy.values())) == 3 + 3000 + 3 + 3000 + 3000
 
 
 def listed(files, free_blocks=0):

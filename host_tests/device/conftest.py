@@ -4,9 +4,8 @@ import io
 from contextlib import redirect_stdout
 
 import pytest
-from kickstand_tools.deploy import status_words
-from kickstand_tools.deploy.connection import WIRINGS
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.simulator import Board
+from kickstand_tools.deploy import status as board_status
 from support import device_plans, device_runs
 from support.board_access import rough
 
@@ -63,8 +62,8 @@ def status(tmp_path):
                 assert board.run(start.main, ride_s + 1) == "returned"
             assert board.run(kickstand.status, ride_s + 60.0) == "returned"
             if wirings:
-                assert board.run(lambda: exec(WIRINGS), ride_s + 120.0) == "returned"
-        return status_words.words(out.getvalue()).splitlines()
+                assert board.run(lambda: exec(board_status.WIRINGS), ride_s + 120.0) == "returned"
+        return board_status.words(out.getvalue()).splitlines()
 
     return lines
 
@@ -91,10 +90,9 @@ def with_app(on_board):
 
     def with_app(use, config=None, **fitted):
         def built(board, settings):
-            from kickstand import devices
             from kickstand.app import App
 
-            return use(board, App(settings, devices.open_lcd(settings), devices.open_sensor(settings)))
+            return use(board, App(settings, settings.open_lcd(), settings.open_sensor()))
 
         return on_board(built, config, **fitted)
 

@@ -1,8 +1,8 @@
 """The whole device on boards other than a Pico, with their pins and their I2C."""
 
 import pytest
-from kickstand_tools.simulated_board.fakes import chips
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.fakes import chips
+from kickstand_sim.simulated_board.simulator import Board
 from support.board_access import level
 from support.device_runs import FreshFirmware
 

@@ -4,8 +4,8 @@ FIFO."""
 from collections import Counter
 
 import pytest
-from kickstand_tools.simulated_board.i2c import LOW, OPEN, Ds3231, Registers
-from kickstand_tools.simulated_board.mpu6050 import Fifo
+from kickstand_sim.simulated_board.i2c import LOW, OPEN, Ds3231, Registers
+from kickstand_sim.simulated_board.mpu6050 import Fifo
 
 WHO_AM_I, PWR_MGMT_1 = 0x75, 0x6B
 BAROMETER, COMPASS, UNKNOWN = (0x77, {}), (0x1E, {}), (0x42, {})

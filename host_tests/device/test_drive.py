@@ -6,7 +6,7 @@ import math
 import pytest
 from kickstand.calibration.parameters import Calibration
 from kickstand.calibration.store import Store
-from kickstand_tools.simulation.scripted import sensor_errors
+from kickstand_sim.simulation.scripted import sensor_errors
 from support import engines
 
 SHORT, LONG = 0.15, 1.2

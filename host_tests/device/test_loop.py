@@ -1,7 +1,7 @@
 """The app's loop: its rate and its garbage collections."""
 
 import pytest
-from kickstand_tools.simulated_board.fakes import fake_time
+from kickstand_sim.simulated_board.fakes import fake_time
 from support import device_runs
 
 

@@ -11,7 +11,7 @@ from kickstand_tools.common import firmware_path, unix_port
 # This code defines for each function: (the function in use, name of its plain version).
 _CHOSEN = """
 from kickstand import quick
-from kickstand.calibration.transform import products
+from kickstand.calibration.parameters import products
 from kickstand.imu.axes import decode, add_up
 from kickstand.lean import kalman
 from kickstand.rides.block import encode

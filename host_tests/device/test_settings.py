@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from kickstand import console
 from kickstand.errors import Notice, SettingsError
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.simulator import Board
 from support.board_access import level
 
 # {name: (values within the limits, values beyond them)}
@@ -110,11 +110,10 @@ def test_other_names_and_a_complete_card_are_accepted():
 )
 def test_pins_that_the_chip_cannot_use_are_named(name, config, code, values, on_board):
     def opened(board, settings):
-        from kickstand.devices import open_button
         from kickstand.speed.source import open_speed
 
         with pytest.raises(SettingsError) as refused:
-            {"button": open_button, "speed": open_speed}[name](settings)
+            settings.open_button() if name == "button" else open_speed(settings)
         return refused.value.code, refused.value.values[: len(values)]
 
     assert on_board(opened, config) == (code, values)

@@ -4,7 +4,7 @@ import re
 
 import pytest
 from kickstand.calibration.store import Store
-from kickstand_tools.simulation.scripted import sensor_errors
+from kickstand_sim.simulation.scripted import sensor_errors
 from support import engines
 from support.device_plans import ALIGNED, LEFT_S, RIGHT_S, STRAIGHT_S
 

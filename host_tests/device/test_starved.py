@@ -2,7 +2,7 @@
 off in a line. The display never shows a lean that is more than half a second old, or half old and half new."""
 
 import pytest
-from kickstand_tools.simulation.scripted import script
+from kickstand_sim.simulation.scripted import script
 from support import engines
 
 FROM_S = 15.0

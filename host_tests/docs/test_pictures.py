@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kickstand_tools.simulated_board import simulator
+from kickstand_sim.simulated_board import simulator
 from kickstand_tools.web import site
 from kickstand_workshop.pictures import displays, page, rides, terminal
 from support.device_runs import FreshFirmware
@@ -64,7 +64,7 @@ def test_drawings_are_small_and_fetch_nothing():
 def test_the_wires_go_to_the_pins_of_the_settings(machine, prefix):
     """In the drawing the default pins are bold, and no other pin is. The page Install has the same pins as a table."""
     with simulator.Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=machine), FreshFirmware():
-        from kickstand.board import pins as usual
+        from kickstand import setting_table as usual
     pins = [prefix + str(pin) for pin in (*usual.SENSOR_PINS, *usual.LCD_PINS, usual.BUTTON_PIN)]
     drawing = checked_in()[f"wiring_{machine}.svg"]
     assert sorted(re.findall(r'font-weight="bold"[^>]*>(?:\d+  )?(GP\d+|\d+)<', drawing)) == sorted(pins)

@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FIRST, DEVICE, TOOLS, CONTRIBUTING = (
     ROOT / name for name in ("README.md", "firmware/README.md", "tools/README.md", ".github/CONTRIBUTING.md")
 )
-BEHIND = sorted(path for folder in ("firmware", "tools") for path in (ROOT / folder / "docs").glob("*.md"))
+BEHIND = sorted([*ROOT.glob("firmware/docs/*.md"), *ROOT.glob("tools/docs/*.md"), *ROOT.glob("tools/*/README.md")])
 DISPLAYS, HOW = (ROOT / "firmware" / "docs" / name for name in ("displays.md", "how-it-works.md"))
 PAGES = [FIRST, DEVICE, TOOLS, CONTRIBUTING, ROOT / "firmware/FAQ.md", ROOT / "CHANGELOG.md", *BEHIND]
 MOST_LINES = {FIRST: 130, DEVICE: 250, TOOLS: 200, ROOT / "firmware/docs/settings.md": 220}
@@ -104,7 +104,8 @@ def test_how_right_it_is_stands_in_both_places_alike():
 PACKAGES = (
     "firmware/kickstand",
     "tools/kickstand_tools",
-    "tools/kickstand_fleet",
+    "tools/kickstand_sim",
+    "tools/fleet/kickstand_fleet",
     "tools/workshop/kickstand_workshop",
 )
 
@@ -133,7 +134,7 @@ def test_every_command_is_described():
 
 
 def test_every_menu_entry_is_described():
-    screen = ast.parse(text_of(ROOT / "firmware" / "kickstand" / "ui" / "screen.py"))
+    screen = ast.parse(text_of(ROOT / "firmware" / "kickstand" / "ui" / "pages.py"))
     (listed,) = [node for node in ast.walk(screen) if isinstance(node, ast.FunctionDef) and node.name == "_entries"]
     tuples = [node for node in ast.walk(listed) if isinstance(node, ast.Tuple) and node.elts]
     entries = {tuple_.elts[0].value for tuple_ in tuples if isinstance(tuple_.elts[0], ast.Constant)}

@@ -10,8 +10,8 @@ from kickstand.calibration.parameters import Calibration
 from kickstand.calibration.store import Store
 from kickstand.drive_alignment import alignment
 from kickstand.lean.meter import LeanMeter
-from kickstand_tools.simulated_board.simulator import Board
-from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
+from kickstand_sim.simulated_board.simulator import Board
+from kickstand_sim.simulation.scripted.sensor_errors import random_mounting
 from support import driving_runs
 from support.driving_runs import around, mounted
 

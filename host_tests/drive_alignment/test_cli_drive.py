@@ -7,8 +7,8 @@ import json
 
 import numpy as np
 import pytest
-from kickstand_tools.simulation.files import simulate
-from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
+from kickstand_sim.simulation.files import simulate
+from kickstand_sim.simulation.scripted.sensor_errors import random_mounting
 from support import command, driving_runs
 from support.driving_runs import RATE_HZ, STAND, around, mounted
 

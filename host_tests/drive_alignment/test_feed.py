@@ -7,11 +7,11 @@ import pytest
 from kickstand.drive_alignment import alignment
 from kickstand.drive_alignment.alignment import DriveAlignment
 from kickstand.rotation import matrix
+from kickstand_sim.simulation.scripted.sensor_errors import random_mounting
 from kickstand_tools.calibration.drive import fit_drive, fit_logs
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.common.errors import InputError, RefusedInput
 from kickstand_tools.logs.log import Log
-from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 from support import driving_runs
 
 NAN = float("nan")

@@ -17,7 +17,7 @@ from array import array
 
 import numpy as np
 import pytest
-from kickstand.errors import AlignmentError
+from kickstand.errors import Refusal
 from kickstand_tools.calibration.published import (
     BACKWARD,
     UP,
@@ -199,7 +199,7 @@ def test_brakings_before_the_first_stop_do_not_count():
     drive.alignment = PublishedAlignment("car")
     drive.brake()
     assert drive.alignment.counted == 0
-    with pytest.raises(AlignmentError, match="not-stopped"):
+    with pytest.raises(Refusal, match="not-stopped"):
         drive.matrix  # noqa: B018
 
 
@@ -209,5 +209,5 @@ def test_too_few_brakings_are_refused_with_their_numbers():
     drive.brake((0.1, 1.0, -0.3), (-0.1, 1.0, -0.3))
     reason = drive.alignment.reason
     assert (reason.code, *reason.values) == ("few-events", 1, 3, 1)
-    with pytest.raises(AlignmentError, match="few-events"):
+    with pytest.raises(Refusal, match="few-events"):
         drive.matrix  # noqa: B018

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from kickstand_sim.simulation.ride import ride
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.simulation.ride import ride
 from kickstand_workshop.evaluation import estimators, faults, integrity, runs
 from kickstand_workshop.evaluation.estimators import Samples
 from kickstand_workshop.evaluation.integrity import FaultJob

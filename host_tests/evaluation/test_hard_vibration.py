@@ -8,10 +8,10 @@ import dataclasses
 
 import numpy as np
 import pytest
+from kickstand_sim.simulation import ride as rides
+from kickstand_sim.simulation.physics import road
+from kickstand_sim.simulation.physics.chip import Chip
 from kickstand_tools.replay.replay_engine import COLUMNS, Replay
-from kickstand_tools.simulation import ride as rides
-from kickstand_tools.simulation.physics import road
-from kickstand_tools.simulation.physics.chip import Chip
 from kickstand_workshop.evaluation.runs import as_log, calibrated_by_poses
 
 pytestmark = pytest.mark.long

@@ -17,9 +17,9 @@ The output begins with the program's own output. The last line is JSON with thes
 import json
 import sys
 
-from kickstand_tools.simulated_board.simulator import Board
-from kickstand_tools.simulation.scripted.script import Ride, accelerate, kickstand, turn
-from kickstand_tools.simulation.scripted.sensor_errors import Sensor
+from kickstand_sim.simulated_board.simulator import Board
+from kickstand_sim.simulation.scripted.script import Ride, accelerate, kickstand, turn
+from kickstand_sim.simulation.scripted.sensor_errors import Sensor
 from support.page_turner import PageTurner
 
 RIDE = (kickstand(2.0, 0.0), accelerate(15.0, 4.0), turn(35.0, 6.0))
@@ -54,7 +54,7 @@ def run(program, until_s, turn_to):
         board.at(at_s, lambda name=name: turner.turn_to(name))
 
     def turn_page():
-        if turner.presses(apps[0].state()["view"] if apps else None):
+        if turner.presses(apps[0].screen.view if apps else None):
             board.press()
 
     def run_app(app):

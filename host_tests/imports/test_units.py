@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.imports import findings, units
-from kickstand_tools.imports.rate_fit import RateFit, fit_rates
 from kickstand_tools.imports.recording import Sheet
-from kickstand_tools.imports.speeds import unit_by_positions
+from kickstand_tools.imports.unit_fits import RateFit, fit_rates, unit_by_positions
 from kickstand_tools.logs.csv_reader import columns_of
 
 MS, DAY_MS = 1_000_000, 86_400_000

@@ -1,7 +1,7 @@
 """Other chips at the addresses of the sensor are named by their registers. The values are from their data sheets."""
 
 import pytest
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.simulator import Board
 
 OTHER, MOTION, SUPPORTED = 0, 1, 2
 WHO_AM_I, PWR_MGMT_1 = 0x75, 0x6B

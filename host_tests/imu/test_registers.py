@@ -5,8 +5,8 @@ The values are from the register map RM-MPU-6000A rev 4.2, and from the data she
 
 import pytest
 from kickstand.lean import lean_filter
-from kickstand_tools.simulated_board.mpu6050 import DLPF_DELAY_US, VARIANTS
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.mpu6050 import DLPF_DELAY_US, VARIANTS
+from kickstand_sim.simulated_board.simulator import Board
 from support.board_access import level
 
 SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, ACCEL_CONFIG2, FIFO_EN = 0x19, 0x1A, 0x1B, 0x1C, 0x1D, 0x23

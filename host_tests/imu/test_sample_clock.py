@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.simulator import Board
 from support.board_access import level
 
 PERIOD_US = 5000

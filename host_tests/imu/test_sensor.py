@@ -8,7 +8,7 @@ import warnings
 from typing import Any
 
 import pytest
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.simulator import Board
 from support.board_access import level, on_board, write
 
 SENSOR = 0x68
@@ -35,11 +35,11 @@ class Run:
         def firmware():
             from time import sleep_us, ticks_ms  # type: ignore[attr-defined]
 
-            from kickstand.board import i2c_bus
+            from kickstand.board import port
             from kickstand.imu.mpu6050 import Mpu6050
             from kickstand.imu.sensor import Sensor
 
-            sensor = Sensor(Mpu6050(None), lambda: i2c_bus.open_i2c(0, 4, 5, 400_000), explain)
+            sensor = Sensor(Mpu6050(None), lambda: port.open_i2c(0, 4, 5, 400_000), explain)
             self.sensor = sensor
             fault(self.board)
             while True:
@@ -167,13 +167,13 @@ def test_a_stuck_bus_is_freed_and_a_dead_one_is_reported():
     """A device that stopped in the middle of a byte needs up to nine clock pulses (NXP UM10204, 3.1.16)."""
 
     def program(board):
-        from kickstand.board import i2c_bus
+        from kickstand.board import port
 
         for bits, freed in ((1, True), (8, True), (9, True), (1000, False)):
             board.sensor_bus.hang(bits)
-            assert i2c_bus.free(4, 5) == freed, bits
+            assert port.free(4, 5) == freed, bits
         with pytest.raises(OSError, match="SDA is held low"):
-            i2c_bus.open_i2c(0, 4, 5, 400_000)
+            port.open_i2c(0, 4, 5, 400_000)
 
     assert on_board(program)[0] == "returned"
 
@@ -190,7 +190,7 @@ def test_the_watchdog_stops_after_ctrl_c(gap_us, monkeypatch, tmp_path):
     def program(board):
         from time import sleep_ms  # type: ignore[attr-defined]
 
-        from kickstand import app, devices
+        from kickstand import app
         from kickstand.settings import Settings
 
         settings = Settings(type("Config", (), {"RECORD": True}))
@@ -198,7 +198,7 @@ def test_the_watchdog_stops_after_ctrl_c(gap_us, monkeypatch, tmp_path):
         if gap_us:
             board.clock.at(4_000_000 + gap_us, interrupt)
         try:
-            app.App(settings, devices.open_lcd(settings), devices.open_sensor(settings)).run()
+            app.App(settings, settings.open_lcd(), settings.open_sensor()).run()
         except KeyboardInterrupt:
             pass
         try:

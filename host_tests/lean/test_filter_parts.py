@@ -7,9 +7,8 @@ from math import cos, degrees, radians, sin
 
 import pytest
 from bike_motion import GRAVITY_MPS2
-from kickstand.lean.dive import PRIOR_SHARE, Dive
-from kickstand.lean.measurements import gyro_variances
-from kickstand.lean.rest import RestDetector
+from kickstand.lean.bike_model import PRIOR_SHARE, Dive
+from kickstand.lean.measurements import RestDetector, gyro_variances
 
 WINDOW_S = 0.25
 NONE = (0.0, 0.0, 0.0)
@@ -25,9 +24,9 @@ def test_the_six_positions_give_the_gyros_variances():
     assert variances == pytest.approx(by_hand)
 
 
-def rest_after(detector, seconds, rates=NONE, force=(0.0, 1.0, 0.0), bias=NONE, **rolling):
+def rest_after(detector, seconds, rates=NONE, force=(0.0, 1.0, 0.0), bias=NONE, moving_s=0.0, **rolling):
     """Pass equal windows to the detector for some seconds. Return the time until rest, or None without a rest."""
-    rest_s = None
+    rest_s, detector.moving_s = None, moving_s
     for k in range(int(seconds / WINDOW_S + 0.5)):
         corrected = [rate - error for rate, error in zip(rates, bias)]
         detector.update(corrected, list(force), list(bias), WINDOW_S, **rolling)
@@ -41,7 +40,7 @@ def rest_after(detector, seconds, rates=NONE, force=(0.0, 1.0, 0.0), bias=NONE, 
     [
         (True, {}, 1.5),
         (True, {"rolling": True}, 10.0),
-        (True, {"moving": True}, None),
+        (True, {"moving_s": 20.0}, None),
         (True, {"rates": (0.05, 0.0, 0.0)}, 1.5),  # before the first rest, a steady rate may be a bias
         (True, {"rates": (0.0, -0.15, 0.0)}, None),
         (False, {"rates": (0.0, 0.05, 0.0)}, None),

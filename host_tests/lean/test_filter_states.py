@@ -48,7 +48,7 @@ def test_rest_shows_every_bias_and_a_restart_keeps_it():
         hold(estimator, 30.0, LEVEL, bias)
         assert estimator.at_rest
         if restarted:
-            estimator.restart()
+            estimator.start()
             assert estimator.variance == pi * pi and not estimator.at_rest and estimator.speed_mps == 0.0
         for k in range(1000):
             lean_deg, roll_dps = 10.0 - 10.0 * cos(k * DT_S), 10.0 * sin(k * DT_S)

@@ -98,7 +98,7 @@ def figures():
         if measured and k % 100 == 50:
             estimator.measure_speed(values[1] + 0.4)
         if abs(t_s - RESTART_S) < 1e-6:
-            estimator.restart()
+            estimator.start()
         for lost_s, seconds in LOST:
             if abs(t_s - lost_s) < 1e-6:
                 estimator.inflate_covariance(seconds)

@@ -3,13 +3,13 @@
 import json
 
 import pytest
-from kickstand.live.bonds import PATH, Bonds
+from kickstand.live.radio import BONDS, Bonds
 
 
 @pytest.fixture(autouse=True)
 def flash(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    return tmp_path / PATH
+    return tmp_path / BONDS
 
 
 def test_key_is_found_by_kind_and_name_or_by_index():

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kickstand_sim.simulation.scripted import script
 from kickstand_tools.analysis import report
 from kickstand_tools.analysis.export.export import export
 from kickstand_tools.analysis.overview import overview
@@ -21,7 +22,6 @@ from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.imports.importing import import_recording, write_imported
 from kickstand_tools.logs.csv_lines import cut_log
 from kickstand_tools.replay.replay import replay_to_csv
-from kickstand_tools.simulation.scripted import script
 from rich.console import Console
 from support import command
 from support.recordings import broken_logs

@@ -7,9 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from kickstand_tools.overlay import parts
-from kickstand_tools.overlay.gauge import Gauge
-from kickstand_tools.overlay.parts import ACCENT, DIM, WHITE
+from kickstand_tools.overlay.gauge import ACCENT, DIM, WHITE, Gauge, arrow, text as drawn_text
 
 NAN = math.nan
 HEIGHT = 480  # height of a video in pixels
@@ -54,7 +52,7 @@ def contains(picture, part) -> bool:
 def says(picture, words, colour=WHITE) -> bool:
     """Return True if the picture contains these words in one of the gauge's sizes."""
     unit = Gauge(HEIGHT).height / 100.0
-    return any(contains(picture, parts.text(words, round(size * unit, 1), colour)) for size in SIZES)
+    return any(contains(picture, drawn_text(words, round(size * unit, 1), colour)) for size in SIZES)
 
 
 @pytest.mark.parametrize("lean", [3.0, 20.0, 45.0, 60.0, 80.0])
@@ -125,7 +123,7 @@ def test_words_and_numbers(gauge, values, white, amber_words, grey):
         assert [text for text in words if not says(picture, text, colour)] == []
     assert not any(says(picture, text, ACCENT) for text in {"LEFT", "RIGHT"} - set(amber_words))
     unit = gauge.height / 100.0
-    arrows = [side for side in (False, True) if contains(picture, parts.arrow(8.0 * unit, side, ACCENT))]
+    arrows = [side for side in (False, True) if contains(picture, arrow(8.0 * unit, side, ACCENT))]
     assert arrows == [side == "RIGHT" for side in amber_words]
 
 

@@ -7,8 +7,7 @@ import pytest
 from kickstand_tools import api
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.overlay.gauge import Gauge
-from kickstand_tools.overlay.overlay import MARGIN
-from kickstand_tools.overlay.shown import shown
+from kickstand_tools.overlay.overlay import MARGIN, shown
 from support import command
 from support.recordings import gopro
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.overlay.shown import Shown, shown
+from kickstand_tools.overlay.overlay import Shown, shown
 
 NAN = math.nan
 

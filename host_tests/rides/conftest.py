@@ -4,8 +4,8 @@ import types
 
 import pytest
 from kickstand.rides import ride_files
-from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.fakes import fake_os, fake_time
+from kickstand_sim.simulated_board.clock import Clock
+from kickstand_sim.simulated_board.fakes import fake_os, fake_time
 from rings import KB_4, opened
 
 

@@ -1,6 +1,5 @@
 """Boards with rides in flash or with a stream of readings, for the tests of `pull` and `record`."""
 
-import base64
 import signal
 import time
 import types
@@ -8,6 +7,7 @@ import types
 from kickstand.rides import ride_files
 from support import fake_board
 from support.recordings import ride_writer
+from support.web.raw_prompt import streamed
 
 
 class RideBoard(fake_board.FakeBoard):
@@ -100,12 +100,6 @@ def plug_in(monkeypatch, root, stream):
     for name in ("monotonic", "time", "sleep"):
         monkeypatch.setattr(time, name, getattr(Clocks, name))
     return fake_board.plug_in(monkeypatch, board)
-
-
-def streamed(block):
-    """Return one block as the board streams it."""
-    pieces = [block[begin : begin + 256] for begin in range(0, len(block), 256)]
-    return b"".join(base64.b64encode(piece) + b"\r\n" for piece in pieces) + b".\r\n"
 
 
 def half_seconds(count, **more):

@@ -9,9 +9,10 @@ import signal
 import pytest
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.rides.record import record
-from ride_boards import Clocks, Stream, Streaming as Streaming, half_seconds, plug_in, streamed
+from ride_boards import Clocks, Stream, Streaming as Streaming, half_seconds, plug_in
 from support import command
 from support.watched_stderr import Watched, watched
+from support.web.raw_prompt import streamed
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals are of Unix")
 CTRL_C = signal.SIGINT

@@ -1,6 +1,6 @@
 """Models of character displays that are not behind a PCF8574. Runs on MicroPython too."""
 
-from kickstand_tools.simulated_board.lcd import Lcd
+from kickstand_sim.simulated_board.lcd import Lcd
 
 
 class OwnI2c:

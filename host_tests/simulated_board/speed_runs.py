@@ -1,6 +1,6 @@
 """Runs the firmware's speed sources on the simulated board, or with wires that the test moves. Runs on MicroPython."""
 
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.simulator import Board
 from support.board_access import level
 
 STEP_US = 10_000

@@ -1,11 +1,11 @@
 """The simulated board: clock, power, watchdog, files, pins, timer, radio, and the fakes of MicroPython's modules."""
 
 import pytest
-from kickstand_tools.simulated_board.clock import Clock, PowerOff
-from kickstand_tools.simulated_board.fakes import fake_bluetooth, fake_machine, fake_time
-from kickstand_tools.simulated_board.fakes.fake_machine import WDT
-from kickstand_tools.simulated_board.radio import EVENT_S, ROOM, Radio
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.clock import Clock, PowerOff
+from kickstand_sim.simulated_board.fakes import fake_bluetooth, fake_machine, fake_time
+from kickstand_sim.simulated_board.fakes.fake_machine import WDT
+from kickstand_sim.simulated_board.radio import EVENT_S, ROOM, Radio
+from kickstand_sim.simulated_board.simulator import Board
 from support.board_access import level, on_board, raised
 
 

@@ -1,9 +1,9 @@
 """The models of button, wheel and GPS receiver, and of each chip's pins, against known numbers."""
 
 import pytest
-from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.contacts import Button
-from kickstand_tools.simulated_board.gps import Gps, sentence
+from kickstand_sim.simulated_board.clock import Clock
+from kickstand_sim.simulated_board.contacts import Button
+from kickstand_sim.simulated_board.gps import Gps, sentence
 
 
 def edges(contact, clock, until_us):

@@ -3,7 +3,7 @@
 import gc
 import sys
 
-from kickstand_tools.simulated_board.lcd import Lcd
+from kickstand_sim.simulated_board.lcd import Lcd
 from other_displays import Mcp23008, OwnI2c
 from support.board_access import on_board
 
@@ -19,10 +19,10 @@ def as_text(lines):
 
 
 def open_display(board, hz=None, kind="auto", wiring=1):
-    from kickstand.board import i2c_bus
+    from kickstand.board import port
     from kickstand.board.display import Display
 
-    return Display(lambda rate: i2c_bus.open_i2c(1, 6, 7, rate), hz, kind, wiring=wiring)
+    return Display(lambda rate: port.open_i2c(1, 6, 7, rate), hz, kind, wiring=wiring)
 
 
 def turns(board, display, count, after=lambda: None):

@@ -2,7 +2,7 @@
 
 import sys
 
-from kickstand_tools.simulated_board.fakes import framebuf as fake
+from kickstand_sim.simulated_board.fakes import framebuf as fake
 
 
 def picture(module):

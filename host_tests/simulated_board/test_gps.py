@@ -1,7 +1,7 @@
 """A GPS receiver: its sentences, positions, time of day, delays and faults. Also runs on MicroPython."""
 
-from kickstand_tools.simulated_board.gps import sentence
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.gps import sentence
+from kickstand_sim.simulated_board.simulator import Board
 from speed_runs import Wire, drive
 from support.board_access import level
 

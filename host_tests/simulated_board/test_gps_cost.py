@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from kickstand_tools.simulated_board.gps import sentence
+from kickstand_sim.simulated_board.gps import sentence
 from support.emulated import modules, pico
 
 pytestmark = [pytest.mark.chip, pytest.mark.long]

@@ -1,7 +1,7 @@
 """A failing GPS receiver, or an attacker on its wire: right checksums around wrong fields."""
 
 from hypothesis import given, strategies as st
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.simulator import Board
 from speed_runs import Wire
 from support.board_access import level
 

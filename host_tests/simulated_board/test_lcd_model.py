@@ -1,8 +1,8 @@
 """The model of the LCD by the data sheet of the HD44780: memory, address counter, times, patterns, and backpacks."""
 
 import pytest
-from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.lcd import Lcd
+from kickstand_sim.simulated_board.clock import Clock
+from kickstand_sim.simulated_board.lcd import Lcd
 
 RS, E, LIGHT = 0x01, 0x04, 0x08
 

@@ -1,8 +1,8 @@
 """The model of the OLEDs by the data sheets, and the text that is read from their pixels."""
 
 import pytest
-from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.oled import Oled
+from kickstand_sim.simulated_board.clock import Clock
+from kickstand_sim.simulated_board.oled import Oled
 
 SUPPLY = {"ssd1306": (0x8D, 0x14), "sh1106": (0xAD, 0x8B)}
 

@@ -1,8 +1,8 @@
 """The model of the sensor by the register map: counts, sample rates, FIFO, self-test, and faults."""
 
 import pytest
-from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.mpu6050 import START_UP_US, WAKE_US, Mpu6050
+from kickstand_sim.simulated_board.clock import Clock
+from kickstand_sim.simulated_board.mpu6050 import START_UP_US, WAKE_US, Mpu6050
 from support.board_access import counts, level, read, write
 
 DIVIDER, GYRO, ACCEL, POWER = 0x19, 0x1B, 0x1C, 0x6B

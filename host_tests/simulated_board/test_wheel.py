@@ -1,6 +1,6 @@
 """A wheel's pulses, and the limits of any speed: periods, bounces, stops, storms. Also runs on MicroPython."""
 
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.simulator import Board
 from speed_runs import Contact
 from support.board_access import level
 

@@ -3,8 +3,8 @@
 import errno
 
 import pytest
-from kickstand_tools.simulated_board.fakes import fake_machine
-from kickstand_tools.simulated_board.fakes.fake_machine import I2C, SPI, Pin, SoftI2C
+from kickstand_sim.simulated_board.fakes import fake_machine
+from kickstand_sim.simulated_board.fakes.fake_machine import I2C, SPI, Pin, SoftI2C
 from support.board_access import firmware, on_board, raised
 
 SENSOR, LCD = 0x68, 0x27

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY as G
-from kickstand_tools.simulation.commands import Leg, commands
-from kickstand_tools.simulation.physics import bike as physics, road
-from kickstand_tools.simulation.physics.bike import Bike
-from kickstand_tools.simulation.physics.chip import Chip
-from kickstand_tools.simulation.physics.kinematics import Motion, body_rates, specific_force
-from kickstand_tools.simulation.physics.signals import integral, second_order, smoothed, smoothstep
+from kickstand_sim.simulation.commands import Leg, commands
+from kickstand_sim.simulation.physics import bike as physics, road
+from kickstand_sim.simulation.physics.bike import Bike
+from kickstand_sim.simulation.physics.chip import Chip
+from kickstand_sim.simulation.physics.kinematics import Motion, body_rates, specific_force
+from kickstand_sim.simulation.physics.signals import integral, second_order, smoothed, smoothstep
 
 RATE = 1000.0
 EDGE = slice(50, -50)  # derivatives are one-sided at both ends

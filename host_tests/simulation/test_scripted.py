@@ -5,12 +5,10 @@ import json
 import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY as G
-from kickstand_tools.common import unix_port
-from kickstand_tools.signals import rotation_matrix
-from kickstand_tools.simulation.physics.bike import Bike
-from kickstand_tools.simulation.physics.kinematics import Motion, body_rates, specific_force
-from kickstand_tools.simulation.scripted import sensor_errors
-from kickstand_tools.simulation.scripted.script import (
+from kickstand_sim.simulation.physics.bike import Bike
+from kickstand_sim.simulation.physics.kinematics import Motion, body_rates, specific_force
+from kickstand_sim.simulation.scripted import sensor_errors
+from kickstand_sim.simulation.scripted.script import (
     KICKSTAND_DEG,
     Ride,
     accelerate,
@@ -22,7 +20,9 @@ from kickstand_tools.simulation.scripted.script import (
     wait,
     yaw_rate_in_balance,
 )
-from kickstand_tools.simulation.scripted.sensor_errors import ACCEL_NOISE_G, GYRO_NOISE_DPS, MAX_OFFSET_G, Sensor
+from kickstand_sim.simulation.scripted.sensor_errors import ACCEL_NOISE_G, GYRO_NOISE_DPS, MAX_OFFSET_G, Sensor
+from kickstand_tools.common import unix_port
+from kickstand_tools.signals import rotation_matrix
 from support import mpy
 
 HILLY = [
@@ -146,9 +146,9 @@ def test_the_rates_of_a_hand_turn_gravity_to_the_next_pose(first, last, degrees)
 
 BOTH = """
 import json
-from kickstand_tools.demo.hand_bike import HandBike
-from kickstand_tools.simulation.scripted.script import Ride, accelerate, brake, kickstand, straight, turn, upright
-from kickstand_tools.simulation.scripted.sensor_errors import Sensor, resting
+from kickstand_sim.demo.hand_bike import HandBike
+from kickstand_sim.simulation.scripted.script import Ride, accelerate, brake, kickstand, straight, turn, upright
+from kickstand_sim.simulation.scripted.sensor_errors import Sensor, resting
 
 script = [kickstand(3), upright(3), accelerate(15, 4), turn(-30, 3), straight(3, slope_deg=4), brake(0, 4)]
 ride = Ride(script)

@@ -5,14 +5,14 @@ import functools
 import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY as G
+from kickstand_sim.simulation import hands
+from kickstand_sim.simulation.commands import Leg, commands
+from kickstand_sim.simulation.files import simulate
+from kickstand_sim.simulation.plan import Plan, lean_for
+from kickstand_sim.simulation.profiles import PROFILES
+from kickstand_sim.simulation.ride import ride
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.signals import rotation_matrix
-from kickstand_tools.simulation import hands
-from kickstand_tools.simulation.commands import Leg, commands
-from kickstand_tools.simulation.files import simulate
-from kickstand_tools.simulation.plan import Plan, lean_for
-from kickstand_tools.simulation.profiles import PROFILES
-from kickstand_tools.simulation.ride import ride
 from kickstand_workshop.evaluation.bands import QUANTITIES, bands_of
 from support.command import works
 

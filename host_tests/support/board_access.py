@@ -1,6 +1,6 @@
 """Helpers for the tests of the simulated board. Runs on MicroPython too."""
 
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.simulator import Board
 
 LEVEL = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 

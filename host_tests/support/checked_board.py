@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
+from kickstand_sim.simulated_board.simulator import Board
+from kickstand_sim.simulation.scripted.sensor_errors import Sensor, resting
 from kickstand_tools.deploy import check
 from kickstand_tools.deploy.check_limits import Finding
-from kickstand_tools.simulated_board.simulator import Board
-from kickstand_tools.simulation.scripted.sensor_errors import Sensor, resting
 
 PRESS_S = 0.5  # time from the check's request to the press
 

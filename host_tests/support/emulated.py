@@ -9,10 +9,10 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from kickstand_sim.simulation.scripted.script import Ride, upright
+from kickstand_sim.simulation.scripted.sensor_errors import Sensor
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.deploy import bytecode
-from kickstand_tools.simulation.scripted.script import Ride, upright
-from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 
 PART = Sensor(seed=1, share=0.5)  # an ordinary sensor, mounted at some angle
 

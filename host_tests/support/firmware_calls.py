@@ -10,9 +10,8 @@ from array import array
 
 from kickstand import rotation
 from kickstand.calibration import six_position, two_position
-from kickstand.calibration.parameters import Calibration
-from kickstand.calibration.still_pose import StillPose
-from kickstand.calibration.transform import Transform
+from kickstand.calibration.parameters import Calibration, Transform
+from kickstand.calibration.poses import StillPose
 from kickstand.errors import Refusal
 from kickstand.imu import axes
 from kickstand.lean import formula

@@ -9,7 +9,7 @@ import sys
 
 from kickstand import facts
 from kickstand.settings import load
-from kickstand_tools.deploy import status_words
+from kickstand_tools.deploy import status
 
 from support.earlier_names import STATUS
 
@@ -23,4 +23,4 @@ def report():
             facts.report()
     finally:
         facts.load = load
-    print(status_words.words(text.getvalue()))
+    print(status.words(text.getvalue()))

@@ -11,7 +11,7 @@ from bumble.controller import Controller
 from bumble.device import Device, Peer
 from bumble.gatt import Characteristic, CharacteristicValue, Service
 from bumble.host import Host
-from kickstand_tools.simulated_board import radio as model
+from kickstand_sim.simulated_board import radio as model
 
 PUMP_S = 0.005
 ROUNDS = 12  # rounds of the event loop per call of pump(), because a packet passes several layers

@@ -1,5 +1,5 @@
 import pytest
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_sim.simulated_board.simulator import Board
 from panel import panels
 from support.board_access import level
 

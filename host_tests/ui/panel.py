@@ -6,6 +6,11 @@ from typing import Any
 
 import numpy as np
 from kickstand.calibration.parameters import Calibration
+from kickstand_sim.simulated_board.simulator import Board
+from support.board_access import level
+
+with Board(level):  # for the clock
+    from kickstand.ui import pages as pages
 
 panels = []  # those of the present test, whose recordings the fixture `board` ends
 SHORT, LONG = 1, 2  # as in board/button.py
@@ -29,15 +34,14 @@ class Panel:
     """
 
     def __init__(self, aligned=True, **config):
-        from kickstand import devices
         from kickstand.app import App
         from kickstand.settings import Settings
 
         settings = Settings(type("Config", (), config))
-        sensor = devices.open_sensor(settings)
+        sensor = settings.open_sensor()
         sensor.chip.who_am_i = 0x68
         sensor.fault = None
-        self.app: Any = App(settings, devices.open_lcd(settings), sensor)
+        self.app: Any = App(settings, settings.open_lcd(), sensor)
         self.app.calibration.chip_started(sensor.chip)
         if aligned:
             self.app.calibration.save(self.app.calibration.value.with_alignment(AXES, (0.0, 0.0, 0.0)))

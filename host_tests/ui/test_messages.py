@@ -6,8 +6,9 @@ import re
 
 from kickstand import console, errors
 from kickstand.errors import Notice, Refusal, SettingsError
-from kickstand.ui import messages, pages
+from kickstand.ui import messages
 from kickstand_tools.common import firmware_path
+from panel import pages
 
 CLASSES = {name for name in vars(errors) if name[0].isupper()}
 # Codes that the firmware passes as a variable, so codes() does not find them.
@@ -78,7 +79,7 @@ def test_a_refusal_of_the_board_has_a_console_sentence():
         if code in sentences and kind != "Notice":
             values = VALUES.get(code, ("NAME", 2.0, 3.0, 4.0, 5.0, 6.0) if kind == "SettingsError" else (1.0, 2.0, 3.0))
             assert "{" not in console.sentence(Refusal(code, *values))
-        assert code in sentences or kind not in ("SettingsError", "LiveError", "StoreError")
+        assert code in sentences or kind not in ("SettingsError", "SickSensor")
 
 
 def test_the_limits_of_user_code_are_said_as_they_are():

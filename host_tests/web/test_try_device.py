@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 
 import pytest
-from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.lcd import Lcd
+from kickstand_sim.simulated_board.clock import Clock
+from kickstand_sim.simulated_board.lcd import Lcd
 from kickstand_tools.web.device import STATE, PageDevice, display
 from page_drive import ALIGN, RIDE, SHORT, Drive
 from support.mpy import run_mpy

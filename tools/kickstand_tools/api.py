@@ -15,6 +15,8 @@ The text of an InputError is one line: what is wrong with the input, and what to
 reason as a Message. Notices are Messages too. A Message has a code and named fields, and sentence() returns its text.
 """
 
+from kickstand_sim.simulation import ride as _simulation
+
 from .analysis.brake_tests import brake_tests as brake_tests
 from .analysis.channels import Channels as Channels
 from .analysis.export.export import export as export
@@ -55,7 +57,6 @@ from .logs.log import Log as Log, Stretch as Stretch
 from .logs.reader import read_log as read_log
 from .overlay.overlay import Overlaid as Overlaid, overlay as overlay
 from .replay.replay import LeanTable as LeanTable, replay as replay
-from .simulation import ride as _simulation
 from .web.site import site_files as site_files, write_site as write_site
 
 SimulatedRide, simulate_ride = _simulation.SimulatedRide, _simulation.ride

@@ -1,13 +1,15 @@
-"""The differences between boards: I2C, interrupts, the SD card's driver, how to disarm the watchdog, and
-how the heap grows.
+"""The differences between boards: I2C, interrupts, how to disarm the watchdog, and how the heap grows.
 
-Except pins.py, no other module depends on the kind of board.
+The usual pins are in setting_table.py, the driver of the SD card in sd_card.py. No other module depends on the kind of
+board.
 """
 
 import gc
 import sys
+from time import sleep_us
 
 import machine
+from machine import Pin
 
 IS_ESP32 = sys.platform == "esp32"
 # The board and its chip, such as "Raspberry Pi Pico with RP2040" or "ESP32C3 module with ESP32-C3"
@@ -21,7 +23,10 @@ ONLY_MS_YIELD = IS_ESP32  # there sleep_us() gives no time to the radio and the 
 _ESP32_HZ = 240_000_000
 # Largest clock of SoftI2C, with half a period of 2 us. At 400 kHz, half a period is 1 us, but the MPU6050 needs 1.3 us
 _SOFT_I2C_HZ = 250_000
-_TURN_BYTES = 2000  # bytes of heap that one pass of the app's loop uses; 3000 while aligning by driving
+_HALF_PERIOD_US = 5  # half a period of SCL while a bus is freed, so SCL runs at 100 kHz
+# Time-out in bit times. On a Pico the time-out is for a whole transfer, which has at most 136 bytes. On an ESP32 the
+# time-out is for each bit. The default of 50 ms would stop the loop for too long.
+_TIMEOUT_BITS = 2000
 _FEWEST_TURNS = 3
 
 _WATCHDOG_MS = 8000  # the watchdog of a Pico allows at most 8388 ms
@@ -43,8 +48,38 @@ def begin():
             pass
 
 
-def open_i2c(controller, sda, scl, frequency, timeout_us):
-    """Open a machine.I2C, or a SoftI2C on an ESP32. Raises ValueError for pins that the controller cannot use.
+def _set(pin, value):
+    pin.value(value)
+    sleep_us(_HALF_PERIOD_US)
+
+
+def free(sda_pin, scl_pin):
+    """Make a device release SDA (NXP UM10204, section 3.1.16, bus clear). Return True if SDA is high afterwards.
+
+    If the microcontroller resets in the middle of a read, the device waits for clock pulses and holds SDA low forever.
+    Up to nine pulses let the device finish its byte, and a STOP condition ends the transfer. MicroPython sends neither.
+
+    Args:
+        sda_pin, scl_pin: GPIO numbers.
+    """
+    scl = Pin(scl_pin, Pin.OPEN_DRAIN, value=1)
+    sda = Pin(sda_pin, Pin.OPEN_DRAIN, value=1)
+    for _ in range(9):
+        sleep_us(_HALF_PERIOD_US)
+        if sda.value():
+            break
+        _set(scl, 0)
+        scl.value(1)
+    scl.value(0)
+    _set(sda, 0)
+    _set(scl, 1)
+    _set(sda, 1)
+    return bool(sda.value())
+
+
+def open_i2c(controller, sda_pin, scl_pin, frequency):
+    """Free a bus, and open it as a machine.I2C, or as a SoftI2C on an ESP32. Raises OSError if SDA stays low,
+    ValueError for pins that the controller cannot use.
 
     An ESP32's machine.I2C has three problems. Up to MicroPython 1.28 machine.I2C ignores the time-out, and waits up to
     0.1 s for each byte of a stalled transfer. The whole transfer then takes longer than the watchdog allows. Later
@@ -53,27 +88,33 @@ def open_i2c(controller, sda, scl, frequency, timeout_us):
 
     Args:
         controller: number of the controller, not used on an ESP32.
-        sda, scl: each a machine.Pin.
+        sda_pin, scl_pin: GPIO numbers.
         frequency: clock in Hz.
-        timeout_us: time-out in us.
     """
+    if not free(sda_pin, scl_pin):
+        raise OSError("SDA is held low")
+    sda, scl, timeout_us = Pin(sda_pin), Pin(scl_pin), _TIMEOUT_BITS * 1_000_000 // frequency
     if IS_ESP32:
         return machine.SoftI2C(scl, sda, freq=min(frequency, _SOFT_I2C_HZ), timeout=timeout_us)
     return machine.I2C(controller, sda=sda, scl=scl, freq=frequency, timeout=timeout_us)
 
 
-def turns_to_collect(most):
-    """Return the number of passes of the app's loop between two garbage collections, at most `most`.
+def turns_to_collect(turn_bytes):
+    """Return the number of passes of the app's loop between two garbage collections.
 
-    An ESP32's heap starts with 64 KB and grows only after a collection that frees too little. In such a small heap,
-    `most` passes would use up the heap, and collections would often run in the middle of a pass."""
-    if not IS_ESP32:
-        return most
-    import esp32  # type: ignore[import-not-found]
+    These passes use most of the free heap. If they used it up, a collection would run in the middle of a pass. An
+    ESP32's heap starts with 64 KB and grows only after a collection that frees too little.
 
-    # mem_free() also counts the possible growth of the heap, which is the largest block of ESP-IDF's heap
-    grow = max(region[2] for region in esp32.idf_heap_info(esp32.HEAP_DATA))
-    return max(_FEWEST_TURNS, min(most, (gc.mem_free() - grow) // (2 * _TURN_BYTES)))
+    Args:
+        turn_bytes: bytes of heap that a pass uses.
+    """
+    free = gc.mem_free()
+    if IS_ESP32:
+        import esp32  # type: ignore[import-not-found]
+
+        # mem_free() also counts the possible growth of the heap, which is the largest block of ESP-IDF's heap
+        free -= max(region[2] for region in esp32.idf_heap_info(esp32.HEAP_DATA))
+    return max(_FEWEST_TURNS, free * 5 // (6 * turn_bytes))
 
 
 def start_watchdog():
@@ -98,23 +139,3 @@ def rest_watchdog():
     # address. Sections 2.1.2 and 2.1.3: a write to address + 0x3000 clears the bits that are 1.
     base = 0x400D8000 if "RP2350" in MACHINE else 0x40058000
     machine.mem32[base + 0x3000] = 1 << 30
-
-
-def open_sd_card(number, sck, mosi, miso, cs):
-    """Open the card as a block device for os.mount().
-
-    Raises ImportError if the driver is missing, OSError without a card, ValueError for wrong pins.
-
-    Args:
-        number: one of SD_SPI.
-        sck, mosi, miso, cs: each a machine.Pin.
-    """
-    if IS_ESP32:
-        from machine import SDCard
-
-        return SDCard(slot=number, sck=sck, mosi=mosi, miso=miso, cs=cs)
-    from machine import SPI
-
-    from .spi_card import CheckedCard
-
-    return CheckedCard(SPI(number, sck=sck, mosi=mosi, miso=miso), cs)

@@ -3,7 +3,7 @@
 import sys
 from time import ticks_add, ticks_diff, ticks_ms
 
-from ..errors import StoreError, report, unload
+from ..errors import Refusal, report, unload
 from ..units import const
 
 _TRIM_MS = const(60_000)  # shortest time between two saves of the trim, because writing wears the flash
@@ -54,7 +54,7 @@ class ActiveCalibration:
         return True
 
     def save(self, calibration, posed=False):
-        """Save a calibration from the rider's poses to flash, then use it. Raises StoreError.
+        """Save a calibration from the rider's poses to flash, then use it. Raises Refusal.
 
         Args:
             calibration: the new Calibration.
@@ -65,7 +65,7 @@ class ActiveCalibration:
 
     def refine(self, calibration):
         """Save and use an alignment from driving. Unlike save(), keep the maxima and the results of driving. Raises
-        StoreError."""
+        Refusal."""
         self._stored(calibration)
         self._use(calibration, self.REFINED)
 
@@ -87,14 +87,15 @@ class ActiveCalibration:
         """Save the trim if it has changed enough. Return True if it was saved."""
         try:
             return self._meter.keep_trim() and self._stored(self.value, True)
-        except StoreError as error:  # a failed save is not fatal, because the next ride estimates the trim again
+        except Refusal as error:  # a failed save is not fatal, because the next ride estimates the trim again
             report(error)
             return True
 
     def _stored(self, calibration=None, careful=False):
-        """Save a Calibration, or without one load the Calibration in flash. Raises StoreError.
+        """Save a Calibration, or without one load the Calibration in flash.
 
-        The Store is imported only for this, because it takes 3 KB of heap.
+        The Store is imported only for this, because it takes 3 KB of heap. Raises Refusal if the Calibration is not
+        saved. Raises ImportError or MemoryError if the Store cannot be imported to load a Calibration.
 
         Args:
             careful: True to save only if the files are unchanged.
@@ -115,7 +116,9 @@ class ActiveCalibration:
             store.save(calibration)
             return True
         except (ImportError, MemoryError) as error:
-            raise StoreError("not-written", str(error))
+            if calibration is None:
+                raise
+            raise Refusal("not-written", str(error))
         finally:
             self.newest = store.newest
             if not recording:

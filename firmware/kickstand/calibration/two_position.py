@@ -8,7 +8,7 @@ This module differs from the paper in three points:
 
 from math import atan2, degrees
 
-from ..errors import AlignmentError, GyroError
+from ..errors import Refusal, SickSensor
 from ..rotation import cross, dot, frame, matrix, norm, normalize, rotate, vector
 from ..units import const
 
@@ -34,7 +34,7 @@ GYRO_DRIFT, GYRO_WALK = 0.0005, 0.0002
 
 
 def check_one_g(force, tolerance_g, pose):
-    """Raise AlignmentError unless the length of the force is within tolerance_g of 1 g.
+    """Raise Refusal unless the length of the force is within tolerance_g of 1 g.
 
     Args:
         force: 3 values in g.
@@ -43,11 +43,11 @@ def check_one_g(force, tolerance_g, pose):
     """
     size = norm(force)
     if not abs(size - 1.0) <= tolerance_g:
-        raise AlignmentError("not-one-g", pose, size)
+        raise Refusal("not-one-g", pose, size)
 
 
 def two_position(out, kickstand, upright, side="left", tolerance_g=_UNCALIBRATED_TOLERANCE_G):
-    """Compute the rotation from sensor axes to vehicle axes by equations 3-8. Raises AlignmentError.
+    """Compute the rotation from sensor axes to vehicle axes by equations 3-8. Raises Refusal.
 
     Args:
         out: array of 9 for the rotation matrix, with the rows left, up, forward.
@@ -68,11 +68,11 @@ def two_position(out, kickstand, upright, side="left", tolerance_g=_UNCALIBRATED
     cross(z, y, tilted)
     tilt = degrees(atan2(norm(z), dot(y, tilted)))
     if tilt < _SAME_POSE_DEG:
-        raise AlignmentError("same-pose", tilt)
+        raise Refusal("same-pose", tilt)
     if tilt < _MIN_TILT_DEG:
-        raise AlignmentError("tilt-small", tilt, _MIN_TILT_DEG)
+        raise Refusal("tilt-small", tilt, _MIN_TILT_DEG)
     if tilt > _MAX_TILT_DEG:
-        raise AlignmentError("tilt-large", tilt, _MAX_TILT_DEG)
+        raise Refusal("tilt-large", tilt, _MAX_TILT_DEG)
     if side == "right":
         z[0], z[1], z[2] = -z[0], -z[1], -z[2]
     frame(out, y, z)
@@ -80,7 +80,7 @@ def two_position(out, kickstand, upright, side="left", tolerance_g=_UNCALIBRATED
 
 
 def align(calibration, kickstand, upright, side):
-    """Align a Calibration by two poses. Raises AlignmentError.
+    """Align a Calibration by two poses. Raises Refusal.
 
     The gyro's bias is taken from the kickstand pose, because a stand holds the bike stiller than a rider does.
 
@@ -101,7 +101,7 @@ def align(calibration, kickstand, upright, side):
 
 
 def check_turn(calibration, kickstand, upright, turn):
-    """Raise GyroError unless the gyro's turn between the two poses agrees with the tilt between them.
+    """Raise SickSensor unless the gyro's turn between the two poses agrees with the tilt between them.
 
     The longer the turn took, the more difference is allowed. After a minute the check hardly limits a tilt of 12
     degrees. If readings were lost, nothing is checked.
@@ -133,4 +133,4 @@ def check_turn(calibration, kickstand, upright, turn):
         rotate(claimed, (r[0], r[3], r[6], r[1], r[4], r[7], r[2], r[5], r[8]), u)
         normalize(axis)
         cross(inverse, u, claimed)
-        raise GyroError("gyro-tilt", degrees(tilt), degrees(atan2(dot(inverse, axis), dot(u, claimed))))
+        raise SickSensor("gyro-tilt", degrees(tilt), degrees(atan2(dot(inverse, axis), dot(u, claimed))))

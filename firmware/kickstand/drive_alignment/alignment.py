@@ -13,16 +13,22 @@ To show the progress, use `state`, `counted`, `needed` and, in the state REFUSED
 speed or of the mount that more driving cannot resolve. missing() describes the driving that is still needed. `reason`
 is the problem or, without one, the result of missing(). compare() checks whether an earlier alignment still
 fits. Memory is fixed, and each call does a short step of the work.
+
+The vertical from standing is the mean direction of gravity over many stops. The slopes of many stops average out
+(ViriCiti). Each stop counts once, independent of its duration. At a stop the gyro reads only its bias, which is
+measured too. At a stop a motorcycle may lean to a side. So its vertical comes from the upright pose or, without this
+pose, from riding straight, because a balanced bike has no lateral force. A car's vertical is the mean of two verticals,
+from its stops and from driving straight. The camber and slope of the road disturb both verticals by about the same
+amount.
 """
 
 from math import atan2, degrees
 
-from ..errors import AlignmentError
-from ..rotation import angle_deg, dot, frame, vector
+from ..errors import Refusal
+from ..rotation import angle_deg, dot, frame, norm, normalize, vector
 from ..units import GAP_US, const
 from .events import BIN_US, DrivingEvents, Fit, ForceHistory
-from .quality import MIN_EVENTS, DrivingQuality, SpeedCheck
-from .vertical import COUNTS_S, MAX_CHANGE_DEG, MOVED_MPS, SETTLE_S, StandingVertical, Vertical
+from .quality import MAX_CHANGE_DEG, MIN_EVENTS, DrivingQuality, SpeedCheck
 
 CAR, MOTORCYCLE = "car", "motorcycle"
 
@@ -37,6 +43,189 @@ REFUSED = 6  # matrix() raises `problem`
 
 STALE_US = 5_000_000
 STEP_US = 12_000  # an update does one step of work, plus one step for each whole STEP_US since the last update
+_STANDING_MPS = const(0.5)  # highest speed that counts as standing, because a GPS at rest shows speeds up to 0.5 m/s
+MOVED_MPS = 2.0  # speed that a vehicle must exceed between two stops
+SETTLE_S = 1.0  # time for which a vehicle rocks after braking
+COUNTS_S = 2.0  # time that a stop must last after SETTLE_S to count
+# Largest difference at a stop between a mean over 0.1 s and a mean with the time constant _AVERAGE_S. An idling diesel,
+# wind and passengers cause a smaller difference.
+_STILL_G = const(0.06)
+_STILL_DPS = const(3.0)
+_AVERAGE_S = const(0.5)
+_SAME_STOP_DEG = const(1.5)  # largest angle by which doors and passengers tilt a standing vehicle
+# Longest time for which the angle of a sensor that was not rotated can differ from its angle at the last stop. The
+# angle also differs for a short time when the vehicle drives again but the late speed is still zero.
+_TURNED_S = const(6.0)
+# Largest difference between a rate at a stop and the bias at the last stop. At a larger difference the vehicle drives
+# in a bend, and a speed of zero is wrong. The bias of a gyro that warms up changes by less than this limit.
+TURNING_DPS = 10.0
+_MEAN_S = const(60.0)  # time constant of the mean force, which is used until a better vertical is known
+
+
+class StandingVertical:
+    """Measures the vertical at stops. Call update() with each mean over about 0.1 s.
+
+    Args:
+        bias: the gyro's bias until the first stop, 3 values in deg/s.
+
+    Attributes:
+        stops: number of stops that count.
+        up: the vertical, a unit vector in the sensor's axes; None before the first stop.
+        bias: the gyro's bias at the last stop, 3 values in deg/s.
+        standing: True during a stop.
+        moved: True if the verticals of two stops differ so much that the mount must have moved.
+    """
+
+    def __init__(self, bias=(0.0, 0.0, 0.0)):
+        self.stops = 0
+        self.up = None
+        self.bias = list(bias)
+        self.standing = False
+        self.moved = False
+        self._sum = [0.0] * 3  # sum of the directions of the earlier stops
+        self._begin_stop()
+
+    def _begin_stop(self):
+        """Begin the means of a new stop, because the vehicle has driven."""
+        self._stop_force = [0.0] * 3  # mean force during the current stop
+        self._stop_bias = [0.0] * 3
+        self._averaged_s = 0.0
+        self._counted = False
+        self._force = None  # running mean of the force with the time constant _AVERAGE_S
+        self._still_s = 0.0
+
+    def update(self, force, rate, speed_mps, seconds):
+        """Take the means over the last `seconds`.
+
+        Args:
+            force: mean force, 3 values in g.
+            rate: mean rate, 3 values in deg/s.
+            speed_mps: the last value of the speed source.
+            seconds: duration of the means.
+        """
+        if speed_mps > MOVED_MPS and self._force is not None:
+            if self._counted:
+                for i in range(3):
+                    self._sum[i] += self._direction[i]
+            self._begin_stop()
+        self.standing = False
+        if speed_mps > _STANDING_MPS or not self._is_still(force, rate, seconds):
+            self._still_s = 0.0
+            return
+        self._still_s += seconds
+        if self._still_s < SETTLE_S:
+            return
+        if self._counted:
+            apart_deg = angle_deg(self._force, self._stop_force)
+            if apart_deg > _SAME_STOP_DEG:
+                # Either the vehicle drives again while a late speed is still zero, or the sensor was rotated.
+                self.moved = self.moved or (apart_deg > MAX_CHANGE_DEG and self._still_s > _TURNED_S)
+                return
+        self.standing = True
+        self._average(force, rate, seconds)
+
+    def _is_still(self, force, rate, seconds):
+        """Return True if force and rate are near their running means, and the rate is near the bias of the last
+        stop."""
+        if self._force is None:
+            self._force, self._rate = list(force), list(rate)
+        gain = min(1.0, seconds / _AVERAGE_S)
+        from_force = from_rate = from_bias = 0.0  # squared differences
+        for i in range(3):
+            d = force[i] - self._force[i]
+            self._force[i] += gain * d
+            from_force += d * d
+            d = rate[i] - self._rate[i]
+            self._rate[i] += gain * d
+            from_rate += d * d
+            d = rate[i] - self.bias[i]
+            from_bias += d * d
+        turning = self.stops and from_bias > TURNING_DPS * TURNING_DPS
+        return not (turning or from_force > _STILL_G * _STILL_G or from_rate > _STILL_DPS * _STILL_DPS)
+
+    def _average(self, force, rate, seconds):
+        self._averaged_s += seconds
+        gain = seconds / self._averaged_s
+        for i in range(3):
+            self._stop_force[i] += gain * (force[i] - self._stop_force[i])
+            self._stop_bias[i] += gain * (rate[i] - self._stop_bias[i])
+        if self._averaged_s < COUNTS_S:
+            return
+        if not self._counted:
+            self._counted = True
+            self.stops += 1
+        self._direction = list(self._stop_force)
+        normalize(self._direction)
+        self.bias[:] = self._stop_bias
+        self.up = [self._sum[i] + self._direction[i] for i in range(3)]
+        normalize(self.up)
+        if self.stops > 1 and angle_deg(self._direction, self._sum) > MAX_CHANGE_DEG:
+            self.moved = True
+
+
+class Vertical:
+    """The best vertical so far.
+
+    Args:
+        is_car: True for a car, whose stops are used.
+        from_pose: for a motorcycle, the vertical of the upright pose, a unit vector, or None.
+        standing: the StandingVertical of the same drive.
+    """
+
+    def __init__(self, is_car, from_pose, standing):
+        self.is_car = is_car
+        self._from_pose = None if from_pose is None else vector(*from_pose)
+        self._standing = standing
+        self._mean = None  # mean force (3, g) with the time constant _MEAN_S
+        self._mean_s = 0.0
+
+    def update(self, force, seconds):
+        """Take the mean force over the last `seconds`, 3 values in g."""
+        self._mean = self._mean or vector()
+        self._mean_s = min(_MEAN_S, self._mean_s + seconds)
+        gain = seconds / self._mean_s
+        for i in range(3):
+            self._mean[i] += gain * (force[i] - self._mean[i])
+
+    @property
+    def turn_axis(self):
+        """The axis of the yaw rate, 3 values with a length of about 1. The axis is known after the first update()."""
+        return (self.is_car and self._standing.up) or self._from_pose or self._mean
+
+    def known(self, out, fit=None):
+        """Write the vertical into out, as a unit vector. Return False if the vertical is not known yet.
+
+        In a car the vertical is unknown until the first stop.
+
+        Args:
+            out: array of 3.
+            fit: the Fit of all straight driving, or None.
+        """
+        if self.is_car:
+            best = self._standing.up
+            if best and fit:
+                best = [best[i] + fit.level[i] / norm(fit.level) for i in range(3)]
+        else:
+            best = self._from_pose or (fit.level if fit else self._mean)
+        if not best:
+            return False
+        for i in range(3):
+            out[i] = best[i]
+        normalize(out)
+        return True
+
+    def problem(self, level):
+        """Return a Refusal if the vertical of straight driving is wrong for the stops or the upright pose, else
+        None.
+
+        Args:
+            level: the vertical of all straight driving, from its Fit, 3 values.
+        """
+        standing_up = self._standing.up if self.is_car else self._from_pose
+        change_deg = 0.0 if standing_up is None else angle_deg(standing_up, level)
+        if change_deg > MAX_CHANGE_DEG:
+            return Refusal("mount-moved", "since-standing" if self.is_car else "since-upright", change_deg)
+        return None
 
 
 class DriveAlignment:
@@ -68,8 +257,7 @@ class DriveAlignment:
         self._speed_check = SpeedCheck()
         self._bias_given = bias is not None
         self._judged = (0, 0)  # numbers of events and stops when the quality was last judged
-        self._sums = [0.0] * 6  # integrals of force and rate over the current bin
-        self._sums_us = 0
+        self._clear_bin()
         self._speed_mps = -1.0  # the last speed in m/s, negative before the first speed
         self._top_mps = 0.0
         self._silent_us = 0  # time since the last speed, in us
@@ -113,20 +301,20 @@ class DriveAlignment:
 
     @property
     def problem(self):
-        """The fault of the speed or of the mount that more driving cannot resolve, an AlignmentError, or None."""
+        """The fault of the speed or of the mount that more driving cannot resolve, a Refusal, or None."""
         if self._speed_check.problem is None and self.standing.moved and not self._leans:
-            return AlignmentError("mount-moved", "between-stops", MAX_CHANGE_DEG)
+            return Refusal("mount-moved", "between-stops", MAX_CHANGE_DEG)
         if self.counted < self.needed:
             return self._speed_check.problem
         return self._speed_check.problem or self.quality.mount_problem or self.quality.speed_problem
 
     @property
     def reason(self):
-        """The reason why matrix() gives no alignment, an AlignmentError: `problem`, or else the result of missing()."""
+        """The reason why matrix() gives no alignment, a Refusal: `problem`, or else the result of missing()."""
         return self.problem or self.missing(self.counted, self.needed, self.turned)
 
     def missing(self, counted, needed, turned):
-        """Return an AlignmentError that says which driving is still needed. The drive must not have a problem.
+        """Return a Refusal that says which driving is still needed. The drive must not have a problem.
 
         Args:
             counted: number of counted events.
@@ -134,17 +322,17 @@ class DriveAlignment:
             turned: number of braking events that did not count because of a bend.
         """
         if self._speed_mps < 0.0:
-            return AlignmentError("no-speed")
+            return Refusal("no-speed")
         if self._top_mps < MOVED_MPS:
-            return AlignmentError("not-driven", needed)
+            return Refusal("not-driven", needed)
         if not (self._leans or self.standing.stops):
-            return AlignmentError("not-stopped", SETTLE_S + COUNTS_S)
+            return Refusal("not-stopped", SETTLE_S + COUNTS_S)
         if counted < needed:
-            return AlignmentError("few-events", counted, needed, turned)
+            return Refusal("few-events", counted, needed, turned)
         quality = self.quality
         if not quality.agree and quality.quality_deg < 180.0:
-            return AlignmentError("parts-differ", max(quality.parts.forward_deg, quality.halves_deg))
-        return AlignmentError("uncertain", min(quality.quality_deg, 180.0), self.events.braking_count)
+            return Refusal("parts-differ", max(quality.parts.forward_deg, quality.halves_deg))
+        return Refusal("uncertain", min(quality.quality_deg, 180.0), self.events.braking_count)
 
     def update(self, force, rate, dt_us):
         """Take a sample and do a step of the work.
@@ -158,23 +346,26 @@ class DriveAlignment:
             self.interrupt()
             return
         sums = self._sums
-        sums[0] += force[0] * dt_us
-        sums[1] += force[1] * dt_us
-        sums[2] += force[2] * dt_us
-        sums[3] += rate[0] * dt_us
-        sums[4] += rate[1] * dt_us
-        sums[5] += rate[2] * dt_us
-        self._sums_us += dt_us
-        if self._sums_us >= BIN_US:
-            self._end_bin()
-            return
+        for i in range(3):
+            sums[i] += force[i] * dt_us
+            sums[3 + i] += rate[i] * dt_us
+        if self.elapse(dt_us):
+            means = [total / self._bin_us for total in sums]
+            self.end_bin(means[:3], means[3:])
+
+    def elapse(self, dt_us):
+        """Count the time of a sample. Return True at the end of a bin, when end_bin() must follow; else do a step of
+        the work."""
+        self._bin_us += dt_us
+        if self._bin_us >= BIN_US:
+            return True
         for _ in range(1 + dt_us // STEP_US):
             self._do_step()
+        return False
 
     def interrupt(self):
         """Drop the current braking event and the history, because samples are missing. Counted events are kept."""
-        self._sums = [0.0] * 6
-        self._sums_us = 0
+        self._clear_bin()
         self._history.clear()
         self._work = None
         self.events.interrupt()
@@ -199,10 +390,10 @@ class DriveAlignment:
             self.events.interrupt()
         self._silent_us = 0
         self._top_mps = max(self._top_mps, speed_mps)
-        self.events.measure_speed(speed_mps, self._history.now + self._sums_us - age_us)
+        self.events.measure_speed(speed_mps, self._history.now + self._bin_us - age_us)
 
     def matrix(self, out):
-        """Write the rotation from sensor axes to vehicle axes into out. Raises AlignmentError while not ready.
+        """Write the rotation from sensor axes to vehicle axes into out. Raises Refusal while not ready.
 
         Args:
             out: array of 9 for the rotation matrix, with the rows left, up, forward.
@@ -226,24 +417,25 @@ class DriveAlignment:
         elif self.events.due:
             self._work = self._follow()
 
-    def _end_bin(self):
+    def end_bin(self, force, rate):
+        """Take the means over the time since the last bin. force, rate: two lists, as for update()."""
         if self._means is not None:
             self._do_step()
-        sums, n = self._sums, self._sums_us
+        n = self._bin_us
         seconds = n * 1e-6
-        means = [total / n for total in sums]
-        force, rate = means[:3], means[3:]
         self.vertical.update(force, seconds)
         axis, bias = self.vertical.turn_axis, self.standing.bias
         yaw_dps = (rate[0] - bias[0]) * axis[0] + (rate[1] - bias[1]) * axis[1] + (rate[2] - bias[2]) * axis[2]
-        self._history.add(sums, yaw_dps * seconds * 1e5, n)
+        self._history.add([f * n for f in force], yaw_dps * seconds * 1e5, n)
         if self._silent_us < STALE_US:  # a silent source must not be reported as a stuck source
             self._speed_check.update(force, yaw_dps, n)
         self._means = (force, rate, seconds)
         self._silent_us = min(STALE_US + 1, self._silent_us + n)
-        self._sums_us = 0
-        for i in range(6):
-            sums[i] = 0.0
+        self._clear_bin()
+
+    def _clear_bin(self):
+        self._sums = [0.0] * 6  # integrals of force and rate over the current bin
+        self._bin_us = 0
 
     def _follow(self):
         """Process the last interval between two speeds, as a generator of short steps."""

@@ -7,24 +7,12 @@ Flash is written only at standstill.
 
 from time import ticks_add, ticks_diff
 
-from ..errors import Notice, StoreError
+from ..errors import Notice, Refusal
 from ..rotation import matrix
 from ..units import const
-from .alignment import (
-    BRAKING,
-    CAR,
-    MOTORCYCLE,
-    MOVED,
-    REFINED,
-    REVERSED,
-    SAME,
-    TURNING,
-    DriveAlignment,
-    compare,
-    turn_round,
-)
+from . import alignment
 
-# Number of passes of the loop whose counts are added up before they are converted to floats, to save time
+# Number of passes of the loop between two steps of the drive's work, to save time
 _FEED_TURNS = const(2)
 _GAP_MS = const(300)  # a longer time between two readings means that readings were lost
 _LOOK_MS = const(1000)  # time between two calls of _look()
@@ -55,8 +43,8 @@ class BackgroundAlignment:
         drive: the current DriveAlignment, read-only.
         state: the state to show (see alignment.py).
         shown: True if the progress has its own page (ui/pages.py).
-        result: the Notice or AlignmentError at the end of the last drive, or None.
-        message: an AlignmentError, StoreError or Notice to show before everything else, or None. The message is shown
+        result: the Notice or Refusal at the end of the last drive, or None.
+        message: a Refusal or Notice to show before everything else, or None. The message is shown
             until answer() is called or the vehicle drives off.
     """
 
@@ -69,7 +57,6 @@ class BackgroundAlignment:
         self._speed_mps = 0.0
         self._speed_ms = self._fed_ms = self._look_ms = None
         self._total = [0] * 7
-        self._force, self._rate = [0.0] * 3, [0.0] * 3
         self.begin()
 
     def begin(self, asked=False):
@@ -89,7 +76,8 @@ class BackgroundAlignment:
         self._calibration = current
         trusted = self._leans and current.aligned and not self._asked
         up = current.vehicle_from_sensor[3:6] if trusted else None
-        self.drive = DriveAlignment(MOTORCYCLE if self._leans else CAR, up, _KNOWN_BIAS if current.aligned else None)
+        kind = alignment.MOTORCYCLE if self._leans else alignment.CAR
+        self.drive = alignment.DriveAlignment(kind, up, _KNOWN_BIAS if current.aligned else None)
         self.shown = self.shown or not (self._leans or current.aligned)
         self.result = None
         self._clear_sums()
@@ -170,11 +158,14 @@ class BackgroundAlignment:
         self._n += n
         self._us += dt_us
         self._turns += 1
-        if self._turns >= _FEED_TURNS:
-            n = self._n
-            self._calibration.apply([t / n for t in total], self._force, self._rate)
-            self.drive.update(self._force, self._rate, self._us)
+        if self._turns < _FEED_TURNS:
+            return
+        if self.drive.elapse(self._us):
+            n, force, rate = self._n, [0.0] * 3, [0.0] * 3
+            self._calibration.apply([t / n for t in total], force, rate)
+            self.drive.end_bin(force, rate)
             self._clear_sums()
+        self._us = self._turns = 0
 
     def _begin_again(self):
         """Drop the sums, because readings are missing."""
@@ -196,17 +187,17 @@ class BackgroundAlignment:
             if drive.ready:
                 self._adopt(True)
         else:
-            verdict = compare(drive, self._meter.calibration.vehicle_from_sensor)
+            verdict = alignment.compare(drive, self._meter.calibration.vehicle_from_sensor)
             if not self._leans:
-                if drive.ready and verdict in (REFINED, MOVED, REVERSED):
-                    self._adopt(verdict != REFINED)
-            elif verdict == REVERSED:
+                if drive.ready and verdict in (alignment.REFINED, alignment.MOVED, alignment.REVERSED):
+                    self._adopt(verdict != alignment.REFINED)
+            elif verdict == alignment.REVERSED:
                 self._say(Notice(STAND_SIDE))
-            elif verdict == MOVED:
+            elif verdict == alignment.MOVED:
                 self._say(Notice(MOUNT_MOVED, "since-alignment"))
-            elif verdict == REFINED and drive.ready:
+            elif verdict == alignment.REFINED and drive.ready:
                 self._adopt(False)
-            elif verdict == SAME:
+            elif verdict == alignment.SAME:
                 self._meter.distrust(None)
 
     def _away(self):
@@ -242,7 +233,7 @@ class BackgroundAlignment:
         if agreed and code == STAND_SIDE:
             current = self._meter.calibration
             turned = matrix(current.vehicle_from_sensor)
-            turn_round(turned)
+            alignment.turn_round(turned)
             if self._save(turned, -self._meter.trim_deg):
                 self.message = Notice("side-fixed")
                 self._meter.reset_maxima()
@@ -271,7 +262,7 @@ class BackgroundAlignment:
         bias = [used.gyro_bias[i] + self.drive.standing.bias[i] for i in range(3)]
         try:
             self._active.refine(current.with_alignment(vehicle_from_sensor, bias, trim_deg, True))
-        except StoreError as problem:
+        except Refusal as problem:
             self._say(problem)
             return False
         return True
@@ -280,4 +271,4 @@ class BackgroundAlignment:
     def state(self):
         """The drive's state. At walking pace a bend cannot be recognised, so TURNING is replaced by BRAKING."""
         state = self.drive.state
-        return BRAKING if state == TURNING and self._speed_mps < _AWAY_MPS else state
+        return alignment.BRAKING if state == alignment.TURNING and self._speed_mps < _AWAY_MPS else state

@@ -57,7 +57,7 @@ GYRO_DELAY_S = {1: 0.0019, 2: 0.0028, 3: 0.0048, 4: 0.0083, 5: 0.0134, 6: 0.0186
 # * True if the chip has the register ACCEL_CONFIG2 (0x1D)
 # * usable size of its FIFO in bytes
 # * bits of FIFO_EN that must read back as written
-# Also add a new chip to VARIANTS in tools/kickstand_tools/simulated_board/mpu6050.py and to the parts in the README.
+# Also add a new chip to VARIANTS in tools/kickstand_sim/simulated_board/mpu6050.py and to the parts in the README.
 # A chip with other registers (LSM6DS3, BMI160) needs a driver with the same methods. open_sensor() must open that
 # driver.
 CHIPS = {

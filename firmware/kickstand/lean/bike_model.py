@@ -25,14 +25,17 @@ Equations, with ' for the derivative by time
                              f_y = cos q cos t - (v (w_x + d cos t) + h w_z^2) / g                 (5)
     roads are level          0 = q + psi sin t  on average                             (6)
     lean of the bike itself  t - psi cos t (tan q + 1/2 psi sin t)                     (7)
+    springs                  d = share a',  where a = f_z - sin q is the forward acceleration in g        (8)
 
 t and q refer to the sensor's axes, which the yaw error psi has turned. So t contains a part of the bike's own pitch,
 which is q + psi sin t. For example, on a slope of 10 % a yaw error of 5 degrees causes half a degree of lean. (7)
 removes this part, to second order in psi. On a level road q is -psi sin t, and (7) agrees with
 tan(lean of the bike) = tan t / cos psi.
 
-d is the part of the pitch rate q' that the springs cause. The wheels do not rise with this pitch. Braking causes most
-of d, see (8) in dive.py. h is the height of the sensor above the roll axis.
+d is the part of the pitch rate q' that the springs cause. The wheels do not rise with this pitch, so its product with
+the speed is not an acceleration. In braking a telescopic fork dives, by 2.8 degrees per g on a superbike. In
+acceleration the rear sits down, by 1.3 degrees per g. So (8) makes d proportional to the change of the forward
+acceleration. h is the height of the sensor above the roll axis.
 
 (4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a steady bend the two equations cannot separate lean
 from speed, because the derivatives by lean and by speed have the same ratio in (4) and (5). In a steady bend the ratio
@@ -65,6 +68,17 @@ _BALANCE_SHARE = const(0.5)  # ratio. Larger: the balanced rate is used with a w
 BALANCE_SIGMA = radians(20.0)  # rad. Larger: the balanced rate is used with a more uncertain lean.
 # ratio: lower bound of cos(lean) in a division. Larger: in deep leans the rate about left is too small.
 _BALANCE_MIN_COS = const(0.3)
+
+# Dive
+# rad per g: share before the first braking, equal to 1.5 degrees per g. Larger: before the share is found, more of the
+# pitch counts as dive.
+PRIOR_SHARE = 0.026
+# (g/s)^2: weight of PRIOR_SHARE, as a part of the sum of a'^2. Larger: the share is found later, and varies less.
+_PRIOR_SQUARE = const(5.3)
+_MIN_SHARE = const(-0.035)  # rad per g: smallest share, negative because an anti-dive fork may lift the nose
+_MAX_SHARE = const(0.14)  # rad per g: largest share, 8 degrees per g, as with soft, long forks
+_MIN_SPEED = const(5.0)  # m/s: lowest speed of a window that counts. Larger: the share is found later.
+_MAX_JERK = const(3.0)  # g/s: largest a' that counts. Larger: bumps and lost readings count as braking.
 
 
 def predict(x, force, rate, seconds, sums):
@@ -219,3 +233,45 @@ class Linearisation:
         """Return the part of the state's lean that (7) subtracts, in rad. This part is pitch of the bike that looks
         like lean because of the yaw error."""
         return x[YAW_ERROR] * self.cos_lean * (tan(x[PITCH]) + 0.5 * x[YAW_ERROR] * self.sin_lean)
+
+
+class Dive:
+    """Estimates while riding how far braking and acceleration pitch the bike on its springs, in fixed memory.
+
+    The part of the pitch rate that comes from the road does not depend on a' of (8). So a regression of the pitch rate
+    on a' gives the share: sum(a' pitch rate) / sum(a'^2). Each sum begins with a prior.
+
+    share (read-only): pitch in rad per g, positive if the nose goes down in braking.
+    """
+
+    def __init__(self):
+        self.share = PRIOR_SHARE
+        self._product = PRIOR_SHARE * _PRIOR_SQUARE  # sum of a' times the pitch rate
+        self._square = _PRIOR_SQUARE  # sum of a'^2
+        self.restart()
+
+    def restart(self):
+        """Drop the last window, because readings were missing. Keep the share, which belongs to the bike."""
+        self._push = None
+        self._pitch_rate = 0.0
+
+    def update(self, push, pitch_rate, speed, seconds):
+        """Take one window. Return speed x dive' / g, in g. Equations (4) and (5) need this term.
+
+        Args:
+            push: mean forward acceleration in g.
+            pitch_rate: in rad/s.
+            speed: in m/s.
+        """
+        last_push, last_rate = self._push, self._pitch_rate
+        self._push, self._pitch_rate = push, pitch_rate
+        if last_push is None:
+            return 0.0
+        jerk = (push - last_push) / seconds  # in g/s, from the middle of the last window to the middle of this window
+        if not -_MAX_JERK < jerk < _MAX_JERK:  # also true for NaN
+            return 0.0
+        if speed > _MIN_SPEED:
+            self._product += jerk * 0.5 * (pitch_rate + last_rate)
+            self._square += jerk * jerk
+            self.share = max(_MIN_SHARE, min(_MAX_SHARE, self._product / self._square))
+        return speed * self.share * jerk / STANDARD_GRAVITY

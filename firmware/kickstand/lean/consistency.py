@@ -114,6 +114,39 @@ FORGET_S = 60.0
 last_odd = None  # the last code of `odd`, for `kickstand status`
 
 
+class Mean:
+    """A mean with the time constant tau, in s.
+
+    value: the mean.
+    """
+
+    def __init__(self, tau):
+        self.value = 0.0
+        self._tau = tau
+
+    def add(self, x, seconds):
+        """Add the value x of a window of `seconds`."""
+        self.value += min(1.0, seconds / self._tau) * (x - self.value)
+
+
+class Innovations:
+    """The means of a force's innovations. limits: the largest short and long mean, in standard deviations."""
+
+    def __init__(self, limits):
+        self._limits = limits
+        self._short, self._long, self._spread = Mean(_SHORT_S), Mean(_LONG_S), Mean(_LONG_S)
+        self._last = 0.0
+
+    def add(self, x, seconds):
+        """Add an innovation, in standard deviations. Return the larger mean, divided by its limit."""
+        change, self._last = x - self._last, x
+        self._short.add(x, seconds)
+        self._long.add(x, seconds)
+        self._spread.add(0.5 * change * change, seconds)
+        largest = max(abs(self._short.value) / self._limits[0], abs(self._long.value) / self._limits[1])
+        return largest / sqrt(max(1.0, self._spread.value / _SPREAD))
+
+
 class Consistency:
     """Judges the innovations of each window. six_done: True if the six positions have measured the accelerometer.
 
@@ -139,9 +172,9 @@ class Consistency:
         self._forget_means()
 
     def _forget_means(self):
-        self._left = self._left_long = self._up = self._up_long = self._pitch = 0.0
-        self._lean = self._one_side_s = self._slope_square = 0.0
-        self._left_before = self._up_before = self._left_square = self._up_square = 0.0
+        self._left, self._up = Innovations((LEFT_SHORT, LEFT_LONG)), Innovations((UP_SHORT, UP_LONG))
+        self._pitch, self._slope = Mean(_LONG_S), Mean(_SHORT_S)
+        self._lean = self._one_side_s = 0.0
 
     def gap(self, in_rest=True):
         """Doubt until everything has fitted for a while, because the filter has restarted. in_rest: True if time at
@@ -189,40 +222,27 @@ class Consistency:
             push: estimated forward acceleration in g.
             yaw_rate: in rad/s.
         """
-        gain, long_gain = min(1.0, seconds / _SHORT_S), min(1.0, seconds / _LONG_S)
         left, up = max(-_MOST, min(_MOST, left)), max(-_MOST, min(_MOST, up))
         if abs(yaw_rate) < _TURNING:
             left -= max(-_WIND, min(_WIND, left))
-        self._left += gain * (left - self._left)
-        self._up += gain * (up - self._up)
-        self._left_long += long_gain * (left - self._left_long)
-        self._up_long += long_gain * (up - self._up_long)
         self._straight_s = 0.0 if abs(yaw_rate) > _TURNING else self._straight_s + seconds
         if sideways is not None:
             side_s = self._side_s + max(-_MOST_SIDEWAYS, min(_MOST_SIDEWAYS, sideways)) * seconds
             side_s = max(0.0, side_s - _UNBALANCED * seconds) + min(0.0, side_s + _UNBALANCED * seconds)
             if self._straight_s < _BEND_S or abs(side_s) < abs(self._side_s):
                 self._side_s = max(-_MOST_SLIP_S, min(_MOST_SLIP_S, side_s))
-        self._pitch += long_gain * (pitch - self._pitch)
-        # `square` is pitch * pitch if the forward force confirms none of the pitch
-        square = -pitch * max(-abs(pitch), min(abs(pitch), push))
-        self._slope_square += gain * (square - self._slope_square)
-        change = left - self._left_before
-        self._left_square += long_gain * (0.5 * change * change - self._left_square)
-        change = up - self._up_before
-        self._up_square += long_gain * (0.5 * change * change - self._up_square)
-        self._left_before, self._up_before = left, up
+        self._pitch.add(pitch, seconds)
+        # pitch * pitch is added if the forward force confirms none of the pitch
+        self._slope.add(-pitch * max(-abs(pitch), min(abs(pitch), push)), seconds)
         self._lean = lean
         if lean * self._one_side_s < 0.0 or abs(lean) < 0.5 * _ONE_SIDE:
             self._one_side_s = 0.0
         elif abs(lean) > _ONE_SIDE:
             self._one_side_s += seconds if lean > 0.0 else -seconds
         wrong_roll = abs(left) / _WRONG_ROLL if self._roll_out > _ROLL_OUT else 0.0
-        left = max(abs(self._left) / LEFT_SHORT, abs(self._left_long) / LEFT_LONG)
-        left = max(left / sqrt(max(1.0, self._left_square / _SPREAD)), wrong_roll)
-        up = max(abs(self._up) / UP_SHORT, abs(self._up_long) / UP_LONG)
-        up /= self._up_share * sqrt(max(1.0, self._up_square / _SPREAD))
-        pitch = max(abs(self._pitch) / _STEEP, sqrt(max(0.0, self._slope_square)) / _SLOPE)
+        left = max(self._left.add(left, seconds), wrong_roll)
+        up = self._up.add(up, seconds) / self._up_share
+        pitch = max(abs(self._pitch.value) / _STEEP, sqrt(max(0.0, self._slope.value)) / _SLOPE)
         cause = self._cause
         if cause:
             self._blame(cause)

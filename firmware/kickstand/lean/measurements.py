@@ -11,10 +11,10 @@ These arguments are the same in all functions:
 
 SIGMA_... are standard deviations (1 sigma). A disturbance that lasts tau seconds affects several measurements, so their
 errors are not independent. Therefore the variance of the disturbance in windows of T seconds is sigma^2 2 tau / T. The
-parameters of standstill and trim are in rest.py and upright_trim.py, in the same form.
+parameters of the trim are in kalman.py, in the same form.
 """
 
-from math import radians
+from math import radians, sqrt
 
 from ..units import STANDARD_GRAVITY, const
 from .bike_model import BIAS_LEFT, LEAN, PITCH, SCALE_LEFT, SPEED, YAW_ERROR
@@ -174,6 +174,18 @@ MAX_REST_PUSH = 0.08
 # for rest.
 ROLLING_SPEED = 3.0  # m/s
 ROLLING_SIGMAS = 3.0  # standard deviations of the speed
+# Largest deviation of a window's mean from the recent average at rest. Larger: smooth roads are mistaken for rest.
+_MAX_FORCE_G = const(0.010)  # g
+_MAX_RATE_RADPS = const(0.009)  # rad/s (equal to 0.5 deg/s)
+# rad/s (1.2 deg/s): largest mean rate that may be bias. Larger: smooth bends are mistaken for rest.
+MAX_BIAS_RADPS = 0.02
+# rad/s: largest mean rate that may be bias before the first rest, because the bias has drifted since the calibration.
+# Larger: more bends are mistaken for rest.
+_MAX_FIRST_BIAS_RADPS = const(0.1)
+_REST_S = const(1.5)  # s: duration of stillness that counts as rest. Larger: rest is detected later, but more reliably.
+# s: duration of stillness that counts as rest if the bike seems to move or brake. No road is smooth for this long.
+_REST_ROLLING_S = const(10.0)
+_AVERAGE_S = const(0.5)  # s: time constant of the recent average. Larger: rest is detected later after a movement.
 # The trim is measured while the standard deviations of speed and lean are below SIGMA_TRIM_SPEED and SIGMA_TRIM_LEAN.
 # Larger: the trim is found sooner, but less exactly.
 SIGMA_TRIM_SPEED = 8.0  # m/s
@@ -271,3 +283,68 @@ def at_rest(model, means, speed, axis):
         (model.left_row[0:2], means[0] + model.sideways, _SIGMA_REST_FORCE**2),  # only the terms of LEAN and PITCH
         (((PITCH, model.cos_pitch),), means[7] - model.sin_pitch, _SIGMA_REST_FORCE**2),
     )
+
+
+def lies(means):
+    """True if the force is gravity on a bike that lies on its side and does not turn. On a bike in balance the force
+    points to the bike's up axis, even if the estimated lean is wrong."""
+    force = sqrt(means[5] * means[5] + means[6] * means[6] + means[7] * means[7])
+    if abs(means[5]) < LYING_SIDE * force or abs(force - 1.0) > LYING_FORCE:
+        return False
+    return max(max(means[2:5]), -min(means[2:5])) < LYING_RATE
+
+
+class RestDetector:
+    """Detects rest, for zero-velocity updates. update() takes the means of each window, in which an idling engine
+    averages out.
+
+    first: True if there was no rest since power-on, so the bias may be far off.
+
+    moving_s: time for which a measured speed proves that the bike moves.
+    resting (read-only): True after _REST_S of stillness, or after _REST_ROLLING_S if the bike seems to move.
+    """
+
+    def __init__(self, first=True):
+        self.resting = False
+        self.moving_s = 0.0
+        self._still_s = 0.0
+        self._not_rolling_s = 0.0  # time of stillness without a sign that the bike moves
+        self._average = None  # averages of the rates, with the estimated bias included, and of the forces
+        self._max_bias = _MAX_FIRST_BIAS_RADPS if first else MAX_BIAS_RADPS
+
+    def update(self, rates, force, bias, seconds, rolling=False):
+        """Take the means over a window.
+
+        Args:
+            rates: 3 values in rad/s, without the estimated bias.
+            force: 3 values in g.
+            bias: the estimated bias, 3 values in rad/s.
+            seconds: duration of the window.
+            rolling: True if other evidence suggests that the bike moves.
+        """
+        readings = [rates[i] + bias[i] for i in range(3)] + force
+        if self._average is None:
+            self._average = readings
+        average = self._average
+        gain = min(1.0, seconds / _AVERAGE_S)
+        # The average rate must be small after subtracting either the estimated bias or only the calibrated bias.
+        # With only the estimated bias, a wrong estimate, as after moving the sensor by hand, would never be corrected.
+        still = near_estimate = near_calibration = True
+        for i in range(6):
+            deviation = readings[i] - average[i]
+            average[i] += gain * deviation
+            if i < 3:
+                still = still and abs(deviation) < _MAX_RATE_RADPS
+                near_estimate = near_estimate and abs(average[i] - bias[i]) < self._max_bias
+                near_calibration = near_calibration and abs(average[i]) < self._max_bias
+            else:
+                still = still and abs(deviation) < _MAX_FORCE_G
+        still = still and (near_estimate or near_calibration) and self.moving_s <= 0.0
+        self.moving_s -= seconds
+        self._still_s = self._still_s + seconds if still else 0.0
+        # Steady braking looks still, so a second timer counts only stillness without a sign of rolling. With one timer,
+        # braking would count as rest as soon as the estimated speed is low.
+        self._not_rolling_s = self._not_rolling_s + seconds if still and not rolling else 0.0
+        self.resting = self._not_rolling_s >= _REST_S or self._still_s >= _REST_ROLLING_S
+        if self.resting:
+            self._max_bias = MAX_BIAS_RADPS

@@ -2,7 +2,7 @@
 
 from math import degrees, radians
 
-from ..calibration.transform import Transform
+from ..calibration.parameters import Transform
 from ..units import GAP_US, LOST_US, const
 from .consistency import MILD
 from .lean_filter import DELAY_S, LeanFilter
@@ -73,7 +73,7 @@ class LeanMeter:
 
     def restart(self):
         """Restart filter and smoothing after missing readings. Keep the maxima and the sensor's errors."""
-        self.filter.restart()
+        self.filter.start()
         self._fresh = True
         self.fallen = False
         self.lean_deg = 0.0

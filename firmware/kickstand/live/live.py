@@ -4,10 +4,10 @@ from array import array
 from math import degrees, sqrt
 from time import ticks_add, ticks_diff, ticks_ms
 
-from ..calibration.transform import Transform
+from ..calibration.parameters import Transform
 from ..units import const
-from . import packets
-from .packets import LEAN, MOTION, OWN, SPEED
+from . import radio as packets
+from .radio import LEAN, MOTION, OWN, SPEED
 
 _LOOK_MS = const(1000)
 # Time after which a phone that requests nothing is disconnected, so that the next phone can connect. Typing a PIN takes
@@ -116,7 +116,7 @@ class Live:
         if radio.phone is None:
             self._advertised = self._advertised or radio.advertise()
             return
-        size = packets.ride(self._buffer, self._state(self._app.lean_deg), app.meter, app.clock.lost)
+        size = packets.pack_ride(self._buffer, self._state(self._app.lean_deg), app.meter, app.clock.lost)
         radio.keep(radio.ride, self._views[size])
         if self._intervals[OWN]:
             self._put(radio.ride, size)
@@ -129,12 +129,11 @@ class Live:
         self._sent += self.radio.send(handle, self._views[size])
 
     def _state(self, lean):
+        """Return the bits of the state, see pack_now()."""
         app, meter = self._app, self._app.meter
-        state = packets.ALIGNED * meter.calibration.aligned + packets.TRUSTED * (lean is not None)
-        state += (
-            packets.AT_REST * meter.at_rest + packets.FALLEN * meter.fallen + packets.CAR * (not app.settings.leans)
-        )
-        return state + packets.RECORDING * app.recording + packets.NO_READINGS * bool(app.sensor.fault)
+        flags = meter.calibration.aligned, lean is not None, meter.at_rest, meter.fallen
+        flags += app.recording, not app.settings.leans, app.sensor.fault is not None
+        return sum([bool(flags[bit]) << bit for bit in range(7)])
 
     def _send(self, now_ms):
         """Send the packets whose time has come, with the means of the samples since the last call. Without new samples
@@ -178,13 +177,13 @@ class Live:
         if packet == OWN:
             force = self._force if aligned else None  # without an alignment the force is in the sensor's axes
             state = self._state(lean)
-            self._put(radio.now, packets.now(buffer, now_ms, lean, sigma, force, self._rate, speed, state))
+            self._put(radio.now, packets.pack_now(buffer, now_ms, lean, sigma, force, self._rate, speed, state))
         elif packet == LEAN and lean is not None:
-            self._put(radio.chrono, packets.lean(buffer, lean, sigma))
+            self._put(radio.chrono, packets.pack_lean(buffer, lean, sigma))
         elif packet == MOTION and aligned:
-            self._put(radio.chrono, packets.motion(buffer, self._force, self._rate, lean is not None))
+            self._put(radio.chrono, packets.pack_motion(buffer, self._force, self._rate, lean is not None))
         elif packet == SPEED and speed is not None:
-            self._put(radio.chrono, packets.speed(buffer, speed))
+            self._put(radio.chrono, packets.pack_speed(buffer, speed))
 
     def lines(self):
         """Return the two lines of the page Live. The lines show the receiver and the number of packets per second."""

@@ -9,7 +9,7 @@ FIFO keeps the samples during that time.
 from time import ticks_diff, ticks_ms
 
 from ..calibration.store import pack
-from ..errors import CardError, Notice, report
+from ..errors import Notice, Refusal, report
 from ..units import GAP_US, const
 from .block import MAX_DT_US, RideBlock
 
@@ -57,7 +57,7 @@ class Recorder:
                 period_us = 1_000_000 // self._sample_hz
                 self._block, self._spare = RideBlock(period_us), RideBlock(period_us)
             self._ride = self._writer.begin()
-        except (CardError, OSError, MemoryError) as error:
+        except (Refusal, OSError, MemoryError) as error:
             self._fail(error)
             return
         finally:
@@ -201,5 +201,5 @@ class Recorder:
         """End the ride after an error, and report it. Unwritten blocks are lost."""
         self.active = False
         self._writer.abandon()
-        is_card = isinstance(error, CardError)
+        is_card = isinstance(error, Refusal)
         report(error if is_card else Notice(self._writer.fault_code(error), str(error)), self._notices)

@@ -11,7 +11,7 @@ free for the calibration and new firmware.
 import os
 from errno import EEXIST, EIO
 
-from ..errors import CardError, report
+from ..errors import Refusal, report
 from ..units import const
 from .block import BLOCK, block_length
 
@@ -29,12 +29,12 @@ PART_BLOCKS = 16  # number of ride blocks in a part in flash
 # 1300 files.
 _CARD_PART_BLOCKS = const(256)
 # Space for the compiled firmware; each file takes whole blocks, and each folder takes two blocks
-FIRMWARE = 98 * BLOCK
+FIRMWARE = 90 * BLOCK
 RESERVE = 66 * BLOCK  # largest free space that an update of compiled firmware needs, plus a margin
 
 
 def directory(settings):
-    """Return the directory of the rides, in flash or on the SD card that config.py names. Raises CardError."""
+    """Return the directory of the rides, in flash or on the SD card that config.py names. Raises Refusal."""
     if settings.SD_SPI is None:
         return "rides"
     from ..board import sd_card  # imported here, because most boards do not need it
@@ -172,7 +172,7 @@ class RideFiles:
         # Two blocks more than the part, because directories grow too
         self.needed = RESERVE + (self._part_blocks + 2) * BLOCK
         self._file = None
-        self._refused = None  # the CardError that begin() raises
+        self._refused = None  # the Refusal that begin() raises
 
     def prepare(self, notices):
         """Make the first ride's directory in flash, because an ESP32 makes a directory so slowly that the first
@@ -183,7 +183,7 @@ class RideFiles:
         such a wait would freeze the lean, and the watchdog would restart the board again and again.
 
         Args:
-            notices: list to which a CardError is appended if the card cannot be used.
+            notices: list to which a Refusal is appended if the card cannot be used.
         """
         try:
             if self.stops_interrupts:
@@ -192,11 +192,11 @@ class RideFiles:
                 _test_card(directory(self._settings))
         except Exception as error:  # any error of driver or file system, because the board must not restart
             if not self.stops_interrupts:  # begin() reports an error of the flash when the ride begins
-                self._refused = error if isinstance(error, CardError) else CardError("no-card", str(error))
+                self._refused = error if isinstance(error, Refusal) else Refusal("no-card", str(error))
                 report(self._refused, notices)
 
     def begin(self):
-        """Begin a new ride; return its number. Raises OSError, CardError."""
+        """Begin a new ride; return its number. Raises OSError, Refusal."""
         if self._refused:
             raise self._refused
         self._directory = directory(self._settings)

@@ -1,14 +1,14 @@
 """Guides the rider through the six positions and a slanted pose that verifies them.
 
 In the six positions each side of the sensor is up once, in any order. The turns of the sensor between the poses
-calibrate the gyro: see calibration/sensor_fit.py.
+calibrate the gyro: see calibration/six_position.py.
 """
 
+from ..board.display import DEGREE
 from ..calibration import six_position
 from ..calibration.parameters import six_position_calibration
-from ..errors import CaptureError, GyroError
+from ..errors import CaptureError, SickSensor
 from ..units import const
-from .pages import DEGREE
 from .wizard import COMPUTE, NOTICE, RESULT, TAKE, Wizard, words
 
 _NOTICE_MS = const(1500)
@@ -40,14 +40,12 @@ class SixWizard(Wizard):
                 continue
             lines, (offset, slope) = None, self._fitted
             error = six_position.check_free_pose(offset, slope, pose.accel)
-            from ..calibration.sensor_fit import SensorFit  # imported only when needed, because it takes 5 KB of heap
-
-            fit = SensorFit(self._poses, self._turns, offset, slope)
+            fit = six_position.SensorFit(self._poses, self._turns, offset, slope)
             self._show(COMPUTE, ("Computing...", ""))
             for _ in fit.run():
                 yield
             if fit.unproved and len(self._poses) == _MAX_POSES:
-                raise GyroError("unproved-gyro", fit.unproved[0])
+                raise SickSensor("unproved-gyro", fit.unproved[0])
         bias = [value / len(self._poses) for value in bias]
         self._calibration.save(six_position_calibration(fit.offset, fit.slope, bias, fit.matrices()))
         lines = "Saved, err %d mg" % round(abs(error) * 1000), "Now align it"
@@ -109,7 +107,7 @@ class SixWizard(Wizard):
 
     def _keep_side(self):
         """Keep the side of the last pose, and fit the accelerometer after the sixth side. Return two lines. Raises
-        CalibrationError."""
+        Refusal."""
         if self._sides[self._side] < 0:
             self._sides[self._side] = len(self._poses) - 1
         if -1 not in self._sides:

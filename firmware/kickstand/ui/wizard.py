@@ -10,12 +10,11 @@ the two poses.
 from time import ticks_add, ticks_diff, ticks_ms
 
 from ..board.button import LONG
-from ..calibration.still_pose import StillPose
-from ..calibration.turn import Turn
-from ..errors import CaptureError, GyroError, Refusal, SickSensor, report
+from ..board.display import DEGREE
+from ..calibration.poses import StillPose, Turn
+from ..errors import CaptureError, Refusal, SickSensor, report
 from ..units import const
 from .messages import lines
-from .pages import DEGREE, progress_bar
 
 _SETTLE_MS = const(500)  # time for which the sensor must be still before a pose
 _GIVE_UP_MS = const(10_000)  # longest time to wait until the sensor is still
@@ -185,11 +184,16 @@ class Wizard:
 
 
 def words(refusal):
-    """Return the lines for a Refusal. A fault of the sensor is also printed, because its remedy is too long for the
-    display."""
-    if isinstance(refusal, (GyroError, SickSensor)):
+    """Return the lines for a Refusal. A fault of the sensor is also printed."""
+    if isinstance(refusal, SickSensor):
         report(refusal)
     return lines(refusal)
+
+
+def progress_bar(done, total):
+    """Return a bar that has 16 full cells when `done` reaches `total`."""
+    filled = 16 * done // total if total else 0
+    return "\xff" * min(16, filled)
 
 
 class AlignWizard(Wizard):

@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 
 import numpy as np
-from kickstand_tools.simulation.scripted import script
+from kickstand_sim.simulation.scripted import script
 
 from support import command
 
@@ -28,7 +28,7 @@ def calibration(path: Path, **changed) -> Path:
 def write(directory: Path, segments: list, rate_hz: int = 100, speed_hz: int = 0, vibration_g: float = 0.02) -> Path:
     """Simulate a ride and write its RIDE.csv and RIDE.cal.json. Return the path of RIDE.csv.
 
-    segments: the ride's manoeuvres, see kickstand_tools.simulation.scripted.
+    segments: the ride's manoeuvres, see kickstand_sim.simulation.scripted.
     speed_hz: rate of the speed in the log, 0 for a log without speed.
     """
     return _put(directory, _text(segments, rate_hz, speed_hz, vibration_g))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from kickstand_tools.simulation.scripted import script
+from kickstand_sim.simulation.scripted import script
 
 START_UTC_S = 1_715_938_200.25  # 2024-05-17 09:30:00.25 UTC
 BERLIN = 52.5, 13.4

@@ -20,7 +20,7 @@ class RawPrompt:
 
     def __init__(self, board, *streams, vehicle="motorcycle", deaf=False):
         self.board, self._deaf = board, deaf
-        self._streams = [said(blocks) for blocks in streams]
+        self._streams = [streamed(*blocks) for blocks in streams]
         self._vehicle = b"vehicle %s\r\n" % vehicle.encode()
         self._streaming = False
         self._typed = b""
@@ -69,10 +69,7 @@ class RawPrompt:
             self.heard(b"OK" + out + b"\x04" + error + b"\x04>")
 
 
-def said(blocks):
+def streamed(*blocks):
     """Return the output of a board that streams these blocks."""
-    return b"".join(
-        b"".join(base64.b64encode(block[offset : offset + 256]) + b"\r\n" for offset in range(0, len(block), 256))
-        + b".\r\n"
-        for block in blocks
-    )
+    pieces = ([block[begin : begin + 256] for begin in range(0, len(block), 256)] for block in blocks)
+    return b"".join(b"".join(base64.b64encode(part) + b"\r\n" for part in parts) + b".\r\n" for parts in pieces)

@@ -10,7 +10,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from kickstand.lean.upright_trim import MAX_TRIM
+from kickstand.lean.kalman import MAX_TRIM
 
 from ..signals import Array, Bools
 from .channels import Channels, spacing_s

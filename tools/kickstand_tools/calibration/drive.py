@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE, DriveAlignment, compare, yaw_deg
-from kickstand.errors import AlignmentError
+from kickstand.errors import Refusal
 
 from ..checks.log import read_with_notices
 from ..checks.sensor import without_frozen
@@ -167,7 +167,7 @@ def fit_logs(
             vehicle=kind,
             kickstand_side="",
         )
-    except AlignmentError as error:
+    except Refusal as error:
         assumed = " (taken for a car: else --vehicle motorcycle)" if vehicle is None and kind == CAR else ""
         refusal = RefusedInput(of_firmware(error), ", ".join(log.name for log in logs), assumed)
     improved = alignment if isinstance(alignment, DriveAlignment) else None

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 from kickstand.calibration import six_position, two_position
+from kickstand.calibration.poses import StillPose
 from kickstand.calibration.six_position import SIDES
-from kickstand.calibration.still_pose import StillPose
-from kickstand.errors import AlignmentError, CalibrationError, CaptureError
+from kickstand.errors import CaptureError, Refusal
 from kickstand.units import AXES
 
 from ..checks.log import check_log
@@ -146,7 +146,7 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
     try:
         offset, slope = six_position.fit(means)
         error_g = six_position.check_free_pose(offset, slope, free.accel_g.tolist()) if free else None
-    except CalibrationError as error:
+    except Refusal as error:
         raise _with_file(error, sides, free) from error
     bias = np.median([pose.gyro_dps for pose in (*sides, *([free] if free else []))], axis=0)
     return SixPositions(
@@ -198,7 +198,7 @@ def _tilt_deg(pose: Pose) -> float:
     return six_position.tilt_deg(pose.accel_g.tolist())
 
 
-def _with_file(error: CalibrationError, sides: list[Pose], free: Pose | None) -> RefusedInput:
+def _with_file(error: Refusal, sides: list[Pose], free: Pose | None) -> RefusedInput:
     """Return the refusal, with the name of the file if it concerns one pose."""
     reason = of_firmware(error)
     if isinstance(reason, SideTilted):
@@ -257,7 +257,7 @@ def fit_two_positions(
     first, second = read_pose(kickstand), read_pose(upright)
     try:
         aligned, tilt_deg = two_position.align(earlier.to_firmware(), first.still, second.still, side)
-    except AlignmentError as error:
+    except Refusal as error:
         raise RefusedInput(of_firmware(error), f"{first.name} and {second.name}") from error
     result = replace(
         earlier,

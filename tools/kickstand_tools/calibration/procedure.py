@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 from kickstand.calibration import six_position
-from kickstand.calibration.sensor_fit import SensorFit
-from kickstand.calibration.six_position import SIDES
-from kickstand.calibration.turn import Turn
-from kickstand.errors import CalibrationError, GyroError
+from kickstand.calibration.poses import Turn
+from kickstand.calibration.six_position import SIDES, SensorFit
+from kickstand.errors import Refusal
 
 from ..checks.log import check_log
 from ..common.errors import InputError, RefusedInput
@@ -41,7 +40,7 @@ def fit_procedure(source: Source) -> SixPositions:
     the turns between the poses. Every still pose and every turn counts.
 
     The result has offset, slope and cross-axis errors of the accelerometer, and bias, scale and cross-axis errors of
-    the gyro (see kickstand.calibration.sensor_fit).
+    the gyro (see kickstand.calibration.six_position).
 
     source: see read_log.
     Raises InputError. Raises its subclass RefusedInput if the firmware refuses a pose or the result.
@@ -70,7 +69,7 @@ def fit_procedure(source: Source) -> SixPositions:
         fit.finish()
         if fit.unproved:
             raise RefusedInput(UnprovedGyro(fit.unproved[0]), log.name)
-    except (CalibrationError, GyroError) as error:
+    except Refusal as error:
         reason = of_firmware(error)
         side = isinstance(reason, SideTilted)
         raise RefusedInput(reason, poses[sides[SIDES.index(reason.side)]].name if side else log.name) from error

@@ -94,7 +94,7 @@ class PublishedAlignment:
 
     @property
     def problem(self) -> Refusal | None:
-        """An AlignmentError that names the fault of the speed or of the mount; None without a fault."""
+        """A Refusal that names the fault of the speed or of the mount; None without a fault."""
         return self._improved.problem
 
     @property
@@ -113,7 +113,7 @@ class PublishedAlignment:
 
     @property
     def reason(self) -> Refusal:
-        """An AlignmentError that says why matrix() gives no alignment yet."""
+        """A Refusal that says why matrix() gives no alignment yet."""
         return self.problem or self._improved.missing(self.counted, self.needed, self.turned)
 
     def update(self, force: Sequence[float], rate: Sequence[float], dt_us: int) -> None:
@@ -162,7 +162,7 @@ class PublishedAlignment:
     def matrix(self, out: array) -> None:
         """Write the rotation from sensor to vehicle axes into `out`: 9 numbers, with the rows left, up, forward.
 
-        Raises AlignmentError while the alignment is not ready.
+        Raises Refusal while the alignment is not ready.
         """
         if not self.ready:
             raise self.reason

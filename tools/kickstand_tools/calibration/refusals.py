@@ -1,6 +1,6 @@
 """The messages for the firmware's refusals of poses and drives. of_firmware() converts a refusal to its message.
 
-In kickstand.calibration, still_pose refuses a single pose, six_position and sensor_fit refuse six poses, and
+In kickstand.calibration, poses refuses a single pose, six_position refuses six poses, and
 two_position refuses two poses. kickstand.drive_alignment refuses drives.
 """
 
@@ -183,5 +183,5 @@ KINDS = by_code(
 
 
 def of_firmware(refusal: Refusal) -> Message:
-    """Return the message for a CaptureError, CalibrationError, GyroError or AlignmentError."""
+    """Return the message for a Refusal of the firmware."""
     return KINDS[refusal.code](*refusal.values)

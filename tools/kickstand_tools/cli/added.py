@@ -34,7 +34,7 @@ def entry_points() -> dict[str, EntryPoint]:
 def command(entry_point: EntryPoint) -> click.Command:
     """Load the command of an entry point. Raises InputError, which names the package, if loading fails."""
     try:
-        loaded = entry_point.load()
+        loaded = plugins.load(entry_point)
     except InputError:
         raise
     except (Exception, SystemExit) as error:
@@ -97,7 +97,7 @@ def owner(error: Exception) -> str:
     packages = {top: _package(entry_point) for entry_point, top in tops.items()}
     for frame, _ in traceback.walk_tb(error.__traceback__):
         package = packages.get(frame.f_globals.get("__name__", "").partition(".")[0], DISTRIBUTION)
-        if package != DISTRIBUTION:
+        if package not in plugins.OURS:
             return package
     return "kickstand"
 

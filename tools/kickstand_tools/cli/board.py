@@ -11,8 +11,8 @@ from ..common import firmware_path
 from ..common.errors import InputError
 from ..common.progress import Bar
 from ..deploy.check import check, verdict
-from ..deploy.connection import status
 from ..deploy.flash import flash
+from ..deploy.status import status
 from ..rides.pull import PulledRide, pull
 from ..rides.record import live_line, record
 from ..rides.stream import LiveReading
@@ -40,17 +40,17 @@ def flash_command(port: str | None, config: bool, yes: bool) -> None:
         echo(f"note: {setting} is not used, because a '#' is in front of it: remove it, and flash --config")
     if result.why_sources:
         echo(f"note: {result.why_sources}: the board gets the sources and starts more slowly")
-    installed = result.installed
-    if installed.config_differs:
+    update = result.update
+    if update.config_differs:
         echo("kept: config.py on the board is not this version's; --config would replace it")
-    if len(installed.removed) > _NAMED_ONE_BY_ONE:
-        echo(f"removed: {len(installed.removed)} files that are no longer part of the firmware")
+    if len(update.obsolete) > _NAMED_ONE_BY_ONE:
+        echo(f"removed: {len(update.obsolete)} files that are no longer part of the firmware")
     else:
-        for path in installed.removed:
+        for path in update.obsolete:
             echo(f"removed: {path[1:]} is no longer part of the firmware")
     echo(
-        f"copied {len(installed.copied)} files, {installed.copied_bytes / 1000:.1f} kB, and verified them; "
-        f"{len(installed.kept)} left as they were"
+        f"copied {len(update.copy)} files, {sum(map(len, update.copy.values())) / 1000:.1f} kB, and verified them; "
+        f"{len(update.keep)} left as they were"
     )
     echo("restarted: the display shows the rest")
 

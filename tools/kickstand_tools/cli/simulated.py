@@ -4,14 +4,14 @@ from pathlib import Path
 from typing import Any
 
 import click
+from kickstand_sim.simulation.files import simulate
+from kickstand_sim.simulation.physics.mount import MOUNTS
+from kickstand_sim.simulation.physics.road import CLASSES
+from kickstand_sim.simulation.profiles import MAIN, PROFILES
 
 from ..common import plugins
 from ..common.errors import InputError
 from ..common.progress import Bar, spinner
-from ..simulation.files import simulate
-from ..simulation.physics.mount import MOUNTS
-from ..simulation.physics.road import CLASSES
-from ..simulation.profiles import MAIN, PROFILES
 from .common import OUT_DIRECTORY, Command, echo
 
 LINES_S = 10.0  # time between two lines of progress if there is no terminal for a progress bar

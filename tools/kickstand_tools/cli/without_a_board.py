@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import click
+from kickstand_sim.demo.demo import DeviceStopped, demo
 
 from ..common.output import check_directory
 from ..common.progress import spinner
-from ..demo.demo import DeviceStopped, demo
 from ..web import serve, site
 from .common import DISPLAY, PATH, echo, file_argument
 

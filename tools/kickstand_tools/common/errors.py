@@ -74,3 +74,13 @@ def extra(name: str) -> str:
     if firmware_path.installed():
         return f'{sys.executable} -m pip install "{DISTRIBUTION}[{name}]"'
     return f'{sys.executable} -m pip install -e "{firmware_path.TOOLS.parent}[{name}]"'
+
+
+def leaf(folder: str) -> str:
+    """Return the command that installs a package beside the core.
+
+    folder: its name below tools/, such as "fleet", or with an extra "fleet[s3]".
+    """
+    if firmware_path.installed():
+        return f'{sys.executable} -m pip install "kickstand-{folder}"'
+    return f'{sys.executable} -m pip install -e "{firmware_path.TOOLS}/{folder}"'

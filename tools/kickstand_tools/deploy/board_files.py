@@ -47,10 +47,9 @@ Fingerprint = tuple[int, bytes]
 class BoardFiles:
     """The files on a board's flash.
 
-    files: Size in bytes and SHA-256 of each file in the root and in the package, by path.
-    folders: The package's folder and the folders below it.
-    block: Size of a flash block, in bytes.
-    free_blocks: Number of free blocks.
+    files: size in bytes and SHA-256 of each file in the root and in the package, by path.
+    folders: the package's folder and the folders below it.
+    block, free_blocks: bytes of a flash block, and the number of free blocks.
     has_rides: True if the flash contains rides.
     """
 

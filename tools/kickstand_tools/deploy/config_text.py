@@ -9,9 +9,10 @@ from ..common.messages import Remedy
 
 
 def cleaned(data: bytes) -> bytes:
-    """Convert a config.py to UTF-8 without a byte order mark, because MicroPython reads nothing else.
+    """Convert a config.py to UTF-8 without a byte order mark, because MicroPython reads nothing else. Notepad and
+    PowerShell write byte order marks and UTF-16.
 
-    Notepad and PowerShell write byte order marks and UTF-16. Raises InputError for other encodings.
+    Raises InputError for other encodings.
 
     >>> cleaned("\ufeffSIDE = 1".encode("utf-16")), cleaned(b"\xef\xbb\xbfSIDE = 1")
     (b'SIDE = 1', b'SIDE = 1')

@@ -16,7 +16,6 @@ from serial.tools import list_ports
 
 from ..common.errors import InputError, cause
 from ..common.messages import Message, Remedy
-from . import status_words
 
 # A function that is called with the current action, the number of finished bytes and the number of all bytes
 Progress = Callable[[str, int, int], None]
@@ -65,46 +64,6 @@ class ConnectionLost(Message):
         return f"connection lost: {self.todo.words(page)}" if page else super().line()
 
 
-class NotInstalled(Message):
-    """Kickstand is not on the board. name: name of the board's port."""
-
-    name: str
-
-    text = "Kickstand is not on the board at {name}"
-    todo = Remedy("install it with kickstand flash", "install it with the page Install")
-
-
-class UnfitFirmware(Message):
-    """The firmware on the board lacks a module. The board has another version of the firmware, or an update was
-    interrupted.
-
-    name: Name of the board's port.
-    missing: The error about the missing module.
-    """
-
-    name: str
-    missing: str
-
-    text = "the firmware on the board at {name} is of another version or not whole ({missing})"
-    todo = UPDATE
-
-
-class NoAnswer(Message):
-    """A program that uses the firmware failed on the board.
-
-    name: Name of the board's port.
-    what: The result that the program should have printed.
-    reason: The exception on the board.
-    """
-
-    name: str
-    what: str
-    reason: str
-
-    text = "the board at {name} cannot give {what} ({reason})"
-    todo = UPDATE
-
-
 class ConnectedBoard(SerialTransport):
     """A connection to a board that limits the length of answers. mpremote alone reads as long as bytes arrive.
 
@@ -145,33 +104,6 @@ class _EmulatedBoard(ConnectedBoard):
     slower = _SLOWER
 
 
-# Prints what the running app noticed, which a soft reset removes: see App and lean/consistency.py of the firmware
-_NOTICED = """
-import sys
-app, judge = [sys.modules.get("kickstand." + name) for name in ("app", "lean.consistency")]
-worst = app and app.worst
-if worst:
-    worst = worst[0], worst[1], (tuple(worst[2][0]), worst[2][1])
-print(repr((worst, judge and judge.last_odd)))
-"""
-# Shows the number of each wiring on a character display. Each number is sent with its own wiring, so the user can read
-# only the number of the display's real wiring.
-WIRINGS = """
-from time import sleep_ms
-from kickstand.devices import open_lcd
-from kickstand.settings import load
-for number in range(1, 5):
-    lcd = open_lcd(load(), number)
-    lcd.show("This is readable", "LCD_WIRING = %d" % number)
-    lcd.flush()
-    print("%13sLCD_WIRING = %d is shown for 4 s" % ("", number))
-    sleep_ms(4000)
-    lcd.show("", "")  # blank the display now, because it may not react to the next wiring
-    lcd.flush()
-print("%13sput the line that it has shown into config.py; if it has shown none: its contrast, or 5 V" % "")
-"""
-_WORST = (int, int, ((int, int, int), float))
-
 # The name of a port, an open connection to a board, or None for the only board that is plugged in
 Port = str | ConnectedBoard | None
 
@@ -182,8 +114,7 @@ def connected(
 ) -> Iterator[tuple[ConnectedBoard, str]]:
     """A context that yields a board at its raw prompt, and the name of its port. The board's program is interrupted.
 
-    before: function that is called before the soft reset, which removes all modules. It may raise TransportError. It is
-        not called for a board that does not answer.
+    before: called before the soft reset, which removes all modules, if the board answers. It may raise TransportError.
 
     Errors of the connection, also inside the with block, are raised as InputError.
     """
@@ -198,9 +129,7 @@ def connected(
     except TransportExecError as error:
         reason = last_line(error.error_output)
         if damaged(reason):
-            raise InputError(
-                f"{name}: the board's file system is damaged ({reason}): erase its flash: {_NUKE}"
-            ) from error
+            raise _damaged_files(name, f" ({reason})") from error
         raise InputError(f"{name}: the board reports {reason}: try again") from error
     except TransportError as error:
         raise InputError(f"{name}: the board stopped answering: plug it in again, then repeat this") from error
@@ -210,7 +139,7 @@ def connected(
         if error.errno == errno.ENOSPC:
             raise InputError(f"the board at {name} is full: remove files of your own from it") from error
         if error.errno in (errno.EILSEQ, 84, 52):  # an error on the board, which mpremote raises as its own
-            raise InputError(f"{name}: the board's file system is damaged: erase its flash: {_NUKE}") from error
+            raise _damaged_files(name) from error
         raise InputError(ConnectionLost(name, cause(error))) from error
     finally:
         with contextlib.suppress(OSError):
@@ -291,12 +220,11 @@ def ask(transport: SerialTransport, expression: str, *shapes: Any) -> Any:
 
 
 def literal(text: bytes, *shapes: Any) -> Any:
-    """Convert a line of a board's output to the Python value that the line represents.
+    """Convert a line of a board's output to a Python value.
 
-    shapes: the allowed types of the value. Each is a type, or None, or a tuple with the types of a tuple's values.
-    Integers must be 0 or larger.
-
-    Raises InputError for other values. Another device at the port may send such values.
+    shapes: the allowed types. Each is a type, or None, or a tuple with the types of a tuple's values. Integers must be
+        0 or larger.
+    Raises InputError for other values, which another device at the port may send.
 
     >>> literal(b"('/rides', 3)", (str, int))
     ('/rides', 3)
@@ -331,62 +259,35 @@ def describe(transport: SerialTransport, name: str) -> str:
 
 
 def printed(transport: SerialTransport, name: str, code: str, what: str) -> bytes:
-    """Run a program that uses the firmware, and return its output.
-
-    name: Name of the board's port.
-    code: The program.
-    what: Name of the output in messages.
+    """Run a program that uses the firmware, and return its output. name: of the board's port. what: of the output, for
+    messages.
 
     Raises InputError if the program fails on the board.
     """
     output, error = transport.exec_raw(code, timeout=_PROGRAM_S)
     if error:
         reason = last_line(error.decode(errors="replace"))
-        if damaged(reason) and "CardError" not in reason:
-            raise InputError(f"{name}: the board's file system is damaged ({reason}): erase its flash: {_NUKE}")
-        if "CardError" in reason or "SettingsError" in reason:
+        refused = any(name in reason for name in ("Refusal", "SettingsError", "CardError"))  # up to 0.4.0 CardError
+        if damaged(reason) and not refused:
+            raise _damaged_files(name, f" ({reason})")
+        if refused:
             raise InputError(f"{name}: {reason.partition(': ')[2]}")
         refuse_unfit_firmware(reason, name)
-        raise InputError(NoAnswer(name, what, reason))
+        raise InputError(f"the board at {name} cannot give {what} ({reason})", UPDATE)
     return output
 
 
-def status(port: Port, wirings: bool = False) -> str:
-    """Run kickstand.status() on the board, restart the board, and return the report in words.
-
-    wirings: True to also try each wiring of an LCD backpack on the display.
-
-    Raises InputError if the board returns no status.
-    """
-    noticed: list[Any] = [None, None]
-
-    def ask_first(transport: ConnectedBoard) -> None:
-        worst, odd = literal(transport.exec(_NOTICED), *((a, b) for a in (_WORST, None) for b in (str, None)))
-        noticed[:] = worst, odd
-
-    with connected(port, ask_first) as (transport, name):
-        describe(transport, name)
-        try:
-            code = "import kickstand\nkickstand.status()"
-            text = printed(transport, name, code + WIRINGS * wirings, "its status").decode(errors="replace")
-        finally:
-            restart(transport)
-    return status_words.words(text, (noticed[0], noticed[1]))
-
-
 def refuse_unfit_firmware(reason: str, name: str) -> None:
-    """Raise InputError if an error on the board means that Kickstand or one of its modules is missing.
+    """Raise InputError if an exception on the board means that Kickstand or one of its modules is missing.
 
     Modules are missing in another version of the firmware, and after an interrupted update.
-
-    reason: The exception on the board.
-    name: Name of the board's port.
     """
     if "no module named 'kickstand'" in reason:
-        raise InputError(NotInstalled(name))
+        install = Remedy("install it with kickstand flash", "install it with the page Install")
+        raise InputError(f"Kickstand is not on the board at {name}", install)
     missing = reason.partition("ImportError: ")[2]
     if "kickstand" in missing:
-        raise InputError(UnfitFirmware(name, missing))
+        raise InputError(f"the firmware on the board at {name} is of another version or not whole ({missing})", UPDATE)
 
 
 def last_line(text: str) -> str:
@@ -397,10 +298,7 @@ def last_line(text: str) -> str:
 def _enter_raw_prompt(
     transport: ConnectedBoard, name: str, before: Callable[[ConnectedBoard], None] | None = None
 ) -> None:
-    """Send Ctrl-C, then a soft reset into the raw prompt. This soft reset does not start main.py.
-
-    before: see connected().
-    """
+    """Send Ctrl-C, then a soft reset into the raw prompt, which does not start main.py. before: see connected()."""
     for limit_s in (_STARTING_S, ANSWER_S):  # a board may reset when its port is opened, and then needs time to start
         try:
             with contextlib.redirect_stdout(io.StringIO()):  # mpremote prints output that it cannot interpret
@@ -425,37 +323,37 @@ _CRASHES = ("guru meditation", "fatal python error", "abort() was called", "fata
 _LONGEST_WORDS = 60  # longest part of the board's output in a message, characters
 
 
+def _damaged_files(name: str, reason: str = "") -> InputError:
+    return InputError(f"{name}: the board's file system is damaged{reason}: erase its flash: {_NUKE}")
+
+
 def _why_silent(name: str, heard: bytes) -> InputError:
     """Return the error for a board that does not show its prompt. heard: the last bytes of the board's output."""
     text = heard.decode(errors="replace")
     if damaged(text):
         return InputError(f"{name}: the board says that its file system is damaged: erase its flash: {_NUKE}")
-    lower = text.lower()
-    said = next((line.strip() for line in reversed(text.splitlines()) if line.strip().strip("\0\ufffd>")), "")
-    words = f"the board prints {said[:_LONGEST_WORDS]!a}: " if said else ""
-    if any(mark in lower for mark in _CRASHES):
-        return InputError(f"{name}: {words}MicroPython on the board crashes: erase its flash: {_NUKE}")
-    if any(mark in lower for mark in _WATCHDOG):
-        return InputError(
-            f"{name}: {words}a watchdog of the program on it restarts it again and again: try again at once, and if "
-            f"it stays so erase its flash: {_NUKE}"
-        )
+    last = next((line.strip() for line in reversed(text.splitlines()) if line.strip().strip("\0\ufffd>")), "")
+    words = f"the board prints {last[:_LONGEST_WORDS]!a}: " if last else ""
     button = "hold the push button that is wired to it (not BOOTSEL or BOOT) while plugging it in"
-    if words:
+    if any(mark in text.lower() for mark in _CRASHES):
+        words += "MicroPython on the board crashes: erase its flash"
+    elif any(mark in text.lower() for mark in _WATCHDOG):
+        words += "a watchdog of the program on it restarts it again and again: try again at once, and if it stays so "
+        words += "erase its flash"
+    elif words:
+        words += f"a program on it does not let go: if that is Kickstand {button}; else erase its flash"
+    else:
         return InputError(
-            f"{name}: {words}a program on it does not let go: if that is Kickstand {button}; else erase its flash: "
-            f"{_NUKE}"
+            f"no MicroPython answers on {name}: check that this is the board's port, put MicroPython on it, or "
+            f"{button}; a program of another project that does not let go is removed with the flash: {_NUKE}"
         )
-    return InputError(
-        f"no MicroPython answers on {name}: check that this is the board's port, put MicroPython on it, or {button}; a "
-        f"program of another project that does not let go is removed with the flash: {_NUKE}"
-    )
+    return InputError(f"{name}: {words}: {_NUKE}")
 
 
 def damaged(text: str) -> bool:
     """True if a board's message means that its file system is damaged.
 
-    The message can come from MicroPython (inisetup.py of the ESP32), from littlefs, or from the flash. The number 84 is
-    EILSEQ and LFS_ERR_CORRUPT.
+    It comes from MicroPython (inisetup.py of the ESP32), from littlefs or from the flash. 84 is EILSEQ and
+    LFS_ERR_CORRUPT.
     """
     return any(mark in text for mark in _CORRUPT)

@@ -31,11 +31,9 @@ def firmware_files() -> dict[str, Path]:
 def contents(mpy: int | None, compiler: bytecode.Compiler | None = None) -> dict[str, bytes]:
     """Return {path on the board: content}, in the order of firmware_files().
 
-    mpy: The board's sys.implementation._mpy. The package is compiled to .mpy files for this board. None keeps the .py
-        files.
-    compiler: See bytecode.compiled().
-
-    main.py and config.py are always .py files, because MicroPython does not start a main.mpy, and users edit config.py.
+    mpy: the board's sys.implementation._mpy, for which the package is compiled. None keeps the .py files. compiler: see
+        bytecode.compiled().
+    main.py and config.py stay .py files, because MicroPython does not start a main.mpy, and users edit config.py.
     Raises CannotCompile if the package cannot be compiled for the board.
     """
     files = firmware_files()
@@ -49,8 +47,7 @@ def contents(mpy: int | None, compiler: bytecode.Compiler | None = None) -> dict
 def unfinished(path: str) -> str:
     """Return the name that a file has on the board until it is verified.
 
-    main.py and config.py get another name until then. Otherwise an incomplete main.py could start, or the next
-    installation could take an incomplete config.py for the user's own file.
+    An incomplete main.py could start, and an incomplete config.py could be taken for the user's own file.
     """
     return path.removesuffix(".py") + ".new" if path in (CONFIG, MAIN) else path
 

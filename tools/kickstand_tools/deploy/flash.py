@@ -2,7 +2,7 @@
 
 import contextlib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from mpremote.transport_serial import SerialTransport
@@ -23,34 +23,15 @@ _CHUNK = 2048  # bytes per transfer. With mpremote's default of 256 bytes, copyi
 
 
 @dataclass(frozen=True)
-class InstallResult:
-    """The result of install(). The lists contain paths on the board.
-
-    copied: Files that were copied and verified.
-    copied_bytes: Total size of these files.
-    kept: Files that were up to date and stayed unchanged.
-    removed: Files of older versions that were removed.
-    config_differs: True if the user's config.py was kept and differs from this version's.
-    """
-
-    copied: list[str]
-    copied_bytes: int
-    kept: list[str]
-    removed: list[str]
-    config_differs: bool
-
-
-@dataclass(frozen=True)
 class FlashResult:
     """The result of flash().
 
-    board: Name of the board and its version of MicroPython.
-    port: Name of the port.
-    config: The config.py that was checked before copying, or None.
-    others: One line per file of another project that was kept under another name.
-    unused: Settings in the user's config.py that are behind a '#'.
-    why_sources: The reason why the firmware was not compiled, or None.
-    installed: The files.
+    board, port: the board with its version of MicroPython, and its port.
+    config: the config.py that was checked before copying, or None.
+    others: one line per file of another project that was kept under another name.
+    unused: settings in the user's config.py that are behind a '#'.
+    why_sources: the reason why the firmware was not compiled, or None.
+    update: the steps that were carried out.
     """
 
     board: str
@@ -59,7 +40,7 @@ class FlashResult:
     others: list[str]
     unused: list[str]
     why_sources: str | None
-    installed: InstallResult
+    update: Update
 
 
 def describe_supported(transport: SerialTransport, name: str) -> str:
@@ -84,17 +65,13 @@ def flash(
 ) -> FlashResult:
     """Update a board's files, verify them, and restart the board.
 
-    Args:
-        port: The board's port.
-        replace_config: Also replace the user's config.py.
-        progress: Function that is called with the progress.
-        compiler: Function that compiles a module. None uses bytecode.cross_compiled().
-        judge: Function that checks a config.py. None uses config_check.judge(), which starts a process.
-        agree: Function that is called with one line per file of another project that will be renamed. It may raise
-            InputError.
+    replace_config: also replace the user's config.py.
+    progress: called with the progress.
+    compiler: compiles a module; None uses bytecode.cross_compiled().
+    judge: checks a config.py; None uses config_check.judge(), which starts a process.
+    agree: called with one line per file of another project that will be renamed. It may raise InputError.
 
-    Raises:
-        InputError: If the board cannot be updated. If the board has too little room, nothing is changed.
+    Raises InputError if the board cannot be updated. If the board has too little room, nothing is changed.
     """
     with connected(port) as (transport, name):
         board = describe_supported(transport, name)
@@ -116,41 +93,20 @@ def flash(
                 contents[CONFIG] = cleaned(source.read_bytes())
             if not config and foreign.mended and foreign.config is not None:
                 contents[CONFIG] = foreign.config
-            update = prepare(transport, contents, bool(config) or foreign.mended, foreign)
+            update = plan(contents, foreign.files, bool(config) or foreign.mended, foreign.moves)
+            refuse_without_room(update, foreign.files)
             if foreign.moves and agree:
                 agree(foreign.words())
         except InputError:
             restart(transport)  # start the interrupted program again
             raise
-        installed = install(transport, update, progress)
+        install(transport, update, progress)
         restart(transport)
-    return FlashResult(board, name, config, foreign.words(), judged.unused, why_sources, installed)
+    return FlashResult(board, name, config, foreign.words(), judged.unused, why_sources, update)
 
 
-def prepare(
-    transport: SerialTransport,
-    wanted: dict[str, bytes],
-    replace_config: bool = False,
-    there: others.Others | None = None,
-) -> Update:
-    """Plan the Update for install(), without changing the board.
-
-    wanted: The files that the board should have, see contents().
-    replace_config: Also replace the user's config.py.
-    there: Files of other projects on the board. None if such files were not searched.
-
-    Raises InputError if a file is in the way, or if the board has too little room.
-    """
-    present = there.files if there else survey(transport)
-    update = plan(wanted, present, replace_config)
-    if there and there.moves:
-        update = replace(update, moves=there.moves)
-    refuse_without_room(update, present)
-    return update
-
-
-def install(transport: SerialTransport, update: Update, progress: Progress | None = None) -> InstallResult:
-    """Carry out an update.
+def install(transport: SerialTransport, update: Update, progress: Progress | None = None) -> None:
+    """Carry out an update, and verify the copied files.
 
     main.py is removed first. The new main.py gets its name only after all files are verified. So after an interruption,
     the board starts nothing and can be flashed again. The board never runs a mixture of versions.
@@ -187,7 +143,6 @@ def install(transport: SerialTransport, update: Update, progress: Progress | Non
     for path in update.copy:
         if unfinished(path) != path:
             transport.exec(f"import os\nos.rename({unfinished(path)!r}, {path!r})")
-    return InstallResult(list(update.copy), total, update.keep, update.obsolete, update.config_differs)
 
 
 def _contents(transport: SerialTransport, compiler: bytecode.Compiler | None) -> tuple[dict[str, bytes], str | None]:

@@ -51,10 +51,10 @@ _CORRECT_OR_REPLACE = Remedy(
 class Others:
     """The files that were on a board, and the decisions about them.
 
-    files: Files and folders of the board, after renaming.
-    moves: New path of each file to rename, by its present path.
-    config: Content that the user's config.py should have. None if the board has no config.py, or if it is renamed.
-    mended: True if the content in `config` differs from the present content.
+    files: files and folders of the board, after renaming.
+    moves: new path of each file to rename, by its present path.
+    config: content that the user's config.py should have. None if there is none, or if it is renamed.
+    mended: True if `config` differs from the present content.
     """
 
     files: BoardFiles
@@ -69,11 +69,7 @@ class Others:
 
 @dataclass(frozen=True)
 class Contents:
-    """The contents of a board.
-
-    files: Files and folders of the board.
-    texts: Contents of the files MAIN, BOOT and CONFIG, as far as they exist, by path.
-    """
+    """Files and folders of a board, and the contents of its MAIN, BOOT and CONFIG by path."""
 
     files: BoardFiles
     texts: dict[str, bytes]
@@ -87,11 +83,7 @@ def read(transport: SerialTransport) -> Contents:
 
 
 def find(there: Contents, judge: Callable[[Path], Judged], replace_config: bool) -> Others:
-    """Decide which files to rename.
-
-    there: The contents of the board.
-    judge: Function that checks a config.py for this board.
-    replace_config: True if the user's config.py will be replaced.
+    """Decide which files to rename. judge: checks a config.py. replace_config: True if the user's will be replaced.
 
     Raises InputError if the user's config.py would stop the firmware.
     """
@@ -152,9 +144,7 @@ def _settings_named(content: bytes) -> int:
 
 
 def _does_something(content: bytes) -> bool:
-    """True if the file contains more than comments and strings. The boot.py that MicroPython puts on an ESP32 contains
-    only comments and strings.
-    """
+    """True if the file has more than comments and strings, unlike the boot.py that MicroPython puts on an ESP32."""
     try:
         body = ast.parse(content).body
     except (SyntaxError, ValueError, RecursionError, MemoryError):

@@ -37,17 +37,15 @@ def least_blocks(size: int, block: int) -> int:
 
 @dataclass(frozen=True)
 class Update:
-    """The steps of an update. A board that is up to date needs no steps.
+    """The steps of an update, in their order. A board that is up to date needs none.
 
-    These are the steps in their order:
-        moves: New paths of files of another project, by their present paths. They are renamed.
-        remove: Files to remove, main.py first.
-        remove_folders: Folders to remove, which are empty by then.
-        make_folders: Folders to create.
-        copy: Contents of the files to copy, by path, main.py last.
+    moves: new paths of files of another project, by their present paths. They are renamed.
+    remove: files to remove, main.py first. obsolete: those that belong to no module of this version.
+    remove_folders: folders to remove, which are empty by then.
+    make_folders: folders to create.
+    copy: contents of the files to copy, by path, main.py last.
 
-    obsolete: Files in `remove` that belong to no module of this version.
-    keep: Files that stay unchanged.
+    keep: files that stay unchanged.
     config_differs: True if the user's config.py is kept and differs from this version's.
     """
 
@@ -61,16 +59,16 @@ class Update:
     moves: dict[str, str] = field(default_factory=dict)
 
 
-def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> Update:
+def plan(
+    wanted: dict[str, bytes], board: BoardFiles, replace_config: bool = False, moves: dict[str, str] | None = None
+) -> Update:
     """Plan the Update that gives the board the wanted files. The user's own files are kept.
 
     Files to replace are removed first, which frees their blocks. An interruption is harmless, because a board without
     main.py starts nothing and can be flashed again.
 
-    wanted: Contents of the wanted files, by path.
-    board: The files that are on the board.
-    replace_config: Also replace the user's config.py.
-
+    wanted: contents of the wanted files, by path. board: the files that are on the board.
+    replace_config: also replace the user's config.py. moves: see Update.
     Raises InputError if a file of the user is in the way.
     """
     copy = {path: data for path, data in wanted.items() if board.files.get(path) != fingerprint(data)}
@@ -95,6 +93,7 @@ def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> U
         obsolete=[path for path in stale if _module(path) not in modules],
         keep=[path for path in wanted if path not in copy],
         config_differs=config_differs,
+        moves=moves or {},
     )
 
 
@@ -137,9 +136,8 @@ def _folders(path: str) -> list[str]:
 
 
 def _refuse_in_the_way(wanted: dict[str, bytes], folders: set[str], kept: set[str]) -> None:
-    """Raise InputError if MicroPython would import a user's file instead of a wanted file.
-
-    MicroPython imports a folder lean/ instead of lean.py, and lean.py instead of lean.mpy.
+    """Raise InputError if MicroPython would import a user's file: lean/ instead of lean.py, or lean.py instead of
+    lean.mpy.
     """
     modules = {_module(path) for path in wanted}
     for path in sorted(kept):

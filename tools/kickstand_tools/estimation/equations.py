@@ -17,7 +17,7 @@ be 0:
 
     SLIDING         the wheels' velocity sideways, because wheels do not slide
     CLIMBING        the wheels' velocity up minus the part due to the chassis' pitch. The chassis points along the road,
-                    except for dive in braking, (8) in the firmware's kickstand.lean.dive. Dive does not move a wheel.
+                    except for dive in braking, (8) there. Dive does not move a wheel.
     SLOPING         the wheels' velocity up, because roads are level on average
     BALANCED        the force to the side minus TYRES, CAMBER and BESIDE (see unknowns.py): a moving bike is balanced
     ANY_SPEED       the speed minus USUAL_MPS

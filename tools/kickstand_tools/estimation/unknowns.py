@@ -25,7 +25,7 @@ HEIGHT, AHEAD = 24, 25  # the sensor's height above the roll axis, and its dista
 TYRES = 26
 BESIDE = 27  # lasting level force to the side, due to wind, in g; see hypotheses.py
 DELAY = 28  # delay of the log's speed, in s
-DIVE = 29  # pitch of the nose in braking, in rad per g; called share in (8) of the firmware's kickstand.lean.dive
+DIVE = 29  # pitch of the nose in braking, in rad per g; called share in (8) of the firmware's kickstand.lean.bike_model
 # Force to the side on straights, in g. A cambered road touches the tyres beside their middle.
 CAMBER = 30
 # Temperature coefficients of the accelerometer's bias (g per C) and of the gyro's bias (rad/s per C): see Windows.warm

@@ -3,7 +3,7 @@ used, but mainly their values.
 
 * Three columns belong together if their names differ only in the axis, or if they are side by side without names.
 * Whenever the sensor is calm, the acceleration is as long as gravity in some unit.
-* In the gyro's unit, the rates explain how the direction of gravity turns in the sensor's axes (rate_fit.py).
+* In the gyro's unit, the rates explain how the direction of gravity turns in the sensor's axes (unit_fits.py).
 * In the time's unit, the number of samples per second is usual.
 
 Each finding has a reason, and is certain or uncertain. An uncertain finding is proposed to the user, who must confirm
@@ -22,8 +22,8 @@ from kickstand.units import STANDARD_GRAVITY
 from ..common.errors import InputError
 from ..logs.csv_reader import as_text
 from ..signals import Array, moving_mean, moving_spread
-from .rate_fit import RateFit, fit_rates
 from .recording import Sheet, plain, unit_in
+from .unit_fits import RateFit, fit_rates
 from .units import (
     ACCELERATIONS,
     COUNTS_PER_DPS,
@@ -102,16 +102,20 @@ class ColumnFinding:
 class Findings:
     """What was found in a table.
 
+    sheet: the table.
     found: the finding of each quantity, by "t", "a", "g", "speed", "lat" and "lon".
     lacking: the required quantities that are missing, in words.
     single: columns of single axes of an incomplete sensor, by the keys of REQUIRED.
     remarks: problems of the existing columns.
+    joined: True if the table is joined from several files.
     """
 
+    sheet: Sheet
     found: dict[str, ColumnFinding] = field(default_factory=dict)
     lacking: list[str] = field(default_factory=list)
     single: dict[str, str] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
+    joined: bool = False
 
     @property
     def decided(self) -> bool:
@@ -141,10 +145,29 @@ class Findings:
         """The reasons, one sentence per quantity."""
         return "; ".join(f"{key}: {finding.why}" for key, finding in self.found.items() if finding.why)
 
+    @property
+    def lacking_words(self) -> str:
+        """The missing columns in words, or ""."""
+        return f", and no {', no '.join(self.lacking)} found in it" if self.lacking else ""
+
+    def first_seconds(self, seconds: float = 10.0, points: int = 300) -> dict[str, list[float] | list[list[float]]]:
+        """The first seconds of the found time (t, s), accelerometer (a) and gyro (g), reduced to `points` points, in
+        the table's units. Empty without a time."""
+        since = _seconds(self.sheet, self.found.get("t"))
+        if since is None:
+            return {}
+        rows = np.flatnonzero(since <= seconds)
+        rows = rows[:: max(1, len(rows) // points)]
+        picture: dict[str, list[float] | list[list[float]]] = {"t": since[rows].round(3).tolist()}
+        for key in {"a", "g"} & self.found.keys():
+            values = self.sheet.table([self.sheet.columns.index(name) for name in self.found[key].columns])[rows]
+            picture[key] = np.nan_to_num(values).round(5).T.tolist()
+        return picture
+
 
 def find(sheet: Sheet) -> Findings:
     """Find the quantities in the columns of a table."""
-    findings = Findings()
+    findings = Findings(sheet)
     time = _time(sheet)
     if time is None:
         findings.lacking.append("time")
@@ -159,12 +182,15 @@ def find(sheet: Sheet) -> Findings:
         if key not in findings.found:
             findings.single |= _single(sheet, key, kind)
     used = [name for finding in findings.found.values() for name in finding.columns]
-    speed = _speed(sheet, used)
-    lat, lon = (_find_by_name(sheet, words, used) for words in (LATITUDE, LONGITUDE))
+    lat, lon = (_first_named(sheet, used, words) for words in (LATITUDE, LONGITUDE))
     if lat is not None and lon is not None:
-        findings.found |= {"lat": lat, "lon": lon}
+        findings.found |= {key: ColumnFinding([name], "", "by its name") for key, name in (("lat", lat), ("lon", lon))}
+    # velocityx and others are components, but velocity alone also ends in y
+    speed = _first_named(sheet, used, "speed|velocity|kmh|kph", r"acc|ang|[xz]$|(?<!velocit)y$")
     if speed is not None:
-        findings.found["speed"] = speed
+        stated = stated_unit(speed)
+        stated = stated if stated in SPEEDS else next((u for w, u in _SPEED_WORDS if w in plain(speed)), "")
+        findings.found["speed"] = ColumnFinding([speed], stated, "by its name", bool(stated))
     return findings
 
 
@@ -697,25 +723,13 @@ def _by_size(rates: Array, force: Array) -> tuple[str, str]:
 # Speed and position
 
 
-def _speed(sheet: Sheet, used: Sequence[str]) -> ColumnFinding | None:
+def _first_named(sheet: Sheet, used: Sequence[str], words: str, without: str = "acc") -> str | None:
+    """The first unused column with numbers whose name matches `words`, and not `without`."""
     for place, name in enumerate(sheet.columns):
         bare = plain(name) if name not in used else ""
-        # velocityx and others are components, but velocity alone also ends in y
-        if re.search(r"speed|velocity|kmh|kph", bare) and not re.search(r"acc|ang|[xz]$|(?<!velocit)y$", bare):
-            if not np.any(np.isfinite(sheet.numbers(place))):
-                continue
-            stated = stated_unit(name)
-            stated = stated if stated in SPEEDS else next((u for w, u in _SPEED_WORDS if w in bare), "")
-            return ColumnFinding([name], stated, "by its name", bool(stated))
+        if re.search(words, bare) and not re.search(without, bare) and np.any(np.isfinite(sheet.numbers(place))):
+            return name
     return None
 
 
 _SPEED_WORDS = (("kmh", "km/h"), ("kph", "km/h"), ("mph", "mph"), ("mps", "m/s"), ("knot", "knots"))
-
-
-def _find_by_name(sheet: Sheet, words: str, used: Sequence[str]) -> ColumnFinding | None:
-    for place, name in enumerate(sheet.columns):
-        bare = plain(name) if name not in used else ""
-        if re.search(words, bare) and "acc" not in bare and np.any(np.isfinite(sheet.numbers(place))):
-            return ColumnFinding([name], "", "by its name")
-    return None

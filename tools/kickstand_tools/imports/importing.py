@@ -12,7 +12,7 @@ import numpy as np
 from ..checks.axes import log_agrees
 from ..checks.log import check_log
 from ..common.errors import InputError
-from ..common.messages import AT_REST, Message, Remedy
+from ..common.messages import AT_REST, Message, Remedy, kind
 from ..estimation.first_guess import MIN_RIDING_S
 from ..logs.csv_lines import write_log
 from ..logs.log import Log
@@ -34,57 +34,39 @@ LEAST_HZ = 19.5  # a lean needs this many samples per second: 20, minus the erro
 NAMES = [app.NAME for app in reversed(_APPS)]
 
 
-class ImportSlow(Message):
-    """The recording has too few samples per second."""
-
-    rate_hz: float
-
-    code = "import-slow"
-    text = "{rate_hz:.3g} samples per second: at least 20 are needed to find a lean"
-    todo = Remedy("record it faster")
-
-
-class ImportShort(Message):
-    """The recording is too short for an alignment."""
-
-    lasts_s: float
-    least_s: float
-
-    code = "import-short"
-    text = "it lasts {lasts_s:.0f} s: to find the alignment from it, at least {least_s:.0f} s of riding are needed"
-
-
-class ImportDamaged(Message):
-    """Damaged rows are left out."""
-
-    rows: int
-
-    code = "import-damaged"
-    text = (
-        "damaged rows that are left out: {rows}; a cell or a time is not a number, a time is out of order, a row has "
-        "too many cells, or a reading is outside every sensor's range"
-    )
-
-
-class ImportSign(Message):
-    """In this app's files, the sign of accelerations is uncertain: up may read +1 g or -1 g."""
-
-    app: str
-
-    code = "import-sign"
-    text = "which sign accelerations have in {app} is not certain, and no track with turns shows it"
-    todo = Remedy(
+ImportSlow = kind(
+    "import-slow",
+    "rate_hz",
+    "{rate_hz:.3g} samples per second: at least 20 are needed to find a lean",
+    Remedy("record it faster"),
+)
+ImportShort = kind(
+    "import-short",
+    "lasts_s least_s",
+    "it lasts {lasts_s:.0f} s: to find the alignment from it, at least {least_s:.0f} s of riding are needed",
+)
+ImportDamaged = kind(
+    "import-damaged",
+    "rows",
+    "damaged rows that are left out: {rows}; a cell or a time is not a number, a time is out of order, a row has too "
+    "many cells, or a reading is outside every sensor's range",
+)
+# In the files of this app, up may read +1 g or -1 g
+ImportSign = kind(
+    "import-sign",
+    "app",
+    "which sign accelerations have in {app} is not certain, and no track with turns shows it",
+    Remedy(
         f"{AT_REST}, else the ride is mirrored and --units a=-g or a=-m/s2 puts it right",
         f"{AT_REST}, else the ride is mirrored and left is shown as right",
-    )
-
-
-class ImportTurned(Message):
-    """The sign of the accelerations of a table is changed, because the track shows that it is -1 g up."""
-
-    code = "import-turned"
-    text = "by the turns of the track, up reads minus 1 g, so the sign of the accelerations is changed"
-    todo = Remedy("if latitude and longitude are exchanged or without their sign, the lean is mirrored: leave them out")
+    ),
+)
+ImportTurned = kind(
+    "import-turned",
+    "",
+    "by the turns of the track, up reads minus 1 g, so the sign of the accelerations is changed",
+    Remedy("if latitude and longitude are exchanged or without their sign, the lean is mirrored: leave them out"),
+)
 
 
 @dataclass(eq=False)

@@ -4,6 +4,7 @@ found. An AppRecording has the sensors, each on its own clock, in a log's units 
 import csv
 import os
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from ..common.errors import InputError
 from ..common.messages import Message
 from ..logs.csv_reader import Cells, cells_of, columns_of_text, numbers_of, separator_of
-from ..signals import Array, Bools
+from ..signals import Array
 from .files import RecordingFile
 from .units import ACCELERATIONS, NO_TIME, RATES, REPEATED, SPEEDS, Nanoseconds, factor, times_ns
 
@@ -99,6 +100,17 @@ def names_in(line: str) -> list[str]:
         return [] if not line.strip() else [cell.strip() for cell in cells_of(line, separator_of(line))]
     except csv.Error:
         return []
+
+
+def first_names(file: RecordingFile) -> list[str]:
+    """The cells of a file's first line that is not blank."""
+    return names_in(next(iter(file.first_lines(1)), ""))
+
+
+def names_line(file: RecordingFile, fits: Callable[[list[str]], bool], most: int = 60) -> int | None:
+    """The number of the first line whose cells fit, among the first `most` lines. None without such a line."""
+    lines = file.text.split("\n", most)[:most]  # including blank lines, because line numbers count them
+    return next((k for k, line in enumerate(lines) if fits(names_in(line))), None)
 
 
 def read_sheet(file: RecordingFile, header: int = 0, skipped: int = 0) -> Sheet:
@@ -199,17 +211,13 @@ class ReceiverTrack:
         nowhere = (self.lat_deg == 0.0) & (self.lon_deg == 0.0)
         nowhere |= ~((np.abs(self.lat_deg) <= 90.0) & (np.abs(self.lon_deg) <= 180.0))
         self.lat_deg, self.lon_deg = (np.where(nowhere, np.nan, place) for place in (self.lat_deg, self.lon_deg))
-        rows = np.column_stack((self.speed_mps, self.lat_deg, self.lon_deg))
-        filled = (self.time_ns != NO_TIME) & ~np.all(np.isnan(rows), axis=1)
-        self.keep(filled)
-        same = np.all((rows[filled][1:] == rows[filled][:-1]) | np.isnan(rows[filled][1:]), axis=1)
-        same &= np.diff(self.time_ns // SECOND_NS) == 0  # at a standstill, repeated values are kept once per second
-        self.keep(np.concatenate(([True], ~same)) if len(self.time_ns) else np.zeros(0, dtype=bool))
-
-    def keep(self, which: Bools) -> None:
-        """Keep only these rows."""
-        for name in ("time_ns", "speed_mps", "lat_deg", "lon_deg"):
-            setattr(self, name, getattr(self, name)[which])
+        values = np.column_stack((self.speed_mps, self.lat_deg, self.lon_deg))
+        filled = (self.time_ns != NO_TIME) & ~np.all(np.isnan(values), axis=1)
+        rows = np.flatnonzero(filled)
+        same = np.all((values[rows][1:] == values[rows][:-1]) | np.isnan(values[rows][1:]), axis=1)
+        same &= np.diff(self.time_ns[rows] // SECOND_NS) == 0  # at a standstill, values are kept once per second
+        rows = np.delete(rows, np.flatnonzero(same) + 1)
+        self.time_ns, (self.speed_mps, self.lat_deg, self.lon_deg) = self.time_ns[rows], values[rows].T
 
 
 def track_of(

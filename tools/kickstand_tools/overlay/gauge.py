@@ -5,12 +5,21 @@ rider's. Speed and forces are beside the dial. Text has an outline, so it is leg
 """
 
 import math
+from functools import lru_cache
 
-from PIL import Image, ImageChops, ImageDraw
+from PIL import Image, ImageChops, ImageDraw, ImageFilter, ImageFont
 
-from . import parts
-from .parts import ACCENT, DIM, PANEL, WHITE
+Colour = tuple[int, int, int, int]
+Point = tuple[float, float]
 
+WHITE: Colour = (255, 255, 255, 255)
+DARK: Colour = (12, 14, 18, 255)
+DIM: Colour = (150, 156, 166, 255)
+ACCENT: Colour = (255, 176, 0, 255)  # amber, which colour-blind people can distinguish from white and grey
+PANEL: Colour = (12, 14, 18, 120)
+CLEAR: Colour = (0, 0, 0, 0)
+_LAMP: Colour = (214, 40, 40, 255)
+_FINER = 4  # shapes are first drawn larger by this factor; reducing them smooths their edges
 MOST_DEG = 60.0  # lean at each end of the dial
 MOST_G = 1.2  # force at the edge of the circle of forces
 SHARE = 0.3  # usual height of the gauge as a share of the video's height
@@ -22,6 +31,111 @@ _WIDTH = 1.72  # width of the gauge divided by its height
 _SPREAD = 1.5  # degrees on the dial per degree of lean
 _MIDDLE, _SIDE = 60.0, 146.0  # horizontal position of the dial's centre, and of speed and forces
 _KMH, _MPH = 3.6, 3.6 / 1.609344
+
+
+def smooth_mask(size: tuple[int, int], draw, finer: int = _FINER) -> Image.Image:
+    """Draw a mask with smooth edges, values 0 to 255.
+
+    draw: called with an enlarged ImageDraw and with the factor of enlargement.
+    """
+    mask = Image.new("L", (size[0] * finer, size[1] * finer), 0)
+    draw(ImageDraw.Draw(mask), finer)
+    return mask.resize(size, Image.Resampling.BOX)
+
+
+def outlined(mask: Image.Image, colour: Colour, width: int) -> Image.Image:
+    """Draw the shape of a mask in a colour, with a dark edge of `width` pixels."""
+    edge = mask.filter(ImageFilter.MaxFilter(2 * width + 1)).filter(ImageFilter.GaussianBlur(width * 0.4))
+    picture = Image.new("RGBA", mask.size, DARK[:3] + (0,))
+    picture.putalpha(edge)
+    shape = Image.new("RGBA", mask.size, colour[:3] + (0,))
+    shape.putalpha(mask)
+    return Image.alpha_composite(picture, shape)
+
+
+@lru_cache(maxsize=2000)
+def text(words: str, height: float, colour: Colour) -> Image.Image:
+    """Draw words with a dark outline, in a picture of the size of the words. height: font height in pixels."""
+    stroke = max(1, round(height * 0.09))
+    font = ImageFont.load_default(height)
+    left, top, right, bottom = font.getbbox(words, stroke_width=stroke)
+    ascent = font.getbbox("0", stroke_width=stroke)  # gives all texts the same baseline
+    top, bottom = min(top, ascent[1]), max(bottom, ascent[3])
+    picture = Image.new("RGBA", (int(right - left) + 2, int(bottom - top) + 2), DARK[:3] + (0,))
+    origin = 1 - left, 1 - top
+    ImageDraw.Draw(picture).text(origin, words, font=font, fill=colour, stroke_width=stroke, stroke_fill=DARK)
+    return picture
+
+
+def put(picture: Image.Image, part: Image.Image, centre: Point) -> None:
+    """Draw a part over a picture, with its middle at centre. Pixels outside the picture are cut off."""
+    x, y = round(centre[0] - part.width / 2.0), round(centre[1] - part.height / 2.0)
+    left, top = max(0, -x), max(0, -y)
+    right, bottom = min(part.width, picture.width - x), min(part.height, picture.height - y)
+    if right > left and bottom > top:
+        picture.alpha_composite(part.crop((left, top, right, bottom)), (x + left, y + top))
+
+
+@lru_cache(maxsize=64)
+def arrow(size: float, to_the_right: bool, colour: Colour) -> Image.Image:
+    """A triangle that points to a side, with an outline."""
+    width = max(1, round(size * 0.09))
+    side = round(size) + 2 * width + 2
+
+    def draw(pen: ImageDraw.ImageDraw, finer: int) -> None:
+        near, far = width * finer, (side - width) * finer
+        tip, base = (far, near) if to_the_right else (near, far)
+        pen.polygon([(tip, side * finer / 2.0), (base, near), (base, far)], fill=255)
+
+    return outlined(smooth_mask((side, side), draw), colour, width)
+
+
+@lru_cache(maxsize=8)
+def bike(height: float) -> Image.Image:
+    """A motorcycle and its rider from behind, upright. The tyre touches the ground in the middle of the square
+    picture."""
+    side = 2 * round(height * 1.12)
+    unit = height / 36.0
+
+    def draw(pen: ImageDraw.ImageDraw, finer: int) -> None:
+        def at(x: float, y: float) -> Point:
+            return (side / 2.0 + x * unit) * finer, (side / 2.0 - y * unit) * finer
+
+        def line(points: list[Point], width: float) -> None:
+            pen.line([at(*point) for point in points], fill=255, width=round(width * unit * finer), joint="curve")
+            for x, y in (points[0], points[-1]):
+                blob(x, y, width / 2.0)
+
+        def blob(x: float, y: float, radius: float) -> None:
+            pen.ellipse([*at(x - radius, y + radius), *at(x + radius, y - radius)], fill=255)
+
+        pen.rounded_rectangle([*at(-2.7, 15), *at(2.7, 0)], radius=2.5 * unit * finer, fill=255)
+        pen.polygon([at(-5.5, 19), at(5.5, 19), at(3.4, 12.5), at(-3.4, 12.5)], fill=255)
+        pen.polygon([at(-4.8, 17), at(4.8, 17), at(7.8, 26.5), at(4.5, 29), at(-4.5, 29), at(-7.8, 26.5)], fill=255)
+        for sign in (-1.0, 1.0):
+            line([(sign * 6.6, 26.3), (sign * 11.0, 22.0), (sign * 13.0, 19.0)], 3.0)
+            line([(sign * 4.5, 18.0), (sign * 9.0, 13.0), (sign * 6.2, 6.5)], 3.2)
+        blob(0.0, 31.8, 4.4)
+
+    picture = outlined(smooth_mask((side, side), draw), WHITE, max(1, round(unit * 0.9)))
+    lamp = max(1, round(unit * 1.1))
+    middle, up = side // 2, round(16.2 * unit)
+    box = [middle - 3 * lamp, middle - up - lamp, middle + 3 * lamp, middle - up + lamp]
+    ImageDraw.Draw(picture).rounded_rectangle(box, radius=lamp, fill=_LAMP)
+    return picture
+
+
+@lru_cache(maxsize=8)
+def spot(diameter: int, colour: Colour) -> Image.Image:
+    """A round spot with an outline."""
+    width = max(1, round(diameter * 0.12))
+    side = diameter + 2 * width + 2
+
+    def draw(pen: ImageDraw.ImageDraw, finer: int) -> None:
+        near = (width + 1) * finer
+        pen.ellipse([near, near, side * finer - near - 1, side * finer - near - 1], fill=255)
+
+    return outlined(smooth_mask((side, side), draw), colour, width)
 
 
 class Gauge:
@@ -42,7 +156,7 @@ class Gauge:
         self._dial, self._radius = self._px(_MIDDLE, 62.0), round(50.0 * self._unit)
         forces_y, forces_radius = (63.0, 21.0) if has_speed else (46.0, 30.0)
         self._forces, self._forces_radius = self._px(_SIDE, forces_y), forces_radius * self._unit
-        self._band = parts.smooth_mask((2 * self._radius, 2 * self._radius), self._draw_band)
+        self._band = smooth_mask((2 * self._radius, 2 * self._radius), self._draw_band)
         self._still = self._still_picture()
 
     def picture(
@@ -56,9 +170,9 @@ class Gauge:
         is_known = math.isfinite(lean_deg)
         if is_known:
             self._fill(picture, lean_deg)
-            bike = parts.bike(34.0 * self._unit)
-            turned = bike.rotate(-max(-75.0, min(75.0, lean_deg)), Image.Resampling.BICUBIC)
-            parts.put(picture, turned, self._px(_MIDDLE, 61.0))
+            upright = bike(34.0 * self._unit)
+            leaning = upright.rotate(-max(-75.0, min(75.0, lean_deg)), Image.Resampling.BICUBIC)
+            put(picture, leaning, self._px(_MIDDLE, 61.0))
         self._marks(picture, left_deg, right_deg)
         self._number(picture, lean_deg, is_known)
         self._show_forces(picture, forward_g, left_g)
@@ -71,10 +185,8 @@ class Gauge:
     def _px(self, x: float, y: float) -> tuple[float, float]:
         return x * self._unit, y * self._unit
 
-    def _text(
-        self, picture: Image.Image, words: str, size: float, colour: parts.Colour, centre: tuple[float, float]
-    ) -> None:
-        parts.put(picture, parts.text(words, round(size * self._unit, 1), colour), self._px(*centre))
+    def _text(self, picture: Image.Image, words: str, size: float, colour: Colour, centre: tuple[float, float]) -> None:
+        put(picture, text(words, round(size * self._unit, 1), colour), self._px(*centre))
 
     def _draw_band(self, pen: ImageDraw.ImageDraw, finer: int) -> None:
         """The dial's half ring, as a mask."""
@@ -84,18 +196,18 @@ class Gauge:
 
     def _still_picture(self) -> Image.Image:
         """Draw the part of the gauge that never changes."""
-        picture = Image.new("RGBA", (self.width, self.height), parts.CLEAR)
+        picture = Image.new("RGBA", (self.width, self.height), CLEAR)
 
         def draw(pen: ImageDraw.ImageDraw, finer: int) -> None:
             box = [0, 0, self.width * finer - 1, self.height * finer - 1]
             pen.rounded_rectangle(box, radius=9.0 * self._unit * finer, fill=PANEL[3])
 
-        panel = parts.smooth_mask(picture.size, draw)
+        panel = smooth_mask(picture.size, draw)
         picture.paste(PANEL[:3] + (255,), mask=panel)
         picture.putalpha(panel)
         edge = max(1, round(self._unit * 0.8))
-        ring = parts.outlined(self._band, (70, 76, 86, 255), edge)
-        parts.put(picture, ring, self._dial)
+        ring = outlined(self._band, (70, 76, 86, 255), edge)
+        put(picture, ring, self._dial)
         for lean in range(-60, 61, 10):
             long = lean % 30 == 0
             self._tick(picture, lean, 42.0 if long else 46.0, 50.0, WHITE if long else DIM)
@@ -111,14 +223,14 @@ class Gauge:
         angle = math.radians(_SPREAD * max(-MOST_DEG, min(MOST_DEG, lean_deg)))
         return _MIDDLE + radius * math.sin(angle), 62.0 - radius * math.cos(angle)
 
-    def _tick(self, picture: Image.Image, lean_deg: float, near: float, far: float, colour: parts.Colour) -> None:
+    def _tick(self, picture: Image.Image, lean_deg: float, near: float, far: float, colour: Colour) -> None:
         begin, end = (self._px(*self._on_dial(lean_deg, radius)) for radius in (near, far))
 
         def draw(pen: ImageDraw.ImageDraw, finer: int) -> None:
             line = [(x * finer, y * finer) for x, y in (begin, end)]
             pen.line(line, fill=255, width=max(finer, round(0.9 * self._unit * finer)))
 
-        picture.paste(colour, mask=parts.smooth_mask(picture.size, draw))
+        picture.paste(colour, mask=smooth_mask(picture.size, draw))
 
     def _circle(self, picture: Image.Image) -> None:
         """Draw the circle of forces, with rings at 0.5 and 1 g and labels at its ends."""
@@ -132,8 +244,8 @@ class Gauge:
             pen.line([(x * finer, (y - radius) * finer), (x * finer, (y + radius) * finer)], fill=120, width=finer)
             pen.line([((x - radius) * finer, y * finer), ((x + radius) * finer, y * finer)], fill=120, width=finer)
 
-        mask = parts.smooth_mask(picture.size, draw)
-        picture.alpha_composite(parts.outlined(mask, DIM, max(1, round(self._unit * 0.4))))
+        mask = smooth_mask(picture.size, draw)
+        picture.alpha_composite(outlined(mask, DIM, max(1, round(self._unit * 0.4))))
 
     def _fill(self, picture: Image.Image, lean_deg: float) -> None:
         """Fill the band from upright to the lean."""
@@ -144,7 +256,7 @@ class Gauge:
         def draw(pen: ImageDraw.ImageDraw, finer: int) -> None:
             pen.pieslice([0, 0, size * finer - 1, size * finer - 1], begin, end, fill=255)
 
-        mask = ImageChops.multiply(parts.smooth_mask((size, size), draw, finer=2), self._band)
+        mask = ImageChops.multiply(smooth_mask((size, size), draw, finer=2), self._band)
         corner = round(self._dial[0] - self._radius), round(self._dial[1] - self._radius)
         picture.paste(ACCENT, corner, mask)
 
@@ -154,7 +266,7 @@ class Gauge:
         for sign, value in ((-1.0, left_deg), (1.0, right_deg)):
             if value > UPRIGHT_DEG:
                 ends = [self._px(*self._on_dial(sign * value, radius)) for radius in (40.0, 52.0)]
-                pen.line(ends, fill=parts.DARK, width=max(3, round(2.6 * self._unit)))
+                pen.line(ends, fill=DARK, width=max(3, round(2.6 * self._unit)))
                 pen.line(ends, fill=WHITE, width=max(1, round(1.4 * self._unit)))
             words = f"max {value:.0f}°" if value > UPRIGHT_DEG else "max --"
             self._text(picture, words, 7.0, WHITE, (_MIDDLE + sign * 44.0, 70.0))
@@ -168,8 +280,8 @@ class Gauge:
             on = is_known and sign * lean_deg > UPRIGHT_DEG
             self._text(picture, word, 7.5, ACCENT if on else DIM, (_MIDDLE + sign * 37.5, 84.5))
             if on:
-                mark = parts.arrow(8.0 * self._unit, sign > 0.0, ACCENT)
-                parts.put(picture, mark, self._px(_MIDDLE + sign * 54.0, 84.0))
+                mark = arrow(8.0 * self._unit, sign > 0.0, ACCENT)
+                put(picture, mark, self._px(_MIDDLE + sign * 54.0, 84.0))
 
     def _show_forces(self, picture: Image.Image, forward_g: float, left_g: float) -> None:
         is_known = math.isfinite(forward_g) and math.isfinite(left_g)
@@ -183,5 +295,4 @@ class Gauge:
         if is_known:
             (x, y), scale = self._forces, self._forces_radius / MOST_G
             size = min(1.0, MOST_G / max(math.hypot(forward_g, left_g), 1e-9)) * scale
-            spot = parts.spot(round(7.0 * self._unit), ACCENT)
-            parts.put(picture, spot, (x - left_g * size, y - forward_g * size))
+            put(picture, spot(round(7.0 * self._unit), ACCENT), (x - left_g * size, y - forward_g * size))

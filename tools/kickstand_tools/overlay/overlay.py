@@ -6,18 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ..analysis.ride import open_ride
+from ..analysis.ride import RideReading, open_ride
+from ..analysis.summary import HELD_S
 from ..calibration.file import CalibrationFile
 from ..checks.log import CheckedLog
 from ..common.errors import InputError
 from ..common.messages import Message
 from ..common.output import whole_file
-from ..joining.motion import motion
+from ..joining.motion import STEP_S, BinMotion, motion
 from ..logs.log import Source
 from ..logs.source import File, Progress
-from .camera_match import camera_offset_s
-from .shown import Shown, shown
-from .video import Video, ffmpeg, input_of, open_video, telemetry, write_video
+from ..signals import Array, Ints, correlations, log_likelihood_ratio, moving_mean, peak_offset, peaks, smoothed
+from .video import Telemetry, Video, ffmpeg, input_of, open_video, telemetry, write_video
 
 MARGIN = 0.03  # distance from the video's edges to the gauge, as a share of the video's height
 _BEYOND_S = 1.0  # longest time by which a video may begin before the ride or end after the ride
@@ -31,6 +31,17 @@ _TRANSPARENT = {
     ),
 }
 _SOLID = ("-c:v", "libx264", "-preset", "fast", "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart")
+
+_FORCE_S = 0.3  # averaging time of the forces, because engine and road shake the sensor
+_GAP_S = 0.2  # longest gap between readings over which values are interpolated
+_SPEED_S = 3.0  # longest gap between speeds over which the speed is interpolated; most receivers send one per second
+# Finding a video in a ride: the camera and the bike turn by the same rates
+_SLOW_S = 5.0  # changes of rate that take longer are removed, because they may come from the gyros' bias
+_QUICK_S = 0.2  # changes of rate that take less time are removed as vibration, which is different at each place
+_ALIKE_S = 0.5  # smallest time between two readings that count as independent
+_LEAST_S = 8.0  # shortest part of the video that must be within the ride
+_LEAST_EVIDENCE, _LEAST_LEAD, _LEAST_CORRELATION = 15.0, 6.0, 0.5
+_APART_S = 2.0
 
 
 @dataclass
@@ -52,6 +63,53 @@ class Overlaid:
     offset_s: float | None
     correlation: float | None
     notices: list[Message]
+
+
+@dataclass
+class Shown:
+    """The values at n moments of a ride. Values that are unknown or not trusted are NaN.
+
+    t_s: time in s since the ride's first sample.
+    lean_deg: lean, positive to the right.
+    forward_g: forward acceleration, positive when speeding up.
+    left_g: acceleration to the left, parallel to the road.
+    speed_mps: speed.
+    left_deg, right_deg: the largest lean to each side so far, 0 for none.
+    """
+
+    t_s: Array
+    lean_deg: Array
+    forward_g: Array
+    left_g: Array
+    speed_mps: Array
+    left_deg: Array
+    right_deg: Array
+
+    @property
+    def has_speed(self) -> bool:
+        """True if there is a speed at any moment."""
+        return bool(np.any(np.isfinite(self.speed_mps)))
+
+    @property
+    def values(self) -> tuple[Array, ...]:
+        """All values except the times, each of shape (n)."""
+        return self.lean_deg, self.forward_g, self.left_g, self.speed_mps, self.left_deg, self.right_deg
+
+    def at(self, t_s: Array) -> "Shown":
+        """Interpolate the values at other times. The values are NaN before the ride, after it and in gaps."""
+        index = np.clip(np.searchsorted(self.t_s, t_s, side="right") - 1, 0, len(self.t_s) - 2)
+        lean, forward, left = (
+            _along_lines(self.t_s, value, index, t_s, _GAP_S) for value in (self.lean_deg, self.forward_g, self.left_g)
+        )
+        valid = np.flatnonzero(np.isfinite(self.speed_mps))
+        speed = np.full(len(t_s), np.nan)
+        if len(valid) > 1:
+            at_s = self.t_s[valid]
+            speed_index = np.clip(np.searchsorted(at_s, t_s, side="right") - 1, 0, len(valid) - 2)
+            speed = _along_lines(at_s, self.speed_mps[valid], speed_index, t_s, _SPEED_S)
+        last = np.searchsorted(self.t_s, t_s, side="right") - 1
+        most_left, most_right = (np.where(last >= 0, value[last], 0.0) for value in (self.left_deg, self.right_deg))
+        return Shown(t_s, lean, forward, left, speed, most_left, most_right)
 
 
 def overlay(
@@ -192,3 +250,77 @@ def _laid_over(
         *("-filter_complex", f"[0:v:0]{even}{rate}[film];[film][1:v]{laid}[all]"),
         *("-map", "[all]", "-map", "0:a?", "-c:a", "copy", *_SOLID),
     ]
+
+
+# The values that the gauge shows
+
+
+def shown(reading: RideReading) -> Shown:
+    """Compute the values of a ride. open_ride() has selected the live or the smoothed lean. Raises InputError."""
+    columns: list[Array] = []
+    for part in reading.parts():
+        lean = np.where(part.trusted, part.lean_deg, np.nan)
+        columns.append(np.array([part.t_s, lean, part.forward_g, part.lateral_g, part.speed_mps]))
+    t_s, lean, forward, left, speed = np.hstack(columns)
+    forward, left = (smoothed(values, t_s, _FORCE_S) for values in (forward, left))
+    return Shown(t_s, lean, forward, left, speed, _maximum(t_s, -lean), _maximum(t_s, lean))
+
+
+def _maximum(t_s: Array, lean: Array) -> Array:
+    """Find the largest lean up to each moment that lasted at least HELD_S, shape (n). The result is 0 without such a
+    lean."""
+    count = round(HELD_S / float(np.median(np.diff(t_s)))) + 1
+    value = np.where(np.isfinite(lean), lean, 0.0)
+    padded = np.append(np.zeros(count - 1), value)
+    lasted = np.min(np.lib.stride_tricks.sliding_window_view(padded, count), axis=1)
+    return np.maximum(np.maximum.accumulate(lasted), 0.0)
+
+
+def _along_lines(at_s: Array, values: Array, index: Ints, t_s: Array, gap_s: float) -> Array:
+    """Interpolate linearly. NaN outside the values, and between values further apart than gap_s. index: the value
+    before.
+    """
+    step_s = at_s[index + 1] - at_s[index]
+    share = (t_s - at_s[index]) / step_s
+    result = values[index] * (1.0 - share) + values[index + 1] * share
+    margin = gap_s / step_s
+    inside = (share >= -np.minimum(margin, 0.5)) & (share <= 1.0 + np.minimum(margin, 0.5)) & (step_s <= gap_s)
+    return np.where(inside, result, np.nan)
+
+
+# The time of a video
+
+
+def camera_offset_s(ride: BinMotion, camera: Telemetry) -> tuple[float, float]:
+    """Find the ride's time at the video's first picture.
+
+    A camera on the bike turns with the bike. A camera on a helmet also turns with the head, and may not match.
+
+    Returns:
+        offset: time of the first picture, in s since the ride's first sample.
+        correlation: between the rates of camera and bike at this offset.
+
+    Raises InputError without a match.
+    """
+    cell = np.floor((camera.t_s - camera.t_s[0]) / STEP_S).astype(int)
+    count = np.bincount(cell)
+    rate = np.column_stack([np.bincount(cell, axis) for axis in camera.rate_dps.T]) / np.maximum(count, 1)[:, None]
+    filmed, ridden = _turning(rate - np.median(rate[count > 0], axis=0)), _turning(ride.rate_dps)
+    correlation, common = correlations(ridden, ride.valid, filmed, count > 0)
+    correlation = np.where(common * STEP_S >= _LEAST_S, correlation, 0.0)
+    likely = log_likelihood_ratio(correlation, common, STEP_S / _ALIKE_S)
+    best = peaks(likely, round(_APART_S / STEP_S), 2)
+    if not best or likely[best[0]] < _LEAST_EVIDENCE or correlation[best[0]] < _LEAST_CORRELATION:
+        raise InputError("at no time does the camera turn like the bike")
+    if len(best) > 1 and likely[best[1]] > likely[best[0]] - _LEAST_LEAD:
+        raise InputError("the camera turns like the bike at several times")
+    index = best[0]
+    between = peak_offset(correlation[index - 1 : index + 2]) if 0 < index < len(correlation) - 1 else 0.0
+    shift = index - (len(filmed) - 1) + between
+    return shift * STEP_S - float(camera.t_s[0]), float(correlation[index])
+
+
+def _turning(rate_dps: Array) -> Array:
+    """Compute the magnitude of the rate, shape (n), and remove its slow and quick changes."""
+    size = moving_mean(np.linalg.norm(rate_dps, axis=1), round(_QUICK_S / STEP_S))
+    return size - moving_mean(size, round(_SLOW_S / STEP_S))

@@ -29,10 +29,8 @@ class BadBlock(Exception):
 
 @dataclass
 class Place:
-    """A position that arrived in a turn of the board's loop.
+    """A position that arrived in a turn of the board's loop, in degrees north and east.
 
-    lat_deg: latitude, positive to the north.
-    lon_deg: longitude, positive to the east.
     utc_s: Universal Time in s since 1970, None if the receiver did not know the date.
     """
 
@@ -45,10 +43,9 @@ class Place:
 class StoredTurn:
     """One turn of the board's loop.
 
-    time_us: time of the turn's last sample.
-    n: number of samples.
+    time_us: time of the turn's last sample. n: number of samples.
     sums: sums of the counts of these samples, in the order ax ay az gx gy gz.
-    speed_mps, place: speed and position that arrived in this turn, None if none arrived.
+    speed_mps, place: speed and position that arrived in this turn, else None.
     """
 
     time_us: int
@@ -114,10 +111,8 @@ class StoredBlock:
 def read(content: bytes) -> tuple[list[StoredBlock], list[str]]:
     """Read the complete blocks of a file.
 
-    Returns:
-        blocks: the complete blocks.
-        problems: one text per damaged place. The text CUT_SHORT means that the last block is incomplete. This is not
-            damage.
+    Returns the blocks, and one text per damaged place. CUT_SHORT means that the last block is incomplete, which is no
+    damage.
     """
     blocks, problems = [], []
     offset = 0
@@ -177,12 +172,7 @@ def _places(data: bytes) -> Iterator[tuple[int, Place]]:
 
 
 def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]) -> Iterator[StoredTurn]:
-    """Decode the entries that block_format.encode() writes.
-
-    data: the bytes of the entries.
-    count: number of entries.
-    places: {number of the entry: its position}.
-    """
+    """Decode the `count` entries that block_format.encode() writes. places: {number of the entry: its position}."""
     bits = bin(int.from_bytes(b"\x01" + data, "big"))[3:]
     previous = [1] + [0] * (block_format.FIELDS - 1)
     means = [block_format.START_MEAN] * block_format.FIELDS
@@ -224,10 +214,7 @@ def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]
 
 
 def missing_note(missing_s: list[float]) -> str:
-    """Return a line of text about gaps.
-
-    missing_s: durations of the gaps, in s.
-    """
+    """Return a line of text about gaps. missing_s: their durations in s."""
     times = "once" if len(missing_s) == 1 else f"{len(missing_s)} times"
     return (
         f"readings are missing {times}, {sum(missing_s):.1f} s in all: the sensor was set up again, "

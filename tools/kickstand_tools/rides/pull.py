@@ -60,12 +60,7 @@ _Came = Callable[[str, int], None]  # called with the name of the item that is c
 
 
 class _Part(NamedTuple):
-    """A file of a ride on the board.
-
-    ride: number of the ride.
-    part: number of the file in the ride.
-    size: number of bytes.
-    """
+    """A file of a ride on the board. ride, part: number of the ride and of its file. size: in bytes."""
 
     ride: int
     part: int
@@ -80,7 +75,7 @@ class PulledRide:
     log: the written file, with its calibration beside it, or None if the ride cannot be read.
     seconds, readings: duration of the log and its number of readings.
     problems: one line per fault.
-    whole: True if everything was copied. An end that the board itself lost in a power cut does not count as missing.
+    whole: True if everything was copied. An end that the board lost in a power cut does not count as missing.
     deleted: True if the ride was removed from the board.
     """
 
@@ -95,11 +90,7 @@ class PulledRide:
 
 @dataclass(frozen=True)
 class PullResult:
-    """The result of pull().
-
-    port: name of the board's port.
-    rides: the copied rides, sorted by number.
-    """
+    """The copied rides, sorted by number, and the name of the board's port."""
 
     port: str
     rides: list[PulledRide]
@@ -116,8 +107,7 @@ def pull(
 
     port: the board's port, or a connected board; None for the only board that is plugged in.
     delete: True to remove each completely copied ride from the board.
-    progress: function that is called with (what, done, total). The numbers done and total are in bytes.
-    pulled: function that is called with each finished ride.
+    progress: called with (what, done, total), in bytes. pulled: called with each finished ride.
     Raises InputError if the rides cannot be copied.
     """
     check_directory(out)
@@ -151,13 +141,7 @@ def pull(
 
 
 def _list(transport: ConnectedBoard, name: str) -> tuple[str, str, dict[int, list[_Part]]]:
-    """List the rides on the board.
-
-    Returns:
-        directory: the directory of the rides on the board.
-        vehicle: the vehicle from the board's config.py.
-        rides: {number of the ride: its parts in order}.
-    """
+    """List the rides on the board: their directory, the vehicle in config.py, and {number of the ride: its parts}."""
     first, *lines = printed(transport, name, _LIST, "its rides").splitlines() or [b""]
     directory, vehicle = literal(first, (str, str))
     in_order = sorted(_Part(*literal(line, (int, int, int, str))) for line in lines)
@@ -172,8 +156,8 @@ def _pull_ride(
 ) -> PulledRide:
     """Copy a ride and write its log.
 
-    vehicle: the vehicle from the board's config.py. The vehicle is used only if the alignment was measured or refined
-        by driving, because an alignment by two poses is always a motorcycle's.
+    vehicle: from the board's config.py. It is used only if the alignment was measured by driving, because an alignment
+        by two poses is always a motorcycle's.
     """
     ride = PulledRide(number)
     blocks: list[StoredBlock] = []
@@ -247,41 +231,28 @@ def _free_name(log: Path) -> Path:
 
 
 def _read(transport: ConnectedBoard, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
-    """Read a file of the board.
-
-    Returns:
-        content: the bytes that arrived.
-        whole: True if all announced bytes arrived unchanged.
-    """
-    content, complete = b"", False
+    """Read a file of the board. Returns the bytes that arrived, and True if all announced bytes arrived unchanged."""
+    # base64 needs four characters per three bytes, and two per line end. The file of a running recording may grow.
+    code, most_bytes = _READ.replace("PATH", repr(part.path)), 2 * part.size + 9999
+    longest = b""
     for attempt in range(_TRIES):
-        retry, complete = _try_to_copy(transport, part, title, came if attempt == 0 else _no_progress)
-        content = max(content, retry, key=len) if not complete else retry
-        if complete:
-            break
-    return content, complete
-
-
-def _no_progress(_what: str, _count: int) -> None:
-    """A progress function that shows nothing, for the second attempt."""
-
-
-def _try_to_copy(transport: ConnectedBoard, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
-    """Try once to read a file of the board. Returns the same values as _read()."""
-    content = bytearray()
-    answer = None
-    came(f"pulling {title}", 0)
-    try:
-        # base64 needs four characters per three bytes, and two per line end. The file of a running recording may grow.
-        code = _READ.replace("PATH", repr(part.path))
-        for line in lines(transport, code, _SILENT_S, most_bytes=2 * part.size + 9999):
-            if line.startswith(b"("):
-                answer = literal(line, (int, int))
-                continue
-            with contextlib.suppress(binascii.Error):  # a byte was lost; the check sum will show the loss
-                piece = binascii.a2b_base64(line)
-                content += piece
-                came(f"pulling {title}", len(piece))
-    except BrokenOff as error:
-        raise InputError(f"{part.path} did not arrive completely ({error}): try again, with another cable") from error
-    return bytes(content), len(content) >= part.size and answer == (len(content), binascii.crc32(content))
+        content, answer = bytearray(), None
+        if not attempt:
+            came(f"pulling {title}", 0)
+        try:
+            for line in lines(transport, code, _SILENT_S, most_bytes=most_bytes):
+                if line.startswith(b"("):
+                    answer = literal(line, (int, int))
+                    continue
+                with contextlib.suppress(binascii.Error):  # a byte was lost; the check sum will show the loss
+                    piece = binascii.a2b_base64(line)
+                    content += piece
+                    if not attempt:
+                        came(f"pulling {title}", len(piece))
+        except BrokenOff as error:
+            words = f"{part.path} did not arrive completely ({error}): try again, with another cable"
+            raise InputError(words) from error
+        if len(content) >= part.size and answer == (len(content), binascii.crc32(content)):
+            return bytes(content), True
+        longest = max(longest, bytes(content), key=len)
+    return longest, False

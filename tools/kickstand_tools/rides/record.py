@@ -24,13 +24,7 @@ from .stream import LiveReading, StreamLog, blocks
 
 @dataclass(frozen=True)
 class RecordResult:
-    """The result of record().
-
-    log, calibration: the written files.
-    seconds: duration of the recording.
-    readings: number of readings in the recording.
-    notes: one line per gap or fault.
-    """
+    """The written files, the duration in s, the number of readings, and one line per gap or fault."""
 
     log: Path
     calibration: Path
@@ -51,8 +45,7 @@ def record(
 
     port: the board's port; None for the only board that is plugged in.
     out: path of the log, which ends in .csv or .csv.gz.
-    begin: function that is called with the port's name before the first readings.
-    live: function that is called with a LiveReading every half second.
+    begin: called with the port's name before the first readings. live: called with a LiveReading every half second.
     Raises InputError if a file cannot be written, or if the board sends no readings.
     """
     if not out.name.endswith((".csv", ".csv.gz")):
@@ -81,7 +74,7 @@ def record(
 
 
 def _save_first_calibration(blocks: Iterator[StoredBlock], calibration: Path) -> Iterator[StoredBlock]:
-    """Yield the blocks. Write the first block's calibration to the file `calibration` before yielding this block."""
+    """Yield the blocks. Before the first, write its calibration to the file `calibration`."""
     for i, block in enumerate(blocks):
         if i == 0:
             write_calibration(calibration, ride_log.calibration(block))
@@ -119,10 +112,7 @@ class _GrowingFile(io.TextIOBase):
 
 @contextlib.contextmanager
 def live_line() -> Iterator[Callable[[str], None]]:
-    """A context that gives a function to redraw a line on standard error.
-
-    The function draws nothing if standard error is not a terminal. A closed terminal causes no error.
-    """
+    """A context that gives a function to redraw a line on standard error, if that is a terminal."""
     console = Console(stderr=True) if sys.stderr.isatty() else Console(quiet=True)
     line = Live(console=console, auto_refresh=False, transient=True)
 
@@ -140,21 +130,14 @@ def live_line() -> Iterator[Callable[[str], None]]:
 
 @contextlib.contextmanager
 def _signals(stopped: threading.Event) -> Iterator[None]:
-    """A context in which signals that would end this program only set `stopped`."""
-    handlers = {number: signal.signal(number, lambda *_: stopped.set()) for number in _ending_signals()}
+    """A context in which Ctrl-C, kill and a closed terminal only set `stopped`."""
+    ends = [signal.SIGINT, signal.SIGTERM]
+    # Windows has no SIGHUP, and nohup ignores it
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
+        ends.append(signal.SIGHUP)
+    handlers = {number: signal.signal(number, lambda *_: stopped.set()) for number in ends}
     try:
         yield
     finally:
         for number, handler in handlers.items():
             signal.signal(number, handler)
-
-
-def _ending_signals() -> list[signal.Signals]:
-    """Return the signals that end a recording: Ctrl-C, kill and a closed terminal.
-
-    A closed terminal does not count on Windows and after nohup.
-    """
-    ends = [signal.SIGINT, signal.SIGTERM]
-    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
-        ends.append(signal.SIGHUP)
-    return ends

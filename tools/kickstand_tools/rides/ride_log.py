@@ -12,22 +12,17 @@ from .block_reader import StoredBlock, StoredTurn
 
 
 def header(track: Sequence[str]) -> tuple[str, ...]:
-    """Return the log's column names.
-
-    track: the columns of TRACK that this log has.
-    """
+    """Return the log's column names. track: the columns of TRACK that this log has."""
     return (*COLUMNS, *track, "temp_c")
 
 
 def rows(blocks: Iterable[StoredBlock], track: Sequence[str], from_us: int = 0) -> Iterator[list[str]]:
-    """Yield one row per turn of the board's loop.
+    """Yield one row per turn of the board's loop: the time of its last sample and the mean of its samples.
 
-    A row contains the time of the turn's last sample and the mean of the turn's samples.
     Values have enough digits to distinguish single counts of the chip. Only the first row of each block has the
     temperature.
 
-    track: the columns of TRACK that this log has.
-    from_us: the board's time at which the log's time is 0, in us.
+    track: the columns of TRACK that this log has. from_us: the board's time at which the log's time is 0.
     """
     for block in blocks:
         lsb, gyro_lsb = block.accel_lsb_per_g, block.gyro_lsb_tenths / 10
@@ -45,7 +40,7 @@ def rows(blocks: Iterable[StoredBlock], track: Sequence[str], from_us: int = 0) 
 
 
 def _track_cells(turn: StoredTurn) -> dict[str, str]:
-    """Return the cells of the columns TRACK, with the values that the speed source sent in this turn."""
+    """Return the cells of the columns TRACK, with the values that arrived in this turn."""
     cells: dict[str, str] = dict.fromkeys(TRACK, "")
     if turn.speed_mps is not None:
         cells["speed_mps"] = f"{turn.speed_mps:.2f}"
@@ -77,10 +72,7 @@ def calibration(block: StoredBlock) -> CalibrationFile:
 
 
 def write(path: Path, blocks: list[StoredBlock]) -> Path:
-    """Write the log `path` (NAME.csv.gz or NAME.csv), and NAME.cal.json beside it.
-
-    Returns the path of NAME.cal.json.
-    """
+    """Write the log NAME.csv.gz or NAME.csv, and NAME.cal.json beside it. Returns the path of NAME.cal.json."""
     turns = [turn for block in blocks for turn in block.turns]
     columns = {
         "speed_mps": any(turn.speed_mps is not None for turn in turns),

@@ -28,16 +28,13 @@ CHANGED = "the board's calibration has changed: the log ends here"
 class LiveReading:
     """The readings of half a second.
 
-    aligned: True if the sensor is aligned.
-    car: True if the board is set to a vehicle that does not lean.
-    moments: one tuple per turn of the board's loop. Its values are:
-        1. the time since the start of the recording, in s.
-        2. the lean in degrees, positive to the right. It is None for a car, and if it is too uncertain to be shown.
-        3. the specific force forward, in g.
-        4. the specific force to the left, in g. It is None for a motorcycle, because it is near 0 in a bend.
-        The last three values are None if the sensor is not aligned.
-    max_left_deg, max_right_deg, max_accel_g, max_brake_g: maxima since the start of the recording, as on the display.
-        They are 0 if the sensor is not aligned.
+    aligned: True if the sensor is aligned. car: True if the board is set to a vehicle that does not lean.
+    moments: one tuple per turn of the board's loop: the time since the start of the recording in s; the lean in
+        degrees, positive to the right, None for a car and if it is too uncertain to be shown; the specific forces
+        forward and to the left in g, the latter None for a motorcycle, because it is near 0 in a bend. Without an
+        alignment only the time is known.
+    max_left_deg, max_right_deg, max_accel_g, max_brake_g: maxima since the start of the recording, as on the display; 0
+        if the sensor is not aligned.
     rate_hz: turns of the board's loop per second.
     seconds: time since the start of the recording.
     """
@@ -56,11 +53,8 @@ class LiveReading:
 class StreamLog:
     """Writes blocks to a log. If a write fails, the log ends there, with a note.
 
-    stopped: an event that ends the stream. This class sets it if the log must end.
-    live: called with each block's LiveReading.
-    first: the first block.
-    seconds, count: duration and number of readings so far.
-    written: True once the log contains a block.
+    stopped: an event that ends the stream, also set here if the log must end. live: called with each LiveReading.
+    first: the first block. seconds, count: duration and number of readings. written: True once the log has a block.
     """
 
     def __init__(self, stopped: threading.Event, live: Callable[[LiveReading], None] | None = None) -> None:
@@ -74,9 +68,7 @@ class StreamLog:
     def write(self, file: TextIOBase, blocks: Iterator[StoredBlock], notes: list[str]) -> None:
         """Write each block when it arrives.
 
-        file: the log.
-        blocks: the blocks from the board.
-        notes: list to which a line is appended for each kind of gap or fault.
+        notes: a line is appended for each kind of gap or fault.
         Raises InputError if no block was written.
         """
         missing, expected = 0, 0
@@ -139,8 +131,7 @@ class StreamLog:
 def blocks(transport: ConnectedBoard, name: str, notes: list[str], stopped: threading.Event) -> Iterator[StoredBlock]:
     """Yield the complete blocks that the board sends, until `stopped` is set or the connection is lost.
 
-    name: name of the port, "" on a page.
-    notes: list to which the reason is appended if the stream ends early.
+    name: name of the port, "" on a page. notes: the reason is appended if the stream ends early.
     Raises InputError if the firmware on the board cannot stream.
     """
     parts: list[bytes] = []

@@ -11,38 +11,33 @@ def stream():
     from errno import ETIMEDOUT
     from time import ticks_diff, ticks_ms
 
-    from kickstand import devices, settings
+    from kickstand import settings
     from kickstand.app import App
     from kickstand.board import port
     from kickstand.console import say
 
     class RideStream:
-        """Has the same methods as a RideFiles, but writes to the console."""
+        """Writes a ride to the console. It has the methods of RideFiles (kickstand.rides)."""
 
         stops_interrupts = False
 
         def begin(self):
-            """Begin a ride. The number of the ride is always 0."""
             self._slow_ms = None
-            return 0
+            return 0  # the number of the ride
 
         def next_length(self):
-            """Return the number of bytes in a ride block over USB, about half a second of a ride."""
-            return 512
+            return 512  # bytes in a block, about half a second of a ride
 
         def room(self):
-            """Return None, because there is no limit."""
+            return None  # no limit
 
         def ready(self):
-            """Return True, because a block can be written at any time."""
             return True
 
         def write(self, data):
-            """Write the next bytes of the block as one line. Raises OSError."""
             self._say(b2a_base64(data).decode())
 
         def end_block(self):
-            """End a block: print the mark. Raises OSError."""
             self._say(".\n")
 
         def _say(self, text):
@@ -53,10 +48,10 @@ def stream():
                 raise OSError(ETIMEDOUT)
 
         def end(self):
-            """End the ride. There is no file to close."""
+            pass
 
         def abandon(self):
-            """End the ride after an error. There is no file to close."""
+            pass
 
         def fault_code(self, error):
             return "out-of-memory" if isinstance(error, MemoryError) else "usb-fault"
@@ -64,6 +59,6 @@ def stream():
     chosen = settings.load()
     print("vehicle", chosen.VEHICLE)
     try:
-        App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen), RideStream()).run()
+        App(chosen, chosen.open_lcd(), chosen.open_sensor(), RideStream()).run()
     except KeyboardInterrupt:
         port.rest_watchdog()

@@ -42,18 +42,17 @@ _LICENCES = "info/licenses/"
 
 
 class _ToolsFinder(ModuleFinder):
-    """Finds only modules of kickstand_tools, because the folder of an installed kickstand_tools has other packages."""
+    """Finds only modules of these packages, because the folder of an installed kickstand_tools has other packages."""
 
     def find_module(self, name: str, path: Any, parent: Any = None) -> Any:
-        if path is None and name != "kickstand_tools":
+        if path is None and name not in ("kickstand_tools", "kickstand_sim"):
             raise ImportError(name)
         return super().find_module(name, path, parent)
 
 
 def tools(*modules: str) -> dict[str, Path]:
-    """Find the files of some modules of kickstand_tools and of all its modules that they import, also in functions.
+    """Find the files of some modules of kickstand_tools, such as "web/device.py", and all its modules that they import.
 
-    modules: paths in kickstand_tools, such as "web/device.py".
     Returns {path below tools/: file}, also with the templates, scripts and style sheets in the modules' folders.
     """
     finder = _ToolsFinder([str(firmware_path.TOOLS)])
@@ -76,13 +75,11 @@ def zipped(contents: Mapping[str, bytes]) -> bytes:
 
 
 def install_archive() -> bytes:
-    """Pack what the browser needs to install the firmware and to read a board.
+    """Pack what the browser needs to install the firmware and to read a board, in these folders:
 
-    The ZIP file contains these folders:
-        tools/: the tools of `kickstand flash`, `record` and `pull`.
-        firmware/: the firmware's sources.
-        compiled/: the firmware compiled for every architecture in ARCHITECTURES.
-        mpremote/, serial/: mpremote, and a replacement of pyserial.
+    tools/: the tools of `kickstand flash`, `record` and `pull`.
+    firmware/, compiled/: the firmware's sources, and compiled for every architecture in ARCHITECTURES.
+    mpremote/, serial/: mpremote, and a replacement of pyserial.
     """
     files = {f"mpremote/{name}": Path(mpremote.__file__).parent / name for name in _MPREMOTE}
     files |= {f"tools/{name}": path for name, path in tools("web/browser_cable.py", "web/browser_install.py").items()}
@@ -91,17 +88,15 @@ def install_archive() -> bytes:
 
 
 def firmware() -> bytes:
-    """Pack the firmware for riders whose browser cannot connect to a board. These riders copy the firmware with
-    mpremote.
-    """
+    """Pack the firmware for riders whose browser cannot connect to a board. They copy it with mpremote."""
     return zipped({f"kickstand-firmware{path}": source.read_bytes() for path, source in firmware_files().items()})
 
 
 def _compiled() -> dict[str, bytes]:
-    """Compile the firmware for every architecture in ARCHITECTURES.
+    """Compile the firmware for every architecture. Returns {compiled/ARCHITECTURE/... .mpy: content}.
 
-    Returns {compiled/ARCHITECTURE/... .mpy: content}. The first architecture has all files. The other architectures
-    have only the files with machine code. Without a compiler the result is empty, and the board gets the sources.
+    The first architecture has all files, the others only those with machine code. Without a compiler the result is
+    empty, and the board gets the sources.
     """
     sources = sorted(firmware_path.PACKAGE.rglob("*.py"))
     first, *remaining = ARCHITECTURES
@@ -121,11 +116,10 @@ def _compiled() -> dict[str, bytes]:
 
 
 def rides_archive() -> bytes:
-    """Pack what the browser needs for `kickstand report` and `plot`.
+    """Pack what the browser needs for `kickstand report` and `plot`: tools, the firmware's package, and libraries.
 
-    The ZIP file contains the tools, the firmware's package, fitdecode, gpxpy, Jinja and markupsafe. The compiled module
-    of markupsafe is left out, because markupsafe also has this module in Python.
-    Raises InputError if fitdecode or gpxpy is not installed.
+    Markupsafe's compiled module is left out, because it also has this module in Python. Raises InputError if fitdecode
+    or gpxpy is not installed.
     """
     try:
         import fitdecode
@@ -140,12 +134,9 @@ def rides_archive() -> bytes:
 
 
 def numpy_archive(conda: bytes) -> tuple[bytes, bytes]:
-    """Extract numpy from its conda package.
+    """Extract numpy from its conda package of emscripten-forge.
 
-    conda: content of the package from emscripten-forge.
-    Returns:
-        archive: a ZIP file from which numpy can be imported.
-        licences: the text of its licences.
+    Returns a ZIP file from which numpy can be imported, and the text of its licences.
     """
     members, licences = {}, b""
     with tarfile.open(fileobj=io.BytesIO(conda)) as package:

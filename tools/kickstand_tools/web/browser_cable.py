@@ -28,14 +28,12 @@ class LiveStream:
         self._began = datetime.now()
 
     def run(self, line, name, live):
-        """Receive the stream until stop() is called, or until no more data arrives. Then files() returns the log.
+        """Receive the stream until stop() is called or no more data arrives. Then files() returns the log.
 
-        line: the SerialLine of the board.
-        name: name of the port.
-        live: function that is called every half second with the fields of a LiveReading as JSON.
-        Returns JSON, either {"refused": reason} or an object with:
-            notes: lines about missing parts of the log.
-            changed: true if the log ended because the board's calibration changed.
+        line: the board's SerialLine. name: name of the port.
+        live: called every half second with the fields of a LiveReading as JSON.
+        Returns JSON: {"refused": reason}, or {"notes": lines about missing parts, "changed": true if the board's
+        calibration changed}.
         """
         self._recording = stream.StreamLog(self._stopped, lambda reading: live(json.dumps(vars(reading))))
         notes = []
@@ -57,9 +55,8 @@ class LiveStream:
         self._stopped.set()
 
     def files(self):
-        """Return [(name, content)] of the log and its calibration, in the formats of `kickstand record`.
-
-        The list is empty before the first readings.
+        """Return [(name, content)] of the log and its calibration, as `kickstand record` writes them. Empty before the
+        first readings.
         """
         first = self._recording and self._recording.first
         if not first:
@@ -72,15 +69,12 @@ class LiveStream:
 
 
 def pull(line, name, progress):
-    """Fetch the rides from a board.
+    """Fetch the rides from the board at a SerialLine. progress: called with (what, done, total), in bytes.
 
-    line: the SerialLine of the board.
-    name: name of the port.
-    progress: function that is called with (what, done, total). The numbers done and total are in bytes.
     Returns:
-        result: JSON of {"refused": the reason for an early end, or null, "rides": a list}. Each ride is an object with
-            the fields of PulledRide. Its "log" is the file's name, or null.
-        files: [(name, content)] of the logs and their calibrations, in the formats of `kickstand pull`.
+        result: JSON of {"refused": the reason for an early end, or null, "rides": the fields of each PulledRide}.
+        The field "log" is the file's name.
+        files: [(name, content)] of the logs and their calibrations, as `kickstand pull` writes them.
     """
     refused, rides = None, []
     with tempfile.TemporaryDirectory() as directory:

@@ -11,7 +11,16 @@ from pathlib import Path
 
 from ..common import firmware_path
 from ..common.errors import InputError
-from ..deploy import bytecode, check as board_check, config_check, config_text, connection, flash, others
+from ..deploy import (
+    bytecode,
+    check as board_check,
+    config_check,
+    config_text,
+    connection,
+    flash,
+    others,
+    status as board_status,
+)
 from ..deploy.firmware_files import CONFIG
 from .browser_serial import BrowserBoard
 
@@ -26,12 +35,10 @@ class Installation:
     def look(self, line, name):
         """Identify the board, read its config.py, and restart the board.
 
-        line: the SerialLine of the board.
-        name: name of the port, for messages.
+        line: the board's SerialLine. name: name of the port.
         Returns {"refused": reason} or:
             board: the board in words.
-            settings: {name: value in config.py}.
-            usual: {name: default value}.
+            settings, usual: {name: value} of config.py and of the defaults.
             by_hand: the reason why the form cannot change this config.py, or null.
             others: one line per file of another project that install() will rename.
         """
@@ -66,10 +73,8 @@ class Installation:
     def check(self, settings):
         """Check the config.py with new settings by the firmware's own rules.
 
-        wanted: JSON of {name: value, or null for the default}.
-        Returns:
-            text: the new config.py.
-            fault: [name of the setting or null, reason], or null if there is no fault.
+        settings: JSON of {name: value, or null for the default}.
+        Returns the new config.py as "text", and as "fault" [name of the setting or null, reason], or null.
         """
         text = self._template if self._own is None else self._own
         values = json.loads(settings)
@@ -109,27 +114,22 @@ class Installation:
             result = flash.flash(board, replaces, progress, compiler=_compiled, judge=_judged)
         except InputError as error:
             return json.dumps({"refused": error.line(page=True)})
-        installed = result.installed
-        counts = {"copied": len(installed.copied), "kept": len(installed.kept)}
-        return json.dumps({"board": result.board, "config_kept": CONFIG not in installed.copied} | counts)
+        counts = {"copied": len(result.update.copy), "kept": len(result.update.keep)}
+        return json.dumps({"board": result.board, "config_kept": CONFIG not in result.update.copy} | counts)
 
 
 def status(line, name):
-    """Run `kickstand status` for the board at a SerialLine.
-
-    Returns {"text": the output} or {"refused": reason}.
-    """
+    """Run `kickstand status` for the board at a SerialLine. Returns {"text": the output} or {"refused": reason}."""
     try:
-        return json.dumps({"text": connection.status(BrowserBoard(line, name))})
+        return json.dumps({"text": board_status.status(BrowserBoard(line, name))})
     except InputError as error:
         return json.dumps({"refused": error.line(page=True)})
 
 
 def check(line, name, say):
-    """Run `kickstand check` on the board at a SerialLine.
+    """Run `kickstand check` on the board at a SerialLine. Returns {"text": its output} or {"refused": reason}.
 
-    say: function that is called with each line of text during the check.
-    Returns {"text": the findings and the verdict} or {"refused": reason}.
+    say: called with each line of text during the check.
     """
     try:
         checked = board_check.check(BrowserBoard(line, name), say)
@@ -145,10 +145,7 @@ def _written(value):
 
 
 def _compiled(source, architecture):
-    """Read a compiled file from the archive instead of calling bytecode.cross_compiled().
-
-    Only files with machine code differ between the boards.
-    """
+    """Read a compiled file from the archive. Only files with machine code differ between the boards."""
     folders = [ROOT / "compiled" / one for one in (architecture, COMMON)]
     path = source.relative_to(firmware_path.PACKAGE).with_suffix(".mpy")
     if not folders[0].is_dir():

@@ -26,6 +26,7 @@ from ..common.errors import InputError
 from ..estimation.alignment import fit_ride
 from ..estimation.smooth import COLUMNS, DIGITS, smooth_to_csv
 from ..imports import mapped
+from ..imports.findings import Findings
 from ..imports.importing import import_recording, write_imported
 from ..joining.joined import join_track, write_joined
 from ..logs.csv_lines import write_lean
@@ -58,11 +59,9 @@ def in_json(function: Callable[..., Any]) -> Callable[..., str]:
 def rides(folder, names):
     """Identify the given files.
 
-    folder: the folder of the files.
-    names: their names as a JSON list, in the order in which the user chose them.
+    folder: the folder of the files. names: JSON list of their names, in the order in which the user chose them.
     Returns:
-        rides: list of objects, sorted by name. Each has the fields of FilesOfRide, "table" as from asked_for(), and
-            "isLog": true if the ride is a log of Kickstand.
+        rides: sorted by name. Each has the fields of FilesOfRide, "table" as from asked_for(), and "isLog".
         kinds: {name: kind of the file}.
         why: {name: reason why the file cannot be used}.
     """
@@ -81,18 +80,17 @@ def rides(folder, names):
     return {"rides": rides, "kinds": inputs.kinds, "why": refused}
 
 
-def asked_for(table: mapped.MappedTable) -> dict[str, Any]:
+def asked_for(findings: Findings) -> dict[str, Any]:
     """Prepare the page's questions about the columns and units of a table.
 
     Returns:
         columns: names of all columns.
         keys: list of [key, words, required, probable column or ""].
-        units: list of [key, words, choices, probable unit, reason]. The choices are a list of [unit, words].
+        units: list of [key, words, choices as [unit, words], probable unit, reason].
         lacking: the missing columns in words.
         certain: true if all required columns are certain.
-        picture: result of MappedTable.first_seconds().
+        picture: see Findings.first_seconds().
     """
-    findings = table.findings
     keys = [[key, words, key in mapped.REQUIRED, findings.columns.get(key, "")] for key, words in mapped.WORDS.items()]
     units = []
     for key, words in (("t", "time"), ("a", "acceleration"), ("g", "rates"), ("speed", "speed")):
@@ -102,22 +100,20 @@ def asked_for(table: mapped.MappedTable) -> dict[str, Any]:
             choices.insert(0, likely)
         units.append([key, f"unit of the {words}", [[unit, unit] for unit in choices], likely, reason])
     units[1][2] += [[f"-{unit}", f"{unit}, all of the opposite sign"] for unit, _ in list(units[1][2])]
-    words = {"lacking": table.lacking, "certain": findings.decided, "picture": table.first_seconds()}
-    return {"columns": table.sheet.columns, "keys": keys, "units": units} | words
+    words = {"lacking": findings.lacking_words, "certain": findings.decided, "picture": findings.first_seconds()}
+    return {"columns": findings.sheet.columns, "keys": keys, "units": units} | words
 
 
 @in_json
 def take(log, is_log, columns, units, track, progress):
     """Import a recording that is not a log, and join a track if there is one.
 
-    log: name of the log or recording.
-    is_log: True if it is a log of Kickstand.
-    columns, units: the values of --columns and --units for a table, as JSON; otherwise "{}".
+    log: name of the log or recording. is_log: True for a log of Kickstand.
+    columns, units: JSON of the values of --columns and --units for a table, else "{}".
     track: name of a .gpx or .fit file, or "".
-    progress: function that is called with the progress of the join.
     Returns {"log": log} for a log without a track, otherwise:
-        log: path of the new log, or the given log if the track could not be joined to it.
-        path: path of the new log. It is missing if no new log was written.
+        log: path of the log to use.
+        path: the same for a new log; missing without one.
         warnings: list of messages.
         words: a sentence about the quality of the join, or "".
     """
@@ -144,16 +140,13 @@ def take(log, is_log, columns, units, track, progress):
 
 @in_json
 def look(log, calibration, progress):
-    """Compute the results of `report` and `plot`.
+    """Compute the results of `report` and `plot`. log, calibration: names of the files.
 
-    log, calibration: names of the files.
-    progress: function that is called with (done, total).
     Returns:
         words: the fields of report.Words, with the units, title and terms of the table of stops.
         json: result of report.as_data(), with the name of the ride.
         warnings: list of messages.
-        page: HTML of the plot.
-        plotly: address of the script that this HTML loads.
+        page: HTML of the plot. plotly: address of the script that this HTML loads.
         stem: name of the ride without suffixes.
     """
     _smoothed.clear()
@@ -172,10 +165,7 @@ def look(log, calibration, progress):
 
 @in_json
 def smooth(log, calibration, progress):
-    """Write LEAN.csv as `smooth` does. If look() has already computed the lean of this ride, it is reused.
-
-    Returns {"path": path of LEAN.csv}.
-    """
+    """Write LEAN.csv as `smooth` does, from the lean of look() if that was of this ride. Returns {"path": its path}."""
     file, out = Path(log), _result_path(log, f"{log_stem(log)}.lean.csv")
     smoothed = _smoothed.get(log)
     if smoothed:
@@ -187,11 +177,8 @@ def smooth(log, calibration, progress):
 
 @in_json
 def align(log, progress):
-    """Write a calibration as `calibrate ride` does.
-
-    Returns:
-        path: path of the calibration.
-        roll_deg, pitch_deg, yaw_deg: its standard errors.
+    """Write a calibration as `calibrate ride` does. Returns its path, and its standard errors roll_deg, pitch_deg,
+    yaw_deg.
     """
     fit = fit_ride(Path(log), progress=progress)
     out = _result_path(log, calibration_path(Path(log)).name)
@@ -215,8 +202,7 @@ def _one_line(text):
 def raising(function):
     """A decorator that makes a function of numpy.linalg raise LinAlgError for a singular matrix.
 
-    On other platforms numpy detects a singular matrix from the processor's flags of floating-point errors. WebAssembly
-    has no such flags, so the result would be NaN.
+    Elsewhere numpy detects it from the processor's flags of floating-point errors, which WebAssembly does not have.
     """
 
     @functools.wraps(function)
@@ -230,5 +216,5 @@ def raising(function):
 
 
 def prepare():
-    """Prepare the module. Call this function once, before all other functions."""
+    """Prepare the module. Call this function once, first."""
     np.linalg.inv, np.linalg.solve = raising(np.linalg.inv), raising(np.linalg.solve)

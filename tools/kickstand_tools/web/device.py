@@ -10,12 +10,13 @@ The module runs on MicroPython (in the browser and elsewhere) and on CPython.
 
 import json
 
-from ..demo.hand_bike import HandBike
-from ..simulated_board.clock import PowerOff, Reset, to_us
-from ..simulated_board.lcd import shown_lean
-from ..simulated_board.oled import Oled
-from ..simulated_board.simulator import Board
-from ..simulation.scripted.sensor_errors import Sensor
+from kickstand_sim.demo.hand_bike import HandBike
+from kickstand_sim.simulated_board import app_state
+from kickstand_sim.simulated_board.clock import PowerOff, Reset, to_us
+from kickstand_sim.simulated_board.lcd import shown_lean
+from kickstand_sim.simulated_board.oled import Oled
+from kickstand_sim.simulated_board.simulator import Board
+from kickstand_sim.simulation.scripted.sensor_errors import Sensor
 
 PART_SEED = 1
 PART_SHARE = 0.5  # the simulated sensor's errors, as a share of the data sheet's limits
@@ -50,16 +51,15 @@ class Device:
         self.board.install()
 
     def act(self, name, value):
-        """Do an action at the board's present time.
+        """Do an action at the board's present time. Names and values:
 
-        These are the names of the actions and their values:
-            button: True to press it, False to release it.
-            pose: "kickstand", "upright", or a speed in m/s at which the bike rides.
-            lean: the lean in degrees, positive to the right.
-            sensor: False to pull the sensor's wire, True to plug it in.
-            display: "lcd", "ssd1306" or "sh1106".
-            cut_save: True to cut the supply during the next save of a calibration, False to cancel this.
-            power: True or False.
+        button: True to press it, False to release it.
+        pose: "kickstand", "upright", or a speed in m/s at which the bike rides.
+        lean: the lean in degrees, positive to the right.
+        sensor: False to pull the sensor's wire, True to plug it in.
+        display: "lcd", "ssd1306" or "sh1106".
+        cut_save: True to cut the supply during the next save of a calibration, False to cancel this.
+        power: True or False.
         """
         board = self.board
         if name == "button":
@@ -138,8 +138,7 @@ class Device:
     def _whole(self):
         """Return True if the display's text is complete, False while the firmware writes to the display.
 
-        The firmware writes some characters in each pass of its loop. A pass is shorter than a tick. So the text is
-        complete if the display did not change during a tick.
+        The firmware writes some characters in each pass of its loop, which is shorter than a tick.
         """
         changes = self.board.lcd.changes
         still = changes == self._changes
@@ -148,16 +147,13 @@ class Device:
         return still or self._held > WHOLE_TICKS
 
     def state(self) -> "dict | None":
-        """Return the entries of App.state() that STATE names.
-
-        Without an App, return only the view: "off", "starting" or "safe".
-        """
+        """Return the entries of STATE. Without an App: the view "off", "starting" or "safe"."""
         return None
 
     def meter(self) -> "list | None":
         """Return the lean meter's [lean_deg, forward_g], or None without a meter.
 
-        lean_deg is None if the meter does not trust it. Both values are None before the alignment.
+        lean_deg is None if the meter does not trust it, and both values before the alignment.
         """
         return None
 
@@ -171,30 +167,26 @@ class Device:
         return state
 
     def take(self):
-        """Return the records since the last call, one per TICK_S, as a JSON list of objects.
+        """Return the records since the last call, one per TICK_S, as a JSON list of objects:
 
-        Each object has these fields:
-            t_s: the board's time.
-            lean_deg, speed_mps, yaw_rate_dps, phase: the bike's true motion.
-            powered: False while the supply is off.
-            meter: result of meter(); missing without a meter.
-            display: result of display(); missing if it has not changed.
-            state: result of state(); missing if it has not changed.
+        t_s: the board's time.
+        lean_deg, speed_mps, yaw_rate_dps, phase: the bike's true motion.
+        powered: False while the supply is off.
+        meter: result of meter(); missing without a meter.
+        display, state: results of display() and state(); missing if unchanged.
         """
         ticks, self._ticks = self._ticks, []
         return json.dumps(ticks)
 
 
 def display(lcd):
-    """Return what a display shows.
+    """Return what a display shows:
 
-    The result has these entries:
-        codes: the character codes of both lines; only for an LCD.
-        cgram: the character memory, 8 rows for each of 8 characters; only for an LCD.
-        pixels: 64 rows of 128 pixels, 8 pixels per byte, the leftmost in bit 7; only for an OLED.
-        lit: True if the display is lit.
-        text: the text of both lines.
-        shown_deg: the lean that the text shows, in degrees, or None.
+    codes, cgram: character codes of both lines, and 8 rows for each of 8 characters; only for an LCD.
+    pixels: 64 rows of 128 pixels, 8 pixels per byte, the leftmost in bit 7; only for an OLED.
+    lit: True if the display is lit.
+    text: the text of both lines.
+    shown_deg: the lean that the text shows, in degrees, or None.
     """
     text = lcd.text()
     if isinstance(lcd, Oled):
@@ -249,7 +241,7 @@ class PageDevice(Device):
     def state(self):
         if not self._app:
             return {"view": "safe" if self._stopped else "starting" if self.powered else "off"}
-        state = self._app.state()
+        state = app_state.state(self._app)
         return {name: state[name] for name in STATE}
 
     def _hand_over(self, app):

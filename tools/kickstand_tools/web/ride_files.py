@@ -10,6 +10,7 @@ from ..calibration.file import calibration_path, read_calibration
 from ..common.errors import InputError
 from ..imports import mapped
 from ..imports.files import RecordingFile, read_files
+from ..imports.findings import Findings
 from ..imports.importing import recordings
 from ..joining.track_files import read_track
 from ..logs.reader import is_log
@@ -24,7 +25,7 @@ class FilesOfRide:
     calibration: str = ""  # name of its calibration file, or ""
     track: str = ""  # name of a .gpx or .fit file to join with the ride, or ""
     # The table whose columns the user must choose; None if the columns are known
-    table: mapped.MappedTable | None = None
+    table: Findings | None = None
 
 
 @dataclass
@@ -103,7 +104,7 @@ def _recordings_among(files: list[RecordingFile]) -> Iterator[tuple[str, list[Re
         yield group[0].name if len(group) == 1 else _in_folder(f"{app.NAME} recording", group), group
     remaining = [file for file in files if id(file) not in used]
     table = mapped.table_in(remaining) if len(remaining) > 1 else None
-    if table is not None and table.joined and not table.findings.lacking:
+    if table is not None and table.joined and not table.lacking:
         yield _in_folder("recording", remaining), remaining
     else:
         yield from ((file.name, [file]) for file in remaining)

@@ -7,12 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from kickstand_sim.simulation.files import positions, simulate, write_poses, write_ride
+from kickstand_sim.simulation.ride import SimulatedRide
 
 from ..calibration.file import write_calibration
 from ..calibration.poses import fit_six_positions, fit_two_positions
 from ..common.svg import drawing, element, path
-from ..simulation.files import positions, simulate, write_poses, write_ride
-from ..simulation.ride import SimulatedRide
 
 LOG, CALIBRATION = "simulated-ride.csv.gz", "simulated-ride.cal.json"
 PROFILE, SEED, SECONDS = "street", 2, 180.0

@@ -1,18 +1,17 @@
-"""The commands that the workshop adds to `kickstand`: evaluate, bands and bench."""
+"""The commands that the workshop adds to `kickstand`: evaluate and bands."""
 
 import json
 from pathlib import Path
 from typing import Any
 
 import click
-from kickstand_emulator.commands import CHIP, ready_emulator
+from kickstand_sim.simulation.physics.mount import MOUNTS
+from kickstand_sim.simulation.physics.road import CLASSES
+from kickstand_sim.simulation.profiles import MAIN, check_profile
 from kickstand_tools.cli.common import JSON, PATH, warn
 from kickstand_tools.cli.simulated import LINES_S, PROFILE_NAMES, pose_options, seconds_option
 from kickstand_tools.common.errors import extra
 from kickstand_tools.common.progress import Bar
-from kickstand_tools.simulation.physics.mount import MOUNTS
-from kickstand_tools.simulation.physics.road import CLASSES
-from kickstand_tools.simulation.profiles import MAIN, check_profile
 from rich.console import Console
 
 from .evaluation import bands, integrity, report, runs
@@ -109,16 +108,3 @@ def bands_command(
             bar.advance(1)
     data = {name: {key: rms.tolist() for key, rms in figures.items()} for name, figures in rides.items()}
     _print({"bands_hz": bands.BANDS_HZ, "rides": data} if as_json else bands.table(rides))
-
-
-@click.command()
-@click.option("--seconds", type=click.IntRange(1, 600), default=10, help="Emulated time of each run.")
-@CHIP
-@JSON
-def bench_command(seconds: int, chip: str, as_json: bool) -> None:
-    """Measure what the firmware costs on an emulated board: time, memory, flash."""
-    ready_emulator(chip)
-    from .bench.bench import bench, tables
-
-    result = bench(seconds, chip)
-    _print(result if as_json else tables(result))

@@ -13,12 +13,14 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
-TESTS = ROOT / "host_tests"
+TESTS = [ROOT / "host_tests", ROOT / "tools" / "fleet" / "tests", ROOT / "tools" / "emulator" / "tests"]
+PLUGIN = "host_tests.support.plugin"  # used by all tests
 PRODUCT = {
     "kickstand": ROOT / "firmware",
     "kickstand_tools": ROOT / "tools",
-    "kickstand_fleet": ROOT / "tools",
-    "kickstand_emulator": ROOT / "tools",
+    "kickstand_sim": ROOT / "tools",
+    "kickstand_fleet": ROOT / "tools" / "fleet",
+    "kickstand_emulator": ROOT / "tools" / "emulator",
     "kickstand_workshop": ROOT / "tools" / "workshop",
 }
 HARDWARE = {"machine", "micropython", "esp32", "rp2", "neopixel", "network", "bluetooth"}
@@ -30,13 +32,13 @@ def import_graph(tests: bool = False) -> dict[str, set[str]]:
     """Return {module: the modules that it imports}, also within functions and for type checking only.
 
     The names are absolute. The modules of the product, MicroPython's hardware modules, and if `tests` is True also the
-    tests (`host_tests.FOLDER.NAME`) are included.
+    tests (`host_tests.FOLDER.NAME`, `tools.fleet.tests.NAME`) are included.
     """
     files = {}
     for package, folder in PRODUCT.items():
         files |= {_name(path, folder): path for path in sorted((folder / package).rglob("*.py"))}
     if tests:
-        files |= {_name(path, ROOT): path for path in sorted(TESTS.rglob("*.py"))}
+        files |= {_name(path, ROOT): path for folder in TESTS for path in sorted(folder.rglob("*.py"))}
     return {name: set(_imports(name, path, files.keys() | HARDWARE)) - {name} for name, path in files.items()}
 
 
@@ -51,10 +53,7 @@ def reached_tests(changed: Iterable[str]) -> list[str]:
         if module not in reached:
             reached.add(module)
             queue += importers[module]
-    paths = [f"{name.replace('.', '/')}.py" for name in sorted(reached)]
-    return [
-        path for path in paths if Path(path).match("host_tests/**/test_*.py") or path.startswith("host_tests/test_")
-    ]
+    return [f"{name.replace('.', '/')}.py" for name in sorted(reached) if name.rpartition(".")[2].startswith("test_")]
 
 
 def _name(path: Path, folder: Path) -> str:
@@ -62,7 +61,6 @@ def _name(path: Path, folder: Path) -> str:
 
 
 def _imports(name: str, path: Path, modules: Iterable[str]) -> Iterator[str]:
-    """Yield the modules that a file imports. A test also has the conftest.py of its folders."""
     package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
     candidates = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -73,23 +71,20 @@ def _imports(name: str, path: Path, modules: Iterable[str]) -> Iterator[str]:
             base = ".".join([*base, *([node.module] if node.module else [])])
             below = [f"{base}.{alias.name}" for alias in node.names]
             candidates += [option for module in below for option in ([module] if module in modules else [module, base])]
-    if name.startswith("host_tests."):
+    if name.startswith(("host_tests.", "tools.")):
         folders = [".".join(package[:depth]) for depth in range(1, len(package) + 1)]
         candidates = [f"{folder}{module}" for module in candidates for folder in ("", "host_tests.", f"{folders[-1]}.")]
-        candidates += [f"{folder}.conftest" for folder in folders]
+        candidates += [PLUGIN, *(f"{folder}.conftest" for folder in folders)]
     yield from (module for module in candidates if module in modules)
 
 
 def _modules(path: Path, modules: Iterable[str]) -> set[str]:
-    """Return the modules that change with a file."""
-    for package, folder in {**PRODUCT, "host_tests": ROOT}.items():
-        if path.is_relative_to(folder / package):
+    for top, folder in [(folder / package, folder) for package, folder in PRODUCT.items()] + [(t, ROOT) for t in TESTS]:
+        if path.is_relative_to(top):
             name = _name(path, folder)
             if path.suffix == ".py":
                 return {name} & set(modules)
-            parents = [
-                f"{_name(parent, folder)}." for parent in path.parents if parent.is_relative_to(folder / package)
-            ]
+            parents = [f"{_name(parent, folder)}." for parent in path.parents if parent.is_relative_to(top)]
             inside = [{module for module in modules if f"{module}.".startswith(parent)} for parent in parents]
             return next(filter(None, inside), set(modules))
     return set(modules)

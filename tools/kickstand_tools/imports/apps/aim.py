@@ -10,7 +10,7 @@ import numpy as np
 
 from ...common.errors import InputError
 from ..files import RecordingFile
-from ..recording import AppRecording, names_in, plain, read_sheet, sensor_of, track_of, unit_in
+from ..recording import AppRecording, names_in, names_line, plain, read_sheet, sensor_of, track_of, unit_in
 from ..units import SPEEDS, unit
 
 NAME = "AiM"
@@ -25,16 +25,12 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing column or sensor."""
-    lines = [names_in(line) for line in files[0].text.split("\n", 60)[:60]]
-    header = next(
-        (k for k, cells in enumerate(lines) if cells and cells[0] == "Time" and sum(map(bool, cells)) > 3), None
-    )
+    header = names_line(files[0], lambda cells: cells[:1] == ["Time"] and sum(map(bool, cells)) > 3)
     if header is None:
         raise InputError(f"{name}: no line with the names of its channels: export it again as AiM CSV")
-    units_line = lines[header + 1] if header + 1 < len(lines) else []
-    has_units = bool(units_line) and unit(units_line[0]) in ("s", "ms")
-    units = dict(enumerate(units_line)) if has_units else {}
-    sheet = read_sheet(files[0], header, 1 if has_units else 0)
+    below = names_in("".join(files[0].text.split("\n", header + 2)[header + 1 : header + 2]))
+    units = dict(enumerate(below)) if unit("".join(below[:1])) in ("s", "ms") else {}
+    sheet = read_sheet(files[0], header, 1 if units else 0)
     places, missing = sheet.axes(*_ACCEL, *_RATES)
     if missing:
         raise InputError(
@@ -43,17 +39,11 @@ def read(files: list[RecordingFile], name: str) -> AppRecording:
     time_ns = sheet.times(0)
     vertical = sheet.numbers(places[1])
     down = bool(np.nanmedian(vertical) < 0.0) if np.any(np.isfinite(vertical)) else True
-    accel = sensor_of(
-        sheet,
-        time_ns,
-        places[:3],
-        "accelerometer",
-        units.get(places[0]) or "g",
-        f"forward, right, {'down' if down else 'up'}: turned",
-        np.array([-1.0, -1.0 if down else 1.0, 1.0]),
-    )
-    rate_unit, turn = units.get(places[3]) or "deg/s", np.array([-1.0, -1.0, 1.0])
-    gyro = sensor_of(sheet, time_ns, places[3:], "gyro", rate_unit, "forward, right, down: turned", turn)
+    accel_unit, rate_unit = units.get(places[0]) or "g", units.get(places[3]) or "deg/s"
+    words, turn = ("forward, right, down: turned", -1.0) if down else ("forward, right, up: turned", 1.0)
+    accel = sensor_of(sheet, time_ns, places[:3], "accelerometer", accel_unit, words, np.array([-1.0, turn, 1.0]))
+    turned = "gyro", rate_unit, "forward, right, down: turned", np.array([-1.0, -1.0, 1.0])
+    gyro = sensor_of(sheet, time_ns, places[3:], *turned)
     speed, speed_unit = sheet.place("GPS Speed", "Speed GPS"), "km/h"
     if speed is not None:
         speed_unit = unit(units.get(speed) or unit_in(sheet.columns[speed])) or speed_unit

@@ -13,7 +13,7 @@ from ...common.errors import InputError, extra
 from ...logs.cells import COLUMNS
 from ...logs.csv_reader import MOST_CELLS
 from ..files import RecordingFile
-from ..recording import AppRecording, Sheet, names_in, read_sheet, sensor_of, track_of
+from ..recording import AppRecording, Sheet, first_names, read_sheet, sensor_of, track_of
 from ..units import EPOCH_NS, Nanoseconds
 
 NAME = "Kickstand"
@@ -59,7 +59,7 @@ def _utc_ns(sheet: Sheet, time_ns: Nanoseconds) -> int | None:
 def _is_ours(file: RecordingFile) -> bool:
     if file.content.startswith(b"PAR1"):
         return True
-    head = names_in(next(iter(file.first_lines(1)), ""))
+    head = first_names(file)
     return "t_s" in head and (set(COLUMNS) <= set(head) or set(_FORCES) <= set(head))
 
 

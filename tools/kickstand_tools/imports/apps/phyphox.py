@@ -20,7 +20,7 @@ from ..recording import (
     ReceiverTrack,
     RecordedSensor,
     Sheet,
-    names_in,
+    first_names,
     plain,
     read_sheet,
     sensor_of,
@@ -73,7 +73,7 @@ def _is_meta(file: RecordingFile) -> bool:
 
 def _is_ours(file: RecordingFile) -> bool:
     """True if the first line has a time in s and then quantities with their units in brackets."""
-    first = names_in(next(iter(file.first_lines(1)), ""))
+    first = first_names(file)
     if _is_meta(file) or len(first) < 2 or not re.fullmatch(r"(.*\s)?time \(s\)", first[0], re.IGNORECASE):
         return False
     axes = [_AXIS.match(column) for column in first if re.search(r"\b[xyz]\b", column, re.IGNORECASE)]

@@ -9,10 +9,9 @@ unit; the unit is found from the positions.
 from collections.abc import Mapping
 
 from ...common.errors import InputError
-from ...common.messages import Message
 from ..files import RecordingFile
-from ..recording import AppRecording, names_in, plain, read_sheet, sensor_of, track_of, unit_in
-from ..speeds import ImportSpeedUnit, unit_by_positions
+from ..recording import AppRecording, names_line, plain, read_sheet, sensor_of, track_of, unit_in
+from ..unit_fits import speed_of
 from ..units import SPEEDS, factor, unit
 
 NAME = "RaceBox"
@@ -32,7 +31,6 @@ def read(files: list[RecordingFile], name: str, units: Mapping[str, str] = {}) -
     stated = units.get("speed", "")
     if stated:
         factor(stated, SPEEDS, "speed")
-    speed_unit = unit(stated)
     sheet = read_sheet(files[0], _header(files[0]) or 0)
     places, missing = sheet.axes(*_AXES)
     if {"GForceY", "GForceZ"} & set(missing):
@@ -44,26 +42,14 @@ def read(files: list[RecordingFile], name: str, units: Mapping[str, str] = {}) -
     accel = sensor_of(sheet, time_ns, places[:3], "accelerometer", "g", box)
     gyro = sensor_of(sheet, time_ns, places[3:], "gyro", "deg/s", "right-handed")
     lat, lon, speed = sheet.place("Latitude"), sheet.place("Longitude"), sheet.place("Speed", "KPH")
-    notices: list[Message] = []
-    if speed is not None:
-        speed_unit = speed_unit or _unit_in_name(sheet.columns[speed])
-        speed_unit = speed_unit or unit_by_positions(sheet, time_ns, speed, lat, lon)
-        if not speed_unit:
-            notices.append(ImportSpeedUnit(sheet.columns[speed]))
-            speed = None
-    track = track_of(sheet, time_ns, speed, lat, lon, speed_unit or "m/s")
+    if speed is not None and not stated:
+        column = sheet.columns[speed]
+        stated = "km/h" if plain(column) == "kph" else unit_in(column)
+    speed, speed_unit, notices = speed_of(sheet, time_ns, speed, unit(stated), lat, lon)
+    track = track_of(sheet, time_ns, speed, lat, lon, speed_unit)
     return AppRecording(NAME, accel, gyro, track, notices=notices, utc_ns=0, vehicle_axes=True)
 
 
 def _header(file: RecordingFile) -> int | None:
     """The number of the line of column names. Lines about the laps may come before this line."""
-    for number, line in enumerate(file.text.split("\n", 200)[:200]):
-        names = {plain(cell) for cell in names_in(line)}
-        if {"gforcex", "gforcez", "time"} <= names:
-            return number
-    return None
-
-
-def _unit_in_name(column: str) -> str:
-    name = "km/h" if plain(column) == "kph" else unit(unit_in(column))
-    return name if name in SPEEDS else ""
+    return names_line(file, lambda cells: {"gforcex", "gforcez", "time"} <= set(map(plain, cells)), 200)

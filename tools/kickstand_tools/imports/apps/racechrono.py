@@ -9,7 +9,7 @@ phone or the box. Kickstand's own export also has this format.
 
 from ...common.errors import InputError
 from ..files import RecordingFile
-from ..recording import AppRecording, names_in, plain, read_sheet, sensor_of, track_of
+from ..recording import AppRecording, names_in, names_line, plain, read_sheet, sensor_of, track_of
 
 NAME = "RaceChrono"
 _FIRST = "This file is created using RaceChrono"
@@ -23,11 +23,11 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing column or sensor."""
-    lines = files[0].text.split("\n", 60)[:60]  # including blank lines, because line numbers count them
-    header = next((k for k, line in enumerate(lines) if _is_header(line)), None)
+    header = names_line(files[0], _is_header)
     if header is None:
         raise InputError(f"{name}: no line with the names of its columns: export it again as CSV v3")
-    units, more = _units(lines, header)
+    lines = files[0].text.split("\n", header + 3)
+    units, more = _units([names_in(line) for line in lines[header : header + 3]])
     sheet = read_sheet(files[0], header, more)
     accel, no_accel = sheet.axes(*((f"{axis}_acc", f"{axis} acceleration", f"{axis}-acceleration") for axis in "xyz"))
     rates = ((f"{axis}_rate_of_rotation", f"{axis} rate of rotation", f"gyro {axis}") for axis in "xyz")
@@ -54,17 +54,15 @@ def read(files: list[RecordingFile], name: str) -> AppRecording:
     )
 
 
-def _is_header(line: str) -> bool:
-    first = [plain(cell) for cell in names_in(line)]
-    return len(first) > 4 and any(name in first[:5] for name in _TIMES)
+def _is_header(cells: list[str]) -> bool:
+    return len(cells) > 4 and any(plain(cell) in _TIMES for cell in cells[:5])
 
 
-def _units(lines: list[str], header: int) -> tuple[dict[int, str], int]:
-    """The units by column number, and the number of header lines after the first."""
-    lines_below = [names_in(line) for line in lines[header + 1 : header + 3]]
-    if len(lines_below) == 2 and lines_below[0] and lines_below[0][0] == "unix time":
-        return {place: cell for place, cell in enumerate(lines_below[0]) if cell}, 2
-    names = names_in(lines[header])
+def _units(lines: list[list[str]]) -> tuple[dict[int, str], int]:
+    """The units by column number, and the number of header lines after the first. lines: the cells of these lines."""
+    names, *below = lines
+    if len(below) == 2 and below[0][:1] == ["unix time"]:
+        return {place: cell for place, cell in enumerate(below[0]) if cell}, 2
     return {place: name.rpartition("(")[2].rstrip(")") for place, name in enumerate(names) if name.endswith(")")}, 0
 
 

@@ -11,7 +11,7 @@ import re
 from ...common.errors import InputError
 from ..files import RecordingFile
 from ..join import with_gravity
-from ..recording import AppRecording, RecordedSensor, names_in, read_sheet, sensor_of
+from ..recording import AppRecording, RecordedSensor, first_names, read_sheet, sensor_of
 
 NAME = "Sensor Kinetics"
 _HEAD = ["time", "x_value", "y_value", "z_value"]
@@ -24,7 +24,7 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """The recordings among these files: the names of a recording's files differ only in the sensor."""
     groups: dict[str, list[RecordingFile]] = {}
     for file in files:
-        head = [cell.lower() for cell in names_in(next(iter(file.first_lines(1)), ""))]
+        head = [cell.lower() for cell in first_names(file)]
         if head == _HEAD:
             groups.setdefault(f"{file.folder}/{_parts(file)[0]}", []).append(file)
     return list(groups.values())

@@ -9,7 +9,7 @@ Frames" was on.
 from ...common.errors import InputError
 from ..files import RecordingFile
 from ..join import with_gravity
-from ..recording import AppRecording, RecordedSensor, names_in, read_sheet, sensor_of, track_of
+from ..recording import AppRecording, RecordedSensor, first_names, names_in, read_sheet, sensor_of, track_of
 
 NAME = "Sensor Logger"
 _TOTAL, _RAW, _USER, _GRAVITY = "totalacceleration", "accelerometeruncalibrated", "accelerometer", "gravity"
@@ -57,7 +57,7 @@ def read(files: list[RecordingFile], name: str) -> AppRecording:
 
 
 def _is_ours(file: RecordingFile) -> bool:
-    first = names_in(next(iter(file.first_lines(1)), ""))
+    first = first_names(file)
     return first[:2] == ["time", "seconds_elapsed"] and file.stem in (_TOTAL, _RAW, _USER, _GRAVITY, *_GYROS)
 
 

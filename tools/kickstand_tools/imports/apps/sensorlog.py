@@ -17,7 +17,7 @@ from ..recording import (
     ReceiverTrack,
     RecordedSensor,
     Sheet,
-    names_in,
+    first_names,
     read_sheet,
     sensor_of,
     track_of,
@@ -54,7 +54,7 @@ def read(files: list[RecordingFile], name: str) -> AppRecording:
 
 
 def _is_ours(file: RecordingFile) -> bool:
-    head = names_in(next(iter(file.first_lines(1)), ""))
+    head = first_names(file)
     return any(cell.startswith((_ACCEL[0], _USER[0])) for cell in head)
 
 

@@ -3,12 +3,12 @@
 from pathlib import Path
 
 import numpy as np
+from kickstand_sim.simulation.ride import ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.simulation.ride import ride
 from numpy.typing import NDArray
 from rich import box
 from rich.table import Table
@@ -75,7 +75,6 @@ def of_recording(path: Path) -> Figures:
 
 
 def of_simulated(profile: str, seed: int, seconds: float, road: str | None, mount: str | None) -> Figures:
-    """Return the rms in each band for a simulated ride, with its true alignment."""
     simulated = ride(profile, seed, seconds, road=road, mount=mount)
     calibration = CalibrationFile(vehicle_from_sensor=simulated.vehicle_from_sensor, aligned=True)
     return bands_of_log(Log.from_readings(simulated.readings, simulated.rate_hz, "RIDE.csv"), calibration)

@@ -1,7 +1,7 @@
 """Rides whose road, bike, rider, mount and sensor are drawn at random from realistic values.
 
 The rides come from the second simulator (other_bike.py). On request, a ride uses one part of
-kickstand_tools.simulation: the sensor with the data sheet's errors and its calibration by six positions. Parameters of
+kickstand_sim.simulation: the sensor with the data sheet's errors and its calibration by six positions. Parameters of
 the estimators are fitted with even seeds only, and figures are reported for odd seeds:
 
     OMP_NUM_THREADS=1 .venv/bin/python -m kickstand_workshop.evaluation.drawn_rides odd 100
@@ -11,13 +11,13 @@ import sys
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand_sim.simulation import hands
+from kickstand_sim.simulation.hands import Hand
+from kickstand_sim.simulation.physics.chip import GYRO_DPS_PER_G, Chip
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.calibration.poses import fit_two_positions
 from kickstand_tools.calibration.procedure import fit_procedure
 from kickstand_tools.logs.log import Log
-from kickstand_tools.simulation import hands
-from kickstand_tools.simulation.hands import Hand
-from kickstand_tools.simulation.physics.chip import GYRO_DPS_PER_G, Chip
 
 from .other_bike import (
     FINE_HZ,
@@ -55,7 +55,6 @@ class DrawnRide:
     mounts: list  # one mount per device, a key of MOUNTS
 
     def true_lean(self, k):
-        """Return the true lean at the samples of device k."""
         return np.interp(self.logs[k].t_s, self.time_s, self.lean_deg)
 
     def riding(self, k):
@@ -92,7 +91,6 @@ def city(chance):
 
 
 def hills(chance):
-    """Return the legs of street() at 0.7 times the speed. drawn_ride() adds the slopes."""
     return [(s, lean, 0.7 * v) for s, lean, v in street(chance)]
 
 
@@ -311,7 +309,6 @@ def _twice(x):
 
 
 def judged(ride, k=0):
-    """Return the result of Known.judged() for device k."""
     return Known(ride.logs[k], ride.calibrations[k], ride.true_lean(k), ride.riding(k)).judged()
 
 

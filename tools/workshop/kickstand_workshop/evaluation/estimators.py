@@ -17,16 +17,16 @@ from math import radians
 from unittest.mock import patch
 
 import numpy as np
-from kickstand.lean import measurements, upright_trim
+from kickstand.lean import kalman, measurements
 from kickstand.lean.bike_model import BIAS_LEFT
 from kickstand.units import STANDARD_GRAVITY
+from kickstand_sim.simulation.physics.chip import CALIBRATED_C, GYRO_DPS_PER_G
+from kickstand_sim.simulation.ride import SimulatedRide
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.estimation.smooth import smooth
 from kickstand_tools.logs.log import Log
 from kickstand_tools.replay import replay_engine
 from kickstand_tools.replay.replay import replay
-from kickstand_tools.simulation.physics.chip import CALIBRATED_C, GYRO_DPS_PER_G
-from kickstand_tools.simulation.ride import SimulatedRide
 from numpy.typing import NDArray
 
 AVERAGE_S = 0.3  # averaging time of the formula's lean
@@ -40,8 +40,6 @@ PACKAGES |= {f"{name} best": package for name, package in PACKAGES.items()}
 
 @dataclass
 class Samples:
-    """N calibrated samples of a log."""
-
     time: NDArray[np.float64]  # evenly spaced times, shape (N), in s
     force: NDArray[np.float64]  # force along left, up, forward, shape (N, 3), in g
     rate: NDArray[np.float64]  # rate about the same axes, shape (N, 3), in deg/s
@@ -93,7 +91,6 @@ def vqf(samples: Samples, tau_s: float = 3.0) -> NDArray[np.float64]:
 
 
 def fusion(samples: Samples, **settings: float) -> NDArray[np.float64]:
-    """Run the filter Fusion of x-io."""
     import imufusion
 
     gyro, accel = _xyz(samples)
@@ -203,7 +200,7 @@ def oracle(ride: SimulatedRide) -> NDArray[np.float64]:
 @contextmanager
 def _oracle_parameters() -> Iterator[None]:
     """A context that sets the filter's parameters to _ORACLE, in this process."""
-    with patch.multiple(measurements, **_ORACLE), patch.object(upright_trim, "MAX_TRIM", 0.0):
+    with patch.multiple(measurements, **_ORACLE), patch.object(kalman, "MAX_TRIM", 0.0):
         yield
 
 

@@ -1,5 +1,5 @@
-"""A second simulator of rides, which shares nothing with kickstand_tools.simulation. The second simulator checks
-parameters that were fitted with kickstand_tools.simulation.
+"""A second simulator of rides, which shares nothing with kickstand_sim.simulation. The second simulator checks
+parameters that were fitted with kickstand_sim.simulation.
 
 The path and the attitude of the bike are random curves. Path and attitude determine the sensor's position. The force is
 the second derivative of the sensor's position plus gravity, and the rates are derivatives of the attitude's matrix.
@@ -116,7 +116,6 @@ def random_tolerances(chance):
 
 
 def random_mounting(chance):
-    """Return the mounting of a sensor, a random rotation matrix."""
     mounting, _ = np.linalg.qr(chance.standard_normal((3, 3)))
     return mounting * np.linalg.det(mounting)
 

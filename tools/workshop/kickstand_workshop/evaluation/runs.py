@@ -13,6 +13,8 @@ from pathlib import Path
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
+from kickstand_sim.simulation.profiles import check_profile
+from kickstand_sim.simulation.ride import SimulatedRide, ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.calibration.mount import read_ride
 from kickstand_tools.calibration.poses import fit_six_positions, fit_two_positions
@@ -23,8 +25,6 @@ from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.signals import moving_mean, peak_offset
-from kickstand_tools.simulation.profiles import check_profile
-from kickstand_tools.simulation.ride import SimulatedRide, ride
 from numpy.typing import NDArray
 
 from . import estimators
@@ -84,7 +84,6 @@ def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64
 
 
 def _speed(log: Log) -> NDArray[np.float64]:
-    """Return the speed at each sample in m/s, interpolated between the logged values."""
     has_speed = ~np.isnan(log.speed_mps)
     if np.count_nonzero(has_speed) < 2:
         raise InputError(f"{log.name} has no speed: without it there is no reference")
@@ -113,7 +112,6 @@ class LeanScore:
 
 
 def rms(error: NDArray) -> float:
-    """Root of the mean square."""
     return float(np.sqrt(np.mean(error * error)))
 
 

@@ -6,10 +6,10 @@ The program prints the table of tools/docs/accuracy.md: the errors of the shown 
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand_sim.simulation.ride import ride
 from kickstand_tools.api import replay, smooth
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
-from kickstand_tools.simulation.ride import ride
 
 from .other_bike import other_ride
 from .runs import as_log, calibrated_by_poses
@@ -46,7 +46,7 @@ class Known:
 
 
 def simulated(profile, seed, seconds):
-    """Return a ride of kickstand_tools.simulation.
+    """Return a ride of kickstand_sim.simulation.
 
     The upright pose is 1.5 degrees off. The pitch between the two poses is 1 degree off.
     """

@@ -12,13 +12,13 @@ import tempfile
 from itertools import groupby
 from typing import Any
 
+from kickstand_sim.demo.device import KICKSTAND_PRESS_S, LONG_PRESS_S, PART_SEED, PART_SHARE, SCRIPT, UPRIGHT_PRESS_S
+from kickstand_sim.simulated_board.oled import HEIGHT, WIDTH, Oled
+from kickstand_sim.simulated_board.simulator import Board
+from kickstand_sim.simulation.scripted.script import Ride
+from kickstand_sim.simulation.scripted.sensor_errors import Sensor
 from kickstand_tools.common import firmware_path
 from kickstand_tools.common.svg import drawing, element
-from kickstand_tools.demo.device import KICKSTAND_PRESS_S, LONG_PRESS_S, PART_SEED, PART_SHARE, SCRIPT, UPRIGHT_PRESS_S
-from kickstand_tools.simulated_board.oled import HEIGHT, WIDTH, Oled
-from kickstand_tools.simulated_board.simulator import Board
-from kickstand_tools.simulation.scripted.script import Ride
-from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from kickstand_tools.web import site
 
 # The demo's bike turns to the right from 32 to 39 s, brakes from 50 to 56 s, and then stands. The presses capture the
@@ -139,7 +139,6 @@ def _device_pages(display: str) -> dict[str, Any]:
 
 
 def _run(display: str) -> dict[str, Any]:
-    """Run the device. After this function the process cannot run another device."""
     ride = Ride(SCRIPT)
     board = Board(Sensor(seed=PART_SEED, share=PART_SHARE).world(ride.motion), display=display)
     for at_s in PRESSES_S:

@@ -8,11 +8,11 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from kickstand_sim.simulation.ride import ride as simulate_ride
 from kickstand_tools.calibration.poses import fit_six_positions, fit_two_positions
 from kickstand_tools.common import firmware_path
 from kickstand_tools.logs.log import Log
 from kickstand_tools.replay.replay import replay
-from kickstand_tools.simulation.ride import ride as simulate_ride
 from PIL import Image
 
 _COMMANDS = (

@@ -3,9 +3,9 @@
 import io
 import re
 
-from kickstand_tools.demo.demo import DeviceProcess
-from kickstand_tools.demo.score import State
-from kickstand_tools.demo.screen import WIDTH, screen
+from kickstand_sim.demo.demo import DeviceProcess
+from kickstand_sim.demo.score import State
+from kickstand_sim.demo.screen import WIDTH, screen
 from rich._export_format import CONSOLE_SVG_FORMAT
 from rich.console import Console
 from rich.terminal_theme import TerminalTheme
@@ -31,7 +31,6 @@ def draw() -> str:
 
 
 def _state() -> State:
-    """Run the demo's device, and return its state at MOMENT_S."""
     with DeviceProcess("cpython", "script", 0.0) as device:
         while not device.ended:
             for state in device.ticks(1.0):

@@ -1,0 +1,255 @@
+"""Measures time, memory and flash of the firmware on an emulated board.
+
+bench() measures, and tables() formats the result.
+"""
+
+import ast
+import re
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from kickstand.calibration.parameters import Calibration
+from kickstand_sim.simulated_board.mpu6050 import ACCEL_XOUT_H, Mpu6050
+from kickstand_sim.simulation.scripted.script import Ride, accelerate, turn, upright
+from kickstand_sim.simulation.scripted.sensor_errors import Sensor
+from kickstand_tools.deploy.bytecode import architecture, cross_compiled
+from rich.table import Table
+
+from . import flash_image
+from .emulate import Kind, device_class
+
+_LIMIT_S = 10.0
+
+
+@dataclass(frozen=True)
+class Boot:
+    micropython_s: float  # time at which main.py begins
+    starting_s: float  # time at which the display says that Kickstand starts
+    sampling_s: float  # time at which the sensor is set up and samples
+    lean_s: float  # time at which the display shows the first lean
+
+
+def _micropython_s(kind: Kind, files: dict[str, bytes]) -> float:
+    begun: list[bytes] = []
+    with kind(files={**files, "/main.py": f"{kind.SINK}Sink().write(b'main')\n".encode()}) as device:
+        device.listen(begun.append)  # on a Pico, Sink does not use USB, which starts later than main.py
+        device.run_until(lambda: begun, _LIMIT_S, 0.001)
+        return device.time_s
+
+
+class SampleCount:
+    """Counts the samples of one sensor. The board may read the data registers or the FIFO."""
+
+    def __init__(self, sensor: Mpu6050) -> None:
+        self._sensor: Any = sensor
+        self._start, self._pop = sensor.start, sensor.fifo.pop
+        sensor.start = self._on_start  # type: ignore[method-assign]
+        sensor.fifo.pop = self._on_pop  # type: ignore[method-assign]
+        self._first = self._waiting = self._popped = 0
+        self._read: set[int] = set()
+
+    def begin(self) -> None:
+        self._sensor._update()
+        self._first, self._waiting = self._sensor._next, self._sensor.fifo.count
+        self._popped = 0
+        self._read = set()
+
+    def taken(self) -> int:
+        self._sensor._update()
+        return self._sensor._next - self._first
+
+    def delivered(self) -> int:
+        return self._popped // (len(self._sensor._fifo_registers) or 1) or len(self._read)
+
+    def lost(self) -> int:
+        """Return the number of samples that are lost: overwritten, or removed from the FIFO before they were read."""
+        samples = self.taken()  # taken() is called first, because it updates the FIFO
+        frame = len(self._sensor._fifo_registers)
+        if frame:
+            accounted = self._popped + self._sensor.fifo.count - self._waiting
+            return samples - accounted // frame
+        return max(0, samples - 1 - len(self._read))  # the latest sample can still be read
+
+    def _on_start(self, address: int, read: bool) -> bool:
+        acknowledged = self._start(address, read)
+        if read and self._sensor._pointer == ACCEL_XOUT_H:
+            self._read.add(self._sensor._next)
+        return acknowledged
+
+    def _on_pop(self, count: int = 1) -> bytes:
+        self._popped += min(count, self._sensor.fifo.count)
+        return self._pop(count)
+
+
+SAMPLE_HZ = 200  # samples per second, as in bench_guest.py
+_GUEST = ("bench_guest", "bluetooth_guest")  # modules of this folder that run on the board
+_SENSOR = Sensor(seed=1, share=0.0)  # a sensor without errors, mounted at some angle
+_SPEED_MPS = 15.0
+_RIDE = [accelerate(_SPEED_MPS, 1.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 20
+_MODES: dict[str, dict[str, Any]] = {
+    "aligning by driving": {"SPEED": "wheel"},
+    "recording": {"RECORD": True},
+    "with an OLED": {"DISPLAY": "ssd1306"},
+    "live to a phone": {"LIVE": True},
+}
+
+
+def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
+    """Measure all costs. This takes minutes.
+
+    seconds: emulated time of each run. A board needs five runs.
+    chip: "rp2040" or "esp32".
+
+    Returns the figures by name. A name ends with the figure's unit. Raises GuestError if the program on the board
+    fails.
+    """
+    plain = loop(seconds, chip)
+    modes = {name: loop(seconds, chip, chosen) for name, chosen in _MODES.items()}
+    for mode in modes.values():
+        mode["us_per_sample"] = (mode["cpu_share"] - plain["cpu_share"]) * 1e6 / SAMPLE_HZ
+    return {
+        "sample_hz": SAMPLE_HZ,
+        **plain,
+        "chip": chip,
+        "modes": modes,
+        "boot": {form: asdict(start(chip, form == "mpy")) for form in ("py", "mpy")},
+        "flash_bytes": {form: _size(form == "mpy", device_class(chip).MPY) for form in ("py", "mpy")},
+    }
+
+
+def tables(result: dict[str, Any]) -> Table:
+    figures = Table(title=f"{result['sample_hz']} samples per second, {result['chip']}", show_header=False)
+    turn = result["turn_us"]
+    pause = result["collection_pause_us"]
+    starts, size = result["boot"], result["flash_bytes"]
+    for name, text in (
+        ("a turn of the loop", ", ".join(f"{name} {turn[name]:.0f} us" for name in ("median", "p99", "max"))),
+        ("CPU share", f"{100 * result['cpu_share']:.0f} %"),
+        ("samples taken / lost", f"{result['samples_taken']} / {result['samples_lost']} in {result['seconds']:.1f} s"),
+        ("heap taken by a sample", f"{result['heap_bytes_per_sample']} bytes"),
+        ("collections", f"{result['collections_by_app']} by the app, {result['collections_automatic']} by themselves"),
+        ("a collection takes", f"{pause['median'] / 1000:.1f} ms, at most {pause['max'] / 1000:.1f} ms"),
+        (
+            "free heap, start / end",
+            f"{result['free_heap_bytes'] / 1024:.0f} / {result['free_heap_at_end_bytes'] / 1024:.0f} KB",
+        ),
+        *((f"while {name}", _mode_text(mode)) for name, mode in result["modes"].items()),
+        ("reset to first lean", f"{starts['py']['lean_s']:.2f} s from .py, {starts['mpy']['lean_s']:.2f} s from .mpy"),
+        ("names, of 1260", str(result["names"])),
+        ("size on flash", f"{size['py'] / 1000:.1f} kB as .py, {size['mpy'] / 1000:.1f} kB as .mpy"),
+    ):
+        figures.add_row(name, text)
+    return figures
+
+
+def _mode_text(mode: dict[str, Any]) -> str:
+    return (
+        f"CPU {100 * mode['cpu_share']:.0f} %, {mode['us_per_sample']:+.0f} us a sample, {mode['samples_lost']} lost, "
+        f"{mode['free_heap_bytes'] / 1024:.0f} / {mode['free_heap_at_end_bytes'] / 1024:.0f} KB free"
+    )
+
+
+def start(chip: str, compiled: bool = True) -> Boot:
+    """Measure the parts of the start. The bike is upright and at rest.
+
+    compiled: True to install the firmware as .mpy files.
+
+    Raises NotReached if one of these parts takes over 10 s.
+    """
+    kind = device_class(chip)
+    files = flash_image.firmware(compiled, kind.MPY) | _calibration()
+    with kind(_SENSOR.world(Ride([upright(100.0)]).motion), files) as device:
+        device.run_until(lambda: device.lcd()[1].startswith("starting"), _LIMIT_S, 0.001)
+        starting_s = device.time_s
+        device.run_until(lambda: device.board.sensor.fifo.count, _LIMIT_S, 0.001)
+        sampling_s = device.time_s
+        device.run_until(lambda: device.lcd()[0].startswith("Lean") and "°" in device.lcd()[0], _LIMIT_S, 0.001)
+        lean_s = device.time_s
+    return Boot(_micropython_s(kind, files), starting_s, sampling_s, lean_s)
+
+
+def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = None) -> dict[str, Any]:
+    """Measure the costs of the app's loop.
+
+    seconds: emulated time of the run. chip: "rp2040" or "esp32". chosen: values of settings, by name.
+
+    Returns the figures by name. A name ends with the figure's unit.
+    """
+    run = _run(chip, seconds, chosen=chosen)
+    figures = run["figures"]
+    return {
+        "seconds": figures["elapsed_us"] / 1e6,
+        "turn_us": _spread(run["took"]),
+        "cpu_share": 1.0 - figures["slept_us"] / figures["elapsed_us"],
+        "turns": figures["turns"],
+        "samples_taken": run["taken"],
+        "samples_lost": run["lost"],
+        "heap_bytes_per_sample": round(figures["heap_bytes"] / max(1, run["heap_samples"])),
+        "collections_by_app": figures["collections_by_app"],
+        "collections_automatic": figures["collections_automatic"],
+        "collection_pause_us": _spread(run["pauses"]),
+        "free_heap_bytes": figures["free_before"],
+        "free_heap_at_end_bytes": figures["free_after"],
+        "names": run["names"],
+    }
+
+
+def _run(chip: str, seconds: int, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
+    """Run the app's loop on the emulated board.
+
+    seconds: emulated time. chosen: values of settings, by name.
+
+    Returns the figures and arrays of bench_guest.py, and the numbers of samples that were taken and lost.
+    """
+    chosen = chosen or {}
+    mpy = device_class(chip).MPY
+    files = flash_image.firmware(True, mpy) | _calibration()
+    del files["/main.py"]
+    folder = Path(__file__).parent
+    files |= {f"{name}.mpy": cross_compiled(folder / f"{name}.py", architecture(mpy)) for name in _GUEST}
+    arrays: list[np.ndarray] = []
+    result: dict[str, Any] = {}
+    with device_class(chip)(_SENSOR.world(Ride(_RIDE).motion), files, display=chosen.get("DISPLAY", "lcd")) as device:
+        samples = SampleCount(device.board.sensor)
+
+        def take(data: bytes) -> None:
+            if data == b"begin":
+                samples.begin()
+            elif data == b"heap":
+                result["heap_samples"] = samples.delivered()
+            elif data == b"end":
+                result.update(taken=samples.taken(), lost=samples.lost())
+            else:
+                arrays.append(np.frombuffer(data, np.uint16))
+
+        device.listen(take)
+        if chosen.get("SPEED") == "wheel":
+            device.fit_wheel(lambda t_s: _SPEED_MPS)
+        code = f"{device.SINK}import bench_guest\nbench_guest.run({seconds}, Sink(), {chosen})\n"
+        output = device.exec(code, limit_s=2.0 * seconds + 30.0)
+        # The figures follow the output of a Sink
+        result["figures"] = ast.literal_eval(output.rpartition("\x02")[2].strip().splitlines()[-1])
+        result["names"] = int(re.findall(r"n_qstr=(\d+)", output)[-1])
+    turns = result["figures"]["turns"]
+    result["took"] = arrays[0][:turns]
+    asked_for = arrays[1][: result["figures"]["collections_by_app"]]
+    result["pauses"] = asked_for if len(asked_for) else np.array([result["figures"]["collect_us"]])
+    return result
+
+
+def _spread(us: np.ndarray) -> dict[str, float]:
+    return {"median": float(np.median(us)), "p99": float(np.percentile(us, 99)), "max": float(us.max())}
+
+
+def _calibration() -> dict[str, bytes]:
+    calibration = Calibration()
+    calibration.aligned = True
+    for i, value in enumerate(_SENSOR.vehicle_from_sensor):
+        calibration.vehicle_from_sensor[i] = value
+    return flash_image.stored(calibration)
+
+
+def _size(compiled: bool, mpy: int) -> int:
+    return sum(len(content) for content in flash_image.firmware(compiled, mpy).values())

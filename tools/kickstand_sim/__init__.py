@@ -1,0 +1,1 @@
+"""Kickstand without a board: the simulated board, simulated rides, and the demo."""

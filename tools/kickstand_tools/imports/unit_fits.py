@@ -1,0 +1,268 @@
+"""Finds units from what the vehicle does: of a gyro's rates from the turns of gravity, of a speed from the positions.
+
+The rates are fitted by least squares. At rest and in a hand, the direction u of gravity turns in the sensor's axes by
+du/dt = u x rate. So over a window of WINDOW_S, the change of u has two parts: the integral of u x reading, times the
+unit's factor, and the effect of a constant bias. In a vehicle the force is not only gravity. Then the rates explain the
+turns of the force less well, and the factor is too small or not found. All 48 signed permutations of the gyro's axes
+are tried: exchanged axes are another mistake, which is checked later.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..checks.axes import PERMUTATIONS
+from ..common.messages import Message, Remedy, kind
+from ..signals import Array, distance_m
+from .recording import SECOND_NS, Sheet
+from .units import SPEEDS, Nanoseconds, factor
+
+CELL_S = 0.05  # readings are averaged over cells of this length
+MOST_CELLS = 12_000  # ten minutes are enough to find a unit
+WINDOW_S = 0.4
+LEAST_TURN = 0.03  # a unit is found only if gravity's turn in the windows has this rms, in rad
+STRAIGHT = 0.25  # the force in a cell counts as gravity if its length is this close to the median
+EXPLAINED = 0.5  # the rates must explain at least this share of the variance of gravity's turns
+# with this share, units that differ by a factor of 2 can be distinguished, as the ranges of raw counts do
+CLEARLY = 0.9
+FEWEST = 8  # least number of windows
+# Gravity keeps its direction over TURNED_S if the mean of its unit vectors is at least KEPT_DIRECTION long. Then the
+# mean rate across gravity must not amount to a turn of over MOST_TURNED degrees in this time. The data sheet's largest
+# bias, 20 deg/s per axis, amounts to less.
+TURNED_S, KEPT_DIRECTION, MOST_TURNED = 2.0, 0.97, 120.0
+_NEAR = 1.25  # largest factor between the speed and the speed from positions; units differ by 1.6 or more
+_FAR = 4.0  # positions whose speed differs by this factor are wrong: of degrees and minutes, or radians
+
+ImportSpeedUnit = kind(
+    "import-speed-unit",
+    "column",
+    "{column} has no unit, and the positions do not show it, so the speed is left out",
+    Remedy("add --units speed=km/h, mph or m/s", "write it in brackets behind that name, as in Speed (km/h)"),
+)
+ImportPositions = kind(
+    "import-positions",
+    "columns why",
+    "the positions in {columns} are left out: {why}",
+    Remedy("name them with --columns lat=...,lon=... if they are right", "export them in degrees"),
+)
+
+
+@dataclass
+class RateFit:
+    """The result of fit_rates().
+
+    factor: rad/s in one unit of the readings.
+    explained: explained share of the turns' variance.
+    turn: root mean square of gravity's turn in a window, in rad.
+    unturned: root mean square of the turn that readings in rad/s would cause, in rad.
+    """
+
+    factor: float = 0.0
+    explained: float = 0.0
+    turn: float = 0.0
+    unturned: float = 0.0
+
+    @property
+    def decides(self) -> bool:
+        """True if the factor is exact enough to choose between very different units."""
+        return self.explained >= EXPLAINED and self.turn >= LEAST_TURN and self.factor > 0.0
+
+    def unit_among(self, units: Mapping[str, float]) -> str:
+        """The unit that the fit shows, among units with these factors to deg/s; "" if it shows none."""
+        if not self.decides:
+            return ""
+        off = {name: np.log(np.degrees(self.factor) / size) for name, size in units.items()}
+        best = min(off, key=lambda name: abs(off[name]))
+        gaps = [abs(np.log(units[best] / size)) for name, size in units.items() if name != best]
+        near = min(gaps) / 2.0 if gaps else 1.0
+        certain = self.explained > CLEARLY or near > 1.5
+        return best if abs(off[best]) < min(near, 1.2) and certain else ""
+
+
+def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
+    """Fit rates to forces. seconds: shape (n). force, rates: in any unit, shape (n, 3).
+
+    NaN is interpolated in each sensor, so each sensor may have its own rows."""
+    cells = _in_cells(seconds, force, rates)
+    if cells is None:
+        return RateFit()
+    u, w = cells
+    length = np.linalg.norm(u, axis=1)
+    good = np.abs(length - np.median(length)) < STRAIGHT * np.median(length)
+    u = u / np.maximum(length, 1e-9)[:, None]
+    span = round(WINDOW_S / CELL_S)
+    begins = np.arange(0, len(u) - span, span // 2)
+    complete = np.array([np.all(good[begin : begin + span + 1]) for begin in begins], dtype=bool)
+    begins = begins[complete]
+    if len(begins) < FEWEST:
+        return RateFit()
+    change = u[begins + span] - u[begins]
+    between = np.array([np.arange(begin, begin + span) for begin in begins])
+    mid = 0.5 * (u[between] + u[between + 1])
+    rate = 0.5 * (w[between] + w[between + 1])
+    rate = rate - np.mean(rate, axis=(0, 1)) if _steady(u) else rate
+    turn = float(np.sqrt(np.mean(np.sum(change**2, axis=1))))
+    best = RateFit(turn=turn)
+    if turn < 1e-6:
+        return best
+    # for each pair of axes i, j: the integral of u x (reading of axis j, used as axis i), (windows, 3, 3, 3)
+    turned = np.einsum("ila,wnl,wnj->waij", _LEVI_CIVITA, mid, rate) * CELL_S
+    bias = np.einsum("ila,wnl->wai", _LEVI_CIVITA, mid) * CELL_S
+    flat = bias.reshape(-1, 3)
+    turns = change.ravel()
+    inverse = np.linalg.pinv(flat.T @ flat + 1e-9 * np.eye(3)) @ flat.T
+    residual = turns - flat @ (inverse @ turns)
+    for permutation in PERMUTATIONS:
+        column = np.einsum("waij,ij->wa", turned, permutation).ravel()
+        column = column - flat @ (inverse @ column)
+        size = float(column @ column)
+        if size <= 0.0:
+            continue
+        factor = float(column @ residual) / size
+        explained = 1.0 - float(np.sum((residual - factor * column) ** 2)) / max(float(np.sum(residual**2)), 1e-12)
+        preferred = explained + 0.02 if permutation is PERMUTATIONS[0] else explained
+        if factor > 0.0 and preferred > best.explained:
+            unturned = float(np.sqrt(np.mean(np.sum(column.reshape(-1, 3) ** 2, axis=1))))
+            best = RateFit(factor, explained, turn, unturned)
+    return best
+
+
+def turns_too_far(seconds: Array, force: Array, rates: Array) -> bool:
+    """True if the rates would turn gravity round and round although its direction is constant.
+
+    rates: shape (n, 3), in deg/s.
+    """
+    cells = _in_cells(seconds, force, rates)
+    if cells is None:
+        return False
+    u, w = cells
+    u = u / np.maximum(np.linalg.norm(u, axis=1), 1e-9)[:, None]
+    span = round(TURNED_S / CELL_S)
+    begins = np.arange(0, len(u) - span + 1, span)
+    steady, fast = [], []
+    for begin in begins:
+        window = u[begin : begin + span]
+        mean = np.mean(window, axis=0)
+        across = np.mean(w[begin : begin + span], axis=0)
+        across = across - mean * (across @ mean) / max(float(mean @ mean), 1e-9)
+        steady.append(float(np.linalg.norm(mean)) > KEPT_DIRECTION)
+        fast.append(float(np.linalg.norm(across)) * TURNED_S > MOST_TURNED)
+    return sum(k and m for k, m in zip(steady, fast)) > 0.5 * len(begins)
+
+
+def _steady(u: Array) -> bool:
+    """True if gravity keeps its direction. The mean of the rates is then their bias."""
+    return float(np.max(np.std(u, axis=0))) < 0.02
+
+
+def _in_cells(seconds: Array, force: Array, rates: Array) -> tuple[Array, Array] | None:
+    """Return the means of force and rates in cells of CELL_S, each of shape (m, 3). None if the stretch is too
+    short."""
+    timed = np.isfinite(seconds)
+    seconds, force, rates = seconds[timed], force[timed], rates[timed]
+    if len(seconds) < 4:
+        return None
+    begin, end = float(np.percentile(seconds, 1.0)), float(np.percentile(seconds, 99.0))
+    count = int(min((end - begin) / CELL_S, MOST_CELLS))
+    if count < 2 * WINDOW_S / CELL_S:
+        return None
+    edges = begin + CELL_S * np.arange(count + 1)
+    within = (seconds >= begin) & (seconds <= edges[-1])
+    seconds, force, rates = seconds[within], force[within], rates[within]
+    means = []
+    for values in (force, rates):
+        valid = np.all(np.isfinite(values), axis=1)
+        order = np.argsort(seconds[valid], kind="stable")
+        times, rows = seconds[valid][order], values[valid][order]
+        if len(times) < 4:
+            return None
+        sums = np.vstack((np.zeros(3), np.cumsum(0.5 * (rows[1:] + rows[:-1]) * np.diff(times)[:, None], axis=0)))
+        integral = np.column_stack([np.interp(edges, times, column) for column in sums.T])
+        means.append(np.diff(integral, axis=0) / CELL_S)
+    return means[0], means[1]
+
+
+# e[i, l, a] is component a of the cross product of the unit vectors of axis l (of gravity) and axis i (of the rate)
+_LEVI_CIVITA = np.cross(np.eye(3)[None, :, :], np.eye(3)[:, None, :])
+
+
+# The unit of a speed
+
+
+def doubt_of_positions(time_ns: Nanoseconds, speed_mps: Array, lat: Array, lon: Array) -> str:
+    """Return why positions are wrong, or "".
+
+    They must move as fast as the speed says. If latitude and longitude are exchanged, the ratio of both speeds changes
+    with the direction. speed_mps: NaN if unknown."""
+    if np.any(np.abs(lat) > 90.0) or np.any(np.abs(lon) > 180.0):
+        return "they are no degrees"
+
+    def ratios(north: Array, east: Array) -> Array:
+        course_mps = _course_mps(time_ns, north, east)
+        return course_mps[(course_mps > 0.0) & (speed_mps > 3.0)] / speed_mps[(course_mps > 0.0) & (speed_mps > 3.0)]
+
+    def spread(ratio: Array) -> float:
+        return float(np.median(np.abs(np.log(ratio / np.median(ratio))))) if len(ratio) > 20 else np.nan
+
+    own, exchanged = ratios(lat, lon), ratios(lon, lat)
+    if np.all(np.abs(lon[np.isfinite(lon)]) <= 90.0) and spread(exchanged) < 0.5 * spread(own) > 0.025:
+        return "latitude and longitude are exchanged"
+    factor_off = float(np.median(own)) if len(own) > 20 else 1.0
+    return "" if 1.0 / _FAR < factor_off < _FAR else "they do not move as fast as the speed says: are they degrees?"
+
+
+def unit_by_positions(
+    sheet: Sheet,
+    time_ns: Nanoseconds,
+    speed: int,
+    lat: int | None,
+    lon: int | None,
+    per_degree: tuple[float, float] = (1.0, 1.0),
+) -> str:
+    """Return the unit in which the speeds fit the changes of position, or "" if several units or none fit.
+
+    speed, lat, lon: numbers of columns. per_degree: factors from the columns to degrees of latitude and longitude.
+    """
+    if lat is None or lon is None:
+        return ""
+    course_mps = _course_mps(time_ns, sheet.numbers(lat) * per_degree[0], sheet.numbers(lon) * per_degree[1])
+    speeds = sheet.numbers(speed)
+    fast = np.isfinite(course_mps) & np.isfinite(speeds) & (course_mps > 3.0)
+    if np.count_nonzero(fast) < 20:
+        return ""
+    ratio = float(np.median(speeds[fast] / course_mps[fast]))
+    near = {name: max(ratio * factor(name, SPEEDS, ""), 1.0 / (ratio * SPEEDS[name])) for name in SPEEDS if ratio > 0.0}
+    best = min(near, key=lambda name: near[name]) if near else ""
+    return best if best and near[best] < _NEAR else ""
+
+
+def speed_of(
+    sheet: Sheet,
+    time_ns: Nanoseconds,
+    speed: int | None,
+    stated: str,
+    lat: int | None,
+    lon: int | None,
+    per_degree: tuple[float, float] = (1.0, 1.0),
+) -> tuple[int | None, str, list[Message]]:
+    """Return the number of the speed's column, its unit, and notices.
+
+    stated: the unit in the column's name or of the user. If it is no unit of speed, the unit is found from the
+    positions. If they do not show it, the speed is left out: the number is None. See unit_by_positions()."""
+    if speed is None:
+        return None, "m/s", []
+    speed_unit = stated if stated in SPEEDS else unit_by_positions(sheet, time_ns, speed, lat, lon, per_degree)
+    if not speed_unit:
+        return None, "m/s", [ImportSpeedUnit(sheet.columns[speed])]
+    return speed, speed_unit, []
+
+
+def _course_mps(time_ns: Nanoseconds, lat: Array, lon: Array) -> Array:
+    """Return the mean speed from the positions over about a second before each row, shape (n). NaN if unknown."""
+    steps = np.diff(time_ns)
+    rows = max(1, round(SECOND_NS / max(float(np.median(steps)), 1.0))) if len(steps) else 1
+    apart_s = np.full(len(time_ns), np.nan)
+    apart_s[rows:] = (time_ns[rows:] - time_ns[:-rows]) / SECOND_NS
+    east, north = distance_m(np.roll(lat, rows), np.roll(lon, rows), lat, lon)
+    return np.where((apart_s > 0.5) & (apart_s < 2.0), np.hypot(east, north) / np.maximum(apart_s, 0.5), np.nan)
