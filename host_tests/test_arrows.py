@@ -28,7 +28,7 @@ FIRMWARE = {
     "speed": {"board"},
     "rides": {"board", "calibration"},  # each block of a ride contains the record of its calibration
     "live": {"calibration.parameters"},
-    "ui": {"board.button", "lean", "calibration", "drive_alignment"},
+    "ui": {"board.button", "board.display", "lean", "calibration", "drive_alignment"},
     "settings": {"setting_table", "board", "imu", "diagnosis"},  # also opens the parts
     "setting_table": {"board", "imu.mpu6050"},  # for the ranges that can be set
     "diagnosis": {"imu"},
@@ -38,10 +38,9 @@ FIRMWARE = {
     },
     "app": {
         *("board", "calibration", "drive_alignment", "imu", "lean"),
-        *("rides", "speed", "state", "ui"),
+        *("rides", "speed", "ui"),
         "user_code",
     },
-    "state": set(),
     "user_code": set(),
     "start": {*("app", "board", "console", "live", "settings"), "ui.messages"},
     "__init__": {"facts"},

@@ -22,7 +22,7 @@ from .errors import report
 from .imu.sensor import SampleClock
 from .lean.meter import LeanMeter
 from .rides.rides import Rides
-from .ui.screen import Screen
+from .ui.pages import Screen
 from .units import const
 
 LOOP_US = 10_000  # length of a pass of the loop in us; the chip's FIFO can keep samples for much longer
@@ -182,12 +182,6 @@ class App:
     def trusted(self):
         """True if there is a lean to show."""
         return self.lean_deg is not None
-
-    def state(self):
-        """Return the state of the app as data, see state.py."""
-        from .state import state  # imported only for programs that use it
-
-        return state(self)
 
     def _plan_collection(self):
         """Set the number of passes until the next garbage collection."""

@@ -28,7 +28,7 @@ _CHARGE_MS = const(100)
 # list with the import statements.
 STEPS = (
     "calibration.parameters calibration.store calibration.active lean.bike_model lean.kalman lean.measurements "
-    "lean.lean_filter lean.meter ui.pages ui.screen rides.rides"
+    "lean.lean_filter lean.meter ui.pages rides.rides"
 ).split()
 
 
@@ -120,10 +120,10 @@ def _open_radio(pin):
     return Radio(pin)
 
 
-def _attach(radio, app):
+def _open_live(radio, app):
     from .live.live import Live
 
-    app.live = Live(radio, app)
+    return Live(radio, app)
 
 
 def _live(notices, function, *arguments):
@@ -133,9 +133,8 @@ def _live(notices, function, *arguments):
     except Refusal as error:
         result, notice = None, error
     if notice:
-        if notice.code == "no-memory":
-            notice = Notice("live-memory", *notice.values)
-        report(notice, notices)
+        memory = notice.code == "no-memory"
+        report(Notice("live-memory", *notice.values) if memory else notice, notices)
     return result
 
 
@@ -161,7 +160,7 @@ def run(chosen, lcd, loop=None):
     print("Kickstand %s. Ctrl-C stops it." % __version__)
     app = App(chosen, lcd, sensor)
     if radio:
-        _live(notices, _attach, radio, app)
+        app.live = _live(notices, _open_live, radio, app)
         if not app.live:
             radio.stop()
     app.notices.extend(notices)

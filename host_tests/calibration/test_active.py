@@ -1,5 +1,7 @@
 """The active calibration is loaded, applied and saved, and its trim is written to flash."""
 
+import sys
+
 import pytest
 from kickstand.calibration.parameters import Calibration
 from kickstand.calibration.store import FILES, Store
@@ -93,6 +95,12 @@ def test_a_restart_saves_the_trim_and_uses_the_stored_values(made):
     active.restart()
     assert stored().trim_deg == active.value.trim_deg == 1.25
     assert (meter.used, active.changed) == (used + 1, None)
+
+
+def test_without_its_module_loading_fails_as_an_incomplete_firmware(made, monkeypatch):
+    monkeypatch.setitem(sys.modules, "kickstand.calibration.store", None)
+    with pytest.raises(ImportError):
+        made[0].chip_started(Chip())
 
 
 def test_an_unwritable_flash_is_reported_and_retried_later(made, tmp_path, capsys):

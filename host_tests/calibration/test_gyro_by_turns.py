@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import pytest
 from kickstand.calibration.poses import Turn
-from kickstand.calibration.sensor_fit import SensorFit
+from kickstand.calibration.six_position import SensorFit
 from kickstand_sim.simulation import hands
 from kickstand_sim.simulation.physics.chip import Chip
 from kickstand_tools.calibration.procedure import fit_procedure
@@ -94,7 +94,7 @@ def test_an_ideal_gyro_needs_no_correction_also_on_micropython():
     assert fit.unproved == []
     assert np.array(fit.gyro_matrix) == pytest.approx(np.eye(3).ravel(), abs=2e-3)
     script = (
-        "from array import array\nfrom kickstand.calibration.sensor_fit import SensorFit\n"
+        "from array import array\nfrom kickstand.calibration.six_position import SensorFit\n"
         f"turns = [(array('f', t), s) for t, s in {turns!r}]\n"
         f"fit = SensorFit({poses_g!r}, turns, [0.0] * 3, [1.0] * 3)\n"
         "fit.finish()\nprint(list(fit.gyro_matrix) + fit.gyro_sigma)\n"

@@ -4,6 +4,7 @@ import re
 from typing import Any
 
 import pytest
+from kickstand_sim.simulated_board import app_state
 from support import device_plans, engines
 from support.device_plans import ALIGNED, LEFT_S, PRESSES, RIDE, RIGHT_S, STRAIGHT_S
 from support.device_runs import Device
@@ -135,7 +136,7 @@ def test_state_says_what_the_display_shows(aligned):
     device: Any = Device(device_plans.world_of({"lean": [[0, 25]]})[0])
     states = {}
     for at_s in STATES:
-        device.board.at(at_s, lambda at_s=at_s: states.update({at_s: device.app.state()}))
+        device.board.at(at_s, lambda at_s=at_s: states.update({at_s: app_state.state(device.app)}))
     for at_s, for_s in ((4, LONG), (6, LONG), (8, SHORT), (13, SHORT)):
         device.board.press(at_s, for_s)
     device.board.faults.unplug_sensor(2.0, 1.0)

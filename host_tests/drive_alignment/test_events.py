@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from kickstand.drive_alignment import quality as limits
+from kickstand.drive_alignment.alignment import StandingVertical, Vertical
 from kickstand.drive_alignment.events import (
     BIN_US,
     MASK,
@@ -14,7 +15,6 @@ from kickstand.drive_alignment.events import (
     difference,
 )
 from kickstand.drive_alignment.quality import DrivingQuality
-from kickstand.drive_alignment.vertical import StandingVertical, Vertical
 from support.engines import ENGINES, run
 
 

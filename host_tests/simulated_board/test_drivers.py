@@ -50,6 +50,20 @@ def test_presses_of_the_button(closed_ms, events):
     assert on_board(program)[0] == "returned"
 
 
+def test_only_a_hard_interrupt_keeps_room_for_its_exceptions(monkeypatch):
+    """Without this room, MicroPython ends the interrupt after an exception."""
+
+    def program(board):
+        from kickstand.speed.wheel import Wheel
+
+        monkeypatch.setattr("micropython.alloc_emergency_exception_buf", sizes.append)
+        for hard in (False, True):
+            Wheel(Pin(14, Pin.IN, Pin.PULL_UP), 0.5, {"hard": hard})
+
+    sizes = []
+    assert on_board(program)[0] == "returned" and sizes == [100]
+
+
 def on_card(program, removed=False, **kind):
     """Run program(board) on a board with this SD card."""
     board = Board(level)

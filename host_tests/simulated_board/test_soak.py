@@ -4,10 +4,9 @@ import gc
 
 import pytest
 from kickstand_sim.simulation.scripted import script
-from kickstand_workshop.soak import soak as soaking
-from kickstand_workshop.soak.__main__ import table
-from kickstand_workshop.soak.soak import soak
-from kickstand_workshop.soak.trip import SENSOR, SHORT_S, Trip
+from kickstand_workshop import soak as soaking
+from kickstand_workshop.soak import soak
+from kickstand_workshop.trip import SENSOR, SHORT_S, Trip
 
 # A power cut leaves a ride's file open. On a board its reset closes the file.
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
@@ -23,7 +22,7 @@ def _close_files():
 def test_some_minutes_of_random_rides_and_faults(hours):
     figures = soak(hours=hours, seed=4)
     assert figures.violations == [] and figures.hours >= hours and sum(figures.faults.values()) > 0
-    assert f"| trips | {figures.trips}," in table(figures)
+    assert f"| trips | {figures.trips}," in figures.table()
 
 
 def trip(cut_save=None):

@@ -119,7 +119,7 @@ class Device:
     def turn_to(self, at_s, name):
         """Press the button from at_s on, until the view with this name appears.
 
-        The names are in kickstand/state.py. run() raises AssertionError if the view never appears.
+        The names are in kickstand/ui/pages.py. run() raises AssertionError if the view never appears.
         """
         self.board.at(at_s, lambda: self._turner.turn_to(name))
 
@@ -183,7 +183,7 @@ class Device:
         app.run()
 
     def _turn_page(self):
-        if self._turner.presses(self.app.state()["view"] if self.app else None):
+        if self._turner.presses(self.app.screen.view if self.app else None):
             self.board.press(for_s=0.15)
 
     def record(self):
@@ -308,4 +308,6 @@ def run_device(plan, fit=None, made=None):
 
 if __name__ == "__main__":
     record = run_device(json.load(sys.stdin))
-    print("\n" + json.dumps(record))
+    print()
+    json.dump(record, sys.stdout)  # one text of all would need one piece of heap
+    print()

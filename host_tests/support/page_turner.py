@@ -11,7 +11,7 @@ class PageTurner:
         self._seen = []  # the view at each press since the search for _wanted[0] began
 
     def turn_to(self, name):
-        """Add a view to the wanted views. The names are in kickstand/state.py."""
+        """Add a view to the wanted views. The names are in kickstand/ui/pages.py."""
         self._wanted.append(name)
 
     def presses(self, view):

@@ -6,6 +6,11 @@ from typing import Any
 
 import numpy as np
 from kickstand.calibration.parameters import Calibration
+from kickstand_sim.simulated_board.simulator import Board
+from support.board_access import level
+
+with Board(level):  # for the clock
+    from kickstand.ui import pages as pages
 
 panels = []  # those of the present test, whose recordings the fixture `board` ends
 SHORT, LONG = 1, 2  # as in board/button.py

@@ -6,8 +6,9 @@ import re
 
 from kickstand import console, errors
 from kickstand.errors import Notice, Refusal, SettingsError
-from kickstand.ui import messages, pages
+from kickstand.ui import messages
 from kickstand_tools.common import firmware_path
+from panel import pages
 
 CLASSES = {name for name in vars(errors) if name[0].isupper()}
 # Codes that the firmware passes as a variable, so codes() does not find them.

@@ -6,10 +6,9 @@ import pytest
 from kickstand.calibration.parameters import Calibration
 from kickstand.drive_alignment import alignment
 from kickstand.errors import Notice, Refusal
-from kickstand.ui import pages
-from panel import Panel, reading
+from panel import Panel, pages, reading
 
-D = pages.DEGREE
+D = "\xdf"
 
 
 def meter(**values) -> Any:

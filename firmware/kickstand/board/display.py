@@ -37,6 +37,7 @@ ADDRESSES = (0x27, 0x3F) + _OLED_ADDRESSES
 _OWN_I2C = const(0x3E)  # address of a controller with I2C, see other_lcds.py
 _FAMILY = tuple(range(0x20, 0x27)) + tuple(range(0x38, 0x3C)) + (_OWN_I2C,)  # other addresses of a backpack
 LCD_HZ, OLED_HZ = 100_000, 400_000  # fastest clocks of a PCF8574 and of the OLEDs
+DEGREE = "\xdf"  # code of the degree sign in the character ROM of an HD44780
 STOPPED = "Kickstand", "stopped"  # text of the display after the firmware has ended
 KINDS = ("auto", "lcd", "ssd1306", "sh1106", "ssd1306-32")
 _PROBE_MS = const(200)  # time between two searches for a missing display

@@ -92,9 +92,10 @@ class ActiveCalibration:
             return True
 
     def _stored(self, calibration=None, careful=False):
-        """Save a Calibration, or without one load the Calibration in flash. Raises Refusal.
+        """Save a Calibration, or without one load the Calibration in flash.
 
-        The Store is imported only for this, because it takes 3 KB of heap.
+        The Store is imported only for this, because it takes 3 KB of heap. Raises Refusal if the Calibration is not
+        saved. Raises ImportError or MemoryError if the Store cannot be imported to load a Calibration.
 
         Args:
             careful: True to save only if the files are unchanged.
@@ -115,6 +116,8 @@ class ActiveCalibration:
             store.save(calibration)
             return True
         except (ImportError, MemoryError) as error:
+            if calibration is None:
+                raise
             raise Refusal("not-written", str(error))
         finally:
             self.newest = store.newest

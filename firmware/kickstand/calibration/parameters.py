@@ -143,22 +143,14 @@ class Calibration:
         if max([abs(value - one) for value, one in zip(turned, matrix())]) > MAX_MATRIX_ERROR:
             return False
         sigma = max(MIN_GYRO_SIGMA, min(MAX_GYRO_SIGMA, sigma))
-        self.gyro_matrix, self.gyro_sigma = (
-            turned,
-            matrix([min(earlier or sigma, sigma) for earlier in self.gyro_sigma]),
-        )
+        self.gyro_matrix = turned
+        self.gyro_sigma = matrix([min(earlier or sigma, sigma) for earlier in self.gyro_sigma])
         return True
 
     def correct(self, accel):
         """Calibrate a mean reading of the accelerometer (3 values, in g). Return the force as a new array."""
         out = vector()
         rotate(out, self.accel_matrix, [self.accel_slope[i] * accel[i] + self.accel_offset[i] for i in range(3)])
-        return out
-
-    def correct_rate(self, gyro):
-        """Calibrate a mean reading of the gyro (3 values, in deg/s). Return the rate as a new array."""
-        out = vector()
-        rotate(out, self.gyro_matrix, [gyro[i] - self.gyro_bias[i] for i in range(3)])
         return out
 
     def scales(self):

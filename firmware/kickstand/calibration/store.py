@@ -16,7 +16,7 @@ from binascii import crc32
 from errno import ENOENT
 
 from ..errors import Refusal
-from ..rotation import is_rotation
+from ..rotation import is_rotation, matrix
 from ..units import const
 from .parameters import MAX_GYRO_SIGMA, MAX_MATRIX_ERROR, MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE, Calibration
 
@@ -55,7 +55,7 @@ class Store:
     def __init__(self, who_am_i, accel_range_g, directory="", newest=None):
         self.who_am_i = who_am_i
         self._chip = (who_am_i, accel_range_g)
-        self._directory = directory
+        self._directory = directory + "/" if directory else ""
         self.message = ""
         self.newest = newest or (0, [])
 
@@ -82,8 +82,10 @@ class Store:
         """Write a Calibration over the older record and read it back. The record in use is never damaged. Raises
         Refusal."""
         sequence, _, _ = self._newest()
-        record = self._pack(calibration, sequence + 1)
-        path = self._path(FILES[(sequence + 1) % 2])
+        version = _WHOLE_VERSION if calibration.whole else _VERSION
+        record = struct.pack(_HEAD, _MAGIC, version, _LENGTHS[version], sequence + 1) + pack(*self._chip, calibration)
+        record += struct.pack("<I", crc32(record))
+        path = self._directory + FILES[(sequence + 1) % 2]
         try:
             with open(path, "wb") as file:
                 file.write(record)
@@ -107,50 +109,34 @@ class Store:
         newest, calibration, problems = 0, None, []
         for name in FILES:
             try:
-                with open(self._path(name), "rb") as file:
-                    record = file.read(_LENGTHS[_WHOLE_VERSION] + 1)
+                with open(self._directory + name, "rb") as file:
+                    sequence, values = self._unpack(file.read(_LENGTHS[_WHOLE_VERSION] + 1))
+                if sequence > newest:
+                    newest, calibration = sequence, values
             except OSError as error:
                 if error.args[0] != ENOENT:  # a missing file is no problem, because save() creates it
                     problems.append("%s unreadable" % name)
-                continue
-            sequence, values, problem = self._unpack(record)
-            if problem:
-                problems.append("%s %s" % (name, problem))
-            if sequence > newest:
-                newest, calibration = sequence, values
+            except ValueError as error:
+                problems.append("%s %s" % (name, error))
         return newest, calibration, problems
 
-    def _path(self, name):
-        return self._directory + "/" + name if self._directory else name
-
-    def _pack(self, calibration, sequence):
-        version = _WHOLE_VERSION if calibration.whole else _VERSION
-        record = struct.pack(_HEAD, _MAGIC, version, _LENGTHS[version], sequence) + pack(*self._chip, calibration)
-        return record + struct.pack("<I", crc32(record))
-
     def _unpack(self, record):
-        """Decode the bytes of a record.
-
-        Returns:
-            sequence: its sequence number, or 0 if it is invalid.
-            calibration: its Calibration, or None if it is invalid.
-            problem: None, or the fault in words if it is invalid.
-        """
+        """Return the sequence number and the Calibration of a record. Raises ValueError with the fault in words."""
         if len(record) not in _LENGTHS.values():
             complete = len(record) >= 6 and record[4] == _WHOLE_VERSION
             length = _LENGTHS[_WHOLE_VERSION if complete else _VERSION]
-            return 0, None, "empty" if not record else "cut short" if len(record) < length else "too long"
+            raise ValueError("empty" if not record else "cut short" if len(record) < length else "too long")
         magic, version, length, sequence = struct.unpack_from(_HEAD, record, 0)
         if struct.unpack_from("<I", record, len(record) - 4)[0] != crc32(record[:-4]):
-            return 0, None, "damaged"
+            raise ValueError("damaged")
         if magic != _MAGIC or length != len(record) or _LENGTHS.get(version) != length or sequence == 0:
-            return 0, None, "of another version"
+            raise ValueError("of another version")
         who_am_i, _, calibration = unpack(record[_HEAD_LENGTH:-4])
         if who_am_i != self.who_am_i:
-            return 0, None, "of another sensor"
+            raise ValueError("of another sensor")
         if not plausible(calibration):
-            return 0, None, "out of range"
-        return sequence, calibration, None
+            raise ValueError("out of range")
+        return sequence, calibration
 
 
 def pack(who_am_i, accel_range_g, calibration):
@@ -183,18 +169,14 @@ def unpack(data):
 
 def plausible(calibration):
     """Return True if all parameters of the Calibration are within the limits of a real sensor."""
-    for i in range(3):
-        if not abs(calibration.accel_offset[i]) < MAX_OFFSET_G:  # "not <" also rejects NaN
-            return False
-        if not MIN_SLOPE < calibration.accel_slope[i] < MAX_SLOPE:
-            return False
-        if not abs(calibration.gyro_bias[i]) < MAX_BIAS_DPS:
-            return False
-    for i in range(9):
-        expected = 1.0 if i % 4 == 0 else 0.0
-        for values in (calibration.accel_matrix, calibration.gyro_matrix):
-            if not abs(values[i] - expected) <= MAX_MATRIX_ERROR:
-                return False
-        if not 0.0 <= calibration.gyro_sigma[i] <= MAX_GYRO_SIGMA:
-            return False
-    return is_rotation(calibration.vehicle_from_sensor, 1e-4) and abs(calibration.trim_deg) <= MAX_TRIM_DEG
+    errors = [calibration.accel_matrix[i] - one for i, one in enumerate(matrix())]
+    errors += [calibration.gyro_matrix[i] - one for i, one in enumerate(matrix())]
+    return (  # each comparison also rejects NaN
+        all(abs(value) < MAX_OFFSET_G for value in calibration.accel_offset)
+        and all(MIN_SLOPE < value < MAX_SLOPE for value in calibration.accel_slope)
+        and all(abs(value) < MAX_BIAS_DPS for value in calibration.gyro_bias)
+        and all(abs(value) <= MAX_MATRIX_ERROR for value in errors)
+        and all(0.0 <= value <= MAX_GYRO_SIGMA for value in calibration.gyro_sigma)
+        and is_rotation(calibration.vehicle_from_sensor, 1e-4)
+        and abs(calibration.trim_deg) <= MAX_TRIM_DEG
+    )

@@ -10,19 +10,7 @@ from time import ticks_add, ticks_diff
 from ..errors import Notice, Refusal
 from ..rotation import matrix
 from ..units import const
-from .alignment import (
-    BRAKING,
-    CAR,
-    MOTORCYCLE,
-    MOVED,
-    REFINED,
-    REVERSED,
-    SAME,
-    TURNING,
-    DriveAlignment,
-    compare,
-    turn_round,
-)
+from . import alignment
 
 # Number of passes of the loop between two steps of the drive's work, to save time
 _FEED_TURNS = const(2)
@@ -88,7 +76,8 @@ class BackgroundAlignment:
         self._calibration = current
         trusted = self._leans and current.aligned and not self._asked
         up = current.vehicle_from_sensor[3:6] if trusted else None
-        self.drive = DriveAlignment(MOTORCYCLE if self._leans else CAR, up, _KNOWN_BIAS if current.aligned else None)
+        kind = alignment.MOTORCYCLE if self._leans else alignment.CAR
+        self.drive = alignment.DriveAlignment(kind, up, _KNOWN_BIAS if current.aligned else None)
         self.shown = self.shown or not (self._leans or current.aligned)
         self.result = None
         self._clear_sums()
@@ -198,17 +187,17 @@ class BackgroundAlignment:
             if drive.ready:
                 self._adopt(True)
         else:
-            verdict = compare(drive, self._meter.calibration.vehicle_from_sensor)
+            verdict = alignment.compare(drive, self._meter.calibration.vehicle_from_sensor)
             if not self._leans:
-                if drive.ready and verdict in (REFINED, MOVED, REVERSED):
-                    self._adopt(verdict != REFINED)
-            elif verdict == REVERSED:
+                if drive.ready and verdict in (alignment.REFINED, alignment.MOVED, alignment.REVERSED):
+                    self._adopt(verdict != alignment.REFINED)
+            elif verdict == alignment.REVERSED:
                 self._say(Notice(STAND_SIDE))
-            elif verdict == MOVED:
+            elif verdict == alignment.MOVED:
                 self._say(Notice(MOUNT_MOVED, "since-alignment"))
-            elif verdict == REFINED and drive.ready:
+            elif verdict == alignment.REFINED and drive.ready:
                 self._adopt(False)
-            elif verdict == SAME:
+            elif verdict == alignment.SAME:
                 self._meter.distrust(None)
 
     def _away(self):
@@ -244,7 +233,7 @@ class BackgroundAlignment:
         if agreed and code == STAND_SIDE:
             current = self._meter.calibration
             turned = matrix(current.vehicle_from_sensor)
-            turn_round(turned)
+            alignment.turn_round(turned)
             if self._save(turned, -self._meter.trim_deg):
                 self.message = Notice("side-fixed")
                 self._meter.reset_maxima()
@@ -282,4 +271,4 @@ class BackgroundAlignment:
     def state(self):
         """The drive's state. At walking pace a bend cannot be recognised, so TURNING is replaced by BRAKING."""
         state = self.drive.state
-        return BRAKING if state == TURNING and self._speed_mps < _AWAY_MPS else state
+        return alignment.BRAKING if state == alignment.TURNING and self._speed_mps < _AWAY_MPS else state

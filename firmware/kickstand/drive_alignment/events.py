@@ -20,9 +20,9 @@ always in use.
 """
 
 from array import array
-from math import pi
+from math import atan2, pi
 
-from ..rotation import norm
+from ..rotation import dot, norm
 from ..units import STANDARD_GRAVITY, const
 
 BIN_US = 100_000
@@ -68,15 +68,11 @@ class ForceHistory:
             dt_us: length of the bin.
         """
         self.now = (self.now + dt_us) & MASK
-        total = self._total
-        total[0] = (total[0] + round(force_us[0])) & MASK
-        total[1] = (total[1] + round(force_us[1])) & MASK
-        total[2] = (total[2] + round(force_us[2])) & MASK
-        total[3] = (total[3] + round(yaw)) & MASK
         self._newest = newest = (self._newest + 1) % SIZE
         self._times[newest] = self.now
         for k in range(COLUMNS):
-            self._columns[k][newest] = total[k]
+            self._total[k] = total = (self._total[k] + round(force_us[k] if k < 3 else yaw)) & MASK
+            self._columns[k][newest] = total
         self._count = min(SIZE, self._count + 1)
 
     def at(self, out, time_us):
@@ -141,6 +137,10 @@ class Fit:
         self.weight = self.seconds = self.explained = 0.0
         self.found = False
         self.total = [0.0] * _TERMS  # each Fit has its own sums, because two Fits may be computed at the same time
+
+    def angle(self, left, forward):
+        """Return the angle of this fit's forward from a forward direction to the left, in rad."""
+        return atan2(dot(left, self.forward), dot(forward, self.forward))
 
 
 class ForwardRegression:

@@ -11,8 +11,7 @@ from math import atan2, degrees, pi, sqrt
 from ..errors import Refusal
 from ..rotation import angle_deg, cross, dot, norm, normalize, vector
 from ..units import const
-from .events import BLOCKS, Fit
-from .vertical import MAX_CHANGE_DEG
+from .events import Fit
 
 PRIOR_DEG = 1.0  # prior of the standard deviation of forward, at a weight of 1 g^2 s
 PRIOR_FREEDOM = 4
@@ -22,6 +21,9 @@ STRETCH_DEG = 1.5
 _MIN_WEIGHT = const(0.1)  # the forward of a part with a smaller weight (g^2 s) is not compared
 _MIN_S = const(20.0)  # the vertical of a part with less straight driving is not compared
 _MIN_BLOCKS = const(4)  # with fewer blocks in the drive, forward is not compared
+# Largest difference of two verticals that the road's slope can cause (14 %). If two verticals differ more, the mount
+# moved.
+MAX_CHANGE_DEG = 8.0
 
 
 def angle_between(a, b):
@@ -64,11 +66,11 @@ class DriveParts:
     """
 
     def __init__(self):
-        self._blocks = [array("f", [0.0] * 6) for _ in range(BLOCKS)]
         self.clear()
 
     def clear(self):
         """Drop all blocks. Call this method before the first add()."""
+        self._blocks = []
         self.count = 0
         self.forward_deg = self.sigmas = self.roll_deg = self.pitch_deg = 0.0
 
@@ -82,23 +84,20 @@ class DriveParts:
             roll_g, pitch_g: the components of the block's vertical to the left and forward, in g.
             weight, seconds: as in the block's Fit.
         """
-        block = self._blocks[self.count]
+        sums = weight * across, weight * along, seconds * roll_g, seconds * pitch_g
+        self._blocks.append(array("f", sums + (weight, seconds, weight * weight)))
         self.count += 1
-        block[0], block[1] = weight * across, weight * along
-        block[2], block[3] = seconds * roll_g, seconds * pitch_g
-        block[4], block[5] = weight, seconds
 
     def compare(self):
         """Compare the two parts of each split, as a generator of short steps."""
-        first, second = [0.0] * 7, [0.0] * 7
         for split in range(1, self.count):
-            self._sum(first, 0, split)
+            first = self._sums(0, split)
             yield
-            self._sum(second, split, self.count)
+            second = self._sums(split, self.count)
             yield
             if first[5] >= _MIN_S and second[5] >= _MIN_S:
-                self.roll_deg = max(self.roll_deg, degrees(abs(first[2] / first[5] - second[2] / second[5])))
-                self.pitch_deg = max(self.pitch_deg, degrees(abs(first[3] / first[5] - second[3] / second[5])))
+                roll, pitch = [degrees(abs(first[i] / first[5] - second[i] / second[5])) for i in (2, 3)]
+                self.roll_deg, self.pitch_deg = max(self.roll_deg, roll), max(self.pitch_deg, pitch)
             if self.count < _MIN_BLOCKS or first[4] < _MIN_WEIGHT or second[4] < _MIN_WEIGHT:
                 continue
             first_angle, second_angle = atan2(first[0], first[1]), atan2(second[0], second[1])
@@ -107,35 +106,25 @@ class DriveParts:
             scatter += self._scatter(second_angle, split, self.count)
             yield
             freedom = self.count - 2  # two degrees of freedom less, because the scatter is about two means
-            variance = (
-                STRETCH_DEG * STRETCH_DEG * (first[6] / (first[4] * first[4]) + second[6] / (second[4] * second[4]))
-            )
-            sampled = blend_prior(scatter / first[4] / freedom, first[4], freedom)
-            sampled += blend_prior(scatter / second[4] / freedom, second[4], freedom)
-            variance += sampled
+            variance = 0.0
+            for part in first, second:
+                variance += STRETCH_DEG * STRETCH_DEG * part[6] / (part[4] * part[4])
+                variance += blend_prior(scatter / part[4] / freedom, part[4], freedom)
             difference_deg = degrees(angle_between(first_angle, second_angle))
             if difference_deg > self.sigmas * sqrt(variance):
                 self.sigmas = difference_deg / sqrt(variance)
                 self.forward_deg = difference_deg
             yield
 
-    def _sum(self, sums, first, last):
-        """Add up the blocks from first to last - 1. Write the 6 sums of the blocks' values and the sum of the squared
-        weights into sums."""
-        for i in range(7):
-            sums[i] = 0.0
-        for k in range(first, last):
-            block = self._blocks[k]
-            for i in range(6):
-                sums[i] += block[i]
-            sums[6] += block[4] * block[4]
+    def _sums(self, first, last):
+        """Return the sums of the 7 values of the blocks from first to last - 1."""
+        return [sum([block[i] for block in self._blocks[first:last]]) for i in range(7)]
 
     def _scatter(self, angle, first, last):
         """Return the scatter of forward about an angle: the sum of weight times squared deviation in deg^2, over the
         blocks from first to last - 1."""
         total = 0.0
-        for k in range(first, last):
-            block = self._blocks[k]
+        for block in self._blocks[first:last]:
             off = degrees(angle_between(angle, atan2(block[0], block[1])))
             total += block[4] * off * off
         return total
@@ -327,13 +316,11 @@ class DrivingQuality:
                 continue
             x, y, weight = dot(left, part.forward), dot(forward, part.forward), part.weight
             yield
-            level = part.level
-            self.parts.add(x, y, dot(left, level), dot(forward, level), weight, part.seconds)
+            self.parts.add(x, y, dot(left, part.level), dot(forward, part.level), weight, part.seconds)
             ratios += weight * sqrt(x * x + y * y)
             weights += weight
             if blocks > 1 and (yield from regression.fitting(part, lag, 0, blocks, block)):
-                angle = atan2(dot(left, part.forward), dot(forward, part.forward))
-                squares += angle * angle
+                squares += part.angle(left, forward) ** 2
             yield
         if blocks < 2 or weights <= 0.0:
             return
@@ -345,12 +332,10 @@ class DrivingQuality:
         yield from self.parts.compare()
         half = blocks // 2
         if (yield from regression.fitting(part, lag, 0, half)):
-            angle = atan2(dot(left, part.forward), dot(forward, part.forward))
-            level = vector(part.level[0], part.level[1], part.level[2])
+            angle, level = part.angle(left, forward), part.level[:]
             yield
             if (yield from regression.fitting(part, lag, half, blocks)):
-                second_angle = atan2(dot(left, part.forward), dot(forward, part.forward))
-                self.halves_deg = degrees(angle_between(angle, second_angle))
+                self.halves_deg = degrees(angle_between(angle, part.angle(left, forward)))
                 yield
                 self._decide(ratios / weights, angle_deg(level, part.level))
 

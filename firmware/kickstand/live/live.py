@@ -129,12 +129,11 @@ class Live:
         self._sent += self.radio.send(handle, self._views[size])
 
     def _state(self, lean):
+        """Return the bits of the state, see pack_now()."""
         app, meter = self._app, self._app.meter
-        state = packets.ALIGNED * meter.calibration.aligned + packets.TRUSTED * (lean is not None)
-        state += (
-            packets.AT_REST * meter.at_rest + packets.FALLEN * meter.fallen + packets.CAR * (not app.settings.leans)
-        )
-        return state + packets.RECORDING * app.recording + packets.NO_READINGS * bool(app.sensor.fault)
+        flags = meter.calibration.aligned, lean is not None, meter.at_rest, meter.fallen
+        flags += app.recording, not app.settings.leans, app.sensor.fault is not None
+        return sum([bool(flags[bit]) << bit for bit in range(7)])
 
     def _send(self, now_ms):
         """Send the packets whose time has come, with the means of the samples since the last call. Without new samples

@@ -18,8 +18,6 @@ LEAN, MOTION, SPEED, OWN = range(4)
 _FASTEST_MS = const(40)  # packets of the same kind are at least this far apart
 UNKNOWN, UNKNOWN_SPEED, UNKNOWN_SIGMA = -0x8000, 0xFFFF, 0xFF
 
-ALIGNED, TRUSTED, AT_REST, FALLEN, RECORDING, CAR, NO_READINGS = (1 << bit for bit in range(7))  # bits of the state
-
 # UUID of our own service. The service's characteristics have 0001 to 0004 in place of the first 0000.
 SERVICE = "7b6f0000-3c1e-4d5a-9a55-6b69636b7374"
 _ADVERTISE_US = const(150_000)
@@ -78,7 +76,7 @@ def pack_now(buffer, ms, lean_deg, sigma_deg, force, rate_dps, speed_mps, state)
         force: force to the left, up and forward, in g, or None.
         rate_dps: rate about left, up and forward, in deg/s. The rate is not sent if force is None.
         speed_mps: the speed, or None.
-        state: the bits ALIGNED to NO_READINGS.
+        state: bits, from bit 0: aligned, trusted, at rest, fallen, recording, car, no readings.
     """
     is_known = lean_deg is not None
     tilt = (whole(lean_deg, 100), _sigma(sigma_deg)) if is_known else (UNKNOWN, UNKNOWN_SIGMA)
@@ -94,7 +92,7 @@ def pack_ride(buffer, state, meter, lost):
     """Write our own packet with the values of the ride so far into the buffer. Return its length.
 
     Args:
-        state: the bits ALIGNED to NO_READINGS.
+        state: as for pack_now().
         meter: a LeanMeter.
         lost: number of lost samples.
     """

@@ -29,7 +29,7 @@ PART_BLOCKS = 16  # number of ride blocks in a part in flash
 # 1300 files.
 _CARD_PART_BLOCKS = const(256)
 # Space for the compiled firmware; each file takes whole blocks, and each folder takes two blocks
-FIRMWARE = 98 * BLOCK
+FIRMWARE = 90 * BLOCK
 RESERVE = 66 * BLOCK  # largest free space that an update of compiled firmware needs, plus a margin
 
 

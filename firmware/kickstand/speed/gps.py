@@ -267,24 +267,14 @@ def _minutes(field, degrees, negative):
     """Convert an angle in NMEA's form, (d)ddmm.mmmm, to units of 0.00001 minutes.
 
     More decimals are cut off. Return None if the field is not an angle, or if it exceeds `degrees` degrees."""
-    integer = part = 0
-    digits = -1  # number of decimals so far, -1 before the point
-    for byte in field:
-        if byte == 46 and digits < 0:  # 46 is the decimal point
-            digits = 0
-        elif not 48 <= byte <= 57:
-            return None
-        elif digits < 0:
-            integer = 10 * integer + byte - 48
-        elif digits < _DIGITS:
-            part = 10 * part + byte - 48
-            digits += 1
-    if digits < 0 or integer >= 100 * degrees or integer % 100 >= 60:
+    integer, point, part = field.partition(b".")
+    part += b"0" * _DIGITS
+    if not (point and integer.isdigit() and part.isdigit()):
         return None
-    while digits < _DIGITS:
-        part *= 10
-        digits += 1
-    angle = (integer // 100 * 60 + integer % 100) * 100_000 + part
+    minutes = int(integer)
+    if minutes >= 100 * degrees or minutes % 100 >= 60:
+        return None
+    angle = (minutes // 100 * 60 + minutes % 100) * 100_000 + int(part[:_DIGITS])
     return -angle if negative else angle
 
 

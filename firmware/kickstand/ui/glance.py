@@ -1,14 +1,12 @@
 """The pages as pictures of 128x64 pixels, for a display that draws. Large digits can be read at a glance.
 
-screen.py looks up the picture of a page in PICTURES. board/display.py says what a picture is. Rows 0 and 1 stay
+pages.py looks up the picture of a page in PICTURES. board/display.py says what a picture is. Rows 0 and 1 stay
 blank, because an OLED shifts its picture.
 """
 
 from binascii import a2b_base64
 
 import framebuf
-
-from . import pages
 
 DIGIT_WIDTH, DIGIT_HEIGHT = 24, 40
 _PITCH = 28  # number of columns from one digit to the next
@@ -74,26 +72,27 @@ def _triangle(canvas, x, y, direction):
         canvas.vline(x - direction * i, y - half, 2 * half + 1, 1)
 
 
-def lean(meter, recording):
+def lean(meter, recording, line2=""):
     """Return the picture of the lean with its side, and of an arc that ends at 60 degrees."""
     deg = meter.lean_deg
-    return _lean, int(abs(deg) + 0.5), pages.side_name(deg), int(deg + (0.5 if deg > 0 else -0.5)), recording
+    return _lean, int(deg + (0.5 if deg > 0 else -0.5)), recording
 
 
-def _lean(canvas, number, side, deg, recording):
+def _lean(canvas, deg, recording):
+    number = abs(deg)
     canvas.blit(_SCALE, 0, 0)
-    for x in range(min(_ARC_DEG, abs(deg)) + 1):
+    for x in range(min(_ARC_DEG, number) + 1):
         canvas.vline(64 + x if deg > 0 else 64 - x, _ARC[x], _ARC_WIDTH, 1)
     x = _number(canvas, number, 52 if number < 10 else 38, 16)
     for side_x in (0, 5):  # the left and the right side of the degree sign
         canvas.vline(x - 3 + side_x, 17, 4, 1)
         canvas.hline(x - 2, 16 + side_x, 4, 1)
-    if side == "left":
+    if deg < 0:
         _triangle(canvas, 2, 40, -1)
-        canvas.text(side, 0, _SMALL_Y, 1)
-    elif side:
+        canvas.text("left", 0, _SMALL_Y, 1)
+    elif deg:
         _triangle(canvas, 125, 40, 1)
-        canvas.text(side, 88, _SMALL_Y, 1)
+        canvas.text("right", 88, _SMALL_Y, 1)
     if recording:
         canvas.text("REC", 48, _SMALL_Y, 1)
 
@@ -111,7 +110,7 @@ def _unsure(canvas, reason):
         canvas.hline(0, y, 128, 1)
 
 
-def maxima(meter, recording):
+def maxima(meter, recording, line2=""):
     """Return the picture of the largest lean to each side."""
     return _maxima, int(meter.max_left_deg + 0.5), int(meter.max_right_deg + 0.5)
 
@@ -123,11 +122,12 @@ def _maxima(canvas, left, right):
     canvas.text("left  max  right", 0, _SMALL_Y, 1)
 
 
-def acceleration(meter, recording):
-    """Return the picture of braking or acceleration as a number and a bar, with the peaks of both."""
-    peaks = pages.acceleration(meter)[1]
+def acceleration(meter, recording, line2=""):
+    """Return the picture of braking or acceleration as a number and a bar, with the peaks of both.
+
+    line2: the second line of the page, which has the peaks."""
     forward, most, least = meter.smooth_force[2], meter.max_accel_g, meter.max_brake_g
-    return _acceleration, round(100 * forward), round(_G_PIXELS * most), round(_G_PIXELS * least), peaks
+    return _acceleration, round(100 * forward), round(_G_PIXELS * most), round(_G_PIXELS * least), line2
 
 
 def _acceleration(canvas, hundredths, most, least, peaks):
@@ -145,5 +145,6 @@ def _acceleration(canvas, hundredths, most, least, peaks):
     canvas.text(peaks, 0, _SMALL_Y, 1)
 
 
-# For each page, the function that returns its picture from a LeanMeter and the state of recording
-PICTURES = {pages.lean: lean, pages.maxima: maxima, pages.acceleration: acceleration}
+# For the name of each page, the function that returns its picture from a LeanMeter, the state of recording, and the
+# page's second line
+PICTURES = {"lean": lean, "maxima": maxima, "acceleration": acceleration}

@@ -1,14 +1,14 @@
 """Guides the rider through the six positions and a slanted pose that verifies them.
 
 In the six positions each side of the sensor is up once, in any order. The turns of the sensor between the poses
-calibrate the gyro: see calibration/sensor_fit.py.
+calibrate the gyro: see calibration/six_position.py.
 """
 
+from ..board.display import DEGREE
 from ..calibration import six_position
 from ..calibration.parameters import six_position_calibration
 from ..errors import CaptureError, SickSensor
 from ..units import const
-from .pages import DEGREE
 from .wizard import COMPUTE, NOTICE, RESULT, TAKE, Wizard, words
 
 _NOTICE_MS = const(1500)
@@ -40,9 +40,7 @@ class SixWizard(Wizard):
                 continue
             lines, (offset, slope) = None, self._fitted
             error = six_position.check_free_pose(offset, slope, pose.accel)
-            from ..calibration.sensor_fit import SensorFit  # imported only when needed, because it takes 5 KB of heap
-
-            fit = SensorFit(self._poses, self._turns, offset, slope)
+            fit = six_position.SensorFit(self._poses, self._turns, offset, slope)
             self._show(COMPUTE, ("Computing...", ""))
             for _ in fit.run():
                 yield

@@ -10,11 +10,11 @@ the two poses.
 from time import ticks_add, ticks_diff, ticks_ms
 
 from ..board.button import LONG
+from ..board.display import DEGREE
 from ..calibration.poses import StillPose, Turn
 from ..errors import CaptureError, Refusal, SickSensor, report
 from ..units import const
 from .messages import lines
-from .pages import DEGREE, progress_bar
 
 _SETTLE_MS = const(500)  # time for which the sensor must be still before a pose
 _GIVE_UP_MS = const(10_000)  # longest time to wait until the sensor is still
@@ -188,6 +188,12 @@ def words(refusal):
     if isinstance(refusal, SickSensor):
         report(refusal)
     return lines(refusal)
+
+
+def progress_bar(done, total):
+    """Return a bar that has 16 full cells when `done` reaches `total`."""
+    filled = 16 * done // total if total else 0
+    return "\xff" * min(16, filled)
 
 
 class AlignWizard(Wizard):

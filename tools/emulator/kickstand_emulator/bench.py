@@ -5,7 +5,6 @@ bench() measures, and tables() formats the result.
 
 import ast
 import re
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -26,37 +25,13 @@ _LIMIT_S = 10.0
 
 @dataclass(frozen=True)
 class Boot:
-    """The parts of a start. All times count from power-on."""
-
     micropython_s: float  # time at which main.py begins
     starting_s: float  # time at which the display says that Kickstand starts
     sampling_s: float  # time at which the sensor is set up and samples
     lean_s: float  # time at which the display shows the first lean
 
 
-def boot(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes], compiled: bool = True) -> Boot:
-    """Measure the parts of the start.
-
-    kind: Class of the emulated board.
-    world: Motion of the board, as for EmulatedDevice. The board must be upright and at rest.
-    files: Calibration files of the board.
-    compiled: True to install the firmware as .mpy files.
-
-    Raises NotReached if one of these parts takes over 10 s.
-    """
-    board_files = flash_image.firmware(compiled, kind.MPY) | files
-    with kind(world, board_files) as device:
-        device.run_until(lambda: device.lcd()[1].startswith("starting"), _LIMIT_S, 0.001)
-        starting_s = device.time_s
-        device.run_until(lambda: device.board.sensor.fifo.count, _LIMIT_S, 0.001)
-        sampling_s = device.time_s
-        device.run_until(lambda: device.lcd()[0].startswith("Lean") and "°" in device.lcd()[0], _LIMIT_S, 0.001)
-        lean_s = device.time_s
-    return Boot(_micropython_s(kind, board_files), starting_s, sampling_s, lean_s)
-
-
 def _micropython_s(kind: Kind, files: dict[str, bytes]) -> float:
-    """Measure the time until MicroPython runs main.py, in s."""
     begun: list[bytes] = []
     with kind(files={**files, "/main.py": f"{kind.SINK}Sink().write(b'main')\n".encode()}) as device:
         device.listen(begun.append)  # on a Pico, Sink does not use USB, which starts later than main.py
@@ -76,19 +51,16 @@ class SampleCount:
         self._read: set[int] = set()
 
     def begin(self) -> None:
-        """Begin to count."""
         self._sensor._update()
         self._first, self._waiting = self._sensor._next, self._sensor.fifo.count
         self._popped = 0
         self._read = set()
 
     def taken(self) -> int:
-        """Return the number of samples that the sensor has taken."""
         self._sensor._update()
         return self._sensor._next - self._first
 
     def delivered(self) -> int:
-        """Return the number of samples that the board has read."""
         return self._popped // (len(self._sensor._fifo_registers) or 1) or len(self._read)
 
     def lost(self) -> int:
@@ -148,7 +120,6 @@ def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
 
 
 def tables(result: dict[str, Any]) -> Table:
-    """Format the result of bench() for a terminal."""
     figures = Table(title=f"{result['sample_hz']} samples per second, {result['chip']}", show_header=False)
     turn = result["turn_us"]
     pause = result["collection_pause_us"]
@@ -181,11 +152,22 @@ def _mode_text(mode: dict[str, Any]) -> str:
 
 
 def start(chip: str, compiled: bool = True) -> Boot:
-    """Measure the time from power-on to the first lean. The bike is upright and at rest.
+    """Measure the parts of the start. The bike is upright and at rest.
 
     compiled: True to install the firmware as .mpy files.
+
+    Raises NotReached if one of these parts takes over 10 s.
     """
-    return boot(device_class(chip), _SENSOR.world(Ride([upright(100.0)]).motion), _calibration(), compiled)
+    kind = device_class(chip)
+    files = flash_image.firmware(compiled, kind.MPY) | _calibration()
+    with kind(_SENSOR.world(Ride([upright(100.0)]).motion), files) as device:
+        device.run_until(lambda: device.lcd()[1].startswith("starting"), _LIMIT_S, 0.001)
+        starting_s = device.time_s
+        device.run_until(lambda: device.board.sensor.fifo.count, _LIMIT_S, 0.001)
+        sampling_s = device.time_s
+        device.run_until(lambda: device.lcd()[0].startswith("Lean") and "°" in device.lcd()[0], _LIMIT_S, 0.001)
+        lean_s = device.time_s
+    return Boot(_micropython_s(kind, files), starting_s, sampling_s, lean_s)
 
 
 def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = None) -> dict[str, Any]:
@@ -262,7 +244,6 @@ def _spread(us: np.ndarray) -> dict[str, float]:
 
 
 def _calibration() -> dict[str, bytes]:
-    """Return the calibration files of _SENSOR. The calibration contains only the alignment."""
     calibration = Calibration()
     calibration.aligned = True
     for i, value in enumerate(_SENSOR.vehicle_from_sensor):

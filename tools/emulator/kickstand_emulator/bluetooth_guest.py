@@ -42,7 +42,6 @@ class BLE:
         self.sent += 1
 
     def connect(self):
-        """Connect a phone, which subscribes to everything in both services."""
         self._handler(1, (0, 0, b"phone."))
         for handle, data in ((11, b"\x01" + FASTEST_MS.to_bytes(2, "big")), (17, FASTEST_MS.to_bytes(2, "little"))):
             self._values[handle] = data

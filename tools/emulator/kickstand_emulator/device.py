@@ -98,7 +98,6 @@ class EmulatedDevice(ABC):
         self.board.watch_pin(number, partial(self._set_pin, number))
 
     def fit_wheel(self, speed: Callable[[float], float], **kind: Any) -> None:
-        """Connect a wheel contact, as simulator.Board.fit_wheel() does."""
         self.board.fit_wheel(speed, **kind)
         self._wire(self.board.wheel_pin)
 
@@ -124,7 +123,6 @@ class EmulatedDevice(ABC):
     # The display and the button
 
     def lcd(self) -> list[str]:
-        """The two lines of the display."""
         return self.board.lcd.text()
 
     def press(self, at_s: float | None = None, for_s: float = 0.15) -> None:
@@ -143,11 +141,9 @@ class EmulatedDevice(ABC):
     def file_system(self, system: bytes) -> None: ...
 
     def put_files(self, files: dict[str, bytes]) -> None:
-        """Replace the content of the file system with these files."""
         self.file_system = self.FLASH.build(files)
 
     def files(self) -> dict[str, bytes]:
-        """Return all files in the flash, as {path: content}."""
         return self.FLASH.read(self.file_system)
 
     # The console
@@ -179,11 +175,9 @@ class EmulatedDevice(ABC):
         return output.decode(errors="replace").replace("\r\n", "\n")
 
     def _until_it_reads(self) -> None:
-        """Advance the time until the board reads its console."""
         self.run(0.1)
 
     def soft_reset(self) -> None:
-        """Do a soft reset, like Ctrl-D at the friendly prompt."""
         self.send(_CTRL_B + _CTRL_D)
         self._raw = False
 

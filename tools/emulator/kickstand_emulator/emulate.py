@@ -57,12 +57,10 @@ class ConsoleServer:
         self.port: int = self._server.getsockname()[1]
 
     def close(self) -> None:
-        """Disconnect the client and stop listening."""
         self._disconnect()
         self._server.close()
 
     def poll(self) -> None:
-        """Accept a client, or pass the data of the connected client to send()."""
         if self._client is None:
             with contextlib.suppress(BlockingIOError):
                 self._client = self._server.accept()[0]
@@ -126,11 +124,9 @@ class ScriptedBike:
         self.begun_s: float | None = None
 
     def motion(self, t_s: float) -> tuple[float, ...]:
-        """See script.Ride.motion()."""
         return self._ride.motion(0.0 if self.begun_s is None else t_s - self.begun_s)
 
     def follow(self, device: EmulatedDevice) -> None:
-        """Begin the ride once the display is on, and press the button at the script's times."""
         if self.begun_s is None and device.board.lcd.on:
             self.begun_s = device.time_s
             for press_s in (KICKSTAND_PRESS_S, UPRIGHT_PRESS_S):

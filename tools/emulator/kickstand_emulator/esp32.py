@@ -21,24 +21,8 @@ from kickstand_sim.simulated_board.i2c import Bus
 from kickstand_sim.simulated_board.simulator import Board
 from kickstand_tools.deploy import bytecode
 
-from . import esp32_library, flash_image
+from . import esp32_library, esp32_machine as machine, flash_image
 from .device import LEVEL, EmulatedDevice
-from .esp32_machine import (
-    COMMAND,
-    GO,
-    HANG,
-    LEVEL as WIRE,
-    MESSAGE,
-    PIN,
-    PRINTED,
-    READ,
-    START,
-    STOP,
-    STOPPED,
-    SYNC,
-    UART,
-    WRITE,
-)
 
 _IMAGE_AT, _FLASH_SIZE = 0x1000, 4 << 20
 _ROM_STARTS = b"ets Jul 29 2019"  # the first text that the chip's ROM prints
@@ -112,7 +96,6 @@ class Sink:
 
     @property
     def reading(self) -> bool:
-        """True while the sensor sends data over I2C."""
         return self.board.sensor_bus.open and self._sends[0]
 
     def reset(self) -> None:
@@ -143,7 +126,7 @@ class Sink:
         its.close()
         self._serve()
         for pin, level in self._levels.items():
-            self._command(PIN, pin, level)
+            self._command(machine.PIN, pin, level)
 
     def _kill(self) -> None:
         if self._process:
@@ -164,7 +147,7 @@ class Sink:
             due_us = max(self.clock.now_us, min(self._end_us, self.clock.next_us))
             if between:
                 due_us = min(due_us, self.clock.now_us + 5000)
-            self._command(GO, value=(due_us - self._begun_us) * 1000)
+            self._command(machine.GO, value=(due_us - self._begun_us) * 1000)
             self._serve()
             self.clock.advance(0)
             if between:
@@ -177,32 +160,31 @@ class Sink:
 
     def _command(self, kind: int, a: int = 0, b: int = 0, value: int = 0) -> None:
         with contextlib.suppress(OSError):  # OSError is ignored, because _serve() reports that QEMU has ended
-            self._link.sendall(COMMAND.pack(kind, a, b, value))
+            self._link.sendall(machine.COMMAND.pack(kind, a, b, value))
 
     def _serve(self) -> None:
-        """Answer the messages of the QEMU process until it reports that the emulation has stopped."""
-        receive, answer, buses, size = self._link.recv, self._link.sendall, self.board.buses, MESSAGE.size
+        receive, answer, buses, size = self._link.recv, self._link.sendall, self.board.buses, machine.MESSAGE.size
         while True:
             message = receive(size, socket.MSG_WAITALL)
             if len(message) < size:
                 raise Stopped(f"QEMU has ended: {self._last_output()}")
-            now_ns, kind, a, b = MESSAGE.unpack(message)
+            now_ns, kind, a, b = machine.MESSAGE.unpack(message)
             self.clock.now_us = self._begun_us + now_ns // 1000
-            if kind == READ:
+            if kind == machine.READ:
                 answer(bytes([buses[a].read_byte()]))
-            elif kind == WRITE:
+            elif kind == machine.WRITE:
                 answer(b"\1" if buses[a].write_byte(b) else b"\0")
-            elif kind == START:
+            elif kind == machine.START:
                 self._sends[a] = bool(b & 1)
                 answer(b"\1" if buses[a].start(b >> 1, bool(b & 1)) else b"\0")
-            elif kind == STOP:
+            elif kind == machine.STOP:
                 buses[a].stop()
-            elif kind == PRINTED:
+            elif kind == machine.PRINTED:
                 self._end_us, end_us = 1 << 60, self._end_us
                 self._received(bytes([a]))
                 stop, self._end_us = self._end_us < 1 << 60, min(end_us, self._end_us)
                 answer(b"\1" if stop else b"\0")
-            elif kind == STOPPED:
+            elif kind == machine.STOPPED:
                 return
 
     def _last_output(self) -> str:
@@ -211,7 +193,7 @@ class Sink:
         return output.rpartition("\n")[2] or "it said nothing"
 
     def _sync(self) -> None:
-        self._command(SYNC)
+        self._command(machine.SYNC)
         self._link.recv(1)
 
     # The console
@@ -228,7 +210,6 @@ class Sink:
         self.heard = hear
 
     def send(self, data: bytes) -> None:
-        """Send data to the board's console at 115,200 baud."""
         self._waiting += data
         if not self._sending:
             self._sending = True
@@ -238,7 +219,7 @@ class Sink:
         chunk = bytes(self._waiting[:_CHUNK])
         del self._waiting[:_CHUNK]
         if chunk and self.powered:
-            self._command(UART, _CONSOLE, len(chunk))
+            self._command(machine.UART, _CONSOLE, len(chunk))
             self._link.sendall(chunk)
         self._sending = bool(self._waiting)
         if self._sending:
@@ -258,30 +239,29 @@ class Sink:
     # Optional parts
 
     def fit_gps(self, speed: Callable[[float], float], **kind: Any) -> None:
-        """Connect a GPS receiver, as simulator.Board.fit_gps() does."""
         self.board.fit_gps(speed, **kind)
         gps: Any = self.board.gps
         gps.connect(self._gps_sends)
 
     def _gps_sends(self, data: bytes) -> None:
         if self.powered:
-            self._command(UART, _GPS, len(data))
+            self._command(machine.UART, _GPS, len(data))
             self._link.sendall(bytes(data))
 
     def _set_pin(self, number: int, level: int) -> None:
         self._levels[number] = level
         if self.powered:
-            self._command(PIN, number, level)
+            self._command(machine.PIN, number, level)
 
     def _have_wires(self, number: int, bus: Any) -> None:
         """Let the methods hang() and sda_level() of a bus use the QEMU process, because it emulates the wires."""
 
         def hang(bits: int = 8) -> None:
             Bus.stop(bus)
-            self._command(HANG, number, bits)
+            self._command(machine.HANG, number, bits)
 
         def sda_level() -> int:
-            self._command(WIRE, number)
+            self._command(machine.LEVEL, number)
             return self._link.recv(1)[0]
 
         bus.hang, bus.sda_level = hang, sda_level

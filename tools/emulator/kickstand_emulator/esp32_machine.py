@@ -324,7 +324,6 @@ class Machine:
         self._qemu.qemu_mutex_lock_iothread_impl(b"kickstand", 1)
 
     def run(self) -> None:
-        """Emulate the chip. Does not return."""
         qemu = self._qemu
         pinmap = (c.c_short * (_PINS + 1))(_PINS, *range(_PINS))
         self._callbacks = _Callbacks(

@@ -27,7 +27,6 @@ class FileSystem:
 
     @property
     def size(self) -> int:
-        """The size of the file system, in bytes."""
         return self.block * self.blocks
 
     def build(self, files: dict[str, bytes]) -> bytes:

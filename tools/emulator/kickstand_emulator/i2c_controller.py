@@ -7,24 +7,14 @@ wires.
 from collections.abc import Callable
 
 from kickstand_sim.simulated_board.i2c import Bus
-from rp2040py.peripherals.i2c import (
-    ENABLE,
-    IC_ENABLE,
-    IC_RAW_INTR_STAT,
-    IC_RXFLR,
-    IC_TX_ABRT_SOURCE,
-    R_TX_EMPTY,
-    RPI2C,
-    TX_EMPTY_CTRL,
-    I2CState,
-)
+from rp2040py.peripherals import i2c
 from rp2040py.rp2040 import RP2040
 
 _CYCLE_NS = 8  # length of a clock cycle at 125 MHz
-_POLLED = (IC_RAW_INTR_STAT, IC_RXFLR, IC_TX_ABRT_SOURCE)
+_POLLED = (i2c.IC_RAW_INTR_STAT, i2c.IC_RXFLR, i2c.IC_TX_ABRT_SOURCE)
 
 
-class TimedI2C(RPI2C):
+class TimedI2C(i2c.RPI2C):
     """rp2040py's I2C controller on a bus of simulated_board. The SCL count registers set the length of a bit.
 
     The SDK waits for the end of each byte in a loop that only reads registers. Emulating this loop would make a
@@ -46,15 +36,13 @@ class TimedI2C(RPI2C):
         self.on_stop = lambda: self._after(1, self._stopped)
 
     def reading(self) -> bool:
-        """True while a device sends a byte."""
         return self._then == self._received
 
     def let_go(self) -> None:
-        """Abandon the transfer. The controller becomes idle and releases the wires."""
         self._alarm.cancel()
         self._then = None
         self.bus.stop()
-        self._state = I2CState.IDLE
+        self._state = i2c.I2CState.IDLE
         self._busy = self._stop = self._pending_restart = False
 
     def reset(self) -> None:
@@ -76,24 +64,24 @@ class TimedI2C(RPI2C):
 
     def write_uint32(self, offset: int, value: int) -> None:
         """Write a register. A write that disables the controller during a transfer releases the wires."""
-        if offset == IC_ENABLE and not value & ENABLE and self._busy and self._state != I2CState.STOP:
+        if offset == i2c.IC_ENABLE and not value & i2c.ENABLE and self._busy and self._state != i2c.I2CState.STOP:
             self.let_go()
         super().write_uint32(offset, value)
 
-    # Interrupts. If TX_EMPTY_CTRL is set, the end of a byte raises TX_EMPTY. An abort raises TX_EMPTY too
+    # Interrupts. If i2c.TX_EMPTY_CTRL is set, the end of a byte raises TX_EMPTY. An abort raises TX_EMPTY too
 
     def _set_interrupts(self, mask: int) -> None:
-        if mask == R_TX_EMPTY and self._busy and self.control & TX_EMPTY_CTRL:
+        if mask == i2c.R_TX_EMPTY and self._busy and self.control & i2c.TX_EMPTY_CTRL:
             return
         super()._set_interrupts(mask)
 
     def _abort(self, reason: int) -> None:
         super()._abort(reason)
-        super()._set_interrupts(R_TX_EMPTY)
+        super()._set_interrupts(i2c.R_TX_EMPTY)
 
     def _byte_over(self) -> None:
         if self._tx_fifo.item_count <= self.tx_threshold:
-            super()._set_interrupts(R_TX_EMPTY)
+            super()._set_interrupts(i2c.R_TX_EMPTY)
 
     # The bus
 

@@ -75,7 +75,6 @@ def build() -> bool:
 
 
 def _compile(compiler: str, directory: Path) -> bool:
-    """Compile all modules. Returns True if the emulator works with the compiled modules."""
     spec = importlib.util.find_spec("rp2040py")
     assert spec and spec.origin
     sources = Path(spec.origin).parent / "native"

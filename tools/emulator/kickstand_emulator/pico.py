@@ -36,7 +36,6 @@ class QuietConsole(USBCDC):
         self.on_serial_data = lambda data: received(bytes(data))
 
     def send(self, data: bytes) -> None:
-        """Send data to the board as fast as the board accepts data."""
         self._waiting += data
         self._give()
 
@@ -139,18 +138,15 @@ class Pico(EmulatedDevice):
 
     @property
     def time_s(self) -> float:
-        """The emulated time since this object was created, in s."""
         return self.chip.clock.nanos / 1e9
 
     def power_on(self) -> None:
-        """Switch on the power of the chip and of all parts."""
         self._reset()
         self.board.power_on()
         self.chip.power_on()
         self.powered = True
 
     def power_off(self) -> None:
-        """Cut the power. Only the content of the flash is kept."""
         self.powered = False
         self.chip.power_off()
         self.board.power_off()
@@ -168,15 +164,12 @@ class Pico(EmulatedDevice):
 
     @property
     def reading(self) -> bool:
-        """True while the sensor sends data over I2C."""
         return self.chip.controllers[0].reading()
 
     def reset(self) -> None:
-        """Reset the chip, like an expired watchdog."""
         self.chip.reset()
 
     def stop(self) -> None:
-        """Make run() return after the current instruction."""
         self.chip.stop()
 
     def stall(self, seconds: float) -> None:
@@ -198,7 +191,6 @@ class Pico(EmulatedDevice):
 
     @property
     def file_system(self) -> bytes:
-        """The part of the flash that holds the files. It can be assigned."""
         return bytes(self.chip.rp2040.flash[self.FLASH.start : self.FLASH.start + self.FLASH.size])
 
     @file_system.setter
@@ -211,7 +203,6 @@ class Pico(EmulatedDevice):
         HostLink(self.chip, b"", sink)
 
     def send(self, data: bytes) -> None:
-        """Send data to the board's console as fast as the board accepts data."""
         self.console.send(data)
 
     # The wires

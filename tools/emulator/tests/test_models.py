@@ -35,27 +35,6 @@ def board():
         yield emulated
 
 
-def test_fast_division_gives_the_results_of_rp2040py():
-    """Results, flags and cycles equal those of rp2040py, also for division by zero and for signed numbers."""
-    device = pico()  # skips the test without the emulator
-    from rp2040py.rp2040 import RP2040
-
-    quick, original = device.chip.rp2040, RP2040()
-    results = []
-    for chip in (quick, original):
-        chip.sio.reset()
-        begin = chip.core.cycles
-        values = []
-        for signed in (0, 8):  # the two registers of signed division follow those of unsigned division
-            for dividend in (0, 1, 7, 1000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF):
-                for divisor in (1, 3, 0, 0x7FFFFFFF, 0xFFFFFFF9, 0xFFFFFFFF):
-                    for register, value in ((0x60 + signed, dividend), (0x64 + signed, divisor)):
-                        chip.write_uint32(0xD0000000 + register, value)
-                        values += [chip.read_uint32(0xD0000000 + r) for r in (0x60, 0x64, 0x78, 0x74, 0x70, 0x78, 0)]
-        results.append((values, chip.core.cycles - begin))
-    assert results[0] == results[1]
-
-
 # Code that removes the import hook for modules that are compiled for this Python.
 _WHEELS_OWN = """
 import sys, kickstand_emulator

@@ -261,7 +261,6 @@ def _silence() -> None:
 
 
 def _announce_and_run(key: str, function: Callable[..., Any], *arguments: Any) -> Any:
-    """In a worker: announce that the task begins, then return function(*arguments)."""
     from distributed import get_worker
 
     worker = get_worker()

@@ -290,8 +290,6 @@ _LEAST_BLOCKS = 4
 
 @dataclass
 class Forward:
-    """The alignment of a mount."""
-
     frame: Array  # rotation from sensor to vehicle axes, shape (3, 3). Its rows are left, up, forward.
     sigma_deg: float  # standard error of forward about up
     attitude_deg: float  # standard error of the whole rotation
@@ -299,7 +297,6 @@ class Forward:
 
     @property
     def sure(self) -> bool:
-        """True if the errors of forward are within the firmware's limits."""
         return self.sigma_deg <= READY_DEG and abs(self.halves_deg) <= AGREE_DEG
 
 
@@ -335,7 +332,6 @@ def find_forward(logs: list[Intervals], device: DriveFit | None = None) -> Forwa
 
 
 def _alone(device: DriveFit) -> Forward:
-    """Return the firmware's alignment with its standard errors."""
     sigma = float(np.hypot(device.quality_deg, SENSOR_DEG))
     attitude = float(np.hypot(sigma, UP_DEG))
     return Forward(device.calibration.vehicle_from_sensor, sigma, attitude, device.halves_deg or 0.0)
@@ -356,5 +352,4 @@ def _mean(frame: Array, variance: float, device: Array, quality_deg: float) -> t
 
 
 def _yaw_deg(frames: Array, reference: Array) -> Array:
-    """Compute the angle about up, in degrees, from the alignment `before` to each alignment in frames."""
     return np.degrees(rotation_vector(frames @ reference.T)[..., 1])

@@ -62,7 +62,6 @@ def _bytes(text: str) -> bytes:
 
 
 def is_remote(path: str) -> bool:
-    """True for a path that only fsspec can open."""
     return "://" in path
 
 

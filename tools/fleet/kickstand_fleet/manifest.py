@@ -99,7 +99,6 @@ def by_pattern(pattern: str, kind: str = CAR) -> list[Period]:
 
 
 def is_pattern(path: str) -> bool:
-    """True if the path contains * ? or [."""
     return any(mark in path for mark in "*?[")
 
 

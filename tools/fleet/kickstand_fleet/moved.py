@@ -56,8 +56,6 @@ STEP_SHARE = 0.7  # a tilt is sudden if more than this share of the tilt happens
 
 @dataclass
 class Move:
-    """A rotation of the mount."""
-
     log: int  # index of the log in which the mount rotated, or of the first log after the rotation
     # Time of the rotation from the beginning of that log. None if the mount rotated before that log.
     at_s: float | None
@@ -70,7 +68,6 @@ class Move:
 
     @property
     def angle_sigma_deg(self) -> float:
-        """Standard deviation of angle_deg."""
         return float(np.linalg.norm(self.turn_deg * self.sigma_deg) / max(self.angle_deg, 1e-9))
 
     @property
@@ -163,8 +160,6 @@ def turn_between(first: Blocks, second: Blocks) -> tuple[Array, Array] | None:
 
 @dataclass
 class _PartAlignment:
-    """The alignment on one side of a comparison."""
-
     frame: Array  # rotation from sensor to vehicle axes, shape (3, 3)
     variance: Array  # variances of pitch, yaw and roll, shape (3), in degrees^2
     sway_deg: float  # direction of the sway, in degrees from forward

@@ -126,8 +126,6 @@ def _result(period: Period, signals_to: str | None) -> PeriodResult:
 
 @dataclass
 class _Drive:
-    """The alignment from the logs of a period."""
-
     fit: DriveFit  # alignment by the firmware's method
     # Intervals of each log. Empty if the firmware refused the logs and no other method can help.
     intervals: list[evidence.Intervals] = field(default_factory=list)
@@ -168,7 +166,6 @@ def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
 def _add_drive(
     result: PeriodResult, period: Period, log: Log, calibration: CalibrationFile, signals_to: str | None
 ) -> None:
-    """Add the brake tests of a log to the result, and write its signals."""
     try:
         tests = brake_tests(log, calibration)
         result.brake_tests += [_vehicle_columns(period) | {"log": log.name} | _stop_row(stop, log) for stop in tests]

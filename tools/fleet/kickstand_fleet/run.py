@@ -176,7 +176,6 @@ def _keep(directory: str, journal: Journal, key: str, result: PeriodResult, agai
 
 
 def _marks(periods: list[Period]) -> dict[str, str]:
-    """Return the mark of each log of the periods (see files.identities())."""
     return files.identities(dict.fromkeys(path for period in periods for path in period.paths))
 
 

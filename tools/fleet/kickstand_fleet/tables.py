@@ -111,7 +111,6 @@ def write_tables(directory: str, results: Iterable[PeriodResult]) -> None:
 
 @contextlib.contextmanager
 def _table(directory: str, name: str) -> Iterator[Callable[[list[Row]], None]]:
-    """A context that yields a function. The function adds rows to the file of a table, and writes them in groups."""
     from pyarrow import Table
     from pyarrow.parquet import ParquetWriter
 

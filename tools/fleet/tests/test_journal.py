@@ -28,7 +28,7 @@ def vehicles(journal, keys):
 
 
 def test_results_are_read_again_in_the_order_of_their_keys(directory):
-    """The next run recomputes a result that was saved with again=True. For each key the final result counts."""
+    """The next run recomputes a result that was saved with again=True. For each key the latest result counts."""
     journal = Journal(directory)
     for name in ("b", "a"):
         journal.add(name, result(name))
@@ -57,7 +57,7 @@ def test_a_damaged_result_is_counted_and_computed_again(directory):
         journal = Journal(directory)
         assert ["a" in journal, "c" in journal] == [True, False] and vehicles(journal, ["a", "c"]) == ["a", "c"]
         assert vehicles(journal, ["b"]) == ([] if journal.damaged else ["b"])
-    files.write_bytes(f"{directory}/c.again.json", b'{"key": "c"')
+    files.write_bytes(f"{directory}/c.json", b'{"key": "c"')
     assert Journal(directory).damaged == 2
     journal.add("b", result("b"))
     assert vehicles(Journal(directory), ["a", "b", "c"]) == ["a", "b"]

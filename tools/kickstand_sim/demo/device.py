@@ -138,7 +138,7 @@ class Demo:
         """Switch the board on, and restart it after every reset, until the time is over or "quit" arrives."""
         self.board.install()
         from kickstand.start import main  # after install(), which replaces `machine` and `time`
-        from kickstand.ui.screen import MOTORCYCLE  # the pages of user.py come after these pages
+        from kickstand.ui.pages import MOTORCYCLE  # the pages of user.py come after these pages
 
         if not self._steer and "user.py" in os.listdir():
             for k in range(len(MOTORCYCLE)):

@@ -91,7 +91,6 @@ class HandBike:
             self._sway += (radians(sway) - self._sway) * step
 
     def _attitude(self, t_s):
-        """Return the lean in rad, its rate in rad/s, and the yaw rate in rad/s."""
         self._advance(t_s)
         lean = self._lean + self._sway * sin(_SWAY_RADPS * t_s)
         lean_rate = self._lean_rate + self._sway * _SWAY_RADPS * sin(_SWAY_RADPS * t_s + pi / 2.0)

@@ -47,7 +47,6 @@ class Score:
         self._turns = 0
 
     def add(self, state: State) -> None:
-        """Add one tick."""
         phase = state["phase"]
         self._turns += phase == "held turn" != self._phase
         self._phase = phase

@@ -31,7 +31,6 @@ def lean_text(lean_deg: float, digits: int = 1) -> str:
 
 
 def lcd_lines(lcd: list[str]) -> list[str]:
-    """Return the two lines of the display in a frame of plain text."""
     edge = "+" + "-" * 16 + "+"
     return [edge, *(f"|{line:16}|" for line in lcd), edge]
 

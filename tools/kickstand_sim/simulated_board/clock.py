@@ -24,7 +24,6 @@ class Reset(BaseException):
 
 
 def to_us(seconds):
-    """Convert seconds to integer microseconds."""
     return round(seconds * 1e6)
 
 
@@ -150,11 +149,9 @@ class Watchdog:
         self._check_later(self._round)
 
     def stop(self):
-        """Stop the watchdog."""
         self._round += 1
 
     def feed(self):
-        """Restart the time-out."""
         self._due_us = self._clock.now_us + self._timeout_us
 
     def _check_later(self, number):

@@ -82,7 +82,6 @@ class Bus:
         self._stuck_bits = -1  # zero bits that a hung device still sends; 0: it waits for ACK; -1: no device hangs
 
     def attach(self, device):
-        """Connect a device."""
         self.devices[device.address] = device
 
     def detach(self, device):
@@ -92,7 +91,6 @@ class Bus:
             self._device = None
 
     def max_hz(self):
-        """Return the highest clock frequency that all devices allow."""
         return min([400_000] + [getattr(d, "max_hz", 400_000) for d in self.devices.values()])
 
     # For a controller
@@ -140,7 +138,6 @@ class Bus:
         return value if self._fault is None else self._fault.on_read(value)
 
     def read_into(self, buf):
-        """Fill buf with bytes from read_byte()."""
         if self._device is not None and self._fault is None and hasattr(self._device, "read_into"):
             self._device.read_into(buf)
             return
@@ -148,7 +145,6 @@ class Bus:
             buf[i] = self.read_byte()
 
     def stop(self):
-        """Send STOP, which ends the transfer."""
         self._device = self._fault = None
         self.open = False
 
@@ -158,7 +154,6 @@ class Bus:
         self._stuck_bits = bits
 
     def power_off(self):
-        """Switch the power off: end the transfer and free a hung device."""
         self.stop()
         self._stuck_bits = -1
 

@@ -135,7 +135,6 @@ class Lcd:
         self.changes += 1
 
     def power_off(self):
-        """Switch the power off. Nothing is visible then."""
         self.on = False
         self._port = 0
         self.changes += 1
@@ -147,7 +146,6 @@ class Lcd:
 
     @property
     def backlight(self):
-        """Return True while the backlight is on."""
         return bool(self._port & _LIGHT)
 
     def codes(self):
@@ -170,7 +168,6 @@ class Lcd:
     # The I2C side
 
     def start(self, address, read):
-        """Receive START and address. Returns True to acknowledge."""
         return True
 
     def write_byte(self, value):

@@ -61,11 +61,9 @@ class Fifo:
 
     @property
     def count(self):
-        """Return the number of bytes that wait to be read."""
         return len(self._waiting)
 
     def clear(self):
-        """Empty the FIFO."""
         self._waiting = b""
 
     def push(self, data, keep_old=False):

@@ -71,13 +71,11 @@ class Oled:
         self.changes += 1
 
     def power_off(self):
-        """Switch the power off. No pixel is lit then."""
         self.on = False
         self.changes += 1
 
     @property
     def backlight(self):
-        """Return True while pixels can be lit."""
         return self.on and self.pumped
 
     def pixels(self):
@@ -100,11 +98,9 @@ class Oled:
 
     @property
     def rows(self):
-        """Return the number of driven rows, at most 64."""
         return self._mux + 1
 
     def pages(self):
-        """Return the visible part of the RAM, 128 bytes per page."""
         starts = [page * self._columns + self._first for page in range(PAGES)]
         return [self.ram[start : start + WIDTH] for start in starts]
 
@@ -118,7 +114,6 @@ class Oled:
     # The I2C side
 
     def start(self, address, read):
-        """Receive START and address. Returns True to acknowledge."""
         self._control = True
         return True
 
@@ -136,7 +131,6 @@ class Oled:
         return True
 
     def read_byte(self):
-        """Return the status."""
         return self.identity | (0 if self.on else _OFF)
 
     # The controller
@@ -265,7 +259,6 @@ def _cells(line):
 
 
 def _small(pages, page):
-    """Return the letters of 8x8 pixels in a page, or None."""
     letters = [_LETTERS.get(cell, "") for cell in _cells(pages[page])]
     return "".join(letters) if all(letters) else None
 
@@ -280,7 +273,6 @@ def _tall(pages, page, inverted=0):
 
 
 def _digit(pages, page, x):
-    """Return the large digit at column x whose top is in this page, or None."""
     from kickstand.ui.glance import DIGITS
 
     pattern = b"".join([bytes(pages[page + row][x : x + _DIGIT_COLUMNS]) for row in range(_DIGIT_ROWS)])

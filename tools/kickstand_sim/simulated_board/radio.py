@@ -44,7 +44,6 @@ class Radio:
         self.off()
 
     def off(self):
-        """Set the state after power-on."""
         self.irq = None
         self.active = False
         self.config = {}
@@ -78,11 +77,9 @@ class Radio:
         return True
 
     def take_passkey(self, passkey):
-        """Receive the PIN of gap_passkey()."""
         self._passkey = passkey
 
     def drop(self):
-        """End the connection from the board's side."""
         phone = self.phone
         self.disconnect()
         if phone is not None:
@@ -159,12 +156,10 @@ class Radio:
         return self.paired
 
     def ask_pin(self):
-        """Ask the board for the PIN that a phone must enter. Returns it."""
         self._tell(PASSKEY, 0, _DISPLAY, 0)
         return self._passkey
 
     def pair(self):
-        """Complete the pairing after the right PIN."""
         self.paired = True
         self._tell(SET_SECRET, _BOND, self.peer, b"\x00key")
 

@@ -52,7 +52,6 @@ class SdCard:
         self._selected = False
 
     def select(self, level):
-        """Set the level of the pin CS."""
         self._selected = not level
         self._command = b""
         if level:
@@ -101,7 +100,6 @@ class SdCard:
         return 0xFF
 
     def _obey(self, number, argument):
-        """Execute a command. Returns the answer."""
         now_us = self._clock.now_us
         if number == 0:
             self._ready_us = None if self._init_s is None else now_us + int(self._init_s * 1e6)
@@ -148,15 +146,12 @@ class SdCard:
     # For a computer's card reader: a block device for os.VfsFat
 
     def readblocks(self, number, buf):
-        """Fill buf with the sectors from this number on."""
         for i in range(len(buf) // SECTOR):
             buf[i * SECTOR : (i + 1) * SECTOR] = self.data.get(number + i, _EMPTY)
 
     def writeblocks(self, number, buf):
-        """Write buf."""
         for i in range(len(buf) // SECTOR):
             self._keep(number + i, bytes(buf[i * SECTOR : (i + 1) * SECTOR]))
 
     def ioctl(self, op, argument):
-        """Answer the queries for the number of sectors and for their size."""
         return {4: self._sectors, 5: SECTOR}.get(op, 0)

@@ -104,11 +104,9 @@ class Board:
             self.fit_lcd()
 
     def install(self):
-        """Make `machine`, `time` and `os` act on this board, for all imported code."""
         self._fakes.install(self)
 
     def uninstall(self):
-        """Undo install()."""
         self.faults.restore("open", "print")
         self._fakes.uninstall()
 
@@ -151,13 +149,11 @@ class Board:
                     part.connect(None)
 
     def power_on(self):
-        """Switch on everything except the processor."""
         self._off = False
         self.sensor.power_on()
         self.lcd.power_on()
 
     def power_off(self):
-        """Switch off everything except the processor."""
         self._off = True
         if self.radio:
             self.radio.off()
@@ -165,12 +161,21 @@ class Board:
             bus.power_off()
         self.lcd.power_off()
 
+    def run_firmware(self, until_s, **config):
+        """Run the firmware with these settings of config.py, as run() does. Call it within the `with` statement."""
+        from kickstand import settings, start
+
+        load = settings.load
+        settings.load = lambda: settings.Settings(type("Config", (), config))
+        try:
+            return self.run(start.main, until_s)
+        finally:
+            settings.load = load
+
     def at(self, t_s, function):
-        """Call function() when the clock reaches t_s."""
         self.clock.at(to_us(t_s), function)
 
     def every(self, period_s, function):
-        """Call function() every period_s."""
         self.clock.every(to_us(period_s), function)
 
     def press(self, at_s=None, for_s=0.15):
@@ -183,16 +188,13 @@ class Board:
     # Parts that are connected and disconnected
 
     def fit_sensor(self):
-        """Connect the sensor and switch its supply on."""
         self.sensor.power_on()
         self.sensor_bus.attach(self.sensor)
 
     def remove_sensor(self):
-        """Disconnect the sensor."""
         self.sensor_bus.detach(self.sensor)
 
     def fit_lcd(self):
-        """Connect the display and switch its supply on."""
         self.lcd.power_on()
         self.lcd_bus.attach(self.lcd)
 
@@ -253,7 +255,6 @@ class Board:
         return Bus(self.clock, sda, scl)
 
     def set_up_pin(self, number, mode, pull, level):
-        """Execute Pin.init()."""
         self.touched.add(number)
         self._pins.setdefault(number, [0, 0, 0, self.clock.now_us])[:3] = mode, pull, level or 0
         self._drive_wire(number, 1 if mode == fake_machine.Pin.IN else level or 0)
@@ -267,7 +268,6 @@ class Board:
             self._drive_wire(number, level)
 
     def pin_level(self, number):
-        """Return the result of Pin.value()."""
         mode, pull = self._pins.get(number, (fake_machine.Pin.IN, -1))[:2]
         level = self._level(number)
         if number in self._high and mode == fake_machine.Pin.IN and pull == fake_machine.Pin.PULL_DOWN:

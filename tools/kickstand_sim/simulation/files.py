@@ -27,22 +27,15 @@ def simulate(
 ) -> SimulatedRide:
     """Simulate a ride and write it to a directory.
 
-    These files are written:
-        POSE_1.csv to POSE_7.csv: Six poses with each side up once, then a slanted pose.
-        SIX.csv: Seven poses in one log, with the turns between them.
-        KICKSTAND.csv, UPRIGHT.csv: The poses of the bike.
-        RIDE.csv: The ride.
-        TRUTH.csv: The truth, with one row per row of RIDE.csv.
+    The files are POSE_1.csv to POSE_7.csv (each side up once, then a slanted pose), SIX.csv (seven poses in one log,
+    with the turns between them), KICKSTAND.csv and UPRIGHT.csv (the poses of the bike), RIDE.csv, and TRUTH.csv with
+    one row per row of RIDE.csv. An old RIDE.cal.json in the directory is removed.
 
-    An old RIDE.cal.json in the directory is removed.
-
-    Args:
-        profile: A key of profiles.PROFILES.
-        seed: Each seed gives another ride.
-        out_dir: The directory.
-        seconds: Exact length of RIDE.csv.
-        speed: True to add a speed and a position to RIDE.csv once per second.
-        conditions: Other arguments of ride.ride().
+    profile: A key of profiles.PROFILES.
+    seed: Each seed gives another ride.
+    seconds: Exact length of RIDE.csv.
+    speed: True to add a speed and a position to RIDE.csv once per second.
+    conditions: Other arguments of ride.ride().
 
     Raises InputError if the profile is unknown or the directory cannot be written.
     """
@@ -64,7 +57,6 @@ def simulate(
 
 
 def _cut(simulated: SimulatedRide, seconds: float) -> SimulatedRide:
-    """Return the first `seconds` of a ride."""
     n = min(len(simulated.time), round(seconds * simulated.rate_hz))
     truth = {name: values[:n] for name, values in simulated.truth.items()}
     return replace(

@@ -23,7 +23,6 @@ def still(chance: np.random.Generator, chip: Chip, up: NDArray, temp_c: float) -
 
 
 def seven(chance: np.random.Generator, chip: Chip, temp_c: float) -> list[NDArray[np.float64]]:
-    """Simulate the readings of the seven poses of ups(), a list with an array per pose."""
     return [still(chance, chip, up, temp_c) for up in ups(chance)]
 
 
@@ -70,8 +69,6 @@ def standing(
 
 @dataclass(frozen=True)
 class Hand:
-    """The movements of a hand that turns a sensor."""
-
     still_s: tuple[float, float] = (4.5, 6.0)  # range (shortest, longest) of the time for holding still
     # Range (shortest, longest) of the time for a turn by 90 degrees. A half turn takes 1.6 times as long.
     turn_s: tuple[float, float] = (0.9, 2.0)
@@ -122,7 +119,6 @@ def procedure(
 
 
 def _turn_between(a: NDArray, b: NDArray) -> NDArray:
-    """Return the smallest rotation from the unit vector a to the unit vector b, shape (3, 3)."""
     axis = np.cross(a, b)
     size = np.linalg.norm(axis)
     if size < 1e-9:

@@ -48,12 +48,10 @@ class Plan:
 
     @property
     def going_on(self) -> bool:
-        """True while the ride needs more legs before finish()."""
         return self._seconds < self._until
 
     @property
     def seconds(self) -> float:
-        """Total duration of the legs that are planned so far."""
         return self._seconds
 
     def fit(self, seconds: float) -> None:
@@ -151,7 +149,6 @@ class Plan:
         self.add("stopped", 1.5, 0.0, lean_deg=0.0, roll_s=1.2)
 
     def walk(self, seconds: float, speed_mps: float) -> None:
-        """Ride straight ahead at walking pace."""
         self.add("walking pace", seconds, speed_mps, lean_deg=0.0, roll_s=1.0)
 
     def finish(self, speed_mps: float, mps2: float) -> None:

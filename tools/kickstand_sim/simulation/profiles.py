@@ -306,6 +306,5 @@ PROFILES = MAIN | {profile.__name__: profile for profile in _HARD}
 
 
 def check_profile(name: str) -> None:
-    """Raise InputError for an unknown profile."""
     if name not in PROFILES:
         raise InputError(f"no profile {name}: there are {', '.join(PROFILES)}")

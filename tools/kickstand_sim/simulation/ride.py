@@ -168,7 +168,6 @@ def ride(
 
 
 def _truth(motion: Motion) -> dict[str, NDArray[np.float64]]:
-    """Return the true values at each reading, by name."""
     return {
         "lean_deg": np.degrees(motion.lean[::DIVIDER]),
         "speed_mps": motion.speed[::DIVIDER].copy(),

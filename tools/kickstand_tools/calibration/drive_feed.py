@@ -10,9 +10,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from kickstand.drive_alignment.alignment import STALE_US, DriveAlignment
+from kickstand.drive_alignment.alignment import MOVED_MPS, STALE_US, DriveAlignment, StandingVertical
 from kickstand.drive_alignment.events import BIN_US
-from kickstand.drive_alignment.vertical import MOVED_MPS, StandingVertical
 from kickstand.units import GAP_US
 
 from ..common.errors import InputError

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from kickstand.calibration import six_position
 from kickstand.calibration.poses import Turn
-from kickstand.calibration.sensor_fit import SensorFit
-from kickstand.calibration.six_position import SIDES
+from kickstand.calibration.six_position import SIDES, SensorFit
 from kickstand.errors import Refusal
 
 from ..checks.log import check_log
@@ -41,7 +40,7 @@ def fit_procedure(source: Source) -> SixPositions:
     the turns between the poses. Every still pose and every turn counts.
 
     The result has offset, slope and cross-axis errors of the accelerometer, and bias, scale and cross-axis errors of
-    the gyro (see kickstand.calibration.sensor_fit).
+    the gyro (see kickstand.calibration.six_position).
 
     source: see read_log.
     Raises InputError. Raises its subclass RefusedInput if the firmware refuses a pose or the result.

@@ -1,6 +1,6 @@
 """The messages for the firmware's refusals of poses and drives. of_firmware() converts a refusal to its message.
 
-In kickstand.calibration, poses refuses a single pose, six_position and sensor_fit refuse six poses, and
+In kickstand.calibration, poses refuses a single pose, six_position refuses six poses, and
 two_position refuses two poses. kickstand.drive_alignment refuses drives.
 """
 

@@ -11,6 +11,7 @@ The module runs on MicroPython (in the browser and elsewhere) and on CPython.
 import json
 
 from kickstand_sim.demo.hand_bike import HandBike
+from kickstand_sim.simulated_board import app_state
 from kickstand_sim.simulated_board.clock import PowerOff, Reset, to_us
 from kickstand_sim.simulated_board.lcd import shown_lean
 from kickstand_sim.simulated_board.oled import Oled
@@ -146,7 +147,7 @@ class Device:
         return still or self._held > WHOLE_TICKS
 
     def state(self) -> "dict | None":
-        """Return the entries of App.state() that STATE names. Without an App: the view "off", "starting" or "safe"."""
+        """Return the entries of STATE. Without an App: the view "off", "starting" or "safe"."""
         return None
 
     def meter(self) -> "list | None":
@@ -240,7 +241,7 @@ class PageDevice(Device):
     def state(self):
         if not self._app:
             return {"view": "safe" if self._stopped else "starting" if self.powered else "off"}
-        state = self._app.state()
+        state = app_state.state(self._app)
         return {name: state[name] for name in STATE}
 
     def _hand_over(self, app):

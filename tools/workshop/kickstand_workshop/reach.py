@@ -61,7 +61,6 @@ def _name(path: Path, folder: Path) -> str:
 
 
 def _imports(name: str, path: Path, modules: Iterable[str]) -> Iterator[str]:
-    """Yield the modules that a file imports. A test also has the conftest.py of its folders."""
     package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
     candidates = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -80,7 +79,6 @@ def _imports(name: str, path: Path, modules: Iterable[str]) -> Iterator[str]:
 
 
 def _modules(path: Path, modules: Iterable[str]) -> set[str]:
-    """Return the modules that change with a file."""
     for top, folder in [(folder / package, folder) for package, folder in PRODUCT.items()] + [(t, ROOT) for t in TESTS]:
         if path.is_relative_to(top):
             name = _name(path, folder)

@@ -75,7 +75,6 @@ class FleetSummary:
         self._rows: dict[bool, list[tuple[Row, list[float]]]] = {False: [], True: []}
 
     def add(self, result: PeriodResult) -> None:
-        """Add the next result."""
         row = result.alignment
         folder = row["vehicle"][: row["vehicle"].rfind("/") + 1]
         common = folder if self.below is None else os.path.commonprefix([self.below, folder])  # noqa: RUF071

@@ -46,20 +46,17 @@ class Panel:
         self._right, self._bottom = self.x + self.width - 8.0, self.y + self.height - 34.0
 
     def dots(self, points: Sequence[Point], colour: str, radius: float = 2.0) -> None:
-        """Draw a dot at each point."""
         d = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in self._positions(points))
         if d:
             style = {"stroke_opacity": 0.55, "stroke_width": 2.0 * radius, "stroke_linecap": "round"}
             self._parts.append(element("path", d=d, stroke=colour, **style))
 
     def line(self, points: Sequence[Point], colour: str, width: float = 1.5) -> None:
-        """Draw a line from point to point."""
         if len(points) > 1:
             d = path(self._positions(points))
             self._parts.append(element("path", d=d, fill="none", stroke=colour, stroke_width=width))
 
     def bars(self, edges: Sequence[float], heights: Sequence[float], colour: str) -> None:
-        """Draw a bar from edge to edge for each height."""
         tops = self._positions(list(zip(edges, heights)))
         ends = self._positions([(edge, 0.0) for edge in edges[1:]])
         for (left, top), (right, bottom) in zip(tops, ends):
@@ -90,7 +87,6 @@ class Panel:
         return element("g", *axes, *self._parts)
 
     def _positions(self, points: Sequence[Point]) -> list[Point]:
-        """The points in the picture's coordinates."""
         (x0, x1), (y0, y1) = self.across, self.along
         x_scale = (self._right - self._left) / ((x1 - x0) or 1.0)
         y_scale = (self._bottom - self._top) / ((y1 - y0) or 1.0)
@@ -109,7 +105,6 @@ def ticks(first: float, last: float, count: int) -> list[float]:
 
 
 def date_text(utc_s: float) -> str:
-    """Format the day of a time as 2026-09-30. utc_s: s since 1970."""
     return datetime.datetime.fromtimestamp(utc_s, datetime.UTC).strftime("%Y-%m-%d")
 
 
@@ -117,7 +112,6 @@ _WIDTH, _HEIGHT = 960, 380
 
 
 def file_name(vehicle: str, mount: str) -> str:
-    """The name of the picture of a mount."""
     return file_stem(f"{vehicle} {mount}".strip(), vehicle, mount) + ".svg"
 
 
@@ -127,7 +121,6 @@ def write_plot(path: str, result: PeriodResult) -> None:
 
 
 def draw(result: PeriodResult) -> str:
-    """The picture as SVG."""
     row = result.alignment
     name = row["vehicle"] + (f", mount {row['mount']}" if row["mount"] else "")
     subtitle = row["message"] or (

@@ -49,8 +49,6 @@ MATRIX = tuple(f"{row}_{axis}" for row in ("left", "up", "forward") for axis in 
 
 @dataclass
 class MadeVehicle:
-    """A vehicle of the fleet."""
-
     name: str  # name of the vehicle in the manifest
     kind: str  # "car", "bus" or "motorcycle"
     trouble: str  # the vehicle's fault, a key of TROUBLES, or ""
@@ -160,13 +158,11 @@ def _vehicle(
 
 
 def _turn(chance: np.random.Generator, degrees: float) -> Array:
-    """Return a rotation by this angle about a random axis, shape (3, 3)."""
     axis = chance.standard_normal(3)
     return rotation_matrix(np.radians(degrees) * axis / np.linalg.norm(axis))
 
 
 def _write(path: Path, log: Log, broken: str) -> None:
-    """Write a log. broken: the fault of the file, a key of TROUBLES, or ""."""
     content = log_bytes(log)
     if path.suffix == ".gz":
         content = gzip.compress(content, 1, mtime=0)
@@ -184,7 +180,6 @@ def _write(path: Path, log: Log, broken: str) -> None:
 
 
 def log_bytes(log: Log) -> bytes:
-    """The bytes of a log as a CSV file."""
     import pyarrow  # imported here, because it is slow to import
     from pyarrow import csv
 

@@ -84,7 +84,6 @@ class _Legs:
         self.leg(seconds)
 
     def to(self, speed: float) -> None:
-        """Speed up or brake in a straight line."""
         limits = self._handling.speed_up_mps2 if speed > self.speed else self._handling.brake_mps2
         self.leg(abs(speed - self.speed) / self.chance.uniform(*limits), speed)
 

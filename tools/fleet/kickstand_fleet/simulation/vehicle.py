@@ -22,8 +22,6 @@ _COUNT_G, _COUNT_DPS = 1.0 / 16384.0, 1.0 / 131.0
 
 @dataclass
 class VehicleSensor:
-    """The mounting and the errors of a sensor."""
-
     mount: Array  # rotation from sensor to vehicle axes, shape (3, 3). Its rows are left, up, forward.
     offset_g: Array  # offset of the accelerometer, shape (3), in g
     slope: Array  # slope of the accelerometer, shape (3)
@@ -32,8 +30,6 @@ class VehicleSensor:
 
 @dataclass
 class Receiver:
-    """The receiver that measures the speed."""
-
     every_s: float = 1.0  # time between two values
     late_s: float = 0.3  # delay of each value
     factor: float = 1.0  # factor on each value. The factor is 3.6 for a receiver that wrongly sends km/h.

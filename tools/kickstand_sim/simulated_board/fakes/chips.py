@@ -68,7 +68,6 @@ def _is_classic(machine):
 
 
 def _kind(machine):
-    """Return the board's key in _ESP32_PINS."""
     kind = _chip(machine)[5:7]
     return kind if kind in _ESP32_PINS else ""
 

@@ -41,7 +41,6 @@ def statvfs(path):
 
 
 def _taken(folder):
-    """Return the number of flash blocks of all files in a folder and its subfolders."""
     blocks = 0
     for name, kind, *rest in ilistdir(folder):
         if kind & 0x4000:

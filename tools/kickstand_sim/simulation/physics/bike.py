@@ -75,8 +75,6 @@ class Bike:
 
 @dataclass
 class Roll:
-    """Motion in roll and yaw."""
-
     lean: Signal  # lean of the chassis, in rad
     balance: Signal  # lean of the centre of mass, in rad
     yaw_rate: Signal  # rate about the vertical, in rad/s

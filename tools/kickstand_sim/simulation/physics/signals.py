@@ -22,7 +22,6 @@ def smoothstep(u: Signal) -> Signal:
 
 
 def derivative(x: Signal, rate_hz: float) -> Signal:
-    """Return the derivative of x per second, by central differences."""
     return np.gradient(x, 1.0 / rate_hz)
 
 

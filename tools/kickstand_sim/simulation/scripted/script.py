@@ -59,12 +59,10 @@ def upright(seconds, lean_deg=0.0, slope_deg=None):
 
 
 def wait(seconds):
-    """Keep all values for `seconds`."""
     return (Segment("wait", seconds),)
 
 
 def straight(seconds, slope_deg=None):
-    """Ride straight ahead. slope_deg: slope at the end."""
     return (Segment("straight", seconds, slope_deg=slope_deg),)
 
 
@@ -74,7 +72,6 @@ def turn(lean_deg, seconds, roll_s=1.5):
 
 
 def accelerate(speed_mps, seconds):
-    """Speed up to speed_mps, upright."""
     return (Segment("accelerate", seconds, 0.0, speed_mps, sway_deg=RIDING_SWAY_DEG, engine=1.0),)
 
 

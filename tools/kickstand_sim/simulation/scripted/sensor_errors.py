@@ -39,8 +39,6 @@ def normal(number):
 
 
 class Chance:
-    """A stream of random numbers from a seed."""
-
     def __init__(self, seed):
         self._seed = scrambled(seed + 1)
         self._count = 0

@@ -1,4 +1,4 @@
-// Describes what the display shows, from the firmware's state (firmware/kickstand/state.py).
+// Describes what the display shows, from the firmware's state (kickstand_sim/simulated_board/app_state.py).
 
 // {name of a view: [its kind for the guide, a few words to show beside the true lean]}
 const VIEWS = {

@@ -75,7 +75,6 @@ def of_recording(path: Path) -> Figures:
 
 
 def of_simulated(profile: str, seed: int, seconds: float, road: str | None, mount: str | None) -> Figures:
-    """Return the rms in each band for a simulated ride, with its true alignment."""
     simulated = ride(profile, seed, seconds, road=road, mount=mount)
     calibration = CalibrationFile(vehicle_from_sensor=simulated.vehicle_from_sensor, aligned=True)
     return bands_of_log(Log.from_readings(simulated.readings, simulated.rate_hz, "RIDE.csv"), calibration)

@@ -55,7 +55,6 @@ class DrawnRide:
     mounts: list  # one mount per device, a key of MOUNTS
 
     def true_lean(self, k):
-        """Return the true lean at the samples of device k."""
         return np.interp(self.logs[k].t_s, self.time_s, self.lean_deg)
 
     def riding(self, k):
@@ -92,7 +91,6 @@ def city(chance):
 
 
 def hills(chance):
-    """Return the legs of street() at 0.7 times the speed. drawn_ride() adds the slopes."""
     return [(s, lean, 0.7 * v) for s, lean, v in street(chance)]
 
 
@@ -311,7 +309,6 @@ def _twice(x):
 
 
 def judged(ride, k=0):
-    """Return the result of Known.judged() for device k."""
     return Known(ride.logs[k], ride.calibrations[k], ride.true_lean(k), ride.riding(k)).judged()
 
 

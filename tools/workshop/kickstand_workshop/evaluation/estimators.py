@@ -40,8 +40,6 @@ PACKAGES |= {f"{name} best": package for name, package in PACKAGES.items()}
 
 @dataclass
 class Samples:
-    """N calibrated samples of a log."""
-
     time: NDArray[np.float64]  # evenly spaced times, shape (N), in s
     force: NDArray[np.float64]  # force along left, up, forward, shape (N, 3), in g
     rate: NDArray[np.float64]  # rate about the same axes, shape (N, 3), in deg/s
@@ -93,7 +91,6 @@ def vqf(samples: Samples, tau_s: float = 3.0) -> NDArray[np.float64]:
 
 
 def fusion(samples: Samples, **settings: float) -> NDArray[np.float64]:
-    """Run the filter Fusion of x-io."""
     import imufusion
 
     gyro, accel = _xyz(samples)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 SEEN, ILL, HARMLESS = "seen", "ill", "harmless"
 ACCEL_RANGE_G, GYRO_RANGE_DPS = 16.0, 500.0  # ranges of the sensor, the defaults of a board
+RANGES = {"force": ACCEL_RANGE_G, "rate": GYRO_RANGE_DPS}
 
 
 @dataclass
@@ -35,8 +36,6 @@ class Part:
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault of the sensor."""
-
     name: str  # description of the fault
     kind: str  # SEEN, ILL or HARMLESS
     change: Callable[[Part], None]  # function that applies the fault to a Part
@@ -45,30 +44,31 @@ class Fault:
 
     @property
     def title(self) -> str:
-        """The name of the fault, and its duration or its beginning."""
         if self.from_start:
             return f"{self.name}, from power-on"
         return self.name if self.seconds is None else f"{self.name}, {self.seconds:g} s"
 
 
-def _gyro_axis_dead(part: Part) -> None:
-    part.rate[:, part.axis] = part.rate[0, part.axis] if part.sign > 0 else 0.0
+def _axis_dead(part: Part, signal: str) -> None:
+    values = getattr(part, signal)
+    values[:, part.axis] = values[0, part.axis] if part.sign > 0 else 0.0
 
 
-def _gyro_dead(part: Part) -> None:
-    part.rate[:] = 0.0
+def _axis_at_rail(part: Part, signal: str) -> None:
+    getattr(part, signal)[:, part.axis] = part.sign * 2.0 * RANGES[signal]
 
 
-def _gyro_axis_at_rail(part: Part) -> None:
-    part.rate[:, part.axis] = part.sign * 2.0 * GYRO_RANGE_DPS
+def _axis_scaled(part: Part, signal: str, scale: float) -> None:
+    getattr(part, signal)[:, part.axis] *= scale
 
 
-def _accel_axis_dead(part: Part) -> None:
-    part.force[:, part.axis] = part.force[0, part.axis] if part.sign > 0 else 0.0
+def _axis_steps(part: Part, signal: str, by: float) -> None:
+    getattr(part, signal)[:, part.axis] += part.sign * by
 
 
-def _accel_axis_at_rail(part: Part) -> None:
-    part.force[:, part.axis] = part.sign * 2.0 * ACCEL_RANGE_G
+def _axis_noisy(part: Part, signal: str, rms: float) -> None:
+    values = getattr(part, signal)
+    values[:, part.axis] += rms * part.chance.standard_normal(len(values))
 
 
 def _accel_frozen(part: Part) -> None:
@@ -79,17 +79,9 @@ def _gyro_scaled(part: Part, scale: float) -> None:
     part.rate *= scale
 
 
-def _gyro_axis_scaled(part: Part, scale: float) -> None:
-    part.rate[:, part.axis] *= scale
-
-
 def _gyro_axes_swapped(part: Part) -> None:
     axes = [k for k in range(3) if k != part.axis]
     part.rate[:, axes] = part.rate[:, axes[::-1]].copy()
-
-
-def _gyro_bias_steps(part: Part, dps: float) -> None:
-    part.rate[:, part.axis] += part.sign * dps
 
 
 def _gyro_bias_drifts(part: Part, dps: float) -> None:
@@ -102,18 +94,6 @@ def _mount_slips(part: Part, degrees: float) -> None:
     turned = rotation_matrix(np.radians(part.sign * degrees) * np.eye(3)[part.axis])
     part.force[:] = part.force @ turned
     part.rate[:] = part.rate @ turned
-
-
-def _accel_axis_steps(part: Part, g: float) -> None:
-    part.force[:, part.axis] += part.sign * g
-
-
-def _accel_axis_scaled(part: Part, scale: float) -> None:
-    part.force[:, part.axis] *= scale
-
-
-def _accel_axis_noisy(part: Part, g: float) -> None:
-    part.force[:, part.axis] += g * part.chance.standard_normal(len(part.force))
 
 
 def _accel_clipped(part: Part, g: float) -> None:
@@ -130,10 +110,6 @@ def _accel_clipped_now_and_then(part: Part) -> None:
 def _gyro_late(part: Part, seconds: float) -> None:
     n = round(seconds * part.rate_hz)
     part.rate[n:] = part.rate[:-n].copy()
-
-
-def _gyro_axis_noisy(part: Part, dps: float) -> None:
-    part.rate[:, part.axis] += dps * part.chance.standard_normal(len(part.rate))
 
 
 def _mount_swings(part: Part, degrees: float, hz: float) -> None:
@@ -155,45 +131,41 @@ def _readings_lost_now_and_then(part: Part) -> None:
     part.lost[np.arange(len(part.lost)) % period < n] = True
 
 
-def _all(name: str, kind: str, change: Callable[[Part], None]) -> Iterator[Fault]:
-    """Yield three faults with this change: from power-on, from mid-ride to the end, and for 5 s."""
-    yield Fault(name, kind, change, from_start=True)
-    yield Fault(name, kind, change)
-    yield Fault(name, kind, change, seconds=5.0)
+START, END = -1.0, None  # a fault from power-on, a fault from mid-ride to the end
 
 
+def _spans(name: str, kind: str, change: Callable[[Part], None], *spans: float | None) -> Iterator[Fault]:
+    """Yield a fault with this change for each span: START, END, or a duration in s."""
+    for seconds in spans:
+        yield Fault(name, kind, change, None if seconds == START else seconds, seconds == START)
+
+
+_EACH = (START, END, 5.0)
 FAULTS: tuple[Fault, ...] = (
-    *_all("gyro axis dead", SEEN, _gyro_axis_dead),
-    *_all("gyro dead", SEEN, _gyro_dead),
-    Fault("gyro axis at the end of its range", SEEN, _gyro_axis_at_rail, seconds=0.3),
-    Fault("gyro axis at the end of its range", SEEN, _gyro_axis_at_rail, seconds=1.0),
-    Fault("gyro axis at the end of its range", SEEN, _gyro_axis_at_rail),
-    *_all("accelerometer axis dead", SEEN, _accel_axis_dead),
-    Fault("accelerometer axis at the end of its range", SEEN, _accel_axis_at_rail, seconds=1.0),
-    Fault("accelerometer axis at the end of its range", SEEN, _accel_axis_at_rail),
+    *_spans("gyro axis dead", SEEN, partial(_axis_dead, signal="rate"), *_EACH),
+    *_spans("gyro dead", SEEN, partial(_gyro_scaled, scale=0.0), *_EACH),
+    *_spans("gyro axis at the end of its range", SEEN, partial(_axis_at_rail, signal="rate"), 0.3, 1.0, END),
+    *_spans("accelerometer axis dead", SEEN, partial(_axis_dead, signal="force"), *_EACH),
+    *_spans("accelerometer axis at the end of its range", SEEN, partial(_axis_at_rail, signal="force"), 1.0, END),
     Fault("accelerometer frozen", SEEN, _accel_frozen),
-    *_all("gyro at half scale", ILL, partial(_gyro_scaled, scale=0.5)),
-    *_all("gyro axis at half scale", ILL, partial(_gyro_axis_scaled, scale=0.5)),
-    Fault("gyro axis at twice the scale", ILL, partial(_gyro_axis_scaled, scale=2.0)),
-    *_all("gyro axis mirrored", ILL, partial(_gyro_axis_scaled, scale=-1.0)),
+    *_spans("gyro at half scale", ILL, partial(_gyro_scaled, scale=0.5), *_EACH),
+    *_spans("gyro axis at half scale", ILL, partial(_axis_scaled, signal="rate", scale=0.5), *_EACH),
+    Fault("gyro axis at twice the scale", ILL, partial(_axis_scaled, signal="rate", scale=2.0)),
+    *_spans("gyro axis mirrored", ILL, partial(_axis_scaled, signal="rate", scale=-1.0), *_EACH),
     Fault("two gyro axes swapped", ILL, _gyro_axes_swapped, from_start=True),
-    Fault("gyro bias steps by 2 deg/s", ILL, partial(_gyro_bias_steps, dps=2.0)),
-    Fault("gyro bias steps by 5 deg/s", ILL, partial(_gyro_bias_steps, dps=5.0)),
-    Fault("gyro bias steps by 10 deg/s", ILL, partial(_gyro_bias_steps, dps=10.0)),
-    Fault("gyro bias steps by 10 deg/s", ILL, partial(_gyro_bias_steps, dps=10.0), seconds=5.0),
+    Fault("gyro bias steps by 2 deg/s", ILL, partial(_axis_steps, signal="rate", by=2.0)),
+    Fault("gyro bias steps by 5 deg/s", ILL, partial(_axis_steps, signal="rate", by=5.0)),
+    *_spans("gyro bias steps by 10 deg/s", ILL, partial(_axis_steps, signal="rate", by=10.0), END, 5.0),
     Fault("gyro bias drifts by 10 deg/s", ILL, partial(_gyro_bias_drifts, dps=10.0)),
     Fault("mount slips by 10 degrees", ILL, partial(_mount_slips, degrees=10.0)),
-    Fault("mount slips by 20 degrees", ILL, partial(_mount_slips, degrees=20.0)),
-    Fault("mount slips by 20 degrees", ILL, partial(_mount_slips, degrees=20.0), seconds=5.0),
-    Fault("accelerometer axis off by 0.3 g", ILL, partial(_accel_axis_steps, g=0.3)),
-    Fault("accelerometer axis off by 0.3 g", ILL, partial(_accel_axis_steps, g=0.3), seconds=5.0),
-    Fault("accelerometer axis at half scale", ILL, partial(_accel_axis_scaled, scale=0.5)),
+    *_spans("mount slips by 20 degrees", ILL, partial(_mount_slips, degrees=20.0), END, 5.0),
+    *_spans("accelerometer axis off by 0.3 g", ILL, partial(_axis_steps, signal="force", by=0.3), END, 5.0),
+    Fault("accelerometer axis at half scale", ILL, partial(_axis_scaled, signal="force", scale=0.5)),
     Fault("accelerometer clipped at 1.2 g", ILL, partial(_accel_clipped, g=1.2)),
-    Fault("accelerometer axis noisy, 1 g", ILL, partial(_accel_axis_noisy, g=1.0)),
-    Fault("readings lost", ILL, _readings_lost, seconds=1.0),
-    Fault("readings lost", ILL, _readings_lost, seconds=5.0),
+    Fault("accelerometer axis noisy, 1 g", ILL, partial(_axis_noisy, signal="force", rms=1.0)),
+    *_spans("readings lost", ILL, _readings_lost, 1.0, 5.0),
     Fault("gyro 150 ms late", HARMLESS, partial(_gyro_late, seconds=0.15)),
-    Fault("gyro axis noisy, 20 deg/s", HARMLESS, partial(_gyro_axis_noisy, dps=20.0)),
+    Fault("gyro axis noisy, 20 deg/s", HARMLESS, partial(_axis_noisy, signal="rate", rms=20.0)),
     Fault("mount swings by 1 degree at 8 Hz", HARMLESS, partial(_mount_swings, degrees=1.0, hz=8.0)),
     Fault("accelerometer clipped now and then", HARMLESS, _accel_clipped_now_and_then),
     Fault("readings lost for 0.3 s every 10 s", HARMLESS, _readings_lost_now_and_then),
@@ -202,8 +174,6 @@ FAULTS: tuple[Fault, ...] = (
 
 @dataclass
 class Ill:
-    """The readings of a ride with a fault."""
-
     readings: Array  # readings in the chip's order, shape (n, 7)
     lost: NDArray[np.bool_]  # True for readings that never arrive, shape (n)
     first: int  # index of the first reading with the fault
@@ -223,11 +193,8 @@ def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: i
     The seed chooses the faulty axis, the sign, and whether the chip is mounted square. A square chip has the same axes
     as the bike.
 
-    fault: The fault.
     readings: Readings in the chip's order, shape (n, 7).
-    rate_hz: Number of readings per second.
     begin_s: Start of a fault that begins in mid-ride.
-    seed: The seed.
     vehicle_from_sensor: Rotation from sensor to bike axes, shape (3, 3).
     """
     chance = np.random.default_rng([seed, *fault.title.encode()])

@@ -45,8 +45,6 @@ CAPTION = (
 
 @dataclass(frozen=True)
 class FaultJob:
-    """A ride to simulate, with or without a fault."""
-
     fault: Fault | None  # the fault, or None
     seed: int  # seed of the ride and of the fault
     seconds: float = 120.0  # riding time
@@ -103,7 +101,6 @@ def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def judge(job: FaultJob, trace: Trace) -> Outcome:
-    """Judge the lean that the rider saw in a ride."""
     step = float(np.median(np.diff(trace.time)))
     off = int(np.argmax(trace.speed > 0.5)) if (trace.speed > 0.5).any() else 0
     error = np.abs(trace.lean - trace.true)
@@ -143,7 +140,6 @@ def _simulated(
 
 
 def follow(job: FaultJob) -> Trace:
-    """Simulate the job's ride, and return what the rider saw."""
     profile = job.profile or PROFILES[job.seed % len(PROFILES)]
     simulated, calibration = _simulated(profile, job.seed, job.seconds, job.road, job.mount)
     true, speed = simulated.truth["lean_deg"], simulated.truth["speed_mps"]
@@ -152,7 +148,6 @@ def follow(job: FaultJob) -> Trace:
 
 
 def _ill(job: FaultJob, readings: Array, rate_hz: float, calibration: CalibrationFile) -> Ill:
-    """Return the readings with the job's fault."""
     if not job.fault:
         return Ill(readings, np.zeros(len(readings), dtype=bool), 0, len(readings))
     begin_s = (0.35 + 0.2 * (job.seed * 0.618 % 1.0)) * len(readings) / rate_hz
@@ -224,7 +219,6 @@ def trace_of(
 
 
 def run(job: FaultJob) -> Outcome:
-    """Simulate the job's ride, and judge the lean that the rider saw."""
     return judge(job, follow(job))
 
 
@@ -265,60 +259,47 @@ def evaluate(jobs: list[FaultJob], done: Callable[[], None] = lambda: None) -> l
     return [outcomes[k] for k in range(len(jobs))]
 
 
-@dataclass
-class FaultSummary:
-    """The results of all rides with one fault. The shares are of the rides.
+def summaries(outcomes: list[Outcome]) -> list[dict[str, Any]]:
+    """Summarise the rides with each fault, in the order in which the faults first appear.
 
-    kind: Kind of the fault, or "none".
-    title: Name of the fault.
-    rides: Number of rides.
+    Returns one dictionary per fault. Shares are of the rides, and NaN means that no ride determines a figure:
+
+    kind, title, rides: Kind of the fault or "none", its name, and the number of rides.
     misleading_s, most_s: Mean and largest time with a misleading lean.
     available: Mean share of the riding time in which a lean is shown.
-    hidden_s, hidden: Median time from the start of the fault until the lean is hidden, or NaN, and the share.
+    hidden_s, hidden: Median time from the start of the fault until the lean is hidden, and the share.
     named_s, named: Likewise until the display names the fault.
-    recovered: Share in which the lean is right after the fault. NaN for a fault that does not end.
+    recovered: Share in which the lean is right after a fault that ends.
     """
-
-    kind: str
-    title: str
-    rides: int
-    misleading_s: float
-    most_s: float
-    available: float
-    hidden_s: float
-    hidden: float
-    named_s: float
-    named: float
-    recovered: float
-
-
-def summaries(outcomes: list[Outcome]) -> list[FaultSummary]:
-    """Return one FaultSummary per fault, in the order in which the faults first appear."""
     groups: dict[tuple[str, str], list[Outcome]] = {}
     for outcome in outcomes:
         fault = outcome.job.fault
         groups.setdefault((fault.kind if fault else "none", outcome.job.title), []).append(outcome)
-    return [_summary(kind, title, rides) for (kind, title), rides in groups.items()]
-
-
-def _summary(kind: str, title: str, rides: list[Outcome]) -> FaultSummary:
-    misleading = [o.misleading_s for o in rides]
-    recovered = [o.recovered for o in rides if o.recovered is not None]
-    return FaultSummary(
-        kind,
-        title,
-        len(rides),
-        float(np.mean(misleading)),
-        max(misleading),
-        float(np.mean([o.available for o in rides])),
-        *_median_and_share([o.hidden_after_s for o in rides]),
-        *_median_and_share([o.named_after_s for o in rides]),
-        float(np.mean(recovered)) if recovered else float("nan"),
-    )
+    rows = []
+    for (kind, title), rides in groups.items():
+        misleading = [o.misleading_s for o in rides]
+        recovered = [o.recovered for o in rides if o.recovered is not None]
+        hidden_s, hidden = _median_and_share([o.hidden_after_s for o in rides])
+        named_s, named = _median_and_share([o.named_after_s for o in rides])
+        rows.append(
+            {
+                "kind": kind,
+                "title": title,
+                "rides": len(rides),
+                "misleading_s": float(np.mean(misleading)),
+                "most_s": max(misleading),
+                "available": float(np.mean([o.available for o in rides])),
+                "hidden_s": hidden_s,
+                "hidden": hidden,
+                "named_s": named_s,
+                "named": named,
+                "recovered": float(np.mean(recovered)) if recovered else float("nan"),
+            }
+        )
+    return rows
 
 
 def _median_and_share(values: list[float]) -> tuple[float, float]:
-    """Return the median of the values that are not NaN, and their share."""
     finite = [value for value in values if np.isfinite(value)]
     return float(np.median(finite)) if finite else float("nan"), len(finite) / len(values)
 
@@ -332,15 +313,15 @@ def fault_table(outcomes: list[Outcome]) -> Table:
         table.add_column(head, justify="right")
     kind = ""
     for s in summaries(outcomes):
-        if s.kind != kind:
-            kind = s.kind
+        if s["kind"] != kind:
+            kind = s["kind"]
             table.add_row(kind, style="cyan")
-        seconds = [f"{s.misleading_s:.1f}", f"{s.most_s:.1f}"]
-        hidden, named = ("--" if np.isnan(time_s) else f"{time_s:.1f}" for time_s in (s.hidden_s, s.named_s))
-        recovered = "--" if np.isnan(s.recovered) else f"{100.0 * s.recovered:.0f} %"
-        shares = [f"{100.0 * share:.0f} %" for share in (s.hidden, s.named)]
-        shown = f"{100.0 * s.available:.1f} %"
-        table.add_row("  " + s.title, *seconds, shown, hidden, shares[0], named, shares[1], recovered)
+        seconds = [f"{s[name]:.1f}" for name in ("misleading_s", "most_s")]
+        hidden, named = ("--" if np.isnan(s[name]) else f"{s[name]:.1f}" for name in ("hidden_s", "named_s"))
+        recovered = "--" if np.isnan(s["recovered"]) else f"{100.0 * s['recovered']:.0f} %"
+        shares = [f"{100.0 * s[name]:.0f} %" for name in ("hidden", "named")]
+        shown = f"{100.0 * s['available']:.1f} %"
+        table.add_row("  " + s["title"], *seconds, shown, hidden, shares[0], named, shares[1], recovered)
     return table
 
 
@@ -349,5 +330,5 @@ def document(outcomes: list[Outcome]) -> dict[str, Any]:
     rides = [{"fault": o.job.title, "seed": o.job.seed, **vars(o)} for o in outcomes]
     for entry in rides:
         del entry["job"]
-    data = {"faults": [vars(s) for s in summaries(outcomes)], "rides": rides}
+    data = {"faults": summaries(outcomes), "rides": rides}
     return json.loads(json.dumps(data), parse_constant=lambda _: None)

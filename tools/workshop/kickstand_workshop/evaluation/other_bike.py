@@ -116,7 +116,6 @@ def random_tolerances(chance):
 
 
 def random_mounting(chance):
-    """Return the mounting of a sensor, a random rotation matrix."""
     mounting, _ = np.linalg.qr(chance.standard_normal((3, 3)))
     return mounting * np.linalg.det(mounting)
 

@@ -106,7 +106,6 @@ def real_table(scores: dict[str, RealScore], name: str) -> Table:
 
 
 def _table(title: str, caption: str) -> Table:
-    """Return an empty table that fits into 80 columns."""
     return Table(title=title, caption=caption, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), min_width=78)
 
 
@@ -122,7 +121,6 @@ def document(evaluation: Evaluation) -> dict[str, Any]:
 
 
 def _scores(scores: Mapping[str, LeanScore | RealScore]) -> dict[str, dict[str, float]]:
-    """Return the scores of each estimator for JSON. The suffix _deg is removed from the names of figures."""
     return {name: {key.removesuffix("_deg"): value for key, value in asdict(s).items()} for name, s in scores.items()}
 
 

@@ -84,7 +84,6 @@ def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64
 
 
 def _speed(log: Log) -> NDArray[np.float64]:
-    """Return the speed at each sample in m/s, interpolated between the logged values."""
     has_speed = ~np.isnan(log.speed_mps)
     if np.count_nonzero(has_speed) < 2:
         raise InputError(f"{log.name} has no speed: without it there is no reference")
@@ -113,7 +112,6 @@ class LeanScore:
 
 
 def rms(error: NDArray) -> float:
-    """Root of the mean square."""
     return float(np.sqrt(np.mean(error * error)))
 
 

@@ -33,12 +33,10 @@ def display_of(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Run the whole device, and read its display every LOOK_S.
 
-    Args:
-        readings: Readings in the chip's order, shape (m, 7).
-        rate_hz: Number of readings per second.
-        calibration: Calibration of the sensor.
-        lost: True for readings at which the sensor does not answer, shape (m).
-        speed: Function that returns the speed of a GPS receiver in m/s at a time in s. None for no receiver.
+    readings: Readings in the chip's order, shape (m, 7).
+    rate_hz: Number of readings per second.
+    lost: True for readings at which the sensor does not answer, shape (m).
+    speed: Function that returns the speed of a GPS receiver in m/s at a time in s. None for no receiver.
 
     Returns:
         times: shape (n), in s.
@@ -72,15 +70,8 @@ def display_of(
     try:
         with tempfile.TemporaryDirectory() as flash, contextlib.chdir(flash):
             with board, contextlib.redirect_stdout(io.StringIO()):
-                from kickstand import settings, start
-
-                load = settings.load
-                settings.load = lambda: settings.Settings(type("Config", (), config))
                 Store(board.sensor.who_am_i, int(ACCEL_RANGE_G), os.curdir).save(calibration.to_firmware())
-                try:
-                    board.run(start.main, (last + 1) / rate_hz)
-                finally:
-                    settings.load = load
+                board.run_firmware((last + 1) / rate_hz, **config)
     finally:
         gc.unfreeze()
     return np.array(times), _read(leans), min(named, default=float("nan"))

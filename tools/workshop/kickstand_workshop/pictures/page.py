@@ -48,7 +48,6 @@ def draw() -> bytes:
 
 
 def _ride(page: Any) -> list[tuple[float, bytes]]:
-    """Press the button twice, and ride a bend to each side. Returns the screenshots, each as (time in s, PNG)."""
     shots: list[tuple[float, bytes]] = []
 
     def film(is_over: Callable[[], bool]) -> None:
@@ -85,7 +84,6 @@ def _ride(page: Any) -> list[tuple[float, bytes]]:
 
 
 def _animated(shots: list[tuple[float, bytes]]) -> bytes:
-    """Return one animation of the screenshots of _ride()."""
     from PIL import Image
 
     shots = shots[:: -(-len(shots) // _MOST)]

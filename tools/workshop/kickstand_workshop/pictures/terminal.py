@@ -31,7 +31,6 @@ def draw() -> str:
 
 
 def _state() -> State:
-    """Run the demo's device, and return its state at MOMENT_S."""
     with DeviceProcess("cpython", "script", 0.0) as device:
         while not device.ended:
             for state in device.ticks(1.0):

@@ -1,4 +1,4 @@
-"""The app's state as data for other programs, such as a simulation or a test."""
+"""The state of the firmware's App as data. Runs on CPython and MicroPython."""
 
 
 def state(app):
