@@ -123,28 +123,20 @@ def channels(log: Log, calibration: CalibrationFile, lean: dict[str, Array], car
 def joined(parts: Iterable[Channels]) -> Channels:
     """Join the parts of a ride.
 
-    The parts are read one by one to limit memory. A column without any value uses no memory, and is read-only.
+    A column without any value uses no memory, and is read-only.
     """
-    columns: list[Array | None] = [None for _ in fields(Channels)]
-    length = 0
+    columns: list[list[Array]] = [[] for _ in fields(Channels)]
     for part in parts:
-        end = length + len(part.t_s)
-        for k, field in enumerate(fields(Channels)):
-            values, column = getattr(part, field.name), columns[k]
-            if column is None:
-                if np.all(np.isnan(values)):
-                    continue
-                column = columns[k] = np.full(end, np.nan)
-            if end > len(column):
-                longer = np.empty(2 * end)  # the system reserves memory only when it is written, except in a browser
-                longer[:length] = column[:length]
-                column = columns[k] = longer
-            column[length:end] = values
-        length = end
-    for column in columns:
-        if column is not None:
-            column.resize(length, refcheck=False)
-    return Channels(*(np.broadcast_to(np.nan, length) if column is None else column for column in columns))
+        for column, field in zip(columns, fields(Channels)):
+            column.append(getattr(part, field.name))
+    return Channels(*map(_concatenated, columns))
+
+
+def _concatenated(parts: list[Array]) -> Array:
+    """Join the parts of a column. Clear the list, so that the parts of each column are freed before the next one."""
+    column = np.concatenate([np.zeros(0), *parts], dtype=float)
+    parts.clear()
+    return np.broadcast_to(np.nan, len(column)) if np.all(np.isnan(column)) else column
 
 
 def thinned(course: Channels, step_s: float) -> Channels:
@@ -197,6 +189,9 @@ def _means(block: Channels, step: Array) -> Channels:
     for field in fields(block):
         values = getattr(block, field.name)
         valid = ~np.isnan(values)
+        if not np.any(valid):
+            columns.append(np.broadcast_to(np.nan, len(starts)))
+            continue
         if field.name in _LAST:
             last = np.maximum.reduceat(np.where(valid, np.arange(len(step)), -1), starts)
             columns.append(np.where(last >= 0, values[last], np.nan))

@@ -18,7 +18,7 @@ from .stops.standstill import standing
 from .summary import Summary
 
 # Columns of the course that are not kept. In a long ride, they would use a quarter of the memory.
-_NOT_KEPT = ("lean_formula_deg", "temp_c", "shown_g", "lean_sigma_deg", "utc_s")
+_NOT_KEPT = ("lean_formula_deg", "roll_rate_dps", "temp_c", "shown_g", "lean_sigma_deg", "utc_s")
 # Averaging time of rates and forces that show whether a vehicle has moved. An idling engine at standstill shakes as
 # much as a road, but the means over OVER_S hardly change.
 OVER_S = 1.0

@@ -15,7 +15,7 @@ from ..calibration.mount import read_ride
 from ..checks.log import CheckedLog
 from ..common.errors import InputError
 from ..common.messages import Message, Remedy, kind
-from ..estimation.smooth import Smoother
+from ..estimation.smooth import COLUMNS, Smoother
 from ..logs.cells import MOST_DPS, MOST_G
 from ..logs.log import Log, Source, Stretch
 from ..logs.reader import check_first_line
@@ -133,13 +133,13 @@ class RideReading:
         for span, values in self._smoother.batches(self._progress):
             part = log.part(span).part(measured[span])
             if values is not None and self._keep:
-                self._keep(self._smoother.with_frozen(span, values))
+                self._keep(values[:, : len(COLUMNS)])
             if values is None:
                 self._slow = True
                 yield span, part, self._displayed(part)
                 continue
-            lean_deg, sigma_deg, _, _, doubtful, standing, rolling = values.T
-            if len(values) and np.all(np.isnan(lean_deg)):
+            lean_deg, sigma_deg, _, _, doubtful, standing, rolling = values[measured[span]].T
+            if len(lean_deg) and np.all(np.isnan(lean_deg)):
                 self._note_absurd(part, _largest(part))
             lean = {"lean_deg": lean_deg, "lean_sigma_deg": sigma_deg, "doubtful": doubtful}
             lean |= {"resting": standing == 1.0, "rolling": rolling == 1.0, "sure": sigma_deg <= _MAX_SIGMA_DEG}

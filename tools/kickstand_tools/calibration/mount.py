@@ -134,6 +134,7 @@ def read_ride(source: Source, calibration: CalibrationFile, progress: Progress |
     ride = read_checked(source, progress)
     problem = contradiction(ride.bins, calibration)
     ride.notices += [problem] if problem else []
+    ride.bins = None  # they use memory, and no other check needs them
     return ride
 
 

@@ -51,10 +51,20 @@ def process_and_measurements(windows: Windows, x: Array) -> Array:
     Returns an array of shape (ROWS, n). The first STATES rows are the states' rates of change. The other rows are the
     measurements.
     """
-    t, q, left, up, forward = x[: BIAS.start]
+    return _models(windows, x, _readings(windows, x))
+
+
+def _readings(windows: Windows, x: Array) -> Array:
+    """Return rates and forces without the sensor's errors, shape (6, n)."""
     p = x[STATES:]
-    wx, wy, wz = corrected_rates(windows.rate.T, x, windows.warm)
-    fx, fy, fz = _corrected(windows.force.T, p, of.ACCEL) + p[of.OFFSET] + p[of.OFFSET_PER_C] * windows.warm
+    force = _corrected(windows.force.T, p, of.ACCEL) + p[of.OFFSET] + p[of.OFFSET_PER_C] * windows.warm
+    return np.concatenate((corrected_rates(windows.rate.T, x, windows.warm), force))
+
+
+def _models(windows: Windows, x: Array, readings: Array) -> Array:
+    """Evaluate process_and_measurements() with these _readings()."""
+    t, q, left, up, forward = x[: BIAS.start]
+    p, (wx, wy, wz, fx, fy, fz) = x[STATES:], readings
     st, ct, sq, cq = np.sin(t), np.cos(t), np.sin(q), np.cos(q)
     yaw = (wx * st + wy * ct) / cq
     upright = fx * st + fy * ct  # upward force in axes that pitch but do not lean with the bike
@@ -83,19 +93,47 @@ def process_and_measurements(windows: Windows, x: Array) -> Array:
 
 
 def jacobian(windows: Windows, x: Array, unknown: Ints) -> Array:
-    """Compute the derivatives of process_and_measurements() by some rows of x, as finite differences.
+    """Compute the derivatives of process_and_measurements() by some rows of x.
+
+    Most unknowns are errors of the sensor, which only change the corrected readings. So the derivatives by the readings
+    are computed first, as finite differences.
 
     unknown: indices of these rows of x.
     Returns an array of shape (len(unknown), ROWS, n).
     """
-    derivatives, moved = np.empty((len(unknown), ROWS, x.shape[1])), x.copy()
-    base = process_and_measurements(windows, x)
+    readings, moved, derivatives = _readings(windows, x), x.copy(), np.empty((len(unknown), ROWS, x.shape[1]))
+    base, by_reading = _models(windows, x, readings), np.empty((6, *derivatives.shape[1:]))
+    for k, slot in enumerate(by_reading):
+        readings[k] += STEP
+        slot[:] = (_models(windows, x, readings) - base) / STEP
+        readings[k] -= STEP
+    errors = _errors(windows)
     for slot, row in zip(derivatives, unknown, strict=True):
         moved[row] += STEP
-        slot[:] = process_and_measurements(windows, moved) - base
+        if row in errors:
+            reading, derivative = errors[row]
+            np.multiply(by_reading[reading], derivative, out=slot)
+        elif STATES <= row < STATES + of.ROTATION.stop:
+            slot[:] = np.einsum("krn,kn->rn", by_reading, (_readings(windows, moved) - readings) / STEP)
+        else:
+            slot[:] = (_models(windows, moved, readings) - base) / STEP
         moved[row] = x[row]
-    derivatives /= STEP
     return derivatives
+
+
+def _errors(windows: Windows) -> dict[int, tuple[int, Array]]:
+    """Return, for each row of x that is an error of one axis, the index of its reading, and this reading's derivative
+    by the row."""
+    warm, errors = windows.warm, {}
+    for k in range(3):
+        errors[BIAS.start + k] = k, -np.ones(len(warm))
+        errors[STATES + of.BIAS_PER_C.start + k] = k, -warm
+        errors[STATES + of.OFFSET.start + k] = 3 + k, np.ones(len(warm))
+        errors[STATES + of.OFFSET_PER_C.start + k] = 3 + k, warm
+        for by in range(3):
+            errors[STATES + of.GYRO.start + 3 * k + by] = k, windows.rate[:, by]
+            errors[STATES + of.ACCEL.start + 3 * k + by] = 3 + k, windows.force[:, by]
+    return errors
 
 
 def corrected_rates(rate: Array, x: Array, warm: Array) -> Array:

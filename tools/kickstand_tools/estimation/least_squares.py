@@ -5,6 +5,8 @@ is the change of the states from window to window minus the predicted change. Ea
 deviation. Outliers of both kinds are down-weighted (Cauchy).
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..signals import Array, Bools, Ints, intervals, rotation_matrix
@@ -17,6 +19,7 @@ from .unknowns import BIAS, CAMBER, FORWARD, LEAN, LEFT, PARAMETERS, PITCH, ROTA
 from .windows import Windows
 
 BLOCK = 50  # number of windows per block; see solver.py
+PART = 6  # number of blocks whose derivatives are computed at once
 ROUNDS, PLAIN_ROUNDS = 20, 2  # largest number of steps; the first PLAIN_ROUNDS steps do not down-weight outliers
 # The largest change of an angle in a step, in rad. If it is under NEAR, the hypotheses are weighted. If it is under
 # CONVERGED, the steps end.
@@ -52,6 +55,9 @@ class Estimate:
         """
         self._length = min(BLOCK, len(windows))
         self._windows = windows = windows.padded(self._length)
+        self._grid = len(windows) // self._length, self._length
+        # Several blocks at once, because the derivatives of all blocks would need much memory
+        self._parts = [slice(k, k + PART) for k in range(0, self._grid[0], PART)]
         self.prior, self._hypotheses, self.matrix = prior, hypotheses, np.eye(3)
         still = standing(windows)
         self._start(still)
@@ -75,8 +81,10 @@ class Estimate:
         """Return the standard deviations of the states, shape (n + 1, STATES)."""
         blocks = self._reduced(robust=True)
         s = STATES
-        joint = covariances(blocks, posterior_covariance(*self._problem(blocks)))
-        variances = np.diagonal(joint[..., : 2 * s], axis1=2, axis2=3)
+        joint, variances = posterior_covariance(*self._problem(blocks)), np.empty((*self._grid, 2 * s))
+        for rows in self._parts:
+            joint_of_links = covariances(blocks.part(rows), joint[rows])
+            variances[rows] = np.diagonal(joint_of_links[..., : 2 * s], axis1=2, axis2=3)
         edges = np.concatenate((variances[:, :, :s].reshape(-1, s), variances[-1, -1:, s:]))
         return np.sqrt(np.maximum(edges, 0.0))
 
@@ -201,23 +209,39 @@ class Estimate:
         return residuals
 
     def _reduced(self, robust: bool) -> Reduced:
-        windows, s, unknown = self._windows, STATES, self.prior.unknown
-        residuals, sigma = self._residuals(), self.noise.sigma()
+        residuals, sigma, x = self._residuals(), self.noise.sigma(), self._middle()
         sigma = self.noise.robust(sigma, residuals) if robust else sigma
-        derivatives = jacobian(windows, self._middle(), np.concatenate((np.arange(s), s + unknown)))
-        derivatives[:, :s] *= -windows.covered
-        derivatives = derivatives.transpose(2, 1, 0) / sigma[..., None]
-        rows = np.empty((len(windows), ROWS, 2 * s + len(unknown) + 1))
+        parts = []
+        for blocks in self._parts:
+            rows = slice(blocks.start * self._length, blocks.stop * self._length)
+            derivatives = self._derivatives(rows, x[:, rows], residuals[rows], sigma[rows])
+            parts.append(reduce_windows(derivatives.reshape(-1, self._length, *derivatives.shape[1:]), STATES))
+        reduced, step = Reduced.joined(parts), np.arange(STATES)
+        reduced.left[0, step, step] += 1.0 / START**2
+        reduced.left[0, DRAWN, -1] += self.states[0, DRAWN] / START[DRAWN] ** 2
+        return reduced
+
+    def _derivatives(self, rows: slice, x: Array, residuals: Array, sigma: Array) -> Array:
+        """Return the derivatives of the residuals of some windows, divided by sigma; see reduce_windows().
+
+        x: unknowns() in the middle of these windows.
+        residuals, sigma: their residuals and standard deviations, shape (windows, ROWS).
+        """
+        windows, s, unknown = self._windows, STATES, self.prior.unknown
+        windows = replace(
+            windows, **{name: getattr(windows, name)[rows] for name in ("rate", "force", "speed", "warm")}
+        )
+        of_middle = jacobian(windows, x, np.concatenate((np.arange(s), s + unknown)))
+        of_middle[:, :s] *= -self._windows.covered[rows]
+        of_middle /= sigma.T
+        derivatives = np.empty((len(sigma), ROWS, 2 * s + len(unknown) + 1))
         # The state in the middle of a window is the mean of the states at its edges.
-        rows[..., :s] = rows[..., s : 2 * s] = 0.5 * derivatives[..., :s]
+        derivatives[..., :s] = derivatives[..., s : 2 * s] = 0.5 * of_middle[:s].transpose(2, 1, 0)
         step = np.arange(s)
-        rows[:, step, step] -= 1.0 / sigma[:, :s]
-        rows[:, step, s + step] += 1.0 / sigma[:, :s]
-        rows[..., 2 * s : -1], rows[..., -1] = derivatives[..., s:], residuals / sigma
-        blocks = reduce_windows(rows.reshape(-1, self._length, *rows.shape[1:]), s)
-        blocks.left[0, step, step] += 1.0 / START**2
-        blocks.left[0, DRAWN, -1] += self.states[0, DRAWN] / START[DRAWN] ** 2
-        return blocks
+        derivatives[:, step, step] -= 1.0 / sigma[:, :s]
+        derivatives[:, step, s + step] += 1.0 / sigma[:, :s]
+        derivatives[..., 2 * s : -1], derivatives[..., -1] = of_middle[s:].transpose(2, 1, 0), residuals / sigma
+        return derivatives
 
     def _problem(self, blocks: Reduced) -> tuple[Reduced, RandomWalks, Array]:
         return blocks, self._likely.random_walks(self.prior, self.parameters), self._likely.weight

@@ -14,7 +14,7 @@ from ..checks.log import CheckedLog
 from ..common.errors import InputError
 from ..common.messages import Message, Remedy, is_explained, kind
 from ..logs.csv_lines import write_lean
-from ..logs.log import Log, Source, Table
+from ..logs.log import PART_SAMPLES, Log, Source, Table
 from ..logs.reader import time_texts
 from ..logs.source import Progress
 from ..signals import Array, Ints
@@ -162,19 +162,13 @@ class Smoother:
             if values is None:
                 raise InputError(f"{log.name}: under {SLOWEST_HZ:.0f} samples per second: too few to smooth the lean")
             if first < span.stop and span.start < last:
-                yield self.with_frozen(span, values)[max(0, first - span.start) : last - span.start]
-
-    def with_frozen(self, span: slice, values: Array) -> Array:
-        """Return the values of COLUMNS for the rows `span` of the log. Frozen readings become NaN."""
-        columns = np.full((span.stop - span.start, len(COLUMNS)), np.nan)
-        columns[self._ride.measured[span]] = values[:, : len(COLUMNS)]
-        return columns
+                yield values[max(0, first - span.start) : last - span.start, : len(COLUMNS)]
 
     def batches(self, progress: Progress | None = None) -> Iterator[tuple[slice, Array | None]]:
-        """Smooth the whole log. A batch is several segments of SEGMENT_S.
+        """Smooth the whole log in batches of several segments of SEGMENT_S.
 
-        Yields the rows of each batch in the log, and the values of its measured samples: those of COLUMNS, then
-        STANDING and ROLLING. The values are None if there are too few samples per second.
+        Yields rows of the log, at most PART_SAMPLES, and their values: those of COLUMNS, then STANDING and ROLLING.
+        Frozen readings have NaN. The values are None if there are too few samples per second.
         """
         log = self._ride.log
         number = np.searchsorted(log.t_s, np.arange(0.0, log.t_s[-1] + SEGMENT_S, SEGMENT_S))
@@ -190,9 +184,15 @@ class Smoother:
             own = slice(begin, begin + int(np.count_nonzero(measured[span])))
             part = log.part(extended)
             values = self._estimated(part if np.all(measured[extended]) else part.part(measured[extended]), own)
-            yield span, None if values is None else values[own]
-            if progress:
-                progress(span.stop, len(log.t_s))
+            if values is not None:
+                rows, values = values[own], np.full((span.stop - span.start, len(COLUMNS) + 2), np.nan)
+                values[measured[span]] = rows
+                del rows
+            for start in range(span.start, span.stop, PART_SAMPLES):
+                rows = slice(start, min(start + PART_SAMPLES, span.stop))
+                yield rows, None if values is None else values[start - span.start : rows.stop - span.start]
+                if progress:
+                    progress(rows.stop, len(log.t_s))
 
     def notices(self) -> list[Message]:
         """Return the remarks about the ride, after the last batch."""
@@ -279,17 +279,17 @@ def at_samples(windows: Windows, rate: Array, estimate: Estimate, lean_sigma: Ar
 
     since, seconds = integral(np.ones(len(number)))
     share = since / seconds
-    first, second = estimate.states[number], estimate.states[number + 1]
-    lean, pitch, speed = (first + share[:, None] * (second - first))[:, [LEAN, PITCH, FORWARD]].T
-    middle, corrected = 0.5 * (first + second), np.empty((3, len(number)))
+    first, change = estimate.states[:-1].T, np.diff(estimate.states, axis=0).T
+    lean, pitch, speed = (first[k, number] + share * change[k, number] for k in (LEAN, PITCH, FORWARD))
+    middle, corrected = 0.5 * (estimate.states[:-1] + estimate.states[1:]), np.empty((3, len(number)))
     for start in range(0, len(number), CHUNK):  # each sample has 45 unknowns, which would need much memory
         rows = slice(start, start + CHUNK)
-        x = estimate.unknowns(number[rows], middle[rows])
+        x = estimate.unknowns(number[rows], middle[number[rows]])
         corrected[:, rows] = corrected_rates(rate[rows].T, x, windows.warm[number[rows]])
     wx, wy, wz = corrected
     roll_rate = wz - np.tan(pitch) * (wx * np.sin(lean) + wy * np.cos(lean))
     rolled, window_roll = integral(roll_rate)
-    lean = first[:, LEAN] + rolled + share * ((second - first)[:, LEAN] - window_roll)
+    lean = first[LEAN, number] + rolled + share * (change[LEAN, number] - window_roll)
     spread = lean_sigma[number] + share * (lean_sigma[number + 1] - lean_sigma[number])
     jolt = 2.0 * np.sqrt(np.clip(share * (1.0 - share), 0.0, 1.0)) * jolted(windows)[number]
     for error in (TIMING_S * roll_rate, LEANED_SHARE * lean, jolt):

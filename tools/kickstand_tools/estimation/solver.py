@@ -5,8 +5,8 @@ with columns for the parameters of the block and for the right-hand side. Every 
 complement, in all blocks at the same time, until one link per block remains (cyclic reduction). The blocks then form a
 chain. Each state of the chain is a block's first state together with the block's parameters.
 
-The same elimination solves this chain, for all G hypotheses about the random walk at the same time. It also computes
-the likelihood of each hypothesis. The result equals one least-squares solution over the whole ride.
+The same elimination solves this chain, for each of G hypotheses about the random walk. It also computes the likelihood
+of each hypothesis. The result equals one least-squares solution over the whole ride.
 
 In the shapes below, a state has s values, and a block has m parameters.
 """
@@ -41,6 +41,21 @@ class Reduced:
     left: Array
     log_determinant: Array
     residual: Array
+
+    def part(self, rows: slice) -> "Reduced":
+        """Select chains."""
+        gains, covariances = ([level[rows] for level in levels] for levels in (self.gains, self.covariances))
+        return Reduced(self.s, gains, covariances, self.left[rows], self.log_determinant[rows], self.residual[rows])
+
+    @staticmethod
+    def joined(parts: "list[Reduced]") -> "Reduced":
+        """Join parts that have the same number of states."""
+        gains, covariances = (
+            [np.concatenate(level) for level in zip(*levels)]
+            for levels in ([part.gains for part in parts], [part.covariances for part in parts])
+        )
+        ends = [(part.left, part.log_determinant, part.residual) for part in parts]
+        return Reduced(parts[0].s, gains, covariances, *map(np.concatenate, zip(*ends)))
 
 
 def reduce_windows(jacobian: Array, states: int) -> Reduced:
@@ -155,41 +170,41 @@ class RandomWalks:
     between: Array
 
 
-def _chains(blocks: Reduced, walks: RandomWalks) -> tuple[Reduced, Array, Array]:
-    """Build G chains of blocks.
+def _chain(blocks: Reduced, walks: RandomWalks, hypothesis: int) -> tuple[Reduced, Array, float]:
+    """Build the chain of the blocks for one hypothesis. All chains at once would need much memory.
 
     A state of a chain has n = s + m values: a block's first state and its parameters. After the last block
     the parameters stay the same.
 
     Returns:
-        reduced: the chains.
-        ends: normal equations of both ends of each chain, shape (G, 2 n, 2 n + 1).
-        minus_two_log: minus twice the log-likelihood, shape (G). A constant that all hypotheses share is left out.
+        reduced: the chain.
+        ends: normal equations of both ends of the chain, shape (2 n, 2 n + 1).
+        minus_two_log: minus twice the log-likelihood. A constant that all hypotheses share is left out.
     """
     (count, width), s = blocks.left.shape[:2], blocks.s
-    hypotheses, n = len(walks.prior), width - s
-    links = np.zeros((hypotheses, count, 2 * n, 2 * n + 1))
+    n, prior, gradient = width - s, walks.prior[hypothesis, :, :-1], walks.prior[hypothesis, :, -1:]
+    links = np.zeros((count, 2 * n, 2 * n + 1))
     columns = np.r_[:s, n : n + s, s:n]
-    links[:, :, columns[:, None], np.r_[columns, 2 * n]] = blocks.left
-    weight, change = np.ones((hypotheses, count, n - s)), np.zeros((count, n - s))
-    weight[:, :-1], change[:-1] = 1.0 / walks.variance, walks.between
+    links[:, columns[:, None], np.r_[columns, 2 * n]] = blocks.left
+    weight, change = np.ones((count, n - s)), np.zeros((count, n - s))
+    weight[:-1], change[:-1] = 1.0 / walks.variance[hypothesis], walks.between
     earlier, later = np.arange(s, n), np.arange(n + s, 2 * n)
     for rows, cross, sign in ((earlier, later, -1.0), (later, earlier, 1.0)):
-        links[:, :, rows, rows] += weight
-        links[:, :, rows, cross] -= weight
-        links[:, :, rows, -1] += sign * weight * change
-    reduced = _reduced(links, np.sum(weight * change**2, axis=(1, 2))[:, None, None])
-    ends, prior = reduced.left, walks.prior[..., :-1]
-    ends[:, s:n, s:n] += prior
-    ends[:, s:n, -1] += walks.prior[..., -1]
-    misfit = reduced.residual + _squared(prior, walks.prior[..., -1:]) - _squared(ends[..., :-1], ends[..., -1:])
-    log_determinant = reduced.log_determinant + np.linalg.slogdet(ends[..., :-1])[1] - np.linalg.slogdet(prior)[1]
-    return reduced, ends, misfit + log_determinant - np.sum(np.log(weight), axis=(1, 2))
+        links[:, rows, rows] += weight
+        links[:, rows, cross] -= weight
+        links[:, rows, -1] += sign * weight * change
+    reduced = _reduced(links[None], np.reshape(np.sum(weight * change**2), (1, 1, 1)))
+    ends = reduced.left[0]
+    ends[s:n, s:n] += prior
+    ends[s:n, -1:] += gradient
+    misfit = reduced.residual[0] + _squared(prior, gradient) - _squared(ends[:, :-1], ends[:, -1:])
+    log_determinant = reduced.log_determinant[0] + np.linalg.slogdet(ends[:, :-1])[1] - np.linalg.slogdet(prior)[1]
+    return reduced, ends, float(misfit + log_determinant - np.sum(np.log(weight)))
 
 
-def _squared(information: Array, gradient: Array) -> Array:
-    """Return the square of each gradient in the metric of the covariance, shape (G). gradient: shape (G, k, 1)."""
-    return np.sum(gradient * np.linalg.solve(information, gradient), axis=(1, 2))
+def _squared(information: Array, gradient: Array) -> float:
+    """Return the square of a gradient in the metric of the covariance. gradient: shape (k, 1)."""
+    return float(np.sum(gradient * np.linalg.solve(information, gradient)))
 
 
 def minus_two_log_likelihood(blocks: Reduced, walks: RandomWalks) -> Array:
@@ -197,7 +212,7 @@ def minus_two_log_likelihood(blocks: Reduced, walks: RandomWalks) -> Array:
 
     A constant that all hypotheses share is left out.
     """
-    return _chains(blocks, walks)[2]
+    return np.array([_chain(blocks, walks, g)[2] for g in range(len(walks.prior))])
 
 
 def solve(blocks: Reduced, walks: RandomWalks, weight: Array) -> tuple[Array, Array]:
@@ -208,8 +223,9 @@ def solve(blocks: Reduced, walks: RandomWalks, weight: Array) -> tuple[Array, Ar
         states: changes of the states, shape (B, K + 1, s). The state between two blocks is in both blocks.
         parameters: changes of the parameters, shape (B, m).
     """
-    reduced, ends, _ = _chains(blocks, walks)
-    mean = np.einsum("g,gbi->bi", weight, _first_states(reduced, ends))
+    mean = np.zeros(1)
+    for g, share in enumerate(weight):
+        mean = mean + share * _first_states(*_chain(blocks, walks, g)[:2])
     states, parameters = mean[:, : blocks.s], mean[:-1, blocks.s :]
     return back(blocks, np.stack((states[:-1], states[1:]), axis=1), parameters), parameters
 
@@ -221,21 +237,23 @@ def posterior_covariance(blocks: Reduced, walks: RandomWalks, weight: Array) -> 
 
     Returns an array of shape (B, s + s + m, s + s + m).
     """
-    reduced, ends, _ = _chains(blocks, walks)
-    s, n = blocks.s, reduced.s
-    states = _first_states(reduced, ends)
-    deviation = np.concatenate((states[:, :-1], states[:, 1:]), axis=2)
+    states, joint = [], np.zeros(1)
+    for g, share in enumerate(weight):
+        reduced, ends, _ = _chain(blocks, walks, g)
+        states.append(_first_states(reduced, ends))
+        joint = joint + share * covariances(reduced, np.linalg.inv(ends[None, :, :-1]).astype(float))[0]
+    deviation = np.stack([np.concatenate((state[:-1], state[1:]), axis=1) for state in states])
     deviation -= np.einsum("g,gbi->bi", weight, deviation)
-    within = covariances(reduced, np.linalg.inv(ends[..., :-1]).astype(float))
-    joint = np.einsum("g,gbij->bij", weight, within + deviation[..., :, None] * deviation[..., None, :])
+    joint = joint + np.einsum("g,gbi,gbj->bij", weight, deviation, deviation)
+    s, n = blocks.s, states[0].shape[1]
     order = np.r_[:s, n : n + s, s:n]
     return joint[:, order[:, None], order]
 
 
 def _first_states(reduced: Reduced, ends: Array) -> Array:
-    """Solve the normal equations of the chains' ends.
+    """Solve the normal equations of a chain's ends.
 
-    Returns the changes of all states of the chains, shape (G, B + 1, n).
+    Returns the changes of all states of the chain, shape (B + 1, n).
     """
-    change = np.linalg.solve(ends[..., :-1], -ends[..., -1:]).astype(float)
-    return back(reduced, change.reshape(len(ends), 2, reduced.s), np.zeros((len(ends), 0)))
+    change = np.linalg.solve(ends[:, :-1], -ends[:, -1:]).astype(float)
+    return back(reduced, change.reshape(1, 2, reduced.s), np.zeros((1, 0)))[0]

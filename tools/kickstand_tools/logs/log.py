@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from pyarrow import Schema
 
-PART_SAMPLES = 60_000  # most samples in a part of Log.parts()
+PART_SAMPLES = 15_000  # most samples in a part of Log.parts()
 ROOM_TEMP_C = 25.0  # temperature for the firmware's modules if a log has no temperature
 
 FirmwareRow = tuple[int, list[float], float]
@@ -68,6 +68,33 @@ def float_schema(units: Mapping[str, str], fine: Container[str], about: dict[str
     )
 
 
+class Sparse:
+    """A column of n numbers of which few are known. It uses memory for the known numbers only.
+
+    rows: indices of the known numbers, increasing.
+    values: the known numbers.
+    """
+
+    def __init__(self, rows: Ints, values: Array, n: int) -> None:
+        self._rows, self._values, self._n = rows, values, n
+
+    def __len__(self) -> int:
+        return self._n
+
+    def __getitem__(self, which: slice | Bools) -> Array:
+        """Return part of the column, NaN for a number that is not known. The whole column is read-only."""
+        if not isinstance(which, slice):
+            return self[:][which]
+        begin, end, _ = which.indices(self._n)
+        if not len(self._rows):
+            return np.broadcast_to(np.nan, end - begin)
+        within = slice(*np.searchsorted(self._rows, (begin, end)).tolist())
+        column = np.full(end - begin, np.nan)
+        column[self._rows[within] - begin] = self._values[within]
+        column.flags.writeable = len(column) < self._n  # a change would be lost
+        return column
+
+
 @dataclass(eq=False)
 class Log(Table):
     """One recording of n samples, in the sensor's own axes.
@@ -112,10 +139,14 @@ class Log(Table):
     def __post_init__(self) -> None:
         self.t_s = np.asarray(self.t_s, dtype=float)
         self.accel_g, self.gyro_dps = np.asarray(self.accel_g, float), np.asarray(self.gyro_dps, float)
-        for name in (*TRACK, "temperature_c"):
-            setattr(self, name, self._optional(getattr(self, name)))
         n = len(self.t_s)
-        shapes = {"t_s": (n,), "accel_g": (n, 3), "gyro_dps": (n, 3)} | dict.fromkeys((*TRACK, "temperature_c"), (n,))
+        self._sparse = {name: vars(self).pop(name) for name in TRACK if isinstance(getattr(self, name), Sparse)}
+        shapes = {"t_s": (n,), "accel_g": (n, 3), "gyro_dps": (n, 3)}
+        for name in (*TRACK, "temperature_c"):
+            if name not in self._sparse:
+                values = np.asarray(getattr(self, name), dtype=float)
+                setattr(self, name, values if values.size else np.full(n, np.nan))
+                shapes[name] = (n,)
         for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
                 raise InputError(f"{self.name}: {name} has the shape {getattr(self, name).shape}, it must be {shape}")
@@ -124,6 +155,11 @@ class Log(Table):
         if n and self.t_s[0] != 0.0:
             self.start_s += float(self.t_s[0])
             self.t_s = self.t_s - self.t_s[0]
+
+    def __getattr__(self, name: str) -> Any:  # called only for the names in self._sparse
+        if name in TRACK:
+            return self._sparse[name][:]
+        raise AttributeError(name)
 
     @classmethod
     def from_readings(cls, readings: ArrayLike, rate_hz: float, name: str = "the log") -> "Log":
@@ -160,7 +196,8 @@ class Log(Table):
     def part(self, which: slice | Bools) -> Self:
         """Select samples. Their times still count from this log's first sample, unlike those of between()."""
         part = copy(self)
-        vars(part).update({name: values[which] for name, values in Table.columns(self).items()})
+        columns = {name: values for name, values in vars(self).items() if isinstance(values, np.ndarray)}
+        vars(part).update({name: values[which] for name, values in (columns | self._sparse).items()}, _sparse={})
         return part
 
     def rows_between(self, from_s: float | None, to_s: float | None) -> slice:
@@ -215,10 +252,6 @@ class Log(Table):
         named |= {f"a{axis}_g": values for axis, values in zip(AXES, self.accel_g.T)}
         named |= {f"g{axis}_dps": values for axis, values in zip(AXES, self.gyro_dps.T)}
         return named | {name: getattr(self, name) for name in TRACK} | {"temp_c": self.temperature_c}
-
-    def _optional(self, values: ArrayLike) -> Array:
-        array = np.asarray(values, dtype=float)
-        return array if array.size else np.full(len(self.t_s), np.nan)
 
 
 @dataclass

@@ -4,6 +4,7 @@ import contextlib
 import itertools
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from . import cells
 from .cells import COLUMNS, OPTIONAL, TRACK
 from .csv_reader import cells_of, numbers_in
 from .even_times import TimesSpread, even_times
-from .log import Log, Source, Stretch
+from .log import Log, Source, Sparse, Stretch
 from .source import File, Progress, chunks, name_of, total_bytes
 
 CHUNK_BYTES = 1 << 20  # bytes of text that are converted at once, about 15000 samples
@@ -116,6 +117,26 @@ def _too_long(name: str) -> InputError:
     return InputError(f"{name} has over {MOST_SAMPLES / 1e6:.0f} million samples: kickstand cut writes a part of it")
 
 
+class _Sparse:
+    """A Sparse that grows."""
+
+    def __init__(self) -> None:
+        self._rows, self._values, self._length = [], [], 0
+
+    def extend(self, values: Array) -> None:
+        """Append n values."""
+        rows = np.flatnonzero(~np.isnan(values))
+        self._rows.append(rows.astype(np.int32) + self._length)
+        self._values.append(values[rows])
+        self._length += len(values)
+
+    def finished(self) -> Array | Sparse:
+        """Return all values."""
+        rows, values = (np.concatenate(parts or [np.zeros(0, int)]) for parts in (self._rows, self._values))
+        column = Sparse(rows, values, self._length)
+        return column if 2 * len(rows) < self._length else column[:].copy()
+
+
 class _Column:
     """A column that grows. A column without any value uses no memory."""
 
@@ -152,12 +173,12 @@ def _parsed(file: File, progress: Progress | None) -> Log:
 
 def _columns(
     pieces: Iterator[tuple[bytes, int]], name: str, notices: list[Message], total: int, progress: Progress | None
-) -> dict[str, Array]:
+) -> dict[str, Any]:
     """Convert the text of a log to its columns."""
     first, position = next(pieces, (b"", 0))
     names, rest = _header(name, first)
     index = {column: names.index(column) for column in COLUMNS + OPTIONAL if column in names}
-    columns = {column: _Column() for column in COLUMNS + OPTIONAL}
+    columns = {column: _Sparse() if column in TRACK else _Column() for column in COLUMNS + OPTIONAL}
     line, count, last_us = 1, 0, None
     for text, done, is_last in _last_marked(itertools.chain([(rest, position)], pieces)):
         if is_last:
@@ -178,7 +199,7 @@ def _columns(
     return {name: column.finished() for name, column in columns.items()}
 
 
-def _log(name: str, columns: dict[str, Array], notices: list[Message]) -> Log:
+def _log(name: str, columns: dict[str, Any], notices: list[Message]) -> Log:
     """Make a log of its columns, with even times."""
     time_us = np.rint(columns.pop("t_s") * 1e6)
     start_s = float(time_us[0]) / 1e6 if len(time_us) else 0.0
