@@ -50,8 +50,12 @@ _STEPS = len(_NIBBLES) + 1 + _GLYPH_PARTS + 2
 def _bar_glyphs():
     """Return the patterns of characters 0 to 7 (64 bytes): 1 to 4 of 5 columns filled from the left, then from the
     right."""
-    rows = [0x1F & ~(0x1F >> columns) for columns in range(1, 5)] + [(1 << columns) - 1 for columns in range(1, 5)]
-    return b"".join([bytes([row] * 8) for row in rows])
+    rows = bytearray()
+    for columns in range(1, 5):
+        rows.extend(bytes([0x1F & ~(0x1F >> columns)] * 8))
+    for columns in range(1, 5):
+        rows.extend(bytes([(1 << columns) - 1] * 8))
+    return rows
 
 
 class Lcd:
@@ -114,14 +118,16 @@ class Lcd:
             self._step = 0
 
     def _put(self, number, text):
-        line = self._wanted[number]
-        is_text = isinstance(text, str)
-        if is_text and text == self._texts[number]:  # usually so, and skipping its conversion saves 0.2 ms
-            return
-        self._texts[number] = text if is_text else _NO_TEXT
-        for i in range(_COLUMNS):
-            code = text[i] if i < len(text) else 0x20
-            line[i] = ord(code) & 0xFF if isinstance(code, str) else code
+        if isinstance(text, str):
+            if text == self._texts[number]:  # the text is usually the same, and skipping its conversion saves 0.2 ms
+                return
+            self._texts[number] = text
+            text = bytes([ord(letter) & 0xFF for letter in text])
+        else:
+            self._texts[number] = _NO_TEXT
+        line, n = self._wanted[number], min(_COLUMNS, len(text))
+        line[:n] = text[:n]
+        line[n:] = b" " * (_COLUMNS - n)
         self._changed = True
 
     def _initialise(self, step):
