@@ -11,6 +11,8 @@ from kickstand_tools.simulated_board import EarlierNames
 STATUS = "kickstand.status_report"  # support/status_report.py
 MOVED = {
     "kickstand.rides.ride_paths": "kickstand.rides.ride_files",
+    "kickstand_sim.simulation.physics.kinematics": "kickstand_sim.simulation.physics.bike",
+    "kickstand_sim.simulation.physics.mount": "kickstand_sim.simulation.physics.chip",
     "kickstand_tools.simulation": "kickstand_sim.simulation",
     "kickstand_tools.demo": "kickstand_sim.demo",
     "kickstand_workshop.bench": "kickstand_emulator",
