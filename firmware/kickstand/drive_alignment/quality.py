@@ -11,7 +11,7 @@ from math import atan2, degrees, pi, sqrt
 from ..errors import Refusal
 from ..rotation import angle_deg, cross, dot, norm, normalize, vector
 from ..units import const
-from .events import Fit
+from .events import BLOCKS, Fit
 
 PRIOR_DEG = 1.0  # prior of the standard deviation of forward, at a weight of 1 g^2 s
 PRIOR_FREEDOM = 4
@@ -66,11 +66,11 @@ class DriveParts:
     """
 
     def __init__(self):
+        self._blocks = [array("f", [0.0] * 7) for _ in range(BLOCKS)]
         self.clear()
 
     def clear(self):
         """Drop all blocks. Call this method before the first add()."""
-        self._blocks = []
         self.count = 0
         self.forward_deg = self.sigmas = self.roll_deg = self.pitch_deg = 0.0
 
@@ -85,7 +85,8 @@ class DriveParts:
             weight, seconds: as in the block's Fit.
         """
         sums = weight * across, weight * along, seconds * roll_g, seconds * pitch_g
-        self._blocks.append(array("f", sums + (weight, seconds, weight * weight)))
+        for i, value in enumerate(sums + (weight, seconds, weight * weight)):
+            self._blocks[self.count][i] = value
         self.count += 1
 
     def compare(self):
