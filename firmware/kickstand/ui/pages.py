@@ -445,16 +445,13 @@ class Screen:
         from .wizard import AlignWizard
 
         self._at = 0
-        settings, calibration = self._app.settings, self._app.calibration
-        chip, rate_hz = self._app.sensor.chip, settings.SAMPLE_HZ
-        self.wizard = AlignWizard(chip, rate_hz, calibration, settings.SIDE, pressed)
+        self.wizard = AlignWizard(self._app, pressed)
 
     def _six(self):
         gc.collect()
         from .six_wizard import SixWizard
 
-        app = self._app
-        self.wizard = SixWizard(app.sensor.chip, app.settings.SAMPLE_HZ, app.calibration)
+        self.wizard = SixWizard(self._app)
 
     def _reset(self):
         self._app.meter.reset_maxima()
