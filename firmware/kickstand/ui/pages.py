@@ -214,20 +214,15 @@ def sensor_info(sensor, lost, meter, seconds):
         if seconds // 2 % 2 == 0:
             return words(sensor.fault)
         return "On its I2C bus:", " ".join(["%02x" % address for address in sensor.found]) or "nothing"
-    chip, calibration = sensor.chip, meter.calibration
+    chip, calibration, yes = sensor.chip, meter.calibration, ("no", "yes")
+    facts = (
+        "6pos %-3s ali %s" % (yes[calibration.six_done], yes[calibration.aligned]),
+        "%d gaps %d starts" % (min(chip.overflows, 99), min(sensor.restarts, 9)),
+        "samples lost%4d" % min(lost, 9999),
+        "I2C address 0x%02x" % chip.address,
+    )
     line1 = "%-9s%5.1f%sC" % (chip.name[:9], chip.temperature_c(meter.reading[3]), DEGREE)
-    turn = seconds // 2 % 4
-    if turn == 0:
-        return line1, "6pos %-3s ali %s" % (_yes(calibration.six_done), _yes(calibration.aligned))
-    if turn == 1:
-        return line1, "%d gaps %d starts" % (min(chip.overflows, 99), min(sensor.restarts, 9))
-    if turn == 2:
-        return line1, "samples lost%4d" % min(lost, 9999)
-    return line1, "I2C address 0x%02x" % chip.address
-
-
-def _yes(flag):
-    return "yes" if flag else "no"
+    return line1, facts[seconds // 2 % 4]
 
 
 MOTORCYCLE = (lean, maxima, acceleration, formula, raw)

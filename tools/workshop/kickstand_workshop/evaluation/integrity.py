@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 from kickstand.lean.meter import FALLEN_DEG
-from kickstand_sim.simulation.physics.mount import MOUNTS
+from kickstand_sim.simulation.physics.chip import MOUNTS
 from kickstand_sim.simulation.physics.road import CLASSES
 from kickstand_sim.simulation.ride import SimulatedRide, ride
 from kickstand_tools.calibration.file import CalibrationFile
