@@ -10,7 +10,8 @@ MODULES = {
     "units.py": "from math import radians\nGRAVITY = 9.5\n_TURN = radians(180.0)\nHALF = _TURN / 2\nWORDS = 'x' * 11\n",
     "lean/__init__.py": "",
     "lean/lean_filter.py": "from ..units import GRAVITY, HALF\nMOST = 2 * GRAVITY\nDELAY_S = 300\n"
-    "_ROWS = ((1, 2), (3, 4))\nSTATE = 1\ndef rows():\n    return _ROWS[1]\ndef change():\n    global STATE\n    STATE = 2\n",
+    "_ROWS = ((1, 2), (3, 4))\nSTATE = 1\n"
+    "def rows():\n    return _ROWS[1]\ndef change():\n    global STATE\n    STATE = 2\n",
     "app.py": "from .lean import lean_filter\nfrom .units import GRAVITY, WORDS\n"
     "def force(mass):\n    from .lean.lean_filter import HALF\n"
     "    return mass * GRAVITY, lean_filter.MOST, HALF, lean_filter.DELAY_S, -lean_filter.MOST\n"
