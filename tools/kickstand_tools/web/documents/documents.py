@@ -14,40 +14,13 @@ ALL = "all.html"
 _BETWEEN = "--"  # separates a document's name from an anchor, on the page with all documents
 _TEMPLATE = Path(__file__).with_name("document.html")
 # The documents in reading order: (title of the group, paths in the project)
+_BIKE = "settings displays rides live cars your-own-code how-it-works what-it-costs limits".split()
+_COMPUTER = "recordings file-formats tracks-and-videos accuracy pages simulation fleets python security".split()
 GROUPS = (
-    ("Start", ("README.md",)),
-    (
-        "On the bike",
-        (
-            "firmware/README.md",
-            "firmware/docs/settings.md",
-            "firmware/docs/displays.md",
-            "firmware/docs/rides.md",
-            "firmware/docs/live.md",
-            "firmware/docs/cars.md",
-            "firmware/docs/your-own-code.md",
-            "firmware/docs/how-it-works.md",
-            "firmware/docs/what-it-costs.md",
-            "firmware/docs/limits.md",
-            "firmware/FAQ.md",
-        ),
-    ),
-    (
-        "On the computer",
-        (
-            "tools/README.md",
-            "tools/docs/recordings.md",
-            "tools/docs/file-formats.md",
-            "tools/docs/tracks-and-videos.md",
-            "tools/docs/accuracy.md",
-            "tools/docs/pages.md",
-            "tools/docs/simulation.md",
-            "tools/docs/fleets.md",
-            "tools/docs/python.md",
-            "tools/docs/security.md",
-        ),
-    ),
-    ("The project", (".github/CONTRIBUTING.md", "CHANGELOG.md")),
+    ("Start", ["README.md"]),
+    ("On the bike", ["firmware/README.md", *(f"firmware/docs/{name}.md" for name in _BIKE), "firmware/FAQ.md"]),
+    ("On the computer", ["tools/README.md", *(f"tools/docs/{name}.md" for name in _COMPUTER)]),
+    ("The project", [".github/CONTRIBUTING.md", "CHANGELOG.md"]),
 )
 PATHS = tuple(path for _, paths in GROUPS for path in paths)
 _PICTURES = "tools/pictures"

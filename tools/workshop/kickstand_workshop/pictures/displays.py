@@ -163,10 +163,8 @@ def _run(display: str) -> dict[str, Any]:
 
     for name, at_s in (MOMENTS_S if display == "lcd" else OLED_MOMENTS_S).items():
         board.at(at_s, lambda name=name: look(name))
-    board.install()
-    from kickstand.start import main  # imported after install(), which replaces `machine` and `time`
-
-    board.run(main, ride.seconds)
+    with board:
+        board.run_firmware(ride.seconds)
     return pages
 
 
