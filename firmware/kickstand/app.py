@@ -109,7 +109,8 @@ class App:
         from .drive_alignment.background import BackgroundAlignment
         from .speed.source import open_speed
 
-        return BackgroundAlignment(self.settings.leans, open_speed(self.settings), self.meter, self.calibration)
+        speed = open_speed(self.settings, self.notices)
+        return BackgroundAlignment(self.settings.leans, speed, self.meter, self.calibration)
 
     def run(self):
         """Run the loop until Ctrl-C, one pass per LOOP_US. At the end the display says that the firmware has stopped,
@@ -251,7 +252,10 @@ class App:
         screen = self.screen
         if screen.entry:
             self.rides.prepare()
-        self._collect_notices()
+        axes = self.sensor.chip.axes
+        if axes.notice:
+            report(axes.notice, self.notices)
+            axes.notice = None
         if self.user:
             self.user.call("on_lean", self.meter.lean_deg, self.trusted, self.meter)
         screen.tick(now_ms)
@@ -259,16 +263,6 @@ class App:
             self.lcd.show(*screen.lines(now_ms))
         if not screen.wizard:
             self.calibration.keep_trim(now_ms)
-
-    def _collect_notices(self):
-        """Take the notices of the speed source and of the sensor."""
-        notice = self.drive and self.drive.speed.take_problem()
-        if notice:
-            self.notices.append(notice)
-        axes = self.sensor.chip.axes
-        if axes.notice:
-            report(axes.notice, self.notices)
-            axes.notice = None
 
     def _pass_on(self, n, dt_us, now_ms):
         """Pass the sum of n new samples to the meter, and each single sample to a wizard.

@@ -118,7 +118,7 @@ def speed(settings):
         return "", (), -1
     from .speed.source import open_speed
 
-    source, mps = open_speed(settings), -1
+    source, mps = open_speed(settings, []), -1
     for _ in range(_LISTEN_MS // 10):
         new = source.poll(ticks_ms())
         mps = mps if new is None else new

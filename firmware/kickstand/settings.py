@@ -66,10 +66,7 @@ class Settings:
             wiring: the wiring of a character display's backpack. The default is LCD_WIRING.
         """
         look = self.OLED_CONTRAST, self.OLED_INVERTED, wiring or self.LCD_WIRING
-        return Display(self._reopen_lcd, self.LCD_BUS_HZ, self.DISPLAY, self.LCD_ADDRESSES, *look)
-
-    def _reopen_lcd(self, hz):
-        return self.open_bus("LCD", hz)
+        return Display(lambda hz: self.open_bus("LCD", hz), self.LCD_BUS_HZ, self.DISPLAY, self.LCD_ADDRESSES, *look)
 
     def open_sensor(self):
         """Return the Sensor. Its first step opens the bus. This step raises SettingsError for pins that the I2C

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 from kickstand.rides import ride_files
 from kickstand_tools.deploy import bytecode, firmware_files, flash, update
-from kickstand_tools.deploy.board_files import BoardFiles, fingerprint, survey
-from kickstand_tools.deploy.update import needed_blocks, plan, refuse_without_room
+from kickstand_tools.deploy.update import BoardFiles, fingerprint, needed_blocks, plan, refuse_without_room, survey
 from littlefs_board import BLOCK, PORTS, LittlefsBoard
 from support import command, fake_board
 

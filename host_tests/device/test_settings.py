@@ -113,7 +113,7 @@ def test_pins_that_the_chip_cannot_use_are_named(name, config, code, values, on_
         from kickstand.speed.source import open_speed
 
         with pytest.raises(SettingsError) as refused:
-            settings.open_button() if name == "button" else open_speed(settings)
+            settings.open_button() if name == "button" else open_speed(settings, [])
         return refused.value.code, refused.value.values[: len(values)]
 
     assert on_board(opened, config) == (code, values)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from kickstand_sim.simulated_board import simulator
 from kickstand_tools.web import site
-from kickstand_workshop.pictures import displays, page, rides, terminal
+from kickstand_workshop.pictures import displays, page, rides
 from support.device_runs import FreshFirmware
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -22,7 +22,7 @@ def checked_in():
 
 @pytest.mark.long  # device and demo run to draw their displays
 def test_no_drawing_is_stale():
-    drawings, committed = displays.draw() | {"demo.svg": terminal.draw()}, checked_in()
+    drawings, committed = displays.draw() | {"demo.svg": displays.draw_demo()}, checked_in()
     stale = [name for name, svg in drawings.items() if committed.get(name) != svg]
     assert not stale, f"{', '.join(stale)}: {STALE}"
 

@@ -26,7 +26,7 @@ class Chip:
 class Receiver:
     """A speed source. speed: the speed that poll() returns next, or None."""
 
-    age_ms, problem = 0, None
+    age_ms = 0
     speed: float | None = None
 
     def poll(self, now_ms):

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from kickstand_sim.simulation.ride import ride
 from kickstand_tools.common.errors import InputError
+from kickstand_tools.estimation.alignment import fit_ride
+from kickstand_tools.logs.reader import read_log
 from kickstand_workshop.evaluation import estimators, faults, integrity, runs
 from kickstand_workshop.evaluation.estimators import Samples
 from kickstand_workshop.evaluation.integrity import FaultJob
@@ -30,7 +32,7 @@ def test_every_filter_has_the_signs_right(name):
 
 @functools.cache
 def swept():
-    return runs.run(runs.Job("sweeper", 1, seconds=120.0, traces=True))
+    return runs.run(runs.Job("sweeper", 1, seconds=120.0))
 
 
 @pytest.mark.long
@@ -40,10 +42,8 @@ def test_every_estimator_is_scored_and_none_beats_the_oracle():
     scores = swept().scores
     names = {"kickstand", "smoothed", "formula", "formula 0.3 s", "possible", "GPS 1 Hz", "GPS 10 Hz"}
     assert swept().refusal is None and set(scores) == {*names, *FILTERS}
-    assert all(
-        np.all(np.isfinite(lean)) and len(lean) == len(swept().traces["time"]) for lean in swept().traces.values()
-    )
     rms = {name: figures.rms_deg for name, figures in scores.items()}
+    assert all(map(math.isfinite, rms.values()))
     assert rms["smoothed"] < 0.6 * rms["kickstand"] < rms["kickstand"] < rms["formula 0.3 s"] < 0.5 * rms["formula"]
     assert scores["complementary"].slope < 0.5 and 0.9 < scores["kickstand"].slope < 1.1
     assert rms["possible"] < min(0.25, 0.8 * min(rms[name] for name in rms if name not in ("possible", "smoothed")))
@@ -71,8 +71,8 @@ def one_other(monkeypatch):
 
 @pytest.mark.long
 def test_set_up_errors_of_the_job_are_simulated(one_other):
-    jobs = [runs.Job("parked", 0, 60.0, error, pitch_change_deg=0.0, traces=True) for error in (0.0, 1.5)]
-    fair, off = (runs.run(job).traces["complementary"] for job in jobs)
+    jobs = [runs.Job("parked", 0, 60.0, error, pitch_change_deg=0.0) for error in (0.0, 1.5)]
+    fair, off = (runs.ridden(job)[1]["complementary"] for job in jobs)
     assert np.mean(off - fair) == pytest.approx(-1.5, abs=0.3)
 
 
@@ -89,10 +89,11 @@ def test_a_refused_calibration_is_reported_not_scored(monkeypatch):
 def test_recorded_motorcycle_has_its_known_scores(shared_data):
     """The slope is the share of the true lean that a filter shows. The reference is computed from speed and yaw
     rate."""
-    compared = runs.score_recording(shared_data / "motorcycle-ride.csv.gz")
-    scores = compared.scores
+    path = shared_data / "motorcycle-ride.csv.gz"
+    scores = runs.score_recording(path).scores
     assert scores["complementary"].slope == pytest.approx(0.40, abs=0.06)
-    assert 15.0 < np.abs(compared.traces["reference"]).max() < 25.0
+    log = read_log(path)
+    assert 15.0 < np.abs(runs.reference_lean(log, fit_ride(log).calibration)).max() < 25.0
     assert scores["kickstand"].rms_deg < scores["formula 0.3 s"].rms_deg < scores["formula"].rms_deg
     assert scores["kickstand"].rms_deg < 2.98 and 0.8 < scores["kickstand"].slope < 1.23
 

@@ -89,7 +89,7 @@ def drive(config, fit, until_s, port="rp2"):
         for name, value in [("WHEEL_PIN", board.wheel_pin)] + list(config.items()):
             setattr(Config, name, value)
         hard, of_board.PIN_IRQ = of_board.PIN_IRQ, {"hard": True} if port == "rp2" else {}
-        speed = source.open_speed(Settings(Config))
+        speed = source.open_speed(Settings(Config), [])
         of_board.PIN_IRQ = hard
         transfer = busy_with_transfers() if port == "esp32" else lambda number: None
         turn = 0

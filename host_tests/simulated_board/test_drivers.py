@@ -58,7 +58,7 @@ def test_only_a_hard_interrupt_keeps_room_for_its_exceptions(monkeypatch):
 
         monkeypatch.setattr("micropython.alloc_emergency_exception_buf", sizes.append)
         for hard in (False, True):
-            Wheel(Pin(14, Pin.IN, Pin.PULL_UP), 0.5, {"hard": hard})
+            Wheel(Pin(14, Pin.IN, Pin.PULL_UP), 0.5, {"hard": hard}, [])
 
     sizes = []
     assert on_board(program)[0] == "returned" and sizes == [100]

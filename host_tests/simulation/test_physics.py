@@ -7,9 +7,8 @@ import pytest
 from kickstand.units import STANDARD_GRAVITY as G
 from kickstand_sim.simulation.commands import Leg, commands
 from kickstand_sim.simulation.physics import bike as physics, road
-from kickstand_sim.simulation.physics.bike import Bike
+from kickstand_sim.simulation.physics.bike import Bike, Motion, body_rates, specific_force
 from kickstand_sim.simulation.physics.chip import Chip
-from kickstand_sim.simulation.physics.kinematics import Motion, body_rates, specific_force
 from kickstand_sim.simulation.physics.signals import integral, second_order, smoothed, smoothstep
 
 RATE = 1000.0

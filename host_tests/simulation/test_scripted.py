@@ -5,8 +5,7 @@ import json
 import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY as G
-from kickstand_sim.simulation.physics.bike import Bike
-from kickstand_sim.simulation.physics.kinematics import Motion, body_rates, specific_force
+from kickstand_sim.simulation.physics.bike import Bike, Motion, body_rates, specific_force
 from kickstand_sim.simulation.scripted import sensor_errors
 from kickstand_sim.simulation.scripted.script import (
     KICKSTAND_DEG,

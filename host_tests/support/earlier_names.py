@@ -3,7 +3,8 @@ tests."""
 
 import importlib.util
 import sys
-from importlib.abc import MetaPathFinder
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import PathFinder
 from pathlib import Path
 
 from kickstand_tools.simulated_board import EarlierNames
@@ -11,6 +12,8 @@ from kickstand_tools.simulated_board import EarlierNames
 STATUS = "kickstand.status_report"  # support/status_report.py
 MOVED = {
     "kickstand.rides.ride_paths": "kickstand.rides.ride_files",
+    "kickstand_sim.simulation.physics.kinematics": "kickstand_sim.simulation.physics.bike",
+    "kickstand_sim.simulation.physics.mount": "kickstand_sim.simulation.physics.chip",
     "kickstand_tools.simulation": "kickstand_sim.simulation",
     "kickstand_tools.demo": "kickstand_sim.demo",
     "kickstand_workshop.bench": "kickstand_emulator",
@@ -24,7 +27,52 @@ class _Status(MetaPathFinder):
         return None
 
 
-_FINDERS = [_Status(), EarlierNames(MOVED)]
+def _take_earlier_argument(module):
+    class ActiveCalibration(module.ActiveCalibration):
+        def __init__(self, meter, _changed=None):
+            super().__init__(meter)
+
+    module.ActiveCalibration = ActiveCalibration
+
+
+def _show_earlier_work(module):
+    class LeanFilter(module.LeanFilter):
+        @property
+        def _work(self):
+            return self._state.work
+
+        @_work.setter
+        def _work(self, work):
+            self._state.work = work
+
+    module.LeanFilter = LeanFilter
+
+
+CHANGED = {
+    "kickstand.calibration.active": _take_earlier_argument,
+    "kickstand.lean.lean_filter": _show_earlier_work,
+}
+
+
+class _Changed(MetaPathFinder, Loader):
+    """Changes a module of CHANGED after its import."""
+
+    def find_spec(self, fullname, path, target=None):
+        spec = PathFinder.find_spec(fullname, path) if fullname in CHANGED else None
+        if spec and spec.loader:
+            self._loader: Loader = spec.loader
+            spec.loader = self
+        return spec
+
+    def create_module(self, spec):
+        return None
+
+    def exec_module(self, module):
+        self._loader.exec_module(module)
+        CHANGED[module.__name__](module)
+
+
+_FINDERS = [_Status(), _Changed(), EarlierNames(MOVED)]
 
 
 def install():

@@ -41,7 +41,7 @@ class Drive:
         self.run(0.4)
 
     def do(self, name, value):
-        """Carry out an order of Device.act(), or one of: wait or press for some seconds, turn to a view by presses."""
+        """Carry out an order of PageDevice.act(), or: wait or press for some seconds, turn to a view by presses."""
         if name in ("wait", "press"):
             return self.run(value) if name == "wait" else self.press(value)
         if name == "turn_to":

@@ -118,17 +118,16 @@ class Lcd:
             self._step = 0
 
     def _put(self, number, text):
-        line = self._wanted[number]
         if isinstance(text, str):
             if text == self._texts[number]:  # the text is usually the same, and skipping its conversion saves 0.2 ms
                 return
             self._texts[number] = text
-            for i in range(_COLUMNS):
-                line[i] = ord(text[i]) & 0xFF if i < len(text) else 0x20
+            text = bytes([ord(letter) & 0xFF for letter in text])
         else:
             self._texts[number] = _NO_TEXT
-            for i in range(_COLUMNS):
-                line[i] = text[i] if i < len(text) else 0x20
+        line, n = self._wanted[number], min(_COLUMNS, len(text))
+        line[:n] = text[:n]
+        line[n:] = b" " * (_COLUMNS - n)
         self._changed = True
 
     def _initialise(self, step):

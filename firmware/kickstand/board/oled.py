@@ -90,9 +90,8 @@ class Oled:
         # the parts of a digit are sent together
         self._pages = HEIGHT // 8 if self.draws else HEIGHT // 16
         starts = [page * WIDTH + x for x in range(0, WIDTH, _PART) for page in range(self._pages)]
-        self._new, self._old = [
-            [memoryview(pixels)[start : start + _PART] for start in starts] for pixels in (self._pixels, self._sent)
-        ]
+        self._new = [memoryview(self._pixels)[start : start + _PART] for start in starts]
+        self._old = [memoryview(self._sent)[start : start + _PART] for start in starts]
         # A transfer consists of three commands, each after a control byte, and the data
         self._packet = bytearray(b"\x80\xb0\x80\x00\x80\x10\x40") + bytearray(_PART)
         self._status = bytearray(1)
@@ -123,9 +122,9 @@ class Oled:
     def show(self, line1, line2, picture=None):
         """Set what tick() shows: the picture or, without a picture, the two lines in letters of double height. The
         lines have the character codes of hd44780.py."""
-        target = (self.draws and picture) or tuple(
-            [line if isinstance(line, str) else bytes(line) for line in (line1, line2)]
-        )
+        target = self.draws and picture
+        if not target:
+            target = tuple([line if isinstance(line, str) else bytes(line) for line in (line1, line2)])
         if target != self._wanted:
             self._wanted = target
 

@@ -18,7 +18,6 @@ class ActiveCalibration:
 
     Args:
         meter: the LeanMeter that uses the Calibration.
-        _changed: not used. Programs for an earlier version give a function here.
 
     Attributes:
         value: the Calibration in use. Until the first chip has started, this is the Calibration of the new meter.
@@ -28,7 +27,7 @@ class ActiveCalibration:
 
     REFINED, REPLACED = 1, 2
 
-    def __init__(self, meter, _changed=None):
+    def __init__(self, meter):
         self._meter = meter
         self.value = meter.calibration
         self.changed = None

@@ -11,7 +11,7 @@ from math import atan2, degrees, pi, sqrt
 from ..errors import Refusal
 from ..rotation import angle_deg, cross, dot, norm, normalize, vector
 from ..units import const
-from .events import Fit
+from .events import BLOCKS, Fit
 
 PRIOR_DEG = 1.0  # prior of the standard deviation of forward, at a weight of 1 g^2 s
 PRIOR_FREEDOM = 4
@@ -66,11 +66,11 @@ class DriveParts:
     """
 
     def __init__(self):
+        self._blocks = [array("f", [0.0] * 7) for _ in range(BLOCKS)]
         self.clear()
 
     def clear(self):
         """Drop all blocks. Call this method before the first add()."""
-        self._blocks = []
         self.count = 0
         self.forward_deg = self.sigmas = self.roll_deg = self.pitch_deg = 0.0
 
@@ -85,7 +85,8 @@ class DriveParts:
             weight, seconds: as in the block's Fit.
         """
         sums = weight * across, weight * along, seconds * roll_g, seconds * pitch_g
-        self._blocks.append(array("f", sums + (weight, seconds, weight * weight)))
+        for i, value in enumerate(sums + (weight, seconds, weight * weight)):
+            self._blocks[self.count][i] = value
         self.count += 1
 
     def compare(self):
@@ -178,12 +179,10 @@ class SpeedCheck:
 
     def __init__(self):
         self.problem = None
-        self._speed = None
+        self._speed = self._force = None
+        self._yaw_dps = 0.0
+        self._sums, self._sums_us = [0.0] * 4, 0
         self._start_count()
-        self._force_before = None
-        self._force_us = [0.0] * 3
-        self._turned = self._yaw_dps_before = 0.0
-        self._sums_us = 0
 
     def _start_count(self):
         """Restart the count of lively seconds, because the speed has changed."""
@@ -205,33 +204,22 @@ class SpeedCheck:
             yaw_dps: mean yaw rate in deg/s.
             dt_us: microseconds.
         """
-        sums = self._force_us
+        sums = self._sums
         for i in range(3):
             sums[i] += force[i] * dt_us
-        self._turned += abs(yaw_dps) * dt_us
+        sums[3] += abs(yaw_dps) * dt_us
         self._sums_us += dt_us
-        if self._sums_us >= 1_000_000:
-            self.update_second([total / self._sums_us for total in sums], self._turned / self._sums_us)
-            self._turned = 0.0
-            self._sums_us = 0
-            for i in range(3):
-                sums[i] = 0.0
-
-    def update_second(self, force, yaw_dps=0.0):
-        """Take the means over the last second.
-
-        Args:
-            force: mean force, 3 values in g.
-            yaw_dps: mean absolute yaw rate in deg/s.
-        """
-        previous, self._force_before = self._force_before, list(force)
-        turning = max(yaw_dps, self._yaw_dps_before) > _TURNING_DPS
-        self._yaw_dps_before = yaw_dps
+        if self._sums_us < 1_000_000:
+            return
+        *mean, yaw_dps = [total / self._sums_us for total in sums]  # over the last second
+        self._sums, self._sums_us = [0.0] * 4, 0
+        previous, self._force = self._force, mean
+        turning = max(yaw_dps, self._yaw_dps) > _TURNING_DPS
+        self._yaw_dps = yaw_dps
         if previous is None or self._speed is None or turning:
             return
-        d0, d1, d2 = force[0] - previous[0], force[1] - previous[1], force[2] - previous[2]
         self._seconds += 1
-        if sqrt(d0 * d0 + d1 * d1 + d2 * d2) > _LIVELY_G:
+        if norm([mean[i] - previous[i] for i in range(3)]) > _LIVELY_G:
             self._lively_seconds += 1
         if self._lively_seconds >= _STUCK_S and self._lively_seconds >= _STUCK_SHARE * self._seconds:
             self.problem = Refusal("speed-stuck", self._speed)

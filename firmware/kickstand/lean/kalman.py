@@ -12,7 +12,7 @@ from math import radians, sin, sqrt
 from ..quick import load, plain
 from ..units import const
 
-# Lower bound of a variance, because rounding in 32-bit floats could make a variance negative
+# Lower bound of a variance, because rounding in 32-bit floats could make it negative. quick_viper.py has it too
 _MIN_VARIANCE = const(1e-10)
 # Number of terms of a Jacobian's row that are processed between two yields. Without machine code three terms take a
 # millisecond.
@@ -52,9 +52,9 @@ NOISE = radians(0.01)
 def add_products_python(out, factors, source, n, rows):
     """Add factors[i] * source[k] to out[i * n + k], for i below rows and k below n.
 
-    out, factors, source: arrays of floats. rows: 1, or n for a symmetric matrix. Half of a symmetric matrix is computed
-    and copied to the other half. On the board add_products() is the machine code of quick_viper.py, for array("f").
-    Elsewhere add_products() is this function.
+    out, factors, source: arrays of floats. rows: 1, or n for a covariance. Half of a covariance is computed and copied
+    to the other half, and its variances are kept above _MIN_VARIANCE. On the board add_products() is the machine code
+    of quick_viper.py, for array("f"). Elsewhere add_products() is this function.
     """
     for i in range(rows):
         factor = factors[i]
@@ -63,12 +63,15 @@ def add_products_python(out, factors, source, n, rows):
             out[i * n + k] = value
             if rows > 1:
                 out[k * n + i] = value
+        if rows > 1 and out[i * n + i] < _MIN_VARIANCE:
+            out[i * n + i] = _MIN_VARIANCE
 
 
 def _adding():
-    """Return arrays and their mark. Some of the sums grow, vanish, change their sign or are rounded."""
+    """Return arrays and their mark. Some of the sums grow, vanish, change their sign or are rounded, and a variance is
+    too small."""
     sums = array("f", (0.65625, 0, 0, -0.75, 8388609, 0, 1e-9, 3e9, -0.984))
-    return (sums, array("f", (1.5, -2.6875, 0.75)), array("f", (-0.4375, 98304.5, 1.3125)), 3, 3), 0x6E921598
+    return (sums, array("f", (1.5, -2.6875, 0.75)), array("f", (-0.4375, 98304.5, 1.3125)), 3, 3), 0x0A019A4B
 
 
 (add_products,) = load("quick_viper", ("add_products", _adding))
@@ -151,7 +154,7 @@ class Covariance:
         from the states before this window's corrections. variance: R, in the measurement's unit squared. If the squared
         innovation exceeds _GATE times its expected variance, this variance is raised until they are equal.
         """
-        p, rows, column, gain, factor = self._p, self.rows, self._column, self._gain, self._factor
+        rows, column, gain, factor = self.rows, self._column, self._gain, self._factor
         correction, n = self.correction, self.n
         column[:] = self._zeros
         for m, (j, h) in enumerate(derivatives):
@@ -167,17 +170,14 @@ class Covariance:
         self.misfit = innovation / sqrt(expected)
         if square > _GATE * expected:
             expected = square / _GATE
-        factor[0] = innovation / expected
-        add_products(correction, factor, column, n, 1)
         yield
         gain[:] = self._zeros
         factor[0] = -1.0 / expected
         add_products(gain, factor, column, n, 1)
-        add_products(p, gain, column, n, n)
+        add_products(self._p, gain, column, n, n)
         yield
-        for i in range(0, n * n, n + 1):
-            if p[i] < _MIN_VARIANCE:
-                p[i] = _MIN_VARIANCE
+        factor[0] = -innovation
+        add_products(correction, factor, gain, n, 1)
         yield
 
 

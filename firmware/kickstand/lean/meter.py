@@ -211,15 +211,19 @@ class LeanMeter:
         if not (
             -self.max_left_deg <= lean <= self.max_right_deg and -self.max_brake_g <= smooth[2] <= self.max_accel_g
         ):
-            self._hold_maxima(lean, smooth[2], dt_us)
+            if self._over_us < 0:
+                self._over_us += dt_us
+            else:
+                self._hold_maxima(lean, smooth[2], dt_us)
         elif self._over_us:
             self._hold_again()
 
     def _hold_again(self):
         """Restart the timing of a lean above its maximum, because the lean is within its maxima or not trusted."""
-        # _over_us: time for which the lean has exceeded a maximum. After each HELD_US it starts again from 0. _least:
-        # smallest lean since _over_us was 0. _least_before: smallest lean in the previous HELD_US, or 0 if the lean was
-        # within its maxima then.
+        # _over_us: time for which the lean has exceeded a maximum. After each HELD_US it starts again from 0. It is
+        # negative after a lean that is not trusted, because trust, which takes 0.2 ms to judge, is not judged again for
+        # some time. _least: smallest lean since _over_us was 0. _least_before: smallest lean in the previous HELD_US,
+        # or 0 if the lean was within its maxima then.
         self._over_us = 0
         self._least = 180.0
         self._least_before = 0.0
@@ -227,6 +231,7 @@ class LeanMeter:
     def _hold_maxima(self, lean, forward, dt_us):
         if not self.trusted:
             self._hold_again()
+            self._over_us = -HELD_US
             return
         self.max_accel_g = max(self.max_accel_g, forward)
         self.max_brake_g = max(self.max_brake_g, -forward)

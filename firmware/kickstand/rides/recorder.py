@@ -64,11 +64,10 @@ class Recorder:
             self._note_stall(begun_ms)  # making a directory, or closing a file after an error, may have taken long
         self._chip = chip
         self._body = pack(chip.who_am_i, chip.accel_range_g, calibration)
-        now_ms = ticks_ms()
-        # The time is kept in two parts, because integers of over 30 bits would take heap in each pass
-        self._start_s, self._start_us = self._time_s, self._time_us = now_ms // 1000, now_ms % 1000 * 1000
+        self._start_ms = self._before_ms = ticks_ms()
+        # The time since the start is kept in two parts, because integers of over 30 bits would take heap in each pass
+        self._time_s = self._time_us = 0
         self._empty = True  # until the first samples
-        self._before_ms = now_ms
         self._sequence = 0
         self._bytes = 0
         self._interrupted = False
@@ -170,7 +169,7 @@ class Recorder:
 
     def seconds(self):
         """Return the duration of this recording so far, in seconds."""
-        return self._time_s - self._start_s - (self._time_us < self._start_us)
+        return self._time_s
 
     def room_s(self):
         """Return the number of seconds that can still be recorded, or None without a limit."""
@@ -184,7 +183,7 @@ class Recorder:
     def _begin_block(self):
         """Begin an empty block. The next passes of the app's loop fill the block."""
         length, number = self._writer.next_length(), (self._ride, self._sequence)
-        time_us = 1_000_000 * self._time_s + self._time_us
+        time_us = 1000 * self._start_ms + 1_000_000 * self._time_s + self._time_us
         self._block.begin(length, *number, time_us, self._chip, self._sample_hz, self._body)
         self._sequence += 1
 

@@ -108,10 +108,10 @@ def _numbers(path, digits, ending=""):
                 yield int(name[:digits]), entry[-1]
 
 
-def _free_bytes(path):
-    """Return the number of free bytes in the file system of a path. Raises OSError."""
+def _space(path):
+    """Return the number of free bytes and of all bytes in the file system of a path. Raises OSError."""
     space = os.statvfs(path)
-    return space[1] * space[3]
+    return space[1] * space[3], space[1] * space[2]
 
 
 def _make(path):
@@ -123,25 +123,20 @@ def _make(path):
             raise
 
 
-def _exists(path):
+def _succeeds(function, *arguments):
+    """Call a function. Return False if it raises OSError, as os.stat() without a file, or os.rmdir() of a directory
+    with files of the board's owner."""
     try:
-        return bool(os.stat(path))
+        function(*arguments)
+        return True
     except OSError:
         return False
-
-
-def _remove_emptied(path):
-    """Remove a directory if it is empty. A directory with files of the board's owner stays."""
-    try:
-        os.rmdir(path)
-    except OSError:
-        pass
 
 
 def _test_card(path):
     """Write and remove a file in a directory of the card. Raises OSError."""
     _make(path)
-    _free_bytes(path)
+    _space(path)
     path += "/probe"
     with open(path, "wb") as file:  # opening the first file searches for free space and may read the FAT
         file.write(_CONTENT)
@@ -204,10 +199,9 @@ class RideFiles:
         self._use(next_ride(self._directory))
         self._part = 0
         self._block = 0  # index of the ride block in its part
-        space = os.statvfs(self._directory)
-        self._free = space[1] * space[3]
+        self._free, size = _space(self._directory)
         # bytes of the earlier rides; this is an estimate, because adding up hundreds of files would take too long
-        self._others = max(0, space[1] * space[2] - self._free - FIRMWARE)
+        self._others = max(0, size - self._free - FIRMWARE)
         self._wrapped = False  # True once parts at the beginning of this ride were removed
         self._removing = self._make_room()
         return self._ride
@@ -246,7 +240,7 @@ class RideFiles:
         else:
             path = part_path(self._directory, self._ride, self._part)
             self._part += 1
-            if _exists(path):  # the existing file may be part of a ride, even if the listing does not show it
+            if _succeeds(os.stat, path):  # the file may be part of a ride, even if the listing does not show it
                 return False
             self._file = open(path, "wb")
             self._left = self._part_blocks
@@ -258,7 +252,7 @@ class RideFiles:
         group = 0
         for ride in rides(self._directory):
             while group < ride // RIDES_IN_GROUP:
-                _remove_emptied(group_path(self._directory, group))
+                _succeeds(os.rmdir, group_path(self._directory, group))
                 group += 1
             yield
             path = ride_path(self._directory, ride)
@@ -276,8 +270,8 @@ class RideFiles:
                 yield
             if ride == self._ride:
                 break
-            _remove_emptied(path)
-            self._free = _free_bytes(self._directory)  # measured again, because in flash a directory takes two blocks
+            _succeeds(os.rmdir, path)
+            self._free = _space(self._directory)[0]  # measured again, because in flash a directory takes two blocks
             yield
         raise OSError(_ENOSPC)
 
@@ -303,10 +297,7 @@ class RideFiles:
 
     def abandon(self):
         """Close the ride's open file after an error; ignore an OSError. Completed blocks are kept."""
-        try:
-            self.end()
-        except OSError:
-            pass
+        _succeeds(self.end)
 
     def fault_code(self, error):
         """Return the code of the Notice for an OSError or MemoryError that this object raised."""

@@ -56,8 +56,6 @@ class Gps:
             the sentence with the smallest delay.
     """
 
-    problem = None  # always None for a Gps; a Wheel has the same attribute and sets it
-
     def __init__(self, uart):
         self._uart = uart
         self._line = b""  # the part of a sentence that has arrived so far

@@ -1,7 +1,6 @@
 """Opens the speed source set in config.py, and rejects speeds that no vehicle can have.
 
-A source is a Gps or a Wheel. Both have poll(now_ms), place(now_ms), after_stall(now_ms), fault(now_ms), problem and
-age_ms.
+A source is a Gps or a Wheel. Both have poll(now_ms), place(now_ms), after_stall(now_ms), fault(now_ms) and age_ms.
 """
 
 from time import ticks_diff
@@ -65,22 +64,21 @@ class Speed:
         self.age_us = 1000 * self.source.age_ms
         return speed
 
-    def take_problem(self):
-        """Return the source's problem, a Notice or None, and clear it."""
-        problem, self.source.problem = self.source.problem, None
-        return problem
 
-
-def open_speed(settings):
+def open_speed(settings, notices):
     """Open the speed source of a Settings and return a Speed. SPEED must not be None. Raises SettingsError for pins
-    that cannot be used."""
+    that cannot be used.
+
+    Args:
+        notices: list to which the Notice of a new fault is appended.
+    """
     if settings.SPEED == "gps":
         from .gps import Gps
 
         return Speed(Gps(_open_uart(settings)))
     from .wheel import Wheel
 
-    return Speed(Wheel(_open_wheel_pin(settings), settings.PULSES_PER_METRE, port.PIN_IRQ))
+    return Speed(Wheel(_open_wheel_pin(settings), settings.PULSES_PER_METRE, port.PIN_IRQ, notices))
 
 
 def _open_uart(settings):

@@ -4,7 +4,7 @@ The interrupt only counts pulses and stores the time of the last pulse. The inte
 interrupt must take no heap. A storm of pulses, for example from an ignition cable, would leave no time for anything
 else. In a storm the interrupt turns itself off, and poll() turns it on again later.
 
->>> wheel = Wheel(machine.Pin(14, machine.Pin.IN, machine.Pin.PULL_UP), 0.5, {"hard": True})
+>>> wheel = Wheel(machine.Pin(14, machine.Pin.IN, machine.Pin.PULL_UP), 0.5, {"hard": True}, [])
 >>> speed_mps = wheel.poll(time.ticks_ms())     # None if there is no new speed
 """
 
@@ -41,13 +41,14 @@ class Wheel:
         pin: a machine.Pin with pull-up.
         pulses_per_metre: number of pulses per metre of road.
         irq: dictionary of further arguments of Pin.irq().
+        notices: list to which the Notice of a new fault is appended.
 
     Attributes:
         age_ms: the age of the speed that poll() last returned.
-        problem: a Notice to show once, or None. The caller that shows the Notice sets problem to None.
     """
 
-    def __init__(self, pin, pulses_per_metre, irq):
+    def __init__(self, pin, pulses_per_metre, irq, notices):
+        self._notices = notices
         shortest_us = int(1e6 / (pulses_per_metre * _MAX_MPS))
         self._shortest_us = shortest_us
         self._open_us = min(_BOUNCE_US, shortest_us // 4)
@@ -66,7 +67,6 @@ class Wheel:
         self._noisy = False  # True after a storm, until the next speed
         self._soft = not irq.get("hard")
         self._too_quick = None  # True while pulses are too fast for a soft interrupt; None before the first pulses
-        self.problem = None
         # An exception in a hard interrupt cannot take heap for its report. MicroPython for Linux lacks the function
         keep_room = getattr(micropython, "alloc_emergency_exception_buf", None)
         if keep_room and not self._soft:
@@ -96,11 +96,10 @@ class Wheel:
             self._edges_us = time_us
         if pin.value():
             self._opened_us = time_us
-        elif (time_us - self._opened_us) & _TICKS >= self._open_us and (
-            time_us - self._pulse_us
-        ) & _TICKS >= self._shortest_us:
-            self._pulse_us = time_us
-            self.count = (self.count + 1) & _COUNT
+        elif (time_us - self._opened_us) & _TICKS >= self._open_us:
+            if (time_us - self._pulse_us) & _TICKS >= self._shortest_us:
+                self._pulse_us = time_us
+                self.count = (self.count + 1) & _COUNT
 
     def _soft_edge(self, pin):
         """Handle a soft interrupt.
@@ -160,7 +159,8 @@ class Wheel:
         if self._off_ms is None:
             self._off_ms = now_ms
             if not self._noisy:
-                self._noisy, self.problem = True, Notice("wheel-storm")
+                self._noisy = True
+                self._notices.append(Notice("wheel-storm"))
         elif ticks_diff(now_ms, self._off_ms) >= _STORM_PAUSE_MS:
             self._seen, self._seen_us = self.count, None
             if self._moved_ms is not None:
@@ -186,7 +186,7 @@ class Wheel:
         self._usual_us = period_us // pulses
         if self._soft and self._usual_us < _SOFT_PERIOD_US:
             if self._too_quick is None:
-                self.problem = Notice("wheel-quick")
+                self._notices.append(Notice("wheel-quick"))
             self._too_quick = True
             return None
         self._too_quick = False

@@ -18,8 +18,10 @@ from ..units import const
 
 ARROW = "\x7e"  # code of an arrow in the display's character ROM
 RECORDING = "*"
-_BLOCK = 0xFF  # code of a full cell in the display's character ROM
-_HALF_BAR = 8  # number of character cells on each side of the middle
+_HALF_BAR = const(8)  # number of character cells on each side of the middle
+# Code 0xFF is a full cell in the display's character ROM
+_EMPTY_THEN_FULL = b"        \xff\xff\xff\xff\xff\xff\xff\xff"
+_FULL_THEN_EMPTY = b"\xff\xff\xff\xff\xff\xff\xff\xff        "
 _DEG_PER_COLUMN = 1.5  # degrees of lean per dot column; the bar ends at 60 degrees, because it has 8 cells of 5 columns
 
 _NOTICE_MS = const(2000)
@@ -66,19 +68,17 @@ def lean_bar(lean_deg):
     The codes 0 to 3 are glyphs with 1 to 4 dot columns filled from the left. The codes 4 to 7 are glyphs with 1 to 4
     dot columns filled from the right."""
     columns = min(5 * _HALF_BAR, int(abs(lean_deg) / _DEG_PER_COLUMN + 0.5))
-    right = columns if lean_deg > 0 else 0
-    left = columns if lean_deg < 0 else 0
-    for cell in range(_HALF_BAR):
-        # the innermost dot column of each side is always on, to mark the middle
-        _bar[_HALF_BAR + cell] = _cell(max(1, right) - 5 * cell, 0)
-        _bar[_HALF_BAR - 1 - cell] = _cell(max(1, left) - 5 * cell, 4)
+    # the innermost dot column of each side is always on, to mark the middle
+    right, left = (columns or 1, 1) if lean_deg > 0 else (1, columns or 1)
+    full, rest = right // 5, right % 5
+    _bar[_HALF_BAR:] = _FULL_THEN_EMPTY[_HALF_BAR - full : 2 * _HALF_BAR - full]
+    if rest:
+        _bar[_HALF_BAR + full] = rest - 1
+    full, rest = left // 5, left % 5
+    _bar[:_HALF_BAR] = _EMPTY_THEN_FULL[full : _HALF_BAR + full]
+    if rest:
+        _bar[_HALF_BAR - 1 - full] = rest + 3
     return _bar
-
-
-def _cell(columns, first_glyph):
-    if columns <= 0:
-        return 0x20
-    return _BLOCK if columns >= 5 else first_glyph + columns - 1
 
 
 def side_name(lean_deg):
@@ -214,20 +214,15 @@ def sensor_info(sensor, lost, meter, seconds):
         if seconds // 2 % 2 == 0:
             return words(sensor.fault)
         return "On its I2C bus:", " ".join(["%02x" % address for address in sensor.found]) or "nothing"
-    chip, calibration = sensor.chip, meter.calibration
+    chip, calibration, yes = sensor.chip, meter.calibration, ("no", "yes")
+    facts = (
+        "6pos %-3s ali %s" % (yes[calibration.six_done], yes[calibration.aligned]),
+        "%d gaps %d starts" % (min(chip.overflows, 99), min(sensor.restarts, 9)),
+        "samples lost%4d" % min(lost, 9999),
+        "I2C address 0x%02x" % chip.address,
+    )
     line1 = "%-9s%5.1f%sC" % (chip.name[:9], chip.temperature_c(meter.reading[3]), DEGREE)
-    turn = seconds // 2 % 4
-    if turn == 0:
-        return line1, "6pos %-3s ali %s" % (_yes(calibration.six_done), _yes(calibration.aligned))
-    if turn == 1:
-        return line1, "%d gaps %d starts" % (min(chip.overflows, 99), min(sensor.restarts, 9))
-    if turn == 2:
-        return line1, "samples lost%4d" % min(lost, 9999)
-    return line1, "I2C address 0x%02x" % chip.address
-
-
-def _yes(flag):
-    return "yes" if flag else "no"
+    return line1, facts[seconds // 2 % 4]
 
 
 MOTORCYCLE = (lean, maxima, acceleration, formula, raw)

@@ -84,9 +84,9 @@ class SixWizard(Wizard):
         if self._fitted:
             offset, slope = self._fitted
             tilt = six_position.tilt_deg([slope[i] * accel[i] + offset[i] for i in range(3)])
-            return (
-                ("Slant it more:", "%d%s is too flat" % (tilt, DEGREE)) if tilt < six_position.FREE_TILT_DEG else None
-            )
+            if tilt >= six_position.FREE_TILT_DEG:
+                return None
+            return "Slant it more:", "%d%s is too flat" % (tilt, DEGREE)
         self._side = six_position.side_of(accel)
         tilt = six_position.tilt_deg(accel)
         if tilt > _ROUGH_TILT_DEG:

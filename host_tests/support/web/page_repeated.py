@@ -11,7 +11,7 @@ It uses the current directory as the board's flash. Its last line is JSON:
 import json
 import sys
 
-from kickstand_tools.web.device import Device, PageDevice
+from kickstand_tools.web.device import PageDevice
 
 
 def page(orders, until_s):
@@ -30,7 +30,7 @@ def page(orders, until_s):
 
 def loop(orders, until_s):
     """Run kickstand.start.main() with its own loop."""
-    device = Device()
+    device = PageDevice()
     from kickstand.start import main
 
     board = device.board

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from kickstand.calibration.parameters import Calibration
-from kickstand_sim.simulated_board.mpu6050 import ACCEL_XOUT_H, Mpu6050
+from kickstand_sim.simulated_board.mpu6050 import Mpu6050
 from kickstand_sim.simulation.scripted.script import Ride, accelerate, turn, upright
 from kickstand_sim.simulation.scripted.sensor_errors import Sensor
 from kickstand_tools.deploy.bytecode import architecture, cross_compiled
@@ -43,44 +43,28 @@ class SampleCount:
     """Counts the samples of one sensor. The board may read the data registers or the FIFO."""
 
     def __init__(self, sensor: Mpu6050) -> None:
-        self._sensor: Any = sensor
-        self._start, self._pop = sensor.start, sensor.fifo.pop
-        sensor.start = self._on_start  # type: ignore[method-assign]
-        sensor.fifo.pop = self._on_pop  # type: ignore[method-assign]
-        self._first = self._waiting = self._popped = 0
-        self._read: set[int] = set()
+        self._sensor = sensor
+        self.begin()
 
     def begin(self) -> None:
-        self._sensor._update()
-        self._first, self._waiting = self._sensor._next, self._sensor.fifo.count
-        self._popped = 0
-        self._read = set()
+        self._first, self._seen = self._sensor.tally()
+        self._bytes, self._waiting = self._sensor.fifo.bytes_read, self._sensor.fifo.count
 
     def taken(self) -> int:
-        self._sensor._update()
-        return self._sensor._next - self._first
+        return self._sensor.tally()[0] - self._first
 
     def delivered(self) -> int:
-        return self._popped // (len(self._sensor._fifo_registers) or 1) or len(self._read)
+        if self._sensor.frame_bytes:
+            return (self._sensor.fifo.bytes_read - self._bytes) // self._sensor.frame_bytes
+        return self._sensor.tally()[1] - self._seen
 
     def lost(self) -> int:
         """Return the number of samples that are lost: overwritten, or removed from the FIFO before they were read."""
-        samples = self.taken()  # taken() is called first, because it updates the FIFO
-        frame = len(self._sensor._fifo_registers)
-        if frame:
-            accounted = self._popped + self._sensor.fifo.count - self._waiting
-            return samples - accounted // frame
-        return max(0, samples - 1 - len(self._read))  # the latest sample can still be read
-
-    def _on_start(self, address: int, read: bool) -> bool:
-        acknowledged = self._start(address, read)
-        if read and self._sensor._pointer == ACCEL_XOUT_H:
-            self._read.add(self._sensor._next)
-        return acknowledged
-
-    def _on_pop(self, count: int = 1) -> bytes:
-        self._popped += min(count, self._sensor.fifo.count)
-        return self._pop(count)
+        samples, fifo = self.taken(), self._sensor.fifo  # taken() is called first, because it updates the FIFO
+        if self._sensor.frame_bytes:
+            accounted = fifo.bytes_read - self._bytes + fifo.count - self._waiting
+            return samples - accounted // self._sensor.frame_bytes
+        return max(0, samples - 1 - self.delivered())  # the latest sample can still be read
 
 
 SAMPLE_HZ = 200  # samples per second, as in bench_guest.py

@@ -52,10 +52,14 @@ VARIANTS = {  # by WHO_AM_I, for the same chips as CHIPS in firmware/kickstand/i
 
 
 class Fifo:
-    """The chip's FIFO. It contains bytes without marks between frames. size: its capacity in bytes."""
+    """The chip's FIFO. It contains bytes without marks between frames.
+
+    size: its capacity in bytes. bytes_read: number of bytes that were read so far.
+    """
 
     def __init__(self, size):
         self.size = size
+        self.bytes_read = 0
         self._last = bytes(1)
         self.clear()
 
@@ -78,6 +82,7 @@ class Fifo:
     def pop(self, count=1):
         """Remove and return the oldest bytes. An empty FIFO repeats the byte that was read last (RM 4.31)."""
         data, self._waiting = self._waiting[:count], self._waiting[count:]
+        self.bytes_read += len(data)
         if data:
             self._last = data[-1:]
         return data + self._last * (count - len(data))
@@ -107,6 +112,8 @@ class Mpu6050:
         self._regs = bytearray(128)
         self._pointer = 0
         self._expect_pointer = False
+        self._next = 0  # number of the next sample
+        self._seen, self._seen_number = 0, -1  # samples read from the data registers, and _next at the last of them
         self.power_on()
 
     def power_on(self):
@@ -155,6 +162,16 @@ class Mpu6050:
         self._update()
         self._override = value
 
+    @property
+    def frame_bytes(self):
+        """Return the size of a frame in the FIFO, 0 if nothing goes to the FIFO."""
+        return len(self._fifo_registers)
+
+    def tally(self):
+        """Return the number of samples since the last change of the rate, and of those read from data registers."""
+        self._update()
+        return self._next, self._seen
+
     def peek(self, register):
         """Return the content of a register, without the side effects of a read."""
         self._update()
@@ -169,6 +186,8 @@ class Mpu6050:
         """
         self._update()
         self._expect_pointer = not read
+        if read and self._pointer == ACCEL_XOUT_H and self._seen_number != self._next:
+            self._seen, self._seen_number = self._seen + 1, self._next
         return True
 
     def write_byte(self, value):
@@ -271,7 +290,7 @@ class Mpu6050:
     def _start_sampling(self, first_us):
         self._period_ns = self._rate_ns()
         self._first_us = first_us
-        self._next = 0  # number of the next sample
+        self._next = 0
         self._due_us = first_us
 
     def _sample_us(self, number):

@@ -3,9 +3,9 @@
     from kickstand_sim.simulation.files import simulate
     simulate("hills", seed=3, out_dir="ride")
 
-A sample passes profiles (the rider's actions), commands (signals over time), physics/bike, kinematics and road (what a
-perfect sensor measures) and physics/chip (the MPU6050). The simulation does not use the firmware's mathematics, because
-it tests them.
+A sample passes profiles (the rider's actions), commands (signals over time), physics/bike and road (what a perfect
+sensor measures) and physics/chip (the MPU6050 and its mount). The simulation does not use the firmware's mathematics,
+because it tests them.
 
 Choose a simulated ride:
 * ride.py uses this physics. It shows how accurate a lean or an alignment is.

@@ -9,10 +9,8 @@ from numpy.typing import NDArray
 
 from . import hands
 from .commands import RiderCommands, commands
-from .physics.bike import Bike, roll, weave
-from .physics.chip import DIVIDER, RATE_HZ, Chip
-from .physics.kinematics import Motion, body_rates, specific_force
-from .physics.mount import MOUNTS, Mount
+from .physics.bike import Bike, Motion, body_rates, roll, specific_force, weave
+from .physics.chip import DIVIDER, MOUNTS, RATE_HZ, Chip, Mount
 from .physics.road import CLASSES, Shaking, add_bumps, profile_slope, shaking, vibration
 from .physics.signals import band_noise, smoothed, smoothstep
 from .plan import Conditions, Plan

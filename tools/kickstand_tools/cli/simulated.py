@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 from kickstand_sim.simulation.files import simulate
-from kickstand_sim.simulation.physics.mount import MOUNTS
+from kickstand_sim.simulation.physics.chip import MOUNTS
 from kickstand_sim.simulation.physics.road import CLASSES
 from kickstand_sim.simulation.profiles import MAIN, PROFILES
 

@@ -27,11 +27,6 @@ def cleaned(data: bytes) -> bytes:
     return text.encode()
 
 
-def decoded(data: bytes) -> str:
-    """Return the text of a config.py. Raises InputError if it is neither UTF-8 nor UTF-16."""
-    return cleaned(data).decode()
-
-
 def lines(text: str) -> list[str]:
     """Split the text into the lines that Python counts. str.splitlines() would also split at a form feed or U+2028."""
     parts = re.split(r"\r\n|\r|\n", text)

@@ -10,11 +10,10 @@ from mpremote.transport_serial import SerialTransport
 from ..common import firmware_path
 from ..common.errors import InputError
 from . import bytecode, config_check, others
-from .board_files import fingerprint, survey
 from .config_text import cleaned
 from .connection import Port, Progress, ask, connected, describe, restart
 from .firmware_files import CONFIG, contents, unfinished
-from .update import Update, plan, refuse_without_room
+from .update import Update, fingerprint, plan, refuse_without_room, survey
 
 OLDEST = (1, 23)  # oldest supported version of MicroPython
 PLATFORMS = ("rp2", "esp32")

@@ -13,10 +13,10 @@ from mpremote.transport_serial import SerialTransport
 from ..common import firmware_path
 from ..common.errors import InputError
 from ..common.messages import Remedy
-from .board_files import BoardFiles, survey
 from .config_check import CORRECT, Judged
 from .config_text import cleaned
 from .firmware_files import CONFIG, MAIN, PACKAGE
+from .update import BoardFiles, survey
 
 BOOT = "/boot.py"
 _KEPT = "-before-kickstand"

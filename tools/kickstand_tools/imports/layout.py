@@ -72,6 +72,7 @@ def sheet_in(file: RecordingFile, wanted: Collection[str] = ()) -> Sheet | None:
     grid = _grid_below(lines, wanted) or find_grid(lines)
     if grid is None:
         return None
+    # ArduPilot's names of columns, by the name of the message
     titles = {name: re.split(", *", columns) for name, columns in _ARDUPILOT.findall("\n".join(lines))}
     return _by_sensor(_read(file.name, text, lines, grid), titles)
 
@@ -204,17 +205,17 @@ def _all_units(cells: list[str]) -> bool:
 
 def _grid_below(lines: Sequence[str], wanted: Collection[str]) -> Grid | None:
     """The grid below a line that has all wanted names; None without such a line."""
-    if not wanted:
-        return None
-    for k, line in enumerate(lines[:-1]):
+    for k, line in enumerate(lines[:-1] if wanted else ()):
         for separator in dict.fromkeys((separator_of(line), *SEPARATORS)):
-            cells = split_row(line.lstrip(_MARKS) if line.lstrip()[:1] in "#%/" else line, separator)
+            cells = split_row(_uncommented(line), separator)
             if set(wanted) <= set(cells):
-                below = find_grid(lines[k + 1 :])
-                if below is None:
-                    return Grid(k, k + 1, separator, len(cells))
+                below = find_grid(lines[k + 1 :]) or Grid(None, 0, separator, 0)
                 return Grid(k, k + 1 + below.first, below.separator, max(below.width, len(cells)))
     return None
+
+
+def _uncommented(line: str) -> str:
+    return line.lstrip(_MARKS) if line.lstrip()[:1] in ("#", "%", "/") else line
 
 
 def _read(name: str, text: str, lines: Sequence[str], grid: Grid) -> Sheet:
@@ -236,8 +237,7 @@ def _names(lines: Sequence[str], grid: Grid) -> list[str]:
     """The columns' names; "" for a column without a name. Units from a line below are added in brackets."""
     if grid.names is None:
         return [f"#{k + 1}" for k in range(grid.width)]
-    line = lines[grid.names]
-    line = line.lstrip(_MARKS) if line.lstrip()[:1] in ("#", "%", "/") else line
+    line = _uncommented(lines[grid.names])
     parts = [split_row(line, separator) for separator in dict.fromkeys((grid.separator, separator_of(line), " "))]
     names = next((part for part in parts if len(part) >= grid.width - 3), parts[0])
     names = [_WITH_UNIT.sub(r"\1 (\2)", name) for name in names]
@@ -245,10 +245,8 @@ def _names(lines: Sequence[str], grid: Grid) -> list[str]:
         last = next(line for line in reversed(lines[: grid.first]) if line.strip())
         units = split_row(last.lstrip("#%/ "), grid.separator)
         if _all_units(units) and len(units) <= len(names):
-            without_unit = names[len(units) :]
-            names = [
-                f"{name} ({mark.strip('[]()')})" if mark else name for name, mark in zip(names, units)
-            ] + without_unit
+            units += [""] * (len(names) - len(units))
+            names = [f"{name} ({mark.strip('[]()')})" if mark else name for name, mark in zip(names, units)]
     return [*names, *[""] * (grid.width - len(names))]
 
 

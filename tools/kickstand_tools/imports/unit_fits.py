@@ -14,7 +14,7 @@ import numpy as np
 
 from ..checks.axes import PERMUTATIONS
 from ..common.messages import Message, Remedy, kind
-from ..signals import Array, distance_m
+from ..signals import Array, distance_m, integral, window_means
 from .recording import SECOND_NS, Sheet
 from .units import SPEEDS, Nanoseconds, factor
 
@@ -139,16 +139,12 @@ def turns_too_far(seconds: Array, force: Array, rates: Array) -> bool:
     u, w = cells
     u = u / np.maximum(np.linalg.norm(u, axis=1), 1e-9)[:, None]
     span = round(TURNED_S / CELL_S)
-    begins = np.arange(0, len(u) - span + 1, span)
-    steady, fast = [], []
-    for begin in begins:
-        window = u[begin : begin + span]
-        mean = np.mean(window, axis=0)
-        across = np.mean(w[begin : begin + span], axis=0)
-        across = across - mean * (across @ mean) / max(float(mean @ mean), 1e-9)
-        steady.append(float(np.linalg.norm(mean)) > KEPT_DIRECTION)
-        fast.append(float(np.linalg.norm(across)) * TURNED_S > MOST_TURNED)
-    return sum(k and m for k, m in zip(steady, fast)) > 0.5 * len(begins)
+    direction, rate = (window_means(values, span)[::span] for values in (u, w))
+    along = np.sum(rate * direction, axis=1) / np.maximum(np.sum(direction**2, axis=1), 1e-9)
+    across = rate - along[:, None] * direction
+    steady = np.linalg.norm(direction, axis=1) > KEPT_DIRECTION
+    turns = np.linalg.norm(across, axis=1) * TURNED_S > MOST_TURNED
+    return bool(np.count_nonzero(steady & turns) > 0.5 * len(turns))
 
 
 def _steady(u: Array) -> bool:
@@ -177,9 +173,8 @@ def _in_cells(seconds: Array, force: Array, rates: Array) -> tuple[Array, Array]
         times, rows = seconds[valid][order], values[valid][order]
         if len(times) < 4:
             return None
-        sums = np.vstack((np.zeros(3), np.cumsum(0.5 * (rows[1:] + rows[:-1]) * np.diff(times)[:, None], axis=0)))
-        integral = np.column_stack([np.interp(edges, times, column) for column in sums.T])
-        means.append(np.diff(integral, axis=0) / CELL_S)
+        sums = np.column_stack([np.interp(edges, times, integral(times, column)) for column in rows.T])
+        means.append(np.diff(sums, axis=0) / CELL_S)
     return means[0], means[1]
 
 

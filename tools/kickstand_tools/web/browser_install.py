@@ -60,7 +60,7 @@ class Installation:
         plan = others.find(files, lambda path: _judged(path, *self._pose), True)
         config = None if CONFIG in plan.moves else files.texts.get(CONFIG)
         try:
-            self._own = None if config is None else config_text.decoded(config)
+            self._own = None if config is None else config_text.cleaned(config).decode()
             settings = config_text.values(self._own or "")
         except InputError as error:
             self._by_hand = str(error)

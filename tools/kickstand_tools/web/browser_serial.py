@@ -14,10 +14,7 @@ _GONE = "nothing comes any more"
 
 
 class Port:
-    """The part of pyserial's Serial that mpremote uses.
-
-    line: the SerialLine of cable.mjs.
-    """
+    """The part of pyserial's Serial that mpremote uses. line: the SerialLine of cable.mjs."""
 
     dtr = rts = True
 
@@ -59,11 +56,7 @@ class Port:
 
 
 class BrowserBoard(ConnectedBoard):
-    """The board at an open serial port.
-
-    line: the SerialLine of the port.
-    name: name of the port, for messages.
-    """
+    """The board at an open serial port. line: its SerialLine. name: name of the port, for messages."""
 
     def __init__(self, line, name):
         self.serial, self.device_name = Port(line), name

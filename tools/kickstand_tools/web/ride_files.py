@@ -38,12 +38,10 @@ class RideFiles:
 
 
 def sorted_out(names: list[str]) -> RideFiles:
-    """Identify files in the working directory.
+    """Identify files in the working directory. names: in the order in which the user chose them.
 
     A calibration belongs to a ride if its name matches the ride's name. Other rides get the last calibration that
     belongs to no ride. Every ride gets the last track.
-
-    names: names of the files, in the order in which the user chose them.
     """
     inputs, loose = RideFiles(), []
     track = ""
@@ -93,10 +91,9 @@ def _in_folder(name: str, files: list[RecordingFile]) -> str:
 
 
 def _recordings_among(files: list[RecordingFile]) -> Iterator[tuple[str, list[RecordingFile]]]:
-    """Find the recordings among single files.
+    """Yield the name and the files of each recording among single files.
 
-    Yields the name and the files of each recording. The files of a recording with several files are written to a new
-    folder, and its name is the folder's name.
+    Several files of one recording are written to a new folder, whose name is the recording's.
     """
     matches = recordings(files)
     used = {id(file) for _, group in matches for file in group}

@@ -31,9 +31,8 @@ def _ride() -> SimulatedRide:
 
 @functools.cache
 def sample_ride() -> dict[str, bytes]:
-    """Return {name: content} of the log and its calibration.
-
-    The log contains values of a GPS receiver. The calibration comes from six positions and then from two poses.
+    """Return {name: content} of the log, with a GPS receiver's values, and of its calibration by six positions and two
+    poses.
     """
     ride = _ride()
     with tempfile.TemporaryDirectory() as directory:
@@ -52,9 +51,9 @@ def sample_ride() -> dict[str, bytes]:
 
 
 def preview() -> str:
-    """Draw the lean during the sample ride, and a map of its road coloured by lean.
+    """Draw the lean during the sample ride, and a map of its road coloured by lean, as an SVG element.
 
-    Returns an SVG element. The style sheet sets the colours of its classes left, right and road.
+    The style sheet sets the colours of its classes left, right and road.
     """
     ride = _ride()
     step = round(_EACH_S * ride.rate_hz)

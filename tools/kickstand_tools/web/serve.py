@@ -38,8 +38,7 @@ TYPES = {
 class Server(ThreadingHTTPServer):
     """Serves the site, and ignores a browser that disconnects.
 
-    With more than MOST connections the server ends an old connection: the oldest that has sent no request. If all have
-    sent a request, the server ends the oldest of all.
+    With more than MOST connections it ends the oldest that has sent no request, or else the oldest of all.
     """
 
     request_queue_size = 128
@@ -85,11 +84,7 @@ class Server(ThreadingHTTPServer):
 
 
 def server(files: dict[str, bytes], port: int = PORT) -> Server:
-    """Return a server for the files of the site. Its port is server_address[1].
-
-    files: {path: content}.
-    port: the wanted port. If this port is in use, the server uses a free port.
-    """
+    """Return a server for {path: content}. Its port is server_address[1], a free one if `port` is in use."""
 
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"

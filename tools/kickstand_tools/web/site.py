@@ -32,9 +32,8 @@ def python_files() -> dict[str, str]:
 
 
 def site_files() -> dict[str, bytes]:
-    """Build the whole site as {path in the site: content}.
-
-    Raises InputError if a required package cannot be downloaded.
+    """Build the whole site as {path in the site: content}. Raises InputError if a required package cannot be
+    downloaded.
 
     >>> sorted(site_files())[:2]  # doctest: +SKIP
     ['bike.mjs', 'board.mjs']
@@ -93,10 +92,7 @@ def _filled(name: str, **values: Any) -> bytes:
 
 
 def write_site(files: dict[str, bytes], out: Path) -> None:
-    """Write the site's files to a directory.
-
-    files: {path in the site: content}, as from site_files().
-    Raises InputError if the directory cannot be written.
+    """Write the files of site_files() to a directory. Raises InputError if it cannot be written.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as made:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import click
-from kickstand_sim.simulation.physics.mount import MOUNTS
+from kickstand_sim.simulation.physics.chip import MOUNTS
 from kickstand_sim.simulation.physics.road import CLASSES
 from kickstand_sim.simulation.profiles import MAIN, check_profile
 from kickstand_tools.cli.common import JSON, PATH, warn

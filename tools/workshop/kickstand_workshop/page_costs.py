@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from kickstand_tools.web import site
 
-from .browser import CHROMIUM, opened
+from .pictures.page import CHROMIUM, opened
 
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
 READY = {  # selectors of the element that is usable when the page is ready, by page

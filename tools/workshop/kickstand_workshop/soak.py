@@ -58,17 +58,16 @@ WORST = {
 class Watch:
     """Checks the invariants during a trip.
 
-    readings: Function that returns the number of readings that the firmware has used so far.
     violations: One line per broken invariant.
     worst: Largest value of each figure of WORST.
     changes: Number of changes of the display.
     """
 
-    def __init__(self, board: Board, trip: Trip, readings: Callable[[], int]) -> None:
+    def __init__(self, board: Board, trip: Trip) -> None:
         self.violations: list[str] = []
         self.worst = dict.fromkeys(WORST, 0.0)
         self.changes = 0
-        self._board, self._trip, self._readings = board, trip, readings
+        self._board, self._trip = board, trip
         self._t_s, self._text = 0.0, ["", ""]
         self._errors: list[float] = []
         self._counts = (0, 0)  # transfers to the sensor and readings at the last look
@@ -98,7 +97,8 @@ class Watch:
         if text[0].startswith(("Error", "Incomplete", "config.py")):
             self._report("the program has failed")
         faulty = any(begin <= self._t_s < end for _, begin, end in self._trip.faults)
-        counts = self._board.sensor_bus.transfers.get(SENSOR, 0), self._readings()
+        sensor = self._board.sensor
+        counts = self._board.sensor_bus.transfers.get(SENSOR, 0), sensor.fifo.bytes_read + sensor.tally()[1]
         is_idle, is_stale = (count == previous for count, previous in zip(counts, self._counts))
         self._counts = counts
         if self._lasts("idle", is_idle and not faulty) > STILL_S:
@@ -247,14 +247,13 @@ def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: 
 
 def _run(bike: SoakBike, trip: Trip, figures: Tallies) -> None:
     board = bike.board(trip)
-    readings = 0
     for at_s, for_s in trip.presses:
         board.press(at_s, for_s)
     for method, arguments in trip.calls:
         getattr(board.faults, method)(*arguments)
     if trip.cut_save is not None:
         board.faults.cut_file(".cal", trip.cut_save)
-    watch = Watch(board, trip, lambda: readings)
+    watch = Watch(board, trip)
     blocks: list[int] = []
     board.every(60.0, lambda: blocks.append(_blocks()))
     console = io.StringIO()
@@ -262,18 +261,7 @@ def _run(bike: SoakBike, trip: Trip, figures: Tallies) -> None:
     gc.freeze()  # the app often collects garbage. Scanning all earlier objects would take too long
     try:
         with board, redirect_stdout(console):
-            from kickstand.imu import mpu6050
-
-            def counted(frames: Any, n: int, sums: Any, repeats: Any) -> int:
-                nonlocal readings
-                readings += n
-                return add_up(frames, n, sums, repeats)
-
-            add_up, mpu6050.add_up = mpu6050.add_up, counted
-            try:
-                end = board.run_firmware(trip.until_s, **bike.config)
-            finally:
-                mpu6050.add_up = add_up
+            end = board.run_firmware(trip.until_s, **bike.config)
             figures.saves_cut += board.faults.files_cut
         if end != "off":
             watch.violations.append(f"the board ended with {end!r} at {board.clock.now_us / 1e6:.1f} s")

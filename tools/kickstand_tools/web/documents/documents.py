@@ -77,8 +77,8 @@ def page_of(path: str) -> str:
 def document_files(home: str) -> dict[str, bytes]:
     """Build the pages of all documents, one page with all of them together, and their pictures.
 
-    home: the project's address, or "" if it is unknown. Without an address, links to the project's other files and to
-        its issues are left out.
+    home: the project's address, or "" if it is unknown. Then links to the project's other files and issues are left
+        out.
     Returns {path in the site: content}.
     """
     root = firmware_path.documents()
@@ -97,10 +97,7 @@ def document_files(home: str) -> dict[str, bytes]:
 
 
 def _on_one_page(root: Path, home: str) -> Document:
-    """Join all documents to one, so the browser can search them together.
-
-    Each anchor begins with its document's name.
-    """
+    """Join all documents to one, so the browser can search them. Each anchor begins with its document's name."""
     converted = [(_name_of(path), _converted(root, path, home, together=True)) for path in PATHS]
     headings = [Heading(2, name, document.title) for name, document in converted]
     html = "\n".join(f'<section id="{name}">\n{document.html}</section>' for name, document in converted)

@@ -43,12 +43,11 @@ def anchor(text: str) -> str:
 
 
 def converted(text: str, link: Link, picture: Callable[[str], str], deeper: int = 1, name: str = "") -> Document:
-    """Convert a document.
+    """Convert a document in Markdown.
 
-    text: the document in Markdown.
-    link: function link(target) that returns the address of a link, or None to keep only the link's words.
-    picture: function picture(source) that returns the address of a picture.
-    deeper: number that is added to the levels of headings, because the site has its own first heading.
+    link(target): returns the address of a link, or None to keep only its words. picture(source): the address of a
+    picture.
+    deeper: is added to the levels of headings, because the site has its own first heading.
     name: prefix of all anchors if several documents share a page.
     """
     markdown = MarkdownIt("commonmark", {"html": True}).enable("table")

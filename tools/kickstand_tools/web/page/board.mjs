@@ -23,7 +23,7 @@ export class Board {
     document.addEventListener("visibilitychange", () => this.#worker.postMessage({ awake: !document.hidden }));
   }
 
-  /** Send an order. name, value: the arguments of Device.act() in web/device.py. */
+  /** Send an order. name, value: the arguments of PageDevice.act() in web/device.py. */
   order(name, value) {
     this.#worker.postMessage({ order: [name, value] });
   }

@@ -25,8 +25,8 @@ const ALIGNING = {
 };
 
 /**
- * Return {kind, words}, or null for an unknown view. state: the result of Device.state() in web/device.py. The kind is
- * "lean" if the display shows the lean.
+ * Return {kind, words}, or null for an unknown view. state: the result of PageDevice.state() in web/device.py. The kind
+ * is "lean" if the display shows the lean.
  */
 export function shows(state) {
   if (state.view === "notice" && state.code === "stopped") return { kind: "stopped", words: "a fault" };

@@ -1,7 +1,7 @@
 // Runs the board (firmware and models on MicroPython) in real time, in a separate thread.
 //
 // Receives these messages:
-//     {order: [name, value]}: an order, see Device.act() in web/device.py.
+//     {order: [name, value]}: an order, see PageDevice.act() in web/device.py.
 //     {ahead: [[s, name, value], ...]}: orders that are carried out at these board times, as fast as possible.
 //     {awake: boolean}: whether the board's time advances.
 // Sends these messages:

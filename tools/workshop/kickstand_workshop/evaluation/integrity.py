@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 from kickstand.lean.meter import FALLEN_DEG
-from kickstand_sim.simulation.physics.mount import MOUNTS
+from kickstand_sim.simulation.physics.chip import MOUNTS
 from kickstand_sim.simulation.physics.road import CLASSES
 from kickstand_sim.simulation.ride import SimulatedRide, ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.replay.replay_engine import NO_SPEED, Replay
+from kickstand_tools.signals import intervals
 from numpy.typing import NDArray
 from rich import box
 from rich.table import Table
@@ -93,20 +94,13 @@ class Outcome:
     recovered: bool | None
 
 
-def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Find the runs of True in the mask. Returns, for each run, the index of its first entry and the index after its
-    last entry."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
-
-
 def judge(job: FaultJob, trace: Trace) -> Outcome:
     step = float(np.median(np.diff(trace.time)))
     off = int(np.argmax(trace.speed > 0.5)) if (trace.speed > 0.5).any() else 0
     error = np.abs(trace.lean - trace.true)
     wrong = trace.shown & (error > WRONG_DEG)
     wrong[:off] = False
-    times = [(end - first) * step for first, end in stretches(wrong) if (end - first) * step > STANDS_S]
+    times = [(end - first) * step for first, end in intervals(wrong) if (end - first) * step > STANDS_S]
     riding = trace.speed > 0.5
     faulty = trace.time >= max(trace.first_s, trace.time[off])
     recovered = None

@@ -49,8 +49,6 @@ class RecordingScores:
 
     name: str  # name of the recording's file
     scores: dict[str, RealScore]  # score of each estimator, by its name
-    # "time" in s, and the leans in degrees, positive to the right: "reference" and each estimator. Each has shape (N).
-    traces: dict[str, NDArray[np.float64]]
     # Remarks about the recording, and about readings that contradict its calibration
     notices: list[Message] = field(default_factory=list)
 
@@ -60,15 +58,12 @@ def score_recording(path: Path) -> RecordingScores:
     log = read_log(path)
     speed, calibration = _speed(log), fit_ride(log).calibration
     reference = reference_lean(log, calibration)
-    time = log.t_s
     riding = speed > _RIDING_MPS
-    leans = estimate(log, calibration)
     scores = {
         name: RealScore(rms((lean - reference)[riding]), slope(lean[riding], reference[riding], _LEANED_DEG))
-        for name, lean in leans.items()
+        for name, lean in estimate(log, calibration).items()
     }
-    notices = read_ride(log, calibration).notices
-    return RecordingScores(path.name, scores, {"time": time, "reference": reference, **leans}, notices)
+    return RecordingScores(path.name, scores, read_ride(log, calibration).notices)
 
 
 def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64]:
@@ -189,7 +184,6 @@ class Job:
     seconds: float = 640.0  # riding time
     upright_error_deg: float = 0.0  # error of the upright pose
     pitch_change_deg: float = 1.0  # change of pitch between the two poses
-    traces: bool = False  # True to keep the leans
 
 
 @dataclass
@@ -198,25 +192,21 @@ class Result:
 
     job: Job  # the ride
     scores: dict[str, LeanScore] = field(default_factory=dict)  # score of each estimator, by its name
-    # "time" in s, and the leans in degrees: "true" and each estimator. Shape (N) each. Empty unless the job keeps the
-    # leans.
-    traces: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     refusal: str | None = None  # the firmware's reason for refusing the poses, or None
 
 
-def jobs(profiles: list[str], seeds: int, traces: bool = False, **each: float) -> list[Job]:
+def jobs(profiles: list[str], seeds: int, **each: float) -> list[Job]:
     """Return one Job for each profile and seed.
 
     profiles: Names of the profiles.
     seeds: Number of seeds, from 0.
-    traces: True to keep the leans of the rides with the first seed.
     each: Other fields of all jobs.
 
     Raises InputError for an unknown profile.
     """
     for name in profiles:
         check_profile(name)
-    return [Job(name, seed, traces=traces and seed == 0, **each) for seed in range(seeds) for name in profiles]
+    return [Job(name, seed, **each) for seed in range(seeds) for name in profiles]
 
 
 @dataclass
@@ -235,34 +225,33 @@ def evaluate(jobs: list[Job], recording: Path | None = None, done: Callable[[], 
     profiles = list(dict.fromkeys(job.profile for job in jobs))
     recorded = score_recording(recording) if recording else None
     results = []
-    for result in run_all(jobs):
+    for result in on_all_processors(run, jobs, ordered=False):
         results.append(result)
         done()
     return Evaluation(sorted(results, key=lambda r: (profiles.index(r.job.profile), r.job.seed)), recorded)
 
 
-def run(job: Job) -> Result:
-    """Simulate a ride, calibrate it, run every estimator over it, and score their leans.
+def ridden(job: Job) -> tuple[SimulatedRide, dict[str, NDArray[np.float64]]]:
+    """Simulate a ride, calibrate it, and run every estimator over it.
 
-    The calibration uses one log of the six positions, and the two poses.
+    The calibration uses one log of the six positions, and the two poses. Returns the ride and the lean of each
+    estimator, by name, in degrees. Raises InputError if the poses are refused.
     """
     upright_sign, pitch_sign = (1, -1)[job.seed % 2], (1, -1)[job.seed // 2 % 2]
     simulated = ride(
         job.profile, job.seed, job.seconds, upright_sign * job.upright_error_deg, pitch_sign * job.pitch_change_deg
     )
+    calibration = calibrated_by_log(simulated)
+    return simulated, estimators.estimate(as_log(simulated), calibration) | estimators.leans(simulated)
+
+
+def run(job: Job) -> Result:
+    """Score the leans of a ride."""
     try:
-        calibration = calibrated_by_log(simulated)
+        simulated, leans = ridden(job)
     except InputError as error:
         return Result(job, refusal=str(error))
-    leans = estimators.estimate(as_log(simulated), calibration) | estimators.leans(simulated)
-    scores = {name: score(lean, simulated.truth, simulated.rate_hz) for name, lean in leans.items()}
-    traces = {"time": simulated.time, "true": simulated.truth["lean_deg"], **leans} if job.traces else {}
-    return Result(job, scores, traces)
-
-
-def run_all(jobs: list[Job]) -> Iterator[Result]:
-    """Yield the result of run() for each job, as soon as it is ready."""
-    yield from on_all_processors(run, jobs, ordered=False)
+    return Result(job, {name: score(lean, simulated.truth, simulated.rate_hz) for name, lean in leans.items()})
 
 
 def on_all_processors(function: Callable, jobs: list, chunk: int = 1, ordered: bool = True) -> Iterator:

@@ -12,7 +12,7 @@ from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
 
 from .other_bike import other_ride
-from .runs import as_log, calibrated_by_poses
+from .runs import as_log, calibrated_by_poses, rms
 
 
 @dataclass
@@ -59,10 +59,6 @@ def other(kind, seed, **more):
     """Return a ride of other_bike.py. more: arguments of other_ride()."""
     log, calibration, lean_deg, speed_mps = other_ride(kind, seed, **more)
     return Known(log, calibration, lean_deg, np.cumsum(speed_mps > 0.5) > 0)
-
-
-def rms(values):
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 ROWS = ("street", "track", "sweeper", "city", "hills", "held", "corners", "wheelie", "banked", "crosswind", "creep")

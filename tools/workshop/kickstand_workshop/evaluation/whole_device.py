@@ -13,6 +13,7 @@ from kickstand.calibration.store import Store
 from kickstand_sim.simulated_board.lcd import shown_lean
 from kickstand_sim.simulated_board.simulator import Board
 from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.signals import intervals
 from numpy.typing import NDArray
 
 from .faults import ACCEL_RANGE_G
@@ -48,8 +49,7 @@ def display_of(
     board = Board(lambda t_s: rows[min(last, max(0, int(t_s * rate_hz)))])
     if speed:
         board.fit_gps(speed)
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], lost.astype(int), [0]))))
-    for first, end in zip(edges[::2], edges[1::2], strict=True):
+    for first, end in intervals(lost):
         board.faults.nack_for(board.sensor.address, first / rate_hz, (end - first) / rate_hz)
     times: list[float] = []
     leans: list[float] = []

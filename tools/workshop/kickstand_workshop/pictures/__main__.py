@@ -7,17 +7,16 @@ The other drawings in this folder, such as the wiring, are their own sources.
 
 from kickstand_tools.common import firmware_path
 
-from ..browser import CHROMIUM
-from . import displays, page, rides, terminal
+from . import displays, page, rides
 
 
 def main() -> None:
     directory = firmware_path.TOOLS / "pictures"
-    for name, svg in (displays.draw() | {"demo.svg": terminal.draw()}).items():
+    for name, svg in (displays.draw() | {"demo.svg": displays.draw_demo()}).items():
         (directory / name).write_text(svg, encoding="utf-8")
     (directory / "ride.png").write_bytes(rides.ride_plot())
     (directory / "lean_compared.png").write_bytes(rides.lean_compared())
-    if CHROMIUM:
+    if page.CHROMIUM:
         (directory / page.NAME).write_bytes(page.draw())
     else:
         print(f"no Chromium: {page.NAME} stays as it is")

@@ -2,17 +2,23 @@
 
 The device runs in a separate process, because the firmware uses the simulated board's clock and files. The process
 prints JSON: {name: [codes of both lines, character memory]} for a character display, {name: pixels} for an OLED.
+draw_demo() draws the demo's screen in the terminal.
 """
 
+import io
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
 from itertools import groupby
 from typing import Any
 
+from kickstand_sim.demo import screen
+from kickstand_sim.demo.demo import DeviceProcess
 from kickstand_sim.demo.device import KICKSTAND_PRESS_S, LONG_PRESS_S, PART_SEED, PART_SHARE, SCRIPT, UPRIGHT_PRESS_S
+from kickstand_sim.demo.score import State
 from kickstand_sim.simulated_board.oled import HEIGHT, WIDTH, Oled
 from kickstand_sim.simulated_board.simulator import Board
 from kickstand_sim.simulation.scripted.script import Ride
@@ -20,6 +26,9 @@ from kickstand_sim.simulation.scripted.sensor_errors import Sensor
 from kickstand_tools.common import firmware_path
 from kickstand_tools.common.svg import drawing, element
 from kickstand_tools.web import site
+from rich._export_format import CONSOLE_SVG_FORMAT
+from rich.console import Console
+from rich.terminal_theme import TerminalTheme
 
 # The demo's bike turns to the right from 32 to 39 s, brakes from 50 to 56 s, and then stands. The presses capture the
 # pose on the kickstand and the upright pose, then show the page of maxima and the page of braking
@@ -154,11 +163,40 @@ def _run(display: str) -> dict[str, Any]:
 
     for name, at_s in (MOMENTS_S if display == "lcd" else OLED_MOMENTS_S).items():
         board.at(at_s, lambda name=name: look(name))
-    board.install()
-    from kickstand.start import main  # imported after install(), which replaces `machine` and `time`
-
-    board.run(main, ride.seconds)
+    with board:
+        board.run_firmware(ride.seconds)
     return pages
+
+
+MOMENT_S = 36.0  # a time in the right turn of the demo's script
+_KEYS = "b button  B long press  p pause  q quit"
+
+_FONT = "DejaVu Sans Mono, Menlo, Consolas, monospace"
+_COLOURS = [(24, 26, 31), (224, 82, 78), (90, 180, 110), (242, 201, 76), (31, 79, 200), (200, 120, 220), (90, 200, 230)]
+_THEME = TerminalTheme((24, 26, 31), (220, 223, 228), [*_COLOURS, (220, 223, 228)], [*_COLOURS, (255, 255, 255)])
+# Rich's SVG format without its comment, and without the fonts that a browser would load from another server
+_TERMINAL = re.sub(r"@font-face \{\{.*?\}\}\s*|<!--.*?-->\s*", "", CONSOLE_SVG_FORMAT, flags=re.DOTALL)
+
+
+def draw_demo() -> str:
+    """Run the demo's device, and return its screen in the middle of a turn as SVG."""
+    console = Console(
+        width=screen.WIDTH, file=io.StringIO(), force_terminal=True, color_system="truecolor", record=True
+    )
+    console.print(screen.screen(_state(), "Kickstand on a simulated board", _KEYS, paused=False))
+    drawn = _TERMINAL.replace("Fira Code, monospace", _FONT)
+    return console.export_svg(
+        title="python3 tools/dev.py demo", theme=_THEME, code_format=drawn, font_aspect_ratio=0.602
+    )
+
+
+def _state() -> State:
+    with DeviceProcess("cpython", "script", 0.0) as device:
+        while not device.ended:
+            for state in device.ticks(1.0):
+                if state["t_s"] >= MOMENT_S:
+                    return state
+    raise RuntimeError("the demo ended early: " + "\n".join(device.console))
 
 
 if __name__ == "__main__":

@@ -1,15 +1,18 @@
 """Records the page of `kickstand web` in Chromium as an animation: two presses, then a bend to each side."""
 
+import contextlib
 import hashlib
 import io
+import shutil
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Any
 
-from kickstand_tools.web import site
+from kickstand_tools.web import serve, site
 
-from .. import browser
+CHROMIUM = shutil.which("chromium")
 
 NAME = "first_minute.webp"
 _SIZE = (1000, 560)
@@ -29,6 +32,21 @@ _SAYS = "text => document.querySelector('#display').ariaLabel.includes(text)"
 _ASKS = "text => document.querySelector('#todo').textContent.includes(text)"
 
 
+@contextlib.contextmanager
+def opened(files: dict[str, bytes]) -> Iterator[tuple[Any, str]]:
+    """A context that serves these files. The context yields playwright's browser and the server's address."""
+    from playwright.sync_api import sync_playwright
+
+    with serve.server(files, 0) as server, sync_playwright() as playwright:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        try:
+            yield browser, f"http://{serve.HOST}:{server.server_address[1]}/"
+        finally:
+            browser.close()
+            server.shutdown()
+
+
 def looks() -> str:
     """Return a hash of the files that determine the page's look.
 
@@ -39,7 +57,7 @@ def looks() -> str:
 
 def draw() -> bytes:
     """Return the first minute on the page as an animated WebP file."""
-    with browser.opened(site.site_files()) as (chromium, address):
+    with opened(site.site_files()) as (chromium, address):
         page = chromium.new_page(viewport={"width": _SIZE[0], "height": _SIZE[1]}, color_scheme="light")
         page.set_default_timeout(_WAIT_MS)
         page.goto(address)
