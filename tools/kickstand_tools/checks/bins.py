@@ -61,9 +61,7 @@ class LogBins:
 
 def log_bins(log: Log) -> LogBins | None:
     """Average a log to LogBins. Returns None without samples, or if gaps make the log too long for a ride."""
-    bins = binned(
-        log.t_s, BIN_S, [*log.accel_g.T, *log.gyro_dps.T], [log.speed_mps], MOST_BINS, longest=10 * MOST_BINS
-    )
+    bins = binned(log.t_s, BIN_S, [*log.accel_g.T, *log.gyro_dps.T], [log.speed_mps], MOST_BINS, longest=10 * MOST_BINS)
     if bins is None:
         return None
     has_samples = bins.count > 0
