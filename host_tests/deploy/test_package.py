@@ -44,14 +44,29 @@ def test_one_version_everywhere():
     assert f'__version__ = "{VERSION}"' in text and versions == [[VERSION]] * 3
 
 
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("dist")
+def built(project, folder):
     build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
-    process = subprocess.run(build, cwd=ROOT, capture_output=True, text=True)
+    process = subprocess.run(build, cwd=project, capture_output=True, text=True)
     assert process.returncode == 0, process.stdout + process.stderr
     (path,) = folder.glob("*.whl")
     return path
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    return built(ROOT, tmp_path_factory.mktemp("dist"))
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [("fleet", ["fleet = kickstand_fleet.", "show/page.html"]), ("emulator", ["bench = ", "emulate = ", "rp2040 = "])],
+)
+def test_a_package_beside_the_core_has_its_entry_points_and_files(tmp_path, name, parts):
+    with zipfile.ZipFile(built(ROOT / "tools" / name, tmp_path)) as archive:
+        names = archive.namelist()
+        commands = archive.read(f"kickstand_{name}-{VERSION}.dist-info/entry_points.txt").decode()
+    assert {path.split("/")[0] for path in names} == {f"kickstand_{name}", f"kickstand_{name}-{VERSION}.dist-info"}
+    assert all(part in commands + " ".join(names) for part in parts)
 
 
 def test_wheel_carries_firmware_pages_and_documents(wheel):

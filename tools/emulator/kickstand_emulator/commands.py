@@ -1,13 +1,9 @@
 """The commands `kickstand emulate` and `bench`, which the entry points in pyproject.toml add."""
 
-import json
-
 import click
-from kickstand_tools.cli.common import DISPLAY, JSON
+from kickstand_tools.cli.common import DISPLAY, JSON, show
 from kickstand_tools.common.progress import spinner
-from rich.console import Console
 
-_WIDTH = 110  # width in columns of a table that is not printed to a terminal
 CHIP = click.option(
     "--chip",
     type=click.Choice(["rp2040", "esp32"]),
@@ -42,11 +38,7 @@ def bench_command(seconds: int, chip: str, as_json: bool) -> None:
     from .bench import bench, tables
 
     result = bench(seconds, chip)
-    if as_json:
-        click.echo(json.dumps(result))
-    else:
-        console = Console()
-        (console if console.is_terminal else Console(width=_WIDTH)).print(tables(result))
+    show(result if as_json else None, tables(result))
 
 
 def ready_emulator(chip: str) -> None:

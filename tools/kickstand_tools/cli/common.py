@@ -1,5 +1,6 @@
 """Parts that several commands share: arguments, options, times, and the output of notices on standard error."""
 
+import json
 from collections.abc import Callable, Iterable
 from inspect import cleandoc
 from pathlib import Path
@@ -11,9 +12,12 @@ from ..common.errors import printable
 from ..common.messages import Message
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from ..estimation.alignment import RideFit
 
 Command = Callable[..., Any]
+_WIDTH = 110  # width in columns of a table that is not printed to a terminal
 
 
 class Time(click.ParamType):
@@ -138,3 +142,14 @@ def warning(text: str) -> None:
 def print_lines(lines: Iterable[str]) -> None:
     for line in lines:
         echo(line)
+
+
+def show(data: dict[str, Any] | None, *tables: "Table") -> None:
+    """Print data as JSON, or else tables. Without a terminal the console is wide enough for a table."""
+    if data is not None:
+        echo(json.dumps(data))
+        return
+    from rich.console import Console  # imported here, because it is slow to import
+
+    console = Console()
+    (console if console.is_terminal else Console(width=_WIDTH)).print(*tables)

@@ -25,21 +25,11 @@ _KEPT = "-before-kickstand"
 _MANY = 3
 _ON_THE_BOARD = "config.py on the board"
 # The first 16 digits of the SHA-256 of every released main.py of Kickstand, with \n as line end
-_OWN_MAIN = {
-    "390e716171ec58a6",
-    "863631249d4a19b6",
-    "3ad59275b8eff314",
-    "caa779ca994cf25e",
-    "aafb0009cd771b00",
-    "1f8719131f69c51c",
-    "a53721c842ec6f79",
-    "4b6a95a0692ff2e4",
-    "7bf67c29fdfcfe88",
-    "441f1b005e130691",
-    "06436eea00d76f87",
-    "8744d5fdcd8f23fe",
-    "901754b7b5d06b9c",
-}
+_OWN_MAIN = set(
+    "390e716171ec58a6 863631249d4a19b6 3ad59275b8eff314 caa779ca994cf25e aafb0009cd771b00 1f8719131f69c51c "
+    "a53721c842ec6f79 4b6a95a0692ff2e4 7bf67c29fdfcfe88 441f1b005e130691 06436eea00d76f87 8744d5fdcd8f23fe "
+    "901754b7b5d06b9c".split()
+)
 
 
 _CORRECT_OR_REPLACE = Remedy(

@@ -1,6 +1,5 @@
 """The commands that the workshop adds to `kickstand`: evaluate and bands."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -8,17 +7,15 @@ import click
 from kickstand_sim.simulation.physics.chip import MOUNTS
 from kickstand_sim.simulation.physics.road import CLASSES
 from kickstand_sim.simulation.profiles import MAIN, check_profile
-from kickstand_tools.cli.common import JSON, PATH, warn
+from kickstand_tools.cli.common import JSON, PATH, show, warn
 from kickstand_tools.cli.simulated import LINES_S, PROFILE_NAMES, pose_options, seconds_option
 from kickstand_tools.common.errors import extra
 from kickstand_tools.common.progress import Bar
-from rich.console import Console
 
 from .evaluation import bands, integrity, report, runs
 from .evaluation.estimators import missing
 
 FAULTS_SECONDS = 120.0  # default riding time with each fault
-_WIDTH = 110  # width in columns of a table that is not printed to a terminal
 
 
 @click.command()
@@ -46,7 +43,7 @@ def evaluate_command(
         jobs = integrity.jobs(of_the_rides["seeds"], first_seed, seconds, whole_device)
         with Bar("riding with faults", len(jobs), patience_s=0.0, lines_s=LINES_S) as bar:
             outcomes = integrity.evaluate(jobs, lambda: bar.advance(1))
-        _print(integrity.document(outcomes) if as_json else integrity.fault_table(outcomes))
+        show(integrity.document(outcomes) if as_json else None, integrity.fault_table(outcomes))
         return
     if _is_on_command_line("first_seed") or whole_device:
         raise click.UsageError("--first-seed and --whole-device belong to --faults.")
@@ -61,25 +58,14 @@ def evaluate_command(
             click.echo(f"{result.job.profile}, seed {result.job.seed}, not calibrated: {result.refusal}", err=True)
     recorded = evaluation.recorded
     warn(str(recording), recorded.notices if recorded else ())
-    if as_json:
-        _print(report.document(evaluation))
-    else:
-        _print(
-            report.table(evaluation.results), *([report.real_table(recorded.scores, recorded.name)] if recorded else [])
-        )
+    tables = [report.table(evaluation.results)]
+    if recorded:
+        tables.append(report.real_table(recorded.scores, recorded.name))
+    show(report.document(evaluation) if as_json else None, *tables)
 
 
 def _is_on_command_line(option: str) -> bool:
     return click.get_current_context().get_parameter_source(option) is click.core.ParameterSource.COMMANDLINE
-
-
-def _print(*results: Any) -> None:
-    """Print data as JSON, and tables as tables. Without a terminal the console is wide enough for a table."""
-    console = Console()
-    if isinstance(results[0], dict):
-        click.echo(json.dumps(results[0]))
-    else:
-        (console if console.is_terminal else Console(width=_WIDTH)).print(*results)
 
 
 @click.command()
@@ -107,4 +93,4 @@ def bands_command(
             rides[name] = bands.of_simulated(profile, seed, seconds, road, mount)
             bar.advance(1)
     data = {name: {key: rms.tolist() for key, rms in figures.items()} for name, figures in rides.items()}
-    _print({"bands_hz": bands.BANDS_HZ, "rides": data} if as_json else bands.table(rides))
+    show({"bands_hz": bands.BANDS_HZ, "rides": data} if as_json else None, bands.table(rides))
