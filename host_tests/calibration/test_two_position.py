@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from kickstand.calibration.parameters import Calibration
-from kickstand.calibration.two_position import align
+from kickstand.calibration.poses import align
 from kickstand.errors import Refusal
 from kickstand_sim.simulation.ride import random_rotation
 from motions import leaned

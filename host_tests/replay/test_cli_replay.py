@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from kickstand.calibration.two_position import two_position
+from kickstand.calibration.poses import two_position
 from kickstand_emulator import image
 from kickstand_tools.common import unix_port
 from kickstand_tools.replay import replay, replay_engine

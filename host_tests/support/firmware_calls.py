@@ -9,7 +9,7 @@ import sys
 from array import array
 
 from kickstand import rotation
-from kickstand.calibration import six_position, two_position
+from kickstand.calibration import poses, six_position
 from kickstand.calibration.parameters import Calibration, Transform
 from kickstand.calibration.poses import StillPose
 from kickstand.errors import Refusal
@@ -35,7 +35,7 @@ def _vector(function, *arguments):
 
 def align_two_position(kickstand, upright, side):
     m = rotation.matrix()
-    tilt = two_position.two_position(m, kickstand, upright, side)
+    tilt = poses.two_position(m, kickstand, upright, side)
     return tilt, list(m)
 
 

@@ -11,7 +11,7 @@ from time import ticks_add, ticks_diff, ticks_ms
 
 from ..board.button import LONG
 from ..board.display import DEGREE
-from ..calibration.poses import StillPose, Turn
+from ..calibration.poses import WARN_TILT_DEG, StillPose, Turn, align, check_turn
 from ..errors import CaptureError, Refusal, SickSensor, report
 from ..units import const
 from .messages import lines
@@ -217,8 +217,6 @@ class AlignWizard(Wizard):
         super().__init__(chip, rate_hz, calibration)
 
     def _flow(self):
-        from ..calibration.two_position import WARN_TILT_DEG, align, check_turn
-
         self.upright = False
         if not self._pressed:
             yield from self._ask(("On the stand,", "press button"))

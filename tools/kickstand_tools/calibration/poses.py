@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from kickstand.calibration import six_position, two_position
-from kickstand.calibration.poses import StillPose
+from kickstand.calibration import six_position
+from kickstand.calibration.poses import StillPose, align
 from kickstand.calibration.six_position import SIDES
 from kickstand.errors import CaptureError, Refusal
 from kickstand.units import AXES
@@ -256,7 +256,7 @@ def fit_two_positions(
     earlier = calibration or CalibrationFile()
     first, second = read_pose(kickstand), read_pose(upright)
     try:
-        aligned, tilt_deg = two_position.align(earlier.to_firmware(), first.still, second.still, side)
+        aligned, tilt_deg = align(earlier.to_firmware(), first.still, second.still, side)
     except Refusal as error:
         raise RefusedInput(of_firmware(error), f"{first.name} and {second.name}") from error
     result = replace(

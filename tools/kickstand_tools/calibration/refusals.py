@@ -1,7 +1,7 @@
 """The messages for the firmware's refusals of poses and drives. of_firmware() converts a refusal to its message.
 
-In kickstand.calibration, poses refuses a single pose, six_position refuses six poses, and
-two_position refuses two poses. kickstand.drive_alignment refuses drives.
+In kickstand.calibration, poses refuses a single pose and two poses, and six_position refuses six poses.
+kickstand.drive_alignment refuses drives.
 """
 
 from kickstand.errors import Refusal

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import click
+from kickstand.calibration.poses import WARN_TILT_DEG
 from kickstand.calibration.six_position import SIDES
-from kickstand.calibration.two_position import WARN_TILT_DEG
 from kickstand.drive_alignment import alignment
 from kickstand.units import AXES
 
