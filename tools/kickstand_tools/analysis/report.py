@@ -11,7 +11,7 @@ from ..common.times import clock
 from ..estimation.smooth import PoseOff
 from .alignment_quality import LeanCost, Quality, lean_cost
 from .overview import Overview
-from .stops.brake_test import Stop, stops_by_speed
+from .stops import Stop, stops_by_speed
 from .summary import Peak
 
 if TYPE_CHECKING:

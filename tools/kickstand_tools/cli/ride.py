@@ -10,7 +10,7 @@ import click
 from rich.console import Console
 from rich.table import Table
 
-from ..analysis.export.export import export_with_notices
+from ..analysis.export import export_with_notices
 from ..analysis.overview import Overview, overview
 from ..analysis.plot import plot
 from ..analysis.report import as_data, page

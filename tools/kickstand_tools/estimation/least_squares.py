@@ -19,7 +19,7 @@ from .unknowns import BIAS, CAMBER, FORWARD, LEAN, LEFT, PARAMETERS, PITCH, ROTA
 from .windows import Windows
 
 BLOCK = 50  # number of windows per block; see solver.py
-PART = 6  # number of blocks whose derivatives are computed at once
+PART = 12  # number of blocks whose derivatives are computed at once
 ROUNDS, PLAIN_ROUNDS = 20, 2  # largest number of steps; the first PLAIN_ROUNDS steps do not down-weight outliers
 # The largest change of an angle in a step, in rad. If it is under NEAR, the hypotheses are weighted. If it is under
 # CONVERGED, the steps end.
