@@ -13,6 +13,7 @@ from time import ticks_add, ticks_diff
 from ..board.button import LONG, SHORT
 from ..board.display import DEGREE
 from ..errors import Notice, attempt
+from ..lean.bike_model import static_lean_deg
 from ..rotation import vector
 from ..units import const
 
@@ -151,8 +152,6 @@ def not_aligned(meter, seconds, todo):
         seconds: any time in seconds. Every two seconds the second line changes between "Not aligned" and `todo`.
         todo: the next step for the rider.
     """
-    from ..lean.formula import static_lean_deg  # imported here, because an aligned bike does not need it
-
     tilt = static_lean_deg(meter.smooth_force)
     hint = "Not aligned" if seconds % 4 < 2 else todo
     return "Raw %4d%s %+.2fg" % (round(tilt), DEGREE, meter.smooth_force[2]), hint
