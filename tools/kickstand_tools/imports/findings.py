@@ -11,6 +11,7 @@ it.
 """
 
 import difflib
+import functools
 import re
 import struct
 from collections.abc import Iterator, Sequence
@@ -22,7 +23,7 @@ from kickstand.units import STANDARD_GRAVITY
 from ..common.errors import InputError
 from ..logs.csv_reader import as_text
 from ..signals import Array, moving_mean, moving_spread
-from .recording import Sheet, plain, unit_in
+from .recording import Sheet, increases, plain, unit_in
 from .unit_fits import RateFit, fit_rates
 from .units import (
     ACCELERATIONS,
@@ -286,6 +287,20 @@ class _Triple:
     kind: str
     values: Array
 
+    @functools.cached_property
+    def good(self) -> Array:
+        """The complete rows of values."""
+        return self.values[np.all(np.isfinite(self.values), axis=1)]
+
+    @functools.cached_property
+    def length(self) -> float:
+        """The median length of the vectors, NaN without one."""
+        return float(np.median(np.linalg.norm(self.good, axis=1))) if len(self.good) else np.nan
+
+    def mean_lengths(self, span_s: float, seconds: Array | None) -> Array:
+        """The length of the moving mean over span_s."""
+        return np.linalg.norm(moving_mean(self.good, _rows_in(span_s, seconds, len(self.values))), axis=1)
+
 
 def completed(sheet: Sheet) -> Sheet:
     """Complete columns that belong together: seconds and their fractions, axes that are in several rows, and the user's
@@ -419,7 +434,7 @@ def _side_by_side(sheet: Sheet) -> list[_Triple]:
     numeric = [
         place
         for place, name in enumerate(sheet.columns)
-        if _numeric(sheet, [place]) and not TIME_NAME.search(plain(name)) and not _increasing(sheet, place)
+        if _numeric(sheet, [place]) and not TIME_NAME.search(plain(name)) and not increases(sheet.numbers(place))
         if len(np.unique(sheet.numbers(place))) > 3 and not _KNOWN.search(plain(name))
     ]
     runs = [numeric[k : k + 3] for k in range(len(numeric) - 2)] if len(numeric) > 5 else []
@@ -432,12 +447,6 @@ def _side_by_side(sheet: Sheet) -> list[_Triple]:
 
 
 _KNOWN = re.compile(r"speed|velocity|lat|lon|lng|alt|height|lean|angle|heading|temp|sat|acc")
-
-
-def _increasing(sheet: Sheet, place: int) -> bool:
-    numbers = sheet.numbers(place)
-    steps = np.diff(numbers[np.isfinite(numbers)])
-    return len(steps) > 2 and bool(np.mean(steps >= 0.0) > 0.95 and np.any(steps > 0.0))
 
 
 def _split_axis(name: str) -> Iterator[tuple[str, str]]:
@@ -587,14 +596,10 @@ def _has_gravity(three: _Triple, seconds: Array | None, near: bool) -> bool:
 
     near: True if the length must also be gravity's length in some unit. If False, the length must be more constant.
     """
-    values = three.values[np.all(np.isfinite(three.values), axis=1)]
-    if len(values) < 3:
+    length, means = three.length, three.mean_lengths(CALM_S, seconds)
+    if len(means) < 3 or length <= 0.0 or float(np.percentile(means, 10.0)) < LINEAR * length:
         return False
-    means = np.linalg.norm(moving_mean(values, _rows_in(CALM_S, seconds, len(three.values))), axis=1)
-    length = float(np.median(np.linalg.norm(values, axis=1)))
-    if length <= 0.0 or float(np.percentile(means, 10.0)) < LINEAR * length:
-        return False
-    most = NEAR if _are_whole(values) else LEANT  # raw counts differ by a factor of 2
+    most = NEAR if _are_whole(three.good) else LEANT  # raw counts differ by a factor of 2
     if near and not any(1.0 / NEAR < length / gravity < most for gravity in _gravities().values()):
         return False
     return float(np.std(means)) / length < (0.25 if near else 0.02)
@@ -602,17 +607,14 @@ def _has_gravity(three: _Triple, seconds: Array | None, near: bool) -> bool:
 
 def _is_second(three: _Triple, accel: _Triple, seconds: Array | None) -> bool:
     """True for another accelerometer beside accel: its values are as long, and contain gravity."""
-    lengths = [float(np.nanmedian(np.linalg.norm(each.values, axis=1))) for each in (three, accel)]
-    return 1.0 / NEAR < lengths[0] / max(lengths[1], 1e-9) < NEAR and _has_gravity(three, seconds, near=True)
+    near = 1.0 / NEAR < three.length / max(accel.length, 1e-9) < NEAR
+    return near and _has_gravity(three, seconds, near=True)
 
 
 def _is_linear(three: _Triple, seconds: Array | None) -> bool:
     """True if the mean of the values over some seconds is short, because they do not contain gravity."""
-    values = three.values[np.all(np.isfinite(three.values), axis=1)]
-    if len(values) < 3:
-        return True
-    means = np.linalg.norm(moving_mean(values, _rows_in(10.0 * CALM_S, seconds, len(three.values))), axis=1)
-    return float(np.median(means)) < LINEAR * float(np.median(np.linalg.norm(values, axis=1)))
+    means = three.mean_lengths(10.0 * CALM_S, seconds)
+    return len(means) < 3 or float(np.median(means)) < LINEAR * three.length
 
 
 def _rows_in(span_s: float, seconds: Array | None, count: int) -> int:
