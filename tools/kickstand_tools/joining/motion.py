@@ -120,7 +120,9 @@ class Comparison:
 
 
 def _double_sums(motion: BinMotion, course: Course, shift_s: float) -> Array:
-    """Return six integrals over time, shape (n + 1, 6). Their differences give means between two times.
+    """Return six integrals over time, of angles and speeds, shape (n + 1, 6).
+
+    The mean of an angle or a speed between two times is the difference of its integral, divided by the duration.
 
     Columns 0 to 2 integrate the rotation about up and about two axes across it, in degrees. Columns 3 to 5 integrate
     the speed that the force along the sensor's axes causes, in m/s. The rate about up is the yaw rate times the cosine
@@ -135,12 +137,12 @@ def _double_sums(motion: BinMotion, course: Course, shift_s: float) -> Array:
     speed = np.interp(motion.t_s + shift_s, middle_s, np.where(course.good, course.speed_mps, 0.0))
     sine = np.minimum(np.abs(speed * np.radians(yaw_dps)) / STANDARD_GRAVITY, _MOST_SINE)
     cosine = np.asarray(np.sqrt(1.0 - sine * sine), dtype=float)
-    turned = _sums(rates / cosine[:, None])
-    sped_up = _sums(motion.force_g * STANDARD_GRAVITY)
+    angle_deg = _sums(rates / cosine[:, None])
+    speed_mps = _sums(motion.force_g * STANDARD_GRAVITY)
     # subtract gravity, whose large sums would cost digits
-    sped_up -= np.linspace(0.0, 1.0, len(sped_up))[:, None] * sped_up[-1]
-    once = np.hstack((turned, sped_up))
-    return _sums((once[1:] + once[:-1]) / 2.0)
+    speed_mps -= np.linspace(0.0, 1.0, len(speed_mps))[:, None] * speed_mps[-1]
+    at_edges = np.hstack((angle_deg, speed_mps))
+    return _sums((at_edges[1:] + at_edges[:-1]) / 2.0)
 
 
 def _sums(values: Array) -> Array:
