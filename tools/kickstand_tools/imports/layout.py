@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from ..common.errors import InputError
 from ..logs.csv_reader import cells_of, columns_of, columns_of_text, filled, numbers_of, separator_of
+from .columns import stated_unit
 from .files import RecordingFile
-from .findings import stated_unit
 from .recording import Sheet, increases, plain
 from .units import ACCELERATIONS, MOMENT, RATES, SPEEDS, TIME_NAME, TIMES, tick_ns, times_ns, unit
 
