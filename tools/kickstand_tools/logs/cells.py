@@ -9,7 +9,7 @@ import numpy as np
 from ..common.errors import InputError
 from ..common.messages import Remedy
 from ..signals import Array
-from .csv_reader import cells_of
+from .csv_reader import cells_of, number_of
 
 COLUMNS = ("t_s", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")
 # Columns from a satellite receiver. Only some rows have values, because the receiver is slower than the sensor.
@@ -135,15 +135,12 @@ class _Mistake(Exception):
 
 def _number(cell: str, name: str, limit: float) -> float:
     """The value of a cell; NaN for an empty cell in a column of OPTIONAL. Raises _Mistake."""
-    try:
-        value = float(cell)
-        if abs(value) <= limit and "_" not in cell:  # Python would read 1_0 as 10
-            return value
-    except ValueError:
-        value = None
+    value = number_of(cell)
+    if value is not None and abs(value) <= limit:
+        return value
     if name in OPTIONAL and not cell.strip():
         return math.nan
-    if value is None or "_" in cell:
+    if value is None:
         raise _Mistake(f"{name} is {_shown(cell)}, not a number")
     if not math.isfinite(value):
         raise _Mistake(f"{name} is {_shown(cell)}: a number is needed")

@@ -53,6 +53,14 @@ def cells_of(line: str, separator: str = ",") -> list[str]:
     return next(csv.reader((line,), delimiter=separator, skipinitialspace=True), [])
 
 
+def number_of(cell: str) -> float | None:
+    """Convert a cell to a number; None for text and for an empty cell. Python would read 1_0 as 10."""
+    try:
+        return None if "_" in cell else float(cell)
+    except ValueError:
+        return None
+
+
 def numbers_in(text: bytes, count: int) -> Array | None:
     """Convert n lines of `count` plain numbers, as float() does. An empty cell becomes NaN.
 
@@ -184,10 +192,4 @@ def _text(cells: Iterable[str]) -> Cells:
 
 def _number(cell: str) -> float | None:
     """Convert a cell to a number. An empty cell becomes NaN. Returns None for text."""
-    cell = cell.strip()
-    if cell.lower() in _NOTHING:
-        return np.nan
-    try:
-        return None if "_" in cell else float(cell)
-    except ValueError:
-        return None
+    return np.nan if cell.strip().lower() in _NOTHING else number_of(cell)

@@ -13,8 +13,8 @@ from typing import IO, Any, cast
 from ..common.errors import InputError, cause
 from ..common.messages import Message, Remedy, kind
 
-# Limit in bytes for one line, and for the NUL bytes that a file system may leave at the end of a file after a power cut
-LONGEST_LINE = 16_000_000
+# Most bytes without a line end. A file system may leave NUL bytes at the end of a file after a power cut
+MOST_PENDING = 16_000_000
 SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # suffixes of logs and of other apps' tables
 File = Path | str | IO[bytes] | IO[str]
 Progress = Callable[[int, int], None]  # called with (done, total) in the same unit; total is 0 if unknown
@@ -118,8 +118,8 @@ def _pieces(name: str, file: Any, packed: Any, size: int, remarks: list[Message]
     for data in _data(file, size, remarks):
         read += len(data)
         pending += data
-        if len(pending) > LONGEST_LINE + size:
-            raise InputError(f"{name}: {LONGEST_LINE / 1e6:.0f} MB without the end of a line: it is not a log")
+        if len(pending) > MOST_PENDING + size:
+            raise InputError(f"{name}: {MOST_PENDING / 1e6:.0f} MB without the end of a line: it is not a log")
         if len(pending) >= size:
             cut = pending.rfind(b"\n") + 1 or pending.rfind(b"\r") + 1
             if cut:
