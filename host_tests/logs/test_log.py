@@ -1,5 +1,6 @@
 """A log in memory: shapes and times that are refused, the order of columns, blocks, stretches, names."""
 
+import io
 from typing import Any
 
 import numpy as np
@@ -62,6 +63,17 @@ def test_a_log_comes_in_parts():
     assert np.concatenate([part.time_us for part in parts]).tolist() == [10_000 * k for k in (1, 2, 3, 4, 6, 7, 8)]
     part = log.between(0.04, 0.07)
     assert (part.start_s, part.t_s.tolist()) == (pytest.approx(7.04), pytest.approx([0.0, 0.01, 0.02, 0.03]))
+
+
+def test_parts_have_the_values_of_a_receiver_that_the_whole_log_has():
+    lines = [f"{k},0,1,0,0,0,0,{'' if k % 5 else k}" for k in range(20)]
+    log = read_log(io.StringIO("t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps,speed_mps\n" + "\n".join(lines)))
+    known = np.where(np.arange(20) % 5, np.nan, np.arange(20.0))
+    parts = [part.speed_mps for _, part in log.parts(np.ones(20, dtype=bool), most=5)]
+    for speed in (log.speed_mps, np.concatenate(parts), log.between(None, None).speed_mps):
+        assert np.array_equal(speed, known, equal_nan=True)
+    with pytest.raises(ValueError, match="read-only"):
+        log.speed_mps[0] = 1.0  # would be lost
 
 
 @pytest.mark.parametrize(
