@@ -203,7 +203,7 @@ def test_a_wrong_arrow_is_noticed():
     assert not is_allowed("imu", "lean.meter", FIRMWARE, ANY)
     assert not is_allowed("imu", "console", FIRMWARE, ANY) and is_allowed("imu", "errors", FIRMWARE, ANY)
     assert not is_allowed("logs", "kickstand_fleet.run", TOOLS) and is_allowed("logs", "signals.rotation", TOOLS)
-    assert ("ui", "lean.formula") in arrows(FIRMWARE_PACKAGES)
+    assert ("ui", "lean.bike_model") in arrows(FIRMWARE_PACKAGES)
 
 
 def test_no_module_imports_itself_by_way_of_others():

@@ -30,7 +30,6 @@ LOOP_US = 10_000  # length of a pass of the loop in us; the chip's FIFO can keep
 _PASS_BYTES = const(2200)
 _PASS_BYTES_DRIVING = const(3000)
 _PLAN_EVERY = const(8)  # number of collections between two checks of the free heap; a check takes 3 to 7 ms
-SINGLE_GAPS = 120  # number of free heap blocks that lie alone after a collection
 _PAGE_MS = const(100)
 # A lean on the display must be at most half a second old. So a page shows no lean if its own delay plus the age of the
 # readings in the FIFO is longer than _LATE_MS. A display that draws needs about _DRAWING_MS longer to send a picture
@@ -39,18 +38,6 @@ _LATE_MS = const(400)
 _DRAWING_MS = const(200)
 # Time from the start of the sensor to the first page, long enough for the lean filter's first window
 _FIRST_PAGE_MS = const(60)
-
-
-def fill_gaps(n):
-    """Allocate n single blocks of the heap and drop them.
-
-    After a collection the heap has many single free blocks. Until these blocks are in use, MicroPython scans past all
-    of them for each larger object. This function takes 0.8 ms, and saves 0.4 ms in each pass of the loop until the next
-    collection.
-    """
-    value = 0.5
-    for _ in range(n):
-        value = -value  # each new float takes one block of the heap
 
 
 # Worst values of the last run, which kickstand.status() prints. Ctrl-C sets them. The values are the length of the
@@ -156,7 +143,6 @@ class App:
         self._turns_left -= 1
         if self._turns_left <= 0:  # collect between two passes, while the FIFO keeps the samples
             gc.collect()
-            fill_gaps(SINGLE_GAPS)
             self._plan_collection()
             if self.user:
                 self.user.check_memory()

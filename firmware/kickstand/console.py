@@ -3,6 +3,8 @@
 This module is imported only when there is something to print. Most boards never print anything.
 """
 
+import time
+
 from .units import const
 
 # Shortest duration of a slow print. Most prints take a few ms. If the computer on USB sleeps, a print takes 500 ms, and
@@ -81,12 +83,10 @@ def sentence(refusal):
 
 def say(text, end="\n"):
     """Print a text. Return True if the print was slow."""
-    from time import ticks_diff, ticks_ms  # imported here, because the tools on a computer need only the words
-
     global _slow_ms
-    begun_ms = ticks_ms()
+    begun_ms = time.ticks_ms()
     print(text, end=end)
-    if ticks_diff(ticks_ms(), begun_ms) < _SLOW_MS:
+    if time.ticks_diff(time.ticks_ms(), begun_ms) < _SLOW_MS:
         return False
     _slow_ms = begun_ms
     return True
@@ -94,7 +94,5 @@ def say(text, end="\n"):
 
 def tell(refusal):
     """Print the sentence for a Refusal or a Notice, unless a print was slow in the last _QUIET_MS."""
-    from time import ticks_diff, ticks_ms
-
-    if _slow_ms is None or not 0 <= ticks_diff(ticks_ms(), _slow_ms) < _QUIET_MS:
+    if _slow_ms is None or not 0 <= time.ticks_diff(time.ticks_ms(), _slow_ms) < _QUIET_MS:
         say(sentence(refusal))

@@ -149,9 +149,8 @@ def fill(settings, config, refusal):
             value = None if allowed in (_PIN, _INPUT) else default
         setattr(settings, name, value)
     settings.leans = settings.VEHICLE == "motorcycle"
-    settings.one_bus = (
-        (settings.SENSOR_SDA, settings.SENSOR_SCL) == (settings.LCD_SDA, settings.LCD_SCL) != (None, None)
-    )
+    sensor, lcd = (settings.SENSOR_SDA, settings.SENSOR_SCL), (settings.LCD_SDA, settings.LCD_SCL)
+    settings.one_bus = sensor == lcd != (None, None)
     if settings.one_bus:  # a PCF8574 allows 100 kHz, which limits a shared bus
         settings.LCD_I2C = settings.SENSOR_I2C
         lcd_hz = settings.LCD_BUS_HZ or (OLED_HZ if settings.DISPLAY not in ("auto", "lcd") else LCD_HZ)

@@ -9,7 +9,7 @@ from kickstand_tools.analysis.alignment_quality import Quality
 from kickstand_tools.analysis.channels import Channels
 from kickstand_tools.analysis.overview import Overview
 from kickstand_tools.analysis.ride import Ride
-from kickstand_tools.analysis.stops.brake_test import Stop
+from kickstand_tools.analysis.stops import Stop
 from kickstand_tools.analysis.summary import summary
 from kickstand_tools.checks.log import CheckedLog
 

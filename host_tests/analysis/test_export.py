@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kickstand_tools.analysis import export as exporting
 from kickstand_tools.analysis.channels import Channels, joined
-from kickstand_tools.analysis.export import export_columns, export_racechrono, export_vbo
-from kickstand_tools.analysis.export.export import export
+from kickstand_tools.analysis.export import export
+from kickstand_tools.analysis.export_formats import RACECHRONO, write_racechrono, write_vbo
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
@@ -44,14 +45,14 @@ def expected(name):
 
 def test_csv_to_the_letter(tmp_path):
     empty_block = block(0.5, 1.25, speed_mps=np.nan, temp_c=np.nan, lean_formula_deg=np.nan, **NOWHERE)
-    text = written(export_columns.write_csv, tmp_path / "x.csv", block(0.25), empty_block, start_s=100.0)
+    text = written(exporting.write_csv, tmp_path / "x.csv", block(0.25), empty_block, start_s=100.0)
     assert text == expected("ride.csv")
 
 
 def test_racechrono_to_the_letter(tmp_path):
     """The axis z points forward. Speed and position are written only in rows where they are new."""
     empty_block = block(0.5, speed_mps=np.nan, **NOWHERE)
-    assert written(export_racechrono.write, tmp_path / "x", block(0.25), empty_block) == expected("ride.racechrono.csv")
+    assert written(write_racechrono, tmp_path / "x", block(0.25), empty_block) == expected("ride.racechrono.csv")
 
 
 def test_vbo_to_the_letter(tmp_path):
@@ -61,7 +62,7 @@ def test_vbo_to_the_letter(tmp_path):
     moved.lon_deg[0] += 1e-5  # a move by 0.68 m to the east
     moved.lat_deg[2] = moved.lon_deg[2] = np.nan
     evening = EVENING_S + 6400.0 - 0.25  # the ride begins in the last second before midnight
-    text = written(export_vbo.write, tmp_path / "x", block(0.0), moved, start_s=evening)
+    text = written(write_vbo, tmp_path / "x", block(0.0), moved, start_s=evening)
     assert text == expected("ride.vbo").replace("\n", "\r\n")
 
 
@@ -89,13 +90,13 @@ def test_a_left_turn_under_braking_has_the_signs_of_each_format(tmp_path):
     for form in ("racechrono", "vbo", "csv"):
         export(open_ride(braking_left(), SQUARE), form, tmp_path / form)
         last[form] = table_of(tmp_path / form, form)[-1]
-    row = dict(zip([name for name, *_ in export_racechrono.COLUMNS], last["racechrono"]))
+    row = dict(zip([name for name, *_ in RACECHRONO], last["racechrono"]))
     names = ("lateral_acc", "longitudinal_acc", "x_acc", "y_acc", "z_acc", *(f"{a}_rate_of_rotation" for a in "xyz"))
     assert [float(row[name]) for name in names] == pytest.approx([0.2, -0.4, 0.2, 1.0, -0.4, 5.0, 7.0, 9.0], abs=1e-3)
     assert row["lean_angle"] == ""  # a car has no lean to export
     # long accel is positive forward, lat accel and yaw are positive in a left turn, roll is positive to the right
     assert [float(cell) for cell in last["vbo"][7:]] == pytest.approx([-0.4, 0.2, 7.0, 9.0])
-    row = dict(zip(export_columns.COLUMNS, last["csv"]))
+    row = dict(zip(exporting.COLUMNS, last["csv"]))
     assert [float(row[f"{name}_rate_dps"]) for name in ("pitch", "yaw", "roll")] == pytest.approx([-5.0, 7.0, 9.0])
 
 
@@ -116,17 +117,17 @@ def test_parquet_has_the_same_columns_with_their_units(tmp_path):
     pytest.importorskip("pyarrow")
     from pyarrow.parquet import ParquetFile
 
-    export_columns.write_parquet(tmp_path / "x", iter([block(0.25), block(0.5, 0.75, speed_mps=np.nan)]), EVENING_S)
+    exporting.write_parquet(tmp_path / "x", iter([block(0.25), block(0.5, 0.75, speed_mps=np.nan)]), EVENING_S)
     file = ParquetFile(tmp_path / "x")
     units = "s deg deg g g g g deg/s deg/s deg/s m/s Cel g deg deg deg s".split()
     columns = {field.name: field.metadata[b"unit"].decode() for field in file.schema_arrow}
-    assert columns == dict(zip(export_columns.COLUMNS, units, strict=True)) and file.num_row_groups == 2
+    assert columns == dict(zip(exporting.COLUMNS, units, strict=True)) and file.num_row_groups == 2
     assert [str(field.type) for field in file.schema_arrow] == ["double", *["float"] * 13, *["double"] * 3]
     assert file.schema_arrow.metadata[b"axes"] == b"left, up, forward; lean > 0 to the right"
     table = file.read()
     assert table["t_s"].to_pylist() == [EVENING_S + 0.25, EVENING_S + 0.5, EVENING_S + 0.75]
     assert np.isnan(table["speed_mps"].to_pylist()[1:]).all()
-    for name in list(export_columns.COLUMNS)[1:]:
+    for name in list(exporting.COLUMNS)[1:]:
         assert table[name][0].as_py() == pytest.approx(VALUES[name], rel=1e-6), name
 
 

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.analysis.export import export_gpx
+from kickstand_tools.analysis.export_formats import GARMIN
 from kickstand_tools.logs.csv_lines import write_log
 from kickstand_tools.signals import EARTH_M
 from small_rides import ALIGNED
@@ -69,7 +69,7 @@ def test_gpx_has_all_positions_with_time_speed_and_lean(tmp_path):
     ride, lean = app_exports.riding(), api.replay(log(), ALIGNED)
     assert extensions(points, "speed") == pytest.approx(np.interp(t_s, ride.t_s, ride.speed_mps), abs=1.0)
     assert extensions(points, "lean_deg") == pytest.approx(np.interp(t_s, lean.t_s, lean.lean_deg), abs=0.06)
-    assert (gpx.nsmap["gpxtpx"], gpx.version) == (export_gpx.GARMIN, "1.1")
+    assert (gpx.nsmap["gpxtpx"], gpx.version) == (GARMIN, "1.1")
 
 
 def test_uncertain_lean_is_left_out_of_a_track(tmp_path):

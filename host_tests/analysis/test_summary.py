@@ -6,10 +6,18 @@ import numpy as np
 import pytest
 from kickstand.lean.kalman import MAX_TRIM
 from kickstand_tools.analysis.alignment_quality import LeanCost, lean_cost, quality, yaw_cost_deg
-from kickstand_tools.analysis.channels import Channels, downsampled, joined, rounded_to, spacing_s, thinned
+from kickstand_tools.analysis.channels import (
+    Channels,
+    LogTrack,
+    downsampled,
+    joined,
+    rounded_to,
+    spacing_s,
+    thinned,
+    track,
+)
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.summary import Peak, Summary, summary
-from kickstand_tools.analysis.track import LogTrack, track
 from kickstand_tools.logs import reader
 from kickstand_tools.replay import replay_engine
 from small_rides import quality_of, samples

@@ -1,6 +1,7 @@
 """Helpers for the tests of the checks: logs in the form that the checks take, and cached simulated rides."""
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 from kickstand_sim.simulation.ride import SimulatedRide, ride
@@ -20,7 +21,7 @@ def bins_of(log: Log, accel=None, gyro=None, speed=True) -> LogBins:
     force = log.accel_g if accel is None else log.accel_g @ np.transpose(accel)
     rate = log.gyro_dps if gyro is None else log.gyro_dps @ np.transpose(gyro)
     mps = log.speed_mps if speed else np.full(len(log.t_s), np.nan)
-    bins = log_bins(log.t_s, force, rate, mps, log.lat_deg, log.lon_deg)
+    bins = log_bins(replace(log, accel_g=force, gyro_dps=rate, speed_mps=mps))
     assert bins is not None
     return bins
 

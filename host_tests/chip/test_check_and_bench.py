@@ -62,7 +62,7 @@ def test_defects_of_many_parts_are_found_at_once(chip):
 
 
 def test_the_loop_and_the_start_stay_within_their_limits():
-    """No sample is lost, the heap does not shrink, and the first lean appears within 1.2 s."""
+    """No sample is lost, the heap does not shrink, and the first lean appears within a second."""
     pico()  # skips the test without the emulator
     from kickstand_emulator import bench
 
@@ -71,22 +71,22 @@ def test_the_loop_and_the_start_stay_within_their_limits():
         assert 0 < spread["median"] <= spread["p99"] <= spread["max"]
     assert result["samples_taken"] == pytest.approx(result["seconds"] * bench.SAMPLE_HZ, abs=2)
     assert result["samples_lost"] == 0
-    assert 0.1 < result["cpu_share"] < 0.50
+    assert 0.1 < result["cpu_share"] < 0.46
     assert result["free_heap_bytes"] > 138_000
     assert result["free_heap_at_end_bytes"] > result["free_heap_bytes"] - 4000
     start = bench.start("rp2040")
     assert 0 < start.micropython_s < 0.1
-    assert 0.2 < start.starting_s < start.sampling_s < start.lean_s < 1.2
+    assert 0.2 < start.starting_s < start.sampling_s < start.lean_s < 1.0
 
 
 @pytest.mark.parametrize(
     ("chosen", "free_kb"),
     [
-        ({}, 138.6),
-        ({"SPEED": "wheel"}, 105.6),
-        ({"RECORD": True}, 118.0),
-        ({"DISPLAY": "ssd1306"}, 127.2),
-        ({"LIVE": True}, 128.3),
+        ({}, 139.9),
+        ({"SPEED": "wheel"}, 106.3),
+        ({"RECORD": True}, 119.3),
+        ({"DISPLAY": "ssd1306"}, 128.8),
+        ({"LIVE": True}, 129.6),
     ],
 )
 def test_free_heap_and_names_of_each_mode(chosen, free_kb):

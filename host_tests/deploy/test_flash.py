@@ -56,11 +56,11 @@ def test_only_different_files_are_copied(board, change):
     command.works("flash")
     board.written.clear()
     assert "copied 0 files" in command.works("flash").out and board.written == []
-    path = board.path("kickstand/lean/formula.mpy")
+    path = board.path("kickstand/lean/kalman.mpy")
     path.write_bytes(change(path.read_bytes()))
     command.works("flash")
-    assert board.written == ["/kickstand/lean/formula.mpy", "/main.py"]
-    assert path.read_bytes() == wanted()["/kickstand/lean/formula.mpy"]
+    assert board.written == ["/kickstand/lean/kalman.mpy", "/main.py"]
+    assert path.read_bytes() == wanted()["/kickstand/lean/kalman.mpy"]
 
 
 @pytest.mark.parametrize(

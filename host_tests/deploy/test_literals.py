@@ -8,13 +8,14 @@ from kickstand_tools.deploy import literals
 
 MODULES = {
     "units.py": "from math import radians\nGRAVITY = 9.5\n_TURN = radians(180.0)\nHALF = _TURN / 2\nWORDS = 'x' * 11\n",
-    "part/__init__.py": "",
-    "part/limits.py": "from ..units import GRAVITY, HALF\nMOST = 2 * GRAVITY\n_ROWS = ((1, 2), (3, 4))\nSTATE = 1\n"
+    "lean/__init__.py": "",
+    "lean/lean_filter.py": "from ..units import GRAVITY, HALF\nMOST = 2 * GRAVITY\nDELAY_S = 300\n"
+    "_ROWS = ((1, 2), (3, 4))\nSTATE = 1\n"
     "def rows():\n    return _ROWS[1]\ndef change():\n    global STATE\n    STATE = 2\n",
-    "app.py": "from .part import limits\nfrom .units import GRAVITY, WORDS\nSINGLE_GAPS = 300\n"
-    "def force(mass):\n    from .part.limits import HALF\n"
-    "    return mass * GRAVITY, limits.MOST, HALF, SINGLE_GAPS, -limits.MOST\n"
-    "def others():\n    limits.change()\n    return limits.STATE, WORDS, limits.rows()\n",
+    "app.py": "from .lean import lean_filter\nfrom .units import GRAVITY, WORDS\n"
+    "def force(mass):\n    from .lean.lean_filter import HALF\n"
+    "    return mass * GRAVITY, lean_filter.MOST, HALF, lean_filter.DELAY_S, -lean_filter.MOST\n"
+    "def others():\n    lean_filter.change()\n    return lean_filter.STATE, WORDS, lean_filter.rows()\n",
 }  # fmt: skip
 
 
@@ -32,9 +33,9 @@ def test_values_replace_the_names_of_constants(package, tmp_path, monkeypatch):
     texts = {name: literals.text(package / name, package) for name in MODULES}
     for name in ("GRAVITY", "HALF", "MOST", "_ROWS", "_TURN"):
         assert not [module for module, text in texts.items() if name in text], name
-    assert "SINGLE_GAPS = 300" in texts["app.py"]  # a program outside the package reads this name
-    assert texts["part/limits.py"].count("import") == 0
-    assert "return mass * 9.5, 19.0, 1.5707963267948966, SINGLE_GAPS, -19.0" in texts["app.py"].replace(
+    assert "DELAY_S = 300" in texts["lean/lean_filter.py"]  # a program outside the package reads this name
+    assert texts["lean/lean_filter.py"].count("import") == 0
+    assert "return mass * 9.5, 19.0, 1.5707963267948966, lean_filter.DELAY_S, -19.0" in texts["app.py"].replace(
         "(", ""
     ).replace(")", "")
     inlined = tmp_path / "inlined"
@@ -47,7 +48,7 @@ def test_values_replace_the_names_of_constants(package, tmp_path, monkeypatch):
     assert app.force(2.0) == (19.0, 19.0, 1.5707963267948966, 300, -19.0)
     assert app.others() == (2, "x" * 11, (3, 4))
     assert {name for name in sys.modules if name.startswith("inlined.")} == {
-        "inlined.app", "inlined.units", "inlined.part", "inlined.part.limits"
+        "inlined.app", "inlined.units", "inlined.lean", "inlined.lean.lean_filter"
     }  # fmt: skip
 
 

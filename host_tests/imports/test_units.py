@@ -4,7 +4,7 @@ whose unit the motion shows."""
 import numpy as np
 import pytest
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.imports import findings, units
+from kickstand_tools.imports import columns, findings, units
 from kickstand_tools.imports.recording import Sheet
 from kickstand_tools.imports.unit_fits import RateFit, fit_rates, unit_by_positions
 from kickstand_tools.logs.csv_reader import columns_of
@@ -87,7 +87,7 @@ def test_the_unit_of_times_is_shown_by_size_and_step(first, step, name):
      ("seconds", "s"), ("s", "s"), ("acc", ""), ("x (left)", ""), ("gyro_counts/131", "counts/131")],
 )  # fmt: skip
 def test_a_unit_is_stated_in_a_name(name, unit):
-    assert findings.stated_unit(name) == unit
+    assert columns.stated_unit(name) == unit
 
 
 def still(length, count=200):

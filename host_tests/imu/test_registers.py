@@ -192,7 +192,7 @@ def test_the_simulated_board_models_every_chip_of_the_driver():
     from kickstand.imu.mpu6050 import CHIPS
 
     assert set(CHIPS) == set(VARIANTS)
-    for who_am_i, (_, counts_per_c, zero_c, has_accel_config2, fifo_bytes, bits) in CHIPS.items():
+    for who_am_i, (_, (counts_per_c, zero_c, has_accel_config2, fifo_bytes, bits)) in CHIPS.items():
         model = VARIANTS[who_am_i]
         assert (counts_per_c, zero_c, has_accel_config2) == (model.counts_per_c, model.zero_c, model.has_accel_config2)
         assert fifo_bytes == (512 if who_am_i == MPU6886 else model.fifo_bytes)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from kickstand_sim.simulation.scripted import script
 from kickstand_tools.analysis import report
-from kickstand_tools.analysis.export.export import export
+from kickstand_tools.analysis.export import export
 from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.plot.charts import charts
 from kickstand_tools.analysis.ride import open_ride

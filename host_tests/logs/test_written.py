@@ -10,9 +10,8 @@ from kickstand_tools.api import Log, read_log, write_log
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import csv_reader
 from kickstand_tools.logs.csv_lines import (
+    csv_lines,
     cut_log,
-    joined_cells,
-    number_cells,
     write_lean,
     write_table,
 )
@@ -28,8 +27,6 @@ from kickstand_tools.logs.log import float_schema
 from kickstand_tools.logs.reader import time_texts
 from support import command
 
-AWKWARD = [0.0, -0.0, -1e-9, 5e-324, 0.5, 1.5, 2.5, -0.5, 9.9999999, 99999.5, 2.0**53, -(2.0**60), 1e300, 1.005]
-
 
 def numbers(digits):
     random = np.random.default_rng(digits)
@@ -39,16 +36,9 @@ def numbers(digits):
     return np.concatenate((*values, middles, np.nextafter(middles, 9.0), decimals))
 
 
-@pytest.mark.parametrize("digits", range(8))
-def test_numbers_are_written_as_python_writes_them(digits):
-    for values in (numbers(digits), np.array(AWKWARD), np.array([*AWKWARD, np.inf, -np.inf]), np.array([-0.25])):
-        lines = joined_cells([number_cells(values, digits)]).decode().split("\n")[:-1]
-        assert lines == [f"{value:.{digits}f}" for value in values.tolist()]
-
-
-@given(st.lists(st.floats(-1e300, 1e300), min_size=1, max_size=20), st.integers(0, 7))
+@given(st.lists(st.floats(allow_nan=False), min_size=1, max_size=20), st.integers(0, 7))
 def test_any_number_is_written_as_python_writes_it(values, digits):
-    lines = joined_cells([number_cells(np.array(values), digits)]).decode().split("\n")[:-1]
+    lines = b"".join(csv_lines(np.reshape(values, (-1, 1)), [digits])).decode().split("\n")[:-1]
     assert lines == [f"{value:.{digits}f}" for value in values]
 
 

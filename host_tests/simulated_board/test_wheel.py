@@ -140,7 +140,7 @@ class Source:
 
     age_ms = 7
 
-    value = None
+    value: float | None = None
 
     def poll(self, now_ms):
         value, self.value = self.value, None

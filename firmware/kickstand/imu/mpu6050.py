@@ -50,35 +50,35 @@ GYRO_LSB_PER_DPS = {250: 131.0, 500: 65.5, 1000: 32.8, 2000: 16.4}  # counts per
 # For each dlpf, the delay of the gyro in seconds (p. 13)
 GYRO_DELAY_S = {1: 0.0019, 2: 0.0028, 3: 0.0048, 4: 0.0083, 5: 0.0134, 6: 0.0186}
 
-# The supported chips. The key is the chip's WHO_AM_I. The values are, in this order:
-# * its name, at most 12 characters
+# The supported chips by WHO_AM_I: name, at most 12 characters, and kind. A kind has, in this order:
 # * temperature counts per degree C
 # * the temperature in degrees C at 0 counts
 # * True if the chip has the register ACCEL_CONFIG2 (0x1D)
 # * usable size of its FIFO in bytes
 # * bits of FIFO_EN that must read back as written
-# Also add a new chip to VARIANTS in tools/kickstand_sim/simulated_board/mpu6050.py and to the parts in the README.
-# A chip with other registers (LSM6DS3, BMI160) needs a driver with the same methods. open_sensor() must open that
-# driver.
+# Also add a new chip to VARIANTS in tools/kickstand_sim/simulated_board/mpu6050.py and to the parts in the README. A
+# chip with other registers (LSM6DS3, BMI160) needs a driver with the same methods. Settings.open_sensor() must open
+# that driver.
+MPU6500 = (333.87, 21.0, True, 512, 0xF8)
+ICM20602 = (326.8, 25.0, True, 1008, 0x18)  # FIFO_EN has no bit for the temperature, which is always stored
 CHIPS = {
-    0x68: ("MPU6050", 340.0, 36.53, False, 1024, 0xF8),
-    0x70: ("MPU6500", 333.87, 21.0, True, 512, 0xF8),
-    0x71: ("MPU9250", 333.87, 21.0, True, 512, 0xF8),
-    0x72: ("MPU6500 0x72", 333.87, 21.0, True, 512, 0xF8),
-    0x73: ("MPU9255", 333.87, 21.0, True, 512, 0xF8),
-    0x74: ("MPU6515", 333.87, 21.0, True, 512, 0xF8),
-    0x78: ("MPU6500 0x78", 333.87, 21.0, True, 512, 0xF8),
-    0x98: ("ICM20689", 326.8, 25.0, True, 512, 0xF8),
-    # FIFO_EN has no bit for the temperature, which these chips always store
-    0x19: ("MPU6886", 326.8, 25.0, True, 512, 0x18),
-    0x12: ("ICM20602", 326.8, 25.0, True, 1008, 0x18),
-    0x11: ("ICM20600", 326.8, 25.0, True, 1008, 0x18),
+    0x68: ("MPU6050", (340.0, 36.53, False, 1024, 0xF8)),
+    0x70: ("MPU6500", MPU6500),
+    0x71: ("MPU9250", MPU6500),
+    0x72: ("MPU6500 0x72", MPU6500),
+    0x73: ("MPU9255", MPU6500),
+    0x74: ("MPU6515", MPU6500),
+    0x78: ("MPU6500 0x78", MPU6500),
+    0x98: ("ICM20689", (326.8, 25.0, True, 512, 0xF8)),
+    0x19: ("MPU6886", (326.8, 25.0, True, 512, 0x18)),  # as ICM20602
+    0x12: ("ICM20602", ICM20602),
+    0x11: ("ICM20600", ICM20602),
 }
-_NAME = const(0)
-_LSB_PER_C = const(1)
-_ZERO_C = const(2)
-_HAS_ACCEL_CONFIG2 = const(3)
-_FIFO_EN_BITS = const(5)
+_LSB_PER_C = const(0)
+_ZERO_C = const(1)
+_HAS_ACCEL_CONFIG2 = const(2)
+_FIFO_BYTES = const(3)
+_FIFO_EN_BITS = const(4)
 
 _MAX_FRAMES = const(8)  # most frames in one transfer, which then takes 3 ms at 400 kHz
 # Most frames in one transfer while fewer than _MAX_FRAMES are in the FIFO. Because of this limit, one slow pass of the
@@ -156,7 +156,7 @@ class Mpu6050:
     @property
     def name(self):
         """Return the chip's name in CHIPS, or its WHO_AM_I in hexadecimal: at most 12 characters."""
-        return self._chip()[_NAME] if self.who_am_i in CHIPS else "WHO 0x%02X" % self.who_am_i
+        return CHIPS[self.who_am_i][0] if self.who_am_i in CHIPS else "WHO 0x%02X" % self.who_am_i
 
     def connect(self, i2c):
         """Use another machine.I2C from now on."""
@@ -184,8 +184,7 @@ class Mpu6050:
             raise OSError("MPU6050 WHO_AM_I reads differently each time")
         if self.who_am_i not in CHIPS and self.who_am_i != self._accept:
             raise UnknownChip(self.who_am_i)
-        _, _, _, _, fifo_bytes, _ = self._chip()  # unpacked for the type checker
-        self._full = fifo_bytes - FRAME
+        self._full = self._kind()[_FIFO_BYTES] - FRAME
         return self.who_am_i
 
     def setup(self):
@@ -211,7 +210,7 @@ class Mpu6050:
         yield 100
         self.write_register(_PWR_MGMT_1, _CLOCK_PLL_GYRO_X)
         yield 60  # ms to wait, because a write too soon after a reset is lost without an error
-        for i in range(5 if self._chip()[_HAS_ACCEL_CONFIG2] else 4):
+        for i in range(5 if self._kind()[_HAS_ACCEL_CONFIG2] else 4):
             self.write_register(_SMPLRT_DIV + i, self._configuration[i])
         if not self.configured():
             raise NotKept("MPU6050 configuration does not read back")
@@ -229,7 +228,7 @@ class Mpu6050:
         self._read_into(_SMPLRT_DIV, self._readback)  # SMPLRT_DIV to FIFO_EN
         self._read_into(_USER_CTRL, self._three)  # USER_CTRL, PWR_MGMT_1 and PWR_MGMT_2
         # Skip ACCEL_CONFIG2 of an accepted unknown chip, because the chip may not have that register.
-        for i in range(5 if self.who_am_i in CHIPS and self._chip()[_HAS_ACCEL_CONFIG2] else 4):
+        for i in range(5 if self.who_am_i in CHIPS and self._kind()[_HAS_ACCEL_CONFIG2] else 4):
             if self._readback[i] != self._configuration[i]:
                 return False
         if self._three[1] != _CLOCK_PLL_GYRO_X or self._three[2] & _STANDBY:
@@ -316,16 +315,16 @@ class Mpu6050:
 
     def _fifo_runs(self, fifo_en, user_ctrl):
         """Return True if these values of the two registers mean that the FIFO stores all three sensors."""
-        bits = self._chip()[_FIFO_EN_BITS]
+        bits = self._kind()[_FIFO_EN_BITS]
         return fifo_en & bits == bits and user_ctrl & _FIFO_ENABLE != 0
 
     def temperature_c(self, counts):
         """Convert counts of the temperature to degrees C (p. 30, and the data sheets of the other chips)."""
-        chip = self._chip()
-        return counts / chip[_LSB_PER_C] + chip[_ZERO_C]
+        kind = self._kind()
+        return counts / kind[_LSB_PER_C] + kind[_ZERO_C]
 
-    def _chip(self):
-        return CHIPS.get(self.who_am_i, CHIPS[0x70])  # an accepted chip that is not in CHIPS is treated as an MPU6500
+    def _kind(self):
+        return CHIPS[self.who_am_i][1] if self.who_am_i in CHIPS else MPU6500  # also for an accepted chip
 
     def waiting(self):
         """Return the number of bytes in the FIFO. Raises OSError from the bus."""

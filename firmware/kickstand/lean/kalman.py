@@ -75,10 +75,10 @@ def _adding():
 
 
 (add_products,) = load("quick_viper", ("add_products", _adding))
+KIND = "f"  # type of the arrays' elements
 if "add_products" in plain:  # as plain Python it cannot take floats apart
-    add_products = add_products_python
-del _adding
-_KIND = "d" if add_products is add_products_python else "f"  # type of the arrays' elements
+    add_products, KIND = add_products_python, "d"
+del _adding, add_products_python
 
 
 class Covariance:
@@ -93,13 +93,13 @@ class Covariance:
 
     def __init__(self, variances):
         n = self.n = len(variances)
-        self._zeros = array(_KIND, [0.0] * n)
-        self._p = array(_KIND, [0.0] * n * n)
+        self._zeros = array(KIND, [0.0] * n)
+        self._p = array(KIND, [0.0] * n * n)
         self._divide()
         for i, variance in enumerate(variances):
             self._p[i * n + i] = variance
-        self.correction, self._column, self._gain = [array(_KIND, self._zeros) for _ in range(3)]
-        self._factor = array(_KIND, [0.0])
+        self.correction, self._column, self._gain = [array(KIND, self._zeros) for _ in range(3)]
+        self._factor = array(KIND, [0.0])
         self.misfit = 0.0
 
     def _divide(self):

@@ -4,6 +4,7 @@ from math import degrees, radians
 
 from ..calibration.parameters import Transform
 from ..units import GAP_US, LOST_US, const
+from .bike_model import formula_lean_deg
 from .consistency import MILD
 from .lean_filter import DELAY_S, LeanFilter
 from .measurements import SIGMA_SHARE, gyro_variances
@@ -155,8 +156,6 @@ class LeanMeter:
     @property
     def lean_formula_deg(self):
         """Nicolae's lean from only the last reading."""
-        from .formula import formula_lean_deg  # imported only for the page that shows this lean
-
         return formula_lean_deg(self.force, self.rate[1])
 
     def measure_speed(self, speed_mps):

@@ -66,10 +66,9 @@ class Gps:
         self._rmc_ms = None  # ticks_ms() of the last RMC
         self._other = b""  # a received kind of sentence or message without a speed
         self._time = b""  # time of day in the last RMC
-        # A fix is stored as (ticks_ms() at its arrival, its time of day in ms).
-        self._reference = None  # the fix from which the delays of other fixes are counted
-        self._earliest = None  # the fix with the smallest delay since the reference was set
-        self._earliest_delay_ms = 0  # the delay of the fix `_earliest`
+        # A fix is stored as the ticks_ms() of the last midnight, which are late by the delay of the fix.
+        self._reference_ms = None  # the fix from which the delays of other fixes are counted
+        self._earliest_ms = 0  # the fix with the smallest delay since the reference was set
         self._fixes = 0  # number of fixes with a delay since the reference was set
         self._since_ms = 0  # ticks_ms() when the reference was set
         self.age_ms = 0
@@ -246,18 +245,18 @@ class Gps:
             raise ValueError
         self._day_ms = day_ms
         self.age_ms = 0
-        if self._reference is not None:
-            reference_ms, reference_day_ms = self._reference
-            delay_ms = ticks_diff(now_ms, reference_ms) - (day_ms - reference_day_ms)
+        midnight_ms = ticks_add(now_ms, -day_ms)
+        if self._reference_ms is not None:
+            delay_ms = ticks_diff(midnight_ms, self._reference_ms)
             if 0 < delay_ms < _TIME_JUMP_MS:
                 self.age_ms = delay_ms
-                if not self._fixes or delay_ms <= self._earliest_delay_ms:
-                    self._earliest, self._earliest_delay_ms = (now_ms, day_ms), delay_ms
+                if not self._fixes or ticks_diff(midnight_ms, self._earliest_ms) <= 0:
+                    self._earliest_ms = midnight_ms
                 self._fixes += 1
                 if self._fixes >= _MIN_FIXES_FOR_NEW_REFERENCE and ticks_diff(now_ms, self._since_ms) > _TIME_JUMP_MS:
-                    self._reference, self._fixes, self._since_ms = self._earliest, 0, now_ms
+                    self._reference_ms, self._fixes, self._since_ms = self._earliest_ms, 0, now_ms
                 return delay_ms
-        self._reference, self._fixes, self._since_ms = (now_ms, day_ms), 0, now_ms
+        self._reference_ms, self._fixes, self._since_ms = midnight_ms, 0, now_ms
         return 0
 
 

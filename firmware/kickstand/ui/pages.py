@@ -13,6 +13,7 @@ from time import ticks_add, ticks_diff
 from ..board.button import LONG, SHORT
 from ..board.display import DEGREE
 from ..errors import Notice, attempt
+from ..lean.bike_model import static_lean_deg
 from ..rotation import vector
 from ..units import const
 
@@ -151,8 +152,6 @@ def not_aligned(meter, seconds, todo):
         seconds: any time in seconds. Every two seconds the second line changes between "Not aligned" and `todo`.
         todo: the next step for the rider.
     """
-    from ..lean.formula import static_lean_deg  # imported here, because an aligned bike does not need it
-
     tilt = static_lean_deg(meter.smooth_force)
     hint = "Not aligned" if seconds % 4 < 2 else todo
     return "Raw %4d%s %+.2fg" % (round(tilt), DEGREE, meter.smooth_force[2]), hint
@@ -182,15 +181,11 @@ def drive(background, now_ms):
     if state == alignment.WAITING_FOR_SPEED:
         fault = background.speed.source.fault(now_ms)
         return words(fault) if fault else ("Align by drive", "waiting: speed")
-    waits = {
-        alignment.WAITING_FOR_STOP: "stop needed",
-        alignment.WAITING_FOR_BRAKING: "brake straight",
-        alignment.BRAKING: "braking...",
-        alignment.TURNING: "turn not counted",
-    }
+    # for the states from WAITING_FOR_STOP to TURNING
+    waiting = ("stop needed", "brake straight", "braking...", "turn not counted")[state - alignment.WAITING_FOR_STOP]
     if drive.counted < drive.needed:
-        return "Brakings %3d/%d" % (drive.counted, drive.needed), waits[state]
-    return "Brake%3d +-%4.1f%s" % (drive.counted, min(drive.quality_deg, 99.9), DEGREE), waits[state]
+        return "Brakings %3d/%d" % (drive.counted, drive.needed), waiting
+    return "Brake%3d +-%4.1f%s" % (drive.counted, min(drive.quality_deg, 99.9), DEGREE), waiting
 
 
 def sensor_info(sensor, lost, meter, seconds):
@@ -449,16 +444,13 @@ class Screen:
         from .wizard import AlignWizard
 
         self._at = 0
-        settings, calibration = self._app.settings, self._app.calibration
-        chip, rate_hz = self._app.sensor.chip, settings.SAMPLE_HZ
-        self.wizard = AlignWizard(chip, rate_hz, calibration, settings.SIDE, pressed)
+        self.wizard = AlignWizard(self._app, pressed)
 
     def _six(self):
         gc.collect()
         from .six_wizard import SixWizard
 
-        app = self._app
-        self.wizard = SixWizard(app.sensor.chip, app.settings.SAMPLE_HZ, app.calibration)
+        self.wizard = SixWizard(self._app)
 
     def _reset(self):
         self._app.meter.reset_maxima()

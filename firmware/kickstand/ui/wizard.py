@@ -37,9 +37,7 @@ class Wizard:
     A subclass has the flow, the generator _flow(). It may raise a Refusal, which is shown until a press.
 
     Args:
-        chip: an Mpu6050.
-        rate_hz: samples per second.
-        calibration: the ActiveCalibration.
+        app: the App, whose chip, settings and calibration are used.
 
     Attributes:
         lines: the two lines to show.
@@ -50,11 +48,10 @@ class Wizard:
 
     SECONDS = 2  # duration of a pose
 
-    def __init__(self, chip, rate_hz, calibration):
-        self._chip = chip
-        self._rate_hz = rate_hz
-        self._calibration = calibration
-        self._turn = Turn(chip.gyro_lsb_per_dps, 1_000_000 // rate_hz)
+    def __init__(self, app):
+        self._chip, self._rate_hz = app.sensor.chip, app.settings.SAMPLE_HZ
+        self._calibration = app.calibration
+        self._turn = Turn(self._chip.gyro_lsb_per_dps, 1_000_000 // self._rate_hz)
         self._averaging = self.ended = False
         self._now_ms = ticks_ms()
         self._flows = self._repeat()
@@ -200,8 +197,7 @@ class AlignWizard(Wizard):
     """Aligns the sensor by two poses. The first pose is on the kickstand, the second is upright.
 
     Args:
-        chip, rate_hz, calibration: as for Wizard.
-        side: "left" or "right", the side to which the kickstand leans the bike.
+        app: as for Wizard.
         pressed: True if the rider has already pressed the button for the kickstand pose.
 
     Attributes:
@@ -211,10 +207,10 @@ class AlignWizard(Wizard):
     name = "align"
     SECONDS = 3
 
-    def __init__(self, chip, rate_hz, calibration, side, pressed=False):
-        self._side = side
+    def __init__(self, app, pressed):
+        self._side = app.settings.SIDE
         self._pressed = pressed
-        super().__init__(chip, rate_hz, calibration)
+        super().__init__(app)
 
     def _flow(self):
         self.upright = False

@@ -60,7 +60,6 @@ class TimedGc:
             return
         start = ticks_us()
         gc.collect()
-        app_module.fill_gaps(app_module.SINGLE_GAPS)  # as the app does after each collection
         if app.n_pauses < MAX_PAUSES:
             app.pauses[app.n_pauses] = min(ticks_diff(ticks_us(), start), 65535)
             app.n_pauses += 1
@@ -103,7 +102,6 @@ class MeasuredApp(app_module.App):
 
     def _begin(self):
         gc.collect()
-        app_module.fill_gaps(app_module.SINGLE_GAPS)  # as the app does after each collection
         self.free_before = gc.mem_free()
         gc.disable()
         self._allocated = gc.mem_alloc()
@@ -124,7 +122,6 @@ class MeasuredApp(app_module.App):
             self._out.write(b"heap")
             gc.enable()
             gc.collect()
-            app_module.fill_gaps(app_module.SINGLE_GAPS)
             self.canary.arm()
         elif self.count > HEAP_TURNS and self.canary.died():
             self.automatic += 1

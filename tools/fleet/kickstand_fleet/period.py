@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 from kickstand.drive_alignment.quality import AGREE_DEG, fit_problem
-from kickstand_tools.analysis.brake_tests import brake_tests
-from kickstand_tools.analysis.stops.brake_test import Stop
+from kickstand_tools.analysis.stops import Stop, brake_tests
 from kickstand_tools.calibration.drive import DriveFit, fit_logs, usable
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.calibration.refusals import Uncertain, of_firmware

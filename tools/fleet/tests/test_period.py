@@ -9,9 +9,8 @@ from fleet_drives import drive, result_of, turn_of, yaw_deg
 from kickstand_fleet import files, signals
 from kickstand_fleet.manifest import Period
 from kickstand_fleet.period import work_on_period
-from kickstand_tools.analysis.brake_tests import brake_tests
 from kickstand_tools.analysis.ride import vehicle_channels
-from kickstand_tools.analysis.stops.brake_test import find_stops
+from kickstand_tools.analysis.stops import brake_tests, find_stops
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
 

@@ -61,6 +61,7 @@ class SdCard:
         """Receive data, and return the bytes that the card sends at the same time."""
         if not self._selected or self.removed:
             return b"\xff" * len(data)
+        # Whole sectors at once, to save time. Shorter data may contain a command, which has 6 bytes.
         if self._taking == SECTOR + 2 and len(data) == SECTOR:
             self._content, self._taking = bytes(data), 2
             return b"\xff" * SECTOR

@@ -13,8 +13,8 @@ from ..signals import Array, Bools, smoothed
 from .alignment_quality import Quality, quality
 from .channels import Channels, downsampled, joined, spacing_s
 from .ride import Ride
-from .stops.brake_test import RATE_S, Stop, stops_of
-from .stops.standstill import standing
+from .standstill import standing
+from .stops import RATE_S, Stop, stops_of
 from .summary import Summary
 
 # Columns of the course that are not kept. In a long ride, they would use a quarter of the memory.

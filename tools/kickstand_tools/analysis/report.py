@@ -11,7 +11,7 @@ from ..common.times import clock
 from ..estimation.smooth import PoseOff
 from .alignment_quality import LeanCost, Quality, lean_cost
 from .overview import Overview
-from .stops.brake_test import Stop, stops_by_speed
+from .stops import Stop, stops_by_speed
 from .summary import Peak
 
 if TYPE_CHECKING:
@@ -187,23 +187,24 @@ def _alignment(overview: Overview, on_page: bool) -> str:
     quality = overview.quality
     if not judged(overview):
         return "Alignment: not judged, see the warning."
-    text = "Alignment: not enough straight riding to know how far it is off."
-    angle_words = angles(quality)
-    if angle_words:
-        far = abs(quality.roll_deg or 0.0) > SWAPPED_DEG and not overview.ride.car
-        # Swapped poses also exchange forward and backward.
-        swapped = far and (overview.exchanged or not overview.has_speed)
-        costs = ""
-        if not (overview.ride.car or overview.exchanged):
-            costs = _cost_sentences(lean_cost(quality), overview.has_speed, on_page)
-        errors = ", ".join(angle_words)
-        text = f"Alignment: it seems off by {errors}"
-        if _is_well_aligned(overview):
-            text = f"Alignment: good. It seems off by {errors}, which costs less than {COSTS_DEG}° of lean."
-        else:
-            text += ": were the poses swapped?" if swapped else ": was it held upright?" if far else "."
-        text += costs
+    errors = ", ".join(angles(quality))
+    if not errors:
+        text = "Alignment: not enough straight riding to know how far it is off."
+    elif _is_well_aligned(overview):
+        text = f"Alignment: good. It seems off by {errors}, which costs less than {COSTS_DEG}° of lean."
+    else:
+        text = f"Alignment: it seems off by {errors}{_question_about_poses(overview)}"
+    if errors and not (overview.ride.car or overview.exchanged):
+        text += _cost_sentences(lean_cost(quality), overview.has_speed, on_page)
     return text + _gravity(quality.gravity_g, on_page)
+
+
+def _question_about_poses(overview: Overview) -> str:
+    """Return a question if the roll error is too large for a motorcycle's upright pose, otherwise a full stop."""
+    if overview.ride.car or abs(overview.quality.roll_deg or 0.0) <= SWAPPED_DEG:
+        return "."
+    swapped = overview.exchanged or not overview.has_speed  # swapped poses also exchange forward and backward
+    return ": were the poses swapped?" if swapped else ": was it held upright?"
 
 
 def _is_well_aligned(overview: Overview) -> bool:

@@ -309,5 +309,5 @@ def course_agrees(bins: LogBins) -> bool | None:
 
 def log_agrees(log: Log) -> bool | None:
     """Call course_agrees() for a log."""
-    bins = log_bins(log.t_s, log.accel_g, log.gyro_dps, log.speed_mps, log.lat_deg, log.lon_deg)
+    bins = log_bins(log)
     return None if bins is None else course_agrees(bins)

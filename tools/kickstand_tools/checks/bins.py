@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..logs.log import Log
 from ..signals import Array, Bins, Bools, bin_numbers, binned, intervals, runs
 
 BIN_S = 0.1  # length of a bin; faster changes are vibration
@@ -58,16 +59,9 @@ class LogBins:
         return merged.means[:, :3], merged.means[:, 3:], merged.latest[:, 0]
 
 
-def log_bins(
-    time_s: Array, force: Array, rate: Array, speed_mps: Array, lat_deg: Array, lon_deg: Array
-) -> LogBins | None:
-    """Average n samples to LogBins. Returns None without samples, or if gaps make the log too long for a ride.
-
-    time_s: shape (n), in s.
-    force, rate: along the sensor's axes, shape (n, 3), in g and deg/s.
-    speed_mps, lat_deg, lon_deg: shape (n); NaN for no new value.
-    """
-    bins = binned(time_s, BIN_S, [*force.T, *rate.T], [speed_mps], MOST_BINS, 10 * MOST_BINS)
+def log_bins(log: Log) -> LogBins | None:
+    """Average a log to LogBins. Returns None without samples, or if gaps make the log too long for a ride."""
+    bins = binned(log.t_s, BIN_S, [*log.accel_g.T, *log.gyro_dps.T], [log.speed_mps], MOST_BINS, longest=10 * MOST_BINS)
     if bins is None:
         return None
     has_samples = bins.count > 0
@@ -77,7 +71,8 @@ def log_bins(
     number, sampled = np.arange(len(valid)), np.flatnonzero(has_samples)
     filled = np.column_stack([np.interp(number, sampled, column[sampled]) for column in bins.means.T]) * valid[:, None]
     first_s = bins.first * BIN_S
-    speeds, positions = (_once_a_second(first_s, time_s, *track) for track in ((speed_mps,), (lat_deg, lon_deg)))
+    speeds = _once_a_second(first_s, log.t_s, log.speed_mps)
+    positions = _once_a_second(first_s, log.t_s, log.lat_deg, log.lon_deg)
     return LogBins(bins, filled[:, :3], filled[:, 3:], valid, speeds, positions)
 
 

@@ -130,8 +130,7 @@ def _bins(log: Log, measured: Bools) -> LogBins | None:
     for vectors, limit in ((log.accel_g, MOST_G), (log.gyro_dps, MOST_DPS)):
         for values in vectors.T:
             used &= np.abs(values) <= limit
-    part = log if np.all(used) else log.part(used)
-    return log_bins(part.t_s, part.accel_g, part.gyro_dps, part.speed_mps, part.lat_deg, part.lon_deg)
+    return log_bins(log if np.all(used) else log.part(used))
 
 
 def _check_units(log: Log) -> None:

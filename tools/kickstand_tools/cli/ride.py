@@ -10,9 +10,9 @@ import click
 from rich.console import Console
 from rich.table import Table
 
-from ..analysis.export.export import export_with_notices
+from ..analysis.export import export_with_notices
 from ..analysis.overview import Overview, overview
-from ..analysis.plot import plot
+from ..analysis.plot.page import check_drawing, draw_ride
 from ..analysis.report import as_data, page
 from ..analysis.ride import Ride, calibration_beside, open_ride
 from ..calibration.file import CalibrationFile, calibration_path, read_calibration
@@ -230,10 +230,10 @@ def plot_command(
     ride: Path, calibration: Path | None, tiles: bool, live: bool, out: Path, **stretch: float | None
 ) -> None:
     """Draw a ride as a picture (PNG) and as a page that you can zoom (HTML)."""
-    plot.check(out)
+    check_drawing(out)
     ride_overview = _overview(ride, calibration, live, **stretch)
     with spinner("drawing"):
-        written = list(plot.draw(ride_overview, out, tiles))
+        written = list(draw_ride(ride_overview, out, tiles))
     common.print_lines(f"written: {path}" for path in written)
 
 

@@ -230,7 +230,7 @@ def fifo(parts, writes):
 
     chip = parts.sensor.chip
     fault = fifo_fault(chip)
-    size = CHIPS.get(chip.who_am_i, CHIPS[0x70])[4]
+    size = CHIPS.get(chip.who_am_i, CHIPS[0x70])[1][3]
     lasts = size // 14 * chip.period_ms
     if fault:
         return fault.values[0], size, lasts, 0, 0, True, 1

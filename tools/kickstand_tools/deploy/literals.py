@@ -23,7 +23,7 @@ from typing import Any
 from ..common import firmware_path
 
 # Names that programs outside the package use on a board: `kickstand bench`, the replay on a Pico, and tests
-KEPT = {"app.SINGLE_GAPS", "drive_alignment.alignment.STEP_US", "lean.lean_filter.DELAY_S"}
+KEPT = {"drive_alignment.alignment.STEP_US", "lean.lean_filter.DELAY_S"}
 # Private data that programs outside the package use on a board
 KEPT_DATA = {"_ble", "_work"}
 _CAPITALS = re.compile("_?[A-Z][A-Z0-9_]*")

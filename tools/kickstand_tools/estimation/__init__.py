@@ -2,10 +2,9 @@
 
     windows.py        readings -> means over 0.2 s
     first_guess.py    standstills, rough lean and speed; for an alignment also rough axes
-    unknowns.py       the states, the parameters, and the prior of the parameters
+    unknowns.py       states and parameters, their priors, and hypotheses about how mount and wind change during a ride
     equations.py      process model, measurement model and their Jacobian
     noise.py          process noise and measurement noise
-    hypotheses.py     how mount and wind may change during a ride; the posterior weight of each hypothesis
     solver.py         linear least squares of one step: Schur complement over states, then the chain of blocks
     least_squares.py  all steps; estimates states and parameters with their covariance
 

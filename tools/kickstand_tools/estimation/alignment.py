@@ -26,9 +26,22 @@ from ..logs.source import Progress
 from ..signals import Array, Bools, intervals, rotation_angle, rotation_vector
 from ..signals.leaning import averaged
 from .first_guess import MIN_RIDING_S, MOUNTED_DEG, MOUNTED_S, Axes, RideContradicts, RideShort, axes, standing
-from .hypotheses import Hypotheses
 from .least_squares import Estimate
-from .unknowns import ACCEL, BESIDE, BIAS, BIAS_PER_C, DELAY, LEAN, MEAN, OFFSET, OFFSET_PER_C, ROTATION, SENSOR, Prior
+from .unknowns import (
+    ACCEL,
+    BESIDE,
+    BIAS,
+    BIAS_PER_C,
+    DELAY,
+    LEAN,
+    MEAN,
+    OFFSET,
+    OFFSET_PER_C,
+    ROTATION,
+    SENSOR,
+    Hypotheses,
+    Prior,
+)
 from .windows import WINDOW_S, Windows, windows_of
 
 SLOWEST_HZ = 20.0  # a log with a lower sample rate is refused

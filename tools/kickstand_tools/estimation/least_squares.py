@@ -12,14 +12,13 @@ import numpy as np
 from ..signals import Array, Bools, Ints, intervals, rotation_matrix
 from .equations import BALANCED, RESTING, RESTING_RATE, ROWS, SLIDING, jacobian, process_and_measurements
 from .first_guess import lean_and_speed, standing
-from .hypotheses import Hypotheses
 from .noise import BRIEF_S, LONG_S, Noise
 from .solver import RandomWalks, Reduced, covariances, posterior_covariance, reduce_windows, solve
-from .unknowns import BIAS, CAMBER, FORWARD, LEAN, LEFT, PARAMETERS, PITCH, ROTATION, STATES, UP, Prior
+from .unknowns import BIAS, CAMBER, FORWARD, LEAN, LEFT, PARAMETERS, PITCH, ROTATION, STATES, UP, Hypotheses, Prior
 from .windows import Windows
 
 BLOCK = 50  # number of windows per block; see solver.py
-PART = 6  # number of blocks whose derivatives are computed at once
+PART = 12  # number of blocks whose derivatives are computed at once
 ROUNDS, PLAIN_ROUNDS = 20, 2  # largest number of steps; the first PLAIN_ROUNDS steps do not down-weight outliers
 # The largest change of an angle in a step, in rad. If it is under NEAR, the hypotheses are weighted. If it is under
 # CONVERGED, the steps end.
@@ -51,7 +50,7 @@ class Estimate:
     def __init__(self, windows: Windows, prior: Prior, hypotheses: Hypotheses) -> None:
         """Run the estimation. Raises LinAlgError if the equations have no solution.
 
-        hypotheses: see hypotheses.py. The first steps use only the first hypothesis.
+        hypotheses: see unknowns.py. The first steps use only the first hypothesis.
         """
         self._length = min(BLOCK, len(windows))
         self._windows = windows = windows.padded(self._length)

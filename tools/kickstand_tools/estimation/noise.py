@@ -1,5 +1,5 @@
 """Defines the process noise and the measurement noise of equations.py, with all their parameters. The random walk of
-the mount and of the sensor's errors is in hypotheses.py.
+the mount and of the sensor's errors is in unknowns.py.
 
 Each line has the form: symbol = default # meaning, unit. All values are standard deviations. A disturbance that lasts
 for tau seconds appears in many windows of T seconds. Measurements that share an error are not independent. Therefore

@@ -19,10 +19,9 @@ from ..logs.reader import time_texts
 from ..logs.source import Progress
 from ..signals import Array, Ints
 from .equations import corrected_rates
-from .hypotheses import ALL, ROLL
 from .least_squares import Estimate
 from .noise import jolted
-from .unknowns import FORWARD, GYRO, LEAN, PITCH, Prior
+from .unknowns import ALL, FORWARD, GYRO, LEAN, PITCH, ROLL, Prior
 from .windows import Windows, windows_of
 
 SLOWEST_HZ = 10.0  # a log with a lower sample rate is not smoothed

@@ -31,7 +31,6 @@ class Reduced:
         s).
     left: normal equations of the first state, the last state and the parameters, shape (B, s + s + m, s + s + m + 1).
         The last column is the gradient.
-    log_determinant: logarithm of the determinant of the eliminated states' information matrix, shape (B).
     residual: sum of squares at the optimum of the eliminated states, shape (B).
     """
 
@@ -39,13 +38,12 @@ class Reduced:
     gains: list[Array]
     covariances: list[Array]
     left: Array
-    log_determinant: Array
     residual: Array
 
     def part(self, rows: slice) -> "Reduced":
         """Select chains."""
         gains, covariances = ([level[rows] for level in levels] for levels in (self.gains, self.covariances))
-        return Reduced(self.s, gains, covariances, self.left[rows], self.log_determinant[rows], self.residual[rows])
+        return Reduced(self.s, gains, covariances, self.left[rows], self.residual[rows])
 
     @staticmethod
     def joined(parts: "list[Reduced]") -> "Reduced":
@@ -54,8 +52,11 @@ class Reduced:
             [np.concatenate(level) for level in zip(*levels)]
             for levels in ([part.gains for part in parts], [part.covariances for part in parts])
         )
-        ends = [(part.left, part.log_determinant, part.residual) for part in parts]
-        return Reduced(parts[0].s, gains, covariances, *map(np.concatenate, zip(*ends)))
+        left, residual = (
+            np.concatenate([part.left for part in parts]),
+            np.concatenate([part.residual for part in parts]),
+        )
+        return Reduced(parts[0].s, gains, covariances, left, residual)
 
 
 def reduce_windows(jacobian: Array, states: int) -> Reduced:
@@ -80,8 +81,7 @@ def _reduced(links: Array, common: Array) -> Reduced:
         the sum of the squared residuals.
     """
     s = links.shape[2] // 2
-    gains, covariances = [], []
-    common, log_determinant = common.copy(), np.zeros(len(links))
+    gains, covariances, common = [], [], common.copy()
     while links.shape[1] > 1:
         even = links.shape[1] // 2 * 2
         first, second = links[:, 0:even:2], links[:, 1:even:2]
@@ -96,11 +96,10 @@ def _reduced(links: Array, common: Array) -> Reduced:
         merged[..., :s, 2 * s :] += first[..., :s, 2 * s :]
         merged[..., s:, 2 * s :] += second[..., s:, 2 * s :]
         common -= np.matmul(_in_rows(parameters).transpose(0, 2, 1), _in_rows(gains[-1][..., 2 * s :]))
-        log_determinant += np.sum(np.linalg.slogdet(inner)[1], axis=1)
         links = np.concatenate((merged, links[:, even:]), axis=1) if links.shape[1] > even else merged
     below = np.concatenate((links[:, 0, :, 2 * s : -1].transpose(0, 2, 1), common[:, :-1]), axis=2)
     left = np.concatenate((links[:, 0], below), axis=1)
-    return Reduced(s, gains, covariances, left, log_determinant, common[:, -1, -1])
+    return Reduced(s, gains, covariances, left, common[:, -1, -1])
 
 
 def _in_rows(values: Array) -> Array:
@@ -170,7 +169,7 @@ class RandomWalks:
     between: Array
 
 
-def _chain(blocks: Reduced, walks: RandomWalks, hypothesis: int) -> tuple[Reduced, Array, float]:
+def _chain(blocks: Reduced, walks: RandomWalks, hypothesis: int) -> tuple[Reduced, Array]:
     """Build the chain of the blocks for one hypothesis. All chains at once would need much memory.
 
     A state of a chain has n = s + m values: a block's first state and its parameters. After the last block
@@ -179,10 +178,9 @@ def _chain(blocks: Reduced, walks: RandomWalks, hypothesis: int) -> tuple[Reduce
     Returns:
         reduced: the chain.
         ends: normal equations of both ends of the chain, shape (2 n, 2 n + 1).
-        minus_two_log: minus twice the log-likelihood. A constant that all hypotheses share is left out.
     """
     (count, width), s = blocks.left.shape[:2], blocks.s
-    n, prior, gradient = width - s, walks.prior[hypothesis, :, :-1], walks.prior[hypothesis, :, -1:]
+    n = width - s
     links = np.zeros((count, 2 * n, 2 * n + 1))
     columns = np.r_[:s, n : n + s, s:n]
     links[:, columns[:, None], np.r_[columns, 2 * n]] = blocks.left
@@ -195,16 +193,14 @@ def _chain(blocks: Reduced, walks: RandomWalks, hypothesis: int) -> tuple[Reduce
         links[:, rows, -1] += sign * weight * change
     reduced = _reduced(links[None], np.reshape(np.sum(weight * change**2), (1, 1, 1)))
     ends = reduced.left[0]
-    ends[s:n, s:n] += prior
-    ends[s:n, -1:] += gradient
-    misfit = reduced.residual[0] + _squared(prior, gradient) - _squared(ends[:, :-1], ends[:, -1:])
-    log_determinant = reduced.log_determinant[0] + np.linalg.slogdet(ends[:, :-1])[1] - np.linalg.slogdet(prior)[1]
-    return reduced, ends, float(misfit + log_determinant - np.sum(np.log(weight)))
+    ends[s:n, s:n] += walks.prior[hypothesis, :, :-1]
+    ends[s:n, -1] += walks.prior[hypothesis, :, -1]
+    return reduced, ends
 
 
-def _squared(information: Array, gradient: Array) -> float:
-    """Return the square of a gradient in the metric of the covariance. gradient: shape (k, 1)."""
-    return float(np.sum(gradient * np.linalg.solve(information, gradient)))
+def _squared(equations: Array) -> float:
+    """Return the square of the gradient in the metric of the covariance. equations: shape (k, k + 1)."""
+    return float(equations[:, -1] @ np.linalg.solve(equations[:, :-1], equations[:, -1]))
 
 
 def minus_two_log_likelihood(blocks: Reduced, walks: RandomWalks) -> Array:
@@ -212,7 +208,14 @@ def minus_two_log_likelihood(blocks: Reduced, walks: RandomWalks) -> Array:
 
     A constant that all hypotheses share is left out.
     """
-    return np.array([_chain(blocks, walks, g)[2] for g in range(len(walks.prior))])
+    minus_two_log = []
+    for g, (prior, variance) in enumerate(zip(walks.prior, walks.variance)):
+        reduced, ends = _chain(blocks, walks, g)
+        misfit = reduced.residual[0] + _squared(prior) - _squared(ends)
+        eliminated = sum(float(np.sum(np.linalg.slogdet(level)[1])) for level in reduced.covariances)
+        log_determinant = np.linalg.slogdet(ends[:, :-1])[1] - np.linalg.slogdet(prior[:, :-1])[1] - eliminated
+        minus_two_log.append(misfit + log_determinant + np.sum(np.log(variance)))
+    return np.array(minus_two_log)
 
 
 def solve(blocks: Reduced, walks: RandomWalks, weight: Array) -> tuple[Array, Array]:
@@ -225,7 +228,7 @@ def solve(blocks: Reduced, walks: RandomWalks, weight: Array) -> tuple[Array, Ar
     """
     mean = np.zeros(1)
     for g, share in enumerate(weight):
-        mean = mean + share * _first_states(*_chain(blocks, walks, g)[:2])
+        mean = mean + share * _first_states(*_chain(blocks, walks, g))
     states, parameters = mean[:, : blocks.s], mean[:-1, blocks.s :]
     return back(blocks, np.stack((states[:-1], states[1:]), axis=1), parameters), parameters
 
@@ -239,7 +242,7 @@ def posterior_covariance(blocks: Reduced, walks: RandomWalks, weight: Array) -> 
     """
     states, joint = [], np.zeros(1)
     for g, share in enumerate(weight):
-        reduced, ends, _ = _chain(blocks, walks, g)
+        reduced, ends = _chain(blocks, walks, g)
         states.append(_first_states(reduced, ends))
         joint = joint + share * covariances(reduced, np.linalg.inv(ends[None, :, :-1]).astype(float))[0]
     deviation = np.stack([np.concatenate((state[:-1], state[1:]), axis=1) for state in states])

@@ -1,7 +1,7 @@
 """Finds the time, the accelerometer and the gyro in an unknown table, and their units. The names of the columns are
 used, but mainly their values.
 
-* Three columns belong together if their names differ only in the axis, or if they are side by side without names.
+* Three columns belong together by their names, or because they are side by side (columns.py).
 * Whenever the sensor is calm, the acceleration is as long as gravity in some unit.
 * In the gyro's unit, the rates explain how the direction of gravity turns in the sensor's axes (unit_fits.py).
 * In the time's unit, the number of samples per second is usual.
@@ -13,16 +13,30 @@ it.
 import difflib
 import re
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from kickstand.units import STANDARD_GRAVITY
 
 from ..common.errors import InputError
 from ..logs.csv_reader import as_text
-from ..signals import Array, moving_mean, moving_spread
-from .recording import Sheet, plain, unit_in
+from ..signals import Array
+from .columns import (
+    GRAVITIES,
+    KINDS,
+    LATITUDE,
+    LEANT,
+    LONGITUDE,
+    NEAR,
+    Triple,
+    are_whole,
+    calm_length,
+    find_triples,
+    is_of,
+    single_axes,
+    stated_unit,
+)
+from .recording import Sheet, plain
 from .unit_fits import RateFit, fit_rates
 from .units import (
     ACCELERATIONS,
@@ -31,7 +45,6 @@ from .units import (
     DATES,
     MOMENT,
     RARE_ACCELERATIONS,
-    RARE_RATES,
     RATES,
     REPEATED,
     SPEEDS,
@@ -40,28 +53,14 @@ from .units import (
     Nanoseconds,
     counts_per,
     factor,
-    of_day,
     since_first_s,
     tick_ns,
     time_unit,
-    unit,
 )
 
 ACCEL, GYRO = ("ax", "ay", "az"), ("gx", "gy", "gz")
 REQUIRED = ("t", *ACCEL, *GYRO)
 OPTIONAL = ("speed", "lat", "lon", "temp")
-LATITUDE, LONGITUDE = r"^lat(?!er)|latitude", r"^lon(?!gi?t?u?d?i?n?al|gacc)|^lng|longitude"
-_KINDS = {  # kinds of sensors, by the words in their columns' names
-    "linear": r"lin|user|withoutgravity|nograv",
-    "gravity": r"^(?!.*(incl|with)).*grav",
-    "other": r"mag|compass|orient|euler|quat|angle|roll|pitch|yaw|azimuth|^[bmqh]$|^mg?$|press|baro",
-    "gyro": r"gyr|rot|omega|angular|angvel|^gy$|^as$|^[wr]$|rate$",
-    "accel": r"acc|force|^ac$|^gf$|^f$|^a$",
-    "either": r"^g$",
-}
-# Words for an axis, longest first: of vehicles, and of web pages, whose alpha turns about z
-_AXES = {"longitudinal": "x", "inline": "x", "long": "x", "roll": "x", "beta": "x", "lateral": "y", "lat": "y"}
-_AXES |= {"pitch": "y", "gamma": "y", "vertical": "z", "vert": "z", "yaw": "z", "alpha": "z"}
 # Scales above the rows: seconds per count, g per count, rad/s per count, counts per g
 _SCALE = re.compile(
     r'^\W*(tscale|ascale|gscale|gyro_?scale|acc_?1g)"?[,;:=\s]+"?(0x[0-9a-f]{8}|\d*\.?\d+(?:[eE][+-]?\d+)?)',
@@ -69,14 +68,7 @@ _SCALE = re.compile(
 )
 _SAMPLE_RATE = re.compile(r"(?:rate|frequency|sampl\w*)[^\d\n]*(\d+(?:\.\d+)?)\W*hz", re.IGNORECASE)
 _COUNTER = re.compile(r"^(no|nr|n|i|index|count|counter|record|sample|frame|id|row)$")
-CALM_S = 0.5  # length of the moving window in which the motion is measured to find calm samples
-CALMEST = 0.2  # share of the samples that count as calm
-NEAR = 1.3  # a calm acceleration is within this factor of gravity, also with clones of the chip and on rough rides
-LEANT = 1.75  # in a long bend, even the calm acceleration is longer than gravity by this factor: 55 degrees of lean
 NOISE_DPS = 0.1  # standard deviation of a gyro at rest
-# Length of the mean acceleration, divided by the mean length of the accelerations. Without gravity the ratio is smaller
-# than this.
-LINEAR = 0.35
 _SLOWEST_S = 1.0  # longest usual time between samples
 DOUBTED_HZ, DOUBTED_S, DOUBTED_ROWS = 1000.0, 10.0, 2000  # more samples per second, or so many rows in less time
 _USUAL_HZ = 4.0, 50.0, 600.0  # lowest, middle and highest usual rate of samples, if the unit of the time is doubted
@@ -180,7 +172,7 @@ def find(sheet: Sheet) -> Findings:
     _accel_and_gyro(sheet, seconds, findings)
     for key, kind in (("a", "accel"), ("g", "gyro")):
         if key not in findings.found:
-            findings.single |= _single(sheet, key, kind)
+            findings.single |= single_axes(sheet, key, kind)
     used = [name for finding in findings.found.values() for name in finding.columns]
     lat, lon = (_first_named(sheet, used, words) for words in (LATITUDE, LONGITUDE))
     if lat is not None and lon is not None:
@@ -274,265 +266,22 @@ def _seconds(sheet: Sheet, time: ColumnFinding | None) -> Array | None:
     return since_first_s(sheet.times(sheet.columns.index(time.columns[0]), time.unit.strip("?")))
 
 
-# Groups of three
-
-
-@dataclass
-class _Triple:
-    """Three columns, one per axis. kind: a key of _KINDS, "" if neither their names nor their unit show it."""
-
-    stem: str
-    places: list[int]
-    kind: str
-    values: Array
-
-
-def completed(sheet: Sheet) -> Sheet:
-    """Complete columns that belong together: seconds and their fractions, axes that are in several rows, and the user's
-    acceleration and gravity."""
-    names = [plain(name) for name in sheet.columns]
-    _add_time(sheet, names)
-    _sign_positions(sheet, names)
-    threes = {three.kind: three for three in reversed(_find_triples(sheet))}
-    for three in threes.values():
-        if not np.any(np.all(np.isfinite(three.values), axis=1)):
-            _merge_rows(sheet, three)
-    if "linear" in threes and "gravity" in threes and "accel" not in threes:
-        linear, gravity = threes["linear"].values, threes["gravity"].values
-        total, valid = linear + gravity, np.all(np.isfinite(gravity), axis=1)
-        if np.all(np.isnan(total)) and np.any(valid):  # in rows of their own
-            t_s = since_first_s(sheet.times(0, ""))
-            total = linear + np.column_stack([np.interp(t_s, t_s[valid], axis[valid]) for axis in gravity.T])
-        stated = stated_unit(sheet.columns[threes["linear"].places[0]])
-        sheet.columns += [f"total acceleration {axis}" + (f" ({stated})" if stated else "") for axis in "xyz"]
-        sheet.cells += list(total.T)
-    return sheet
-
-
-# The ends of names of columns with fractions of a second, without a plural s, and the ns of their unit
-_FRACTIONS = {"nsec": 1, "nanosec": 1, "nanosecond": 1, "usec": 1000, "microsecond": 1000, "msec": 10**6}
-_FRACTIONS |= {"millisecond": 10**6, "milli": 10**6, "m": 10**6}
-
-
-def _add_time(sheet: Sheet, names: Sequence[str]) -> None:
-    """Add the time of a clock in several columns: of hours, minutes and seconds, of whole seconds and their fraction.
-
-    names: the columns' names by plain()."""
-    for k, name in enumerate(names[:-1]):
-        last = k
-        if [part[:1] for part in names[k : k + 3]] == ["h", "m", "s"] and all(map(_PART.fullmatch, names[k : k + 3])):
-            hours, minutes, seconds = (sheet.numbers(k + part) for part in range(3))
-            time_ns, last = of_day(10_000.0 * hours + 100.0 * minutes + seconds), k + 2
-        elif re.search(r"secs?$|seconds?$|stamp$|time$|clock$", name) and sheet.cells[k].dtype.kind in "iO":
-            try:
-                time_ns = sheet.times(k, "s" if sheet.cells[k].dtype.kind == "i" else "")
-            except InputError:
-                continue
-        else:
-            continue
-        after = names[last + 1].removesuffix("s") if last + 1 < len(names) else ""
-        size = next((ns for ending, ns in _FRACTIONS.items() if after.endswith(ending)), 0)
-        fraction = np.nan_to_num(sheet.numbers(last + 1)) * size if size else np.zeros(len(time_ns))
-        if (size and np.any(time_ns[time_ns > REPEATED] % 10**9)) or np.any((fraction < 0) | (fraction >= 1e9)):
-            continue
-        if size or last > k:
-            sheet.columns.append(f"time {' + '.join(sheet.columns[k : last + 1 + (size > 0)])} (ns)")
-            sheet.cells.append(np.where(time_ns > REPEATED, time_ns + fraction.astype(np.int64), time_ns))
-            return
-
-
-_PART = re.compile(r"h(our|r)?s?|m(in|inute)?s?|s(ec|econd)?s?")
-
-
-def _sign_positions(sheet: Sheet, names: Sequence[str]) -> None:
-    """Give positions their signs: south and west are negative. The letter is in the same cell or in its own column."""
-    for words, letters in ((LATITUDE, "NS"), (LONGITUDE, "EW")):
-        place = next((k for k, name in enumerate(names) if re.search(words, name)), None)
-        if place is None:
-            continue
-        for k in dict.fromkeys((place, place + 1, *range(len(names)))):
-            texts = as_text(sheet.cells[k]) if k < len(names) and sheet.cells[k].dtype.kind == "O" else []
-            marks = {mark for text in texts for mark in re.findall("[A-Za-z]+", text)}
-            if marks and marks <= set(letters):
-                numbers = [re.sub("[^0-9.]", "", text) for text in as_text(sheet.cells[place])]
-                signs = np.array([-1.0 if letters[1] in text else 1.0 for text in texts])
-                sheet.cells[place] = signs * np.array([float(number or "nan") for number in numbers])
-                break
-
-
-def _merge_rows(sheet: Sheet, three: _Triple) -> None:
-    """Fill axes that are in successive rows into the row of the last axis."""
-    starts = np.argmax(np.isfinite(three.values), axis=0)
-    ends = np.isfinite(three.values[:, int(np.argmax(starts))])
-    for place, column in zip(three.places, three.values.T):
-        row = np.maximum.accumulate(np.where(np.isfinite(column), np.arange(len(column)), 0))
-        sheet.cells[place] = np.where(ends, column[row], np.nan)
-
-
-def _find_triples(sheet: Sheet) -> list[_Triple]:
-    """The groups of three columns that belong together."""
-    stems: dict[str, dict[str, int]] = {}
-    for place, name in enumerate(sheet.columns):
-        for stem, axis in _split_axis(name):
-            while axis in stems.setdefault(stem, {}):
-                stem += " "  # another sensor with the same names
-            stems[stem][axis] = place
-    triples: list[_Triple] = []
-    used: set[int] = set()
-    for stem, axes in stems.items():
-        for group in ["xyz"] if set("xyz") <= set(axes) else _numbered(axes):
-            places = [axes[axis] for axis in group]
-            stated = stated_unit(sheet.columns[places[0]])
-            by_unit = "gyro" if _is_of(RATES, stated) else "accel" if _is_of(ACCELERATIONS, stated) else ""
-            kind = _kind(stem) or by_unit
-            if kind in ("accel", "gyro", "either") and not _numeric(sheet, places):
-                cell = next((cell for place in places for cell in as_text(sheet.cells[place]) if cell), "")
-                sheet.unread = (
-                    f"its columns {', '.join(sheet.columns[k] for k in places)} hold no numbers ({cell[:20]!a})"
-                )
-            if not used & set(places) and _numeric(sheet, places):
-                used |= set(places)
-                triples.append(_Triple(stem, places, kind, sheet.table(places)))
-    return triples or _side_by_side(sheet)
-
-
-def _single(sheet: Sheet, key: str, kind: str) -> dict[str, str]:
-    """The columns of single axes whose names fit a sensor of this kind."""
-    named = [(stem, axis, name) for name in sheet.columns for stem, axis in _split_axis(name)]
-    return {key + axis: name for stem, axis, name in reversed(named) if axis in "xyz" and _kind(stem) == kind}
-
-
-def _numeric(sheet: Sheet, places: Sequence[int]) -> bool:
-    return all(np.mean(np.isfinite(sheet.numbers(place))) > 0.02 for place in places)
-
-
-def _numbered(axes: dict[str, int]) -> list[list[str]]:
-    """Groups of three columns with successive numbers: data1 to data3, data4 to data6."""
-    numbers = sorted((axis for axis in axes if axis.isdigit()), key=int)
-    if len(numbers) % 3 or not numbers or int(numbers[-1]) - int(numbers[0]) != len(numbers) - 1:
-        return []
-    return [numbers[k : k + 3] for k in range(0, len(numbers), 3)]
-
-
-def _side_by_side(sheet: Sheet) -> list[_Triple]:
-    """Groups of three adjacent columns without meaningful names, of which one contains gravity if possible."""
-    numeric = [
-        place
-        for place, name in enumerate(sheet.columns)
-        if _numeric(sheet, [place]) and not TIME_NAME.search(plain(name)) and not _increasing(sheet, place)
-        if len(np.unique(sheet.numbers(place))) > 3 and not _KNOWN.search(plain(name))
-    ]
-    runs = [numeric[k : k + 3] for k in range(len(numeric) - 2)] if len(numeric) > 5 else []
-    for shift in range(3):  # where the groups begin
-        beside = [run for run in runs[shift::3] if run[2] - run[0] == 2]
-        triples = [_Triple("", run, "", sheet.table(run)) for run in beside]
-        if any(_has_gravity(triple, None, near=True) for triple in triples):
-            return triples
-    return [_Triple("", run, "", sheet.table(run)) for run in runs[::3] if run[2] - run[0] == 2]
-
-
-_KNOWN = re.compile(r"speed|velocity|lat|lon|lng|alt|height|lean|angle|heading|temp|sat|acc")
-
-
-def _increasing(sheet: Sheet, place: int) -> bool:
-    numbers = sheet.numbers(place)
-    steps = np.diff(numbers[np.isfinite(numbers)])
-    return len(steps) > 2 and bool(np.mean(steps >= 0.0) > 0.95 and np.any(steps > 0.0))
-
-
-def _split_axis(name: str) -> Iterator[tuple[str, str]]:
-    """Yield (name without its axis, axis) for each way to find an axis in a name."""
-    sensor, colon, bare = _without_unit(name).rpartition(":")
-    words = re.sub(r"axis|[\W_]+", " ", bare.lower()).split()
-    sensor = plain(sensor) + (":" if colon else "")
-    if words in (["p"], ["q"], ["r"]):  # rates about x, y and z in flight mechanics
-        yield f"{sensor}omega", "xyz"["pqr".index(words[0])]
-        return
-    for k, word in enumerate(words):  # LongAcc, accLat
-        part = next((part for part in _AXES if word.startswith(part) or word.endswith(part)), word)
-        words[k : k + 1] = [word] if part == word else [part, word.replace(part, "", 1)]
-    for k, word in enumerate(words):
-        others = " ".join(words[:k] + words[k + 1 :])
-        axis = word if word in ("x", "y", "z") else _AXES.get(word, "")
-        if axis and (others or word == axis or _is_of(RATES, stated_unit(name))):
-            yield sensor + others, axis
-            return
-    joined = "".join(words)
-    for k, word in reversed(list(enumerate(words))):  # accx, or ax before the name of a sensor
-        last = k == len(words) - 1
-        if len(joined) > 1 and word[-1] in "xyz" and not _NO_AXIS.search(word) and (last or len(word) == 2):
-            yield sensor + " ".join([*words[:k], word[:-1], *words[k + 1 :]]).strip(), word[-1]
-            return
-    if len(joined) > 1 and joined[0] in "xyz":
-        yield sensor + joined[1:], joined[0]
-    elif (match := re.fullmatch(r"(.*?)(\d{1,2})", joined)) and (colon or not bare.startswith("#")):
-        yield sensor + match[1], match[2]
-
-
-_NO_AXIS = re.compile(r"..(acy|ity|ncy)$")  # accuracy, velocity, frequency
-
-
-def _without_unit(name: str) -> str:
-    """A name without its unit. The unit is in brackets at the end, or after the last _."""
-    bare = re.sub(r"[(\[]([^)\]]*)[)\]]\s*$", lambda bracket: "" if _is_unit(bracket[1]) else " " + bracket[1], name)
-    head, mark, last = bare.rpartition("_")
-    return head if mark and _is_unit(last) and len(head) > 1 else bare
-
-
-def _is_of(units: dict[str, float], name: str) -> bool:
-    """True if a unit is one of ACCELERATIONS or RATES, or a rare one of the same kind."""
-    return name in units or name in (RARE_RATES if units is RATES else RARE_ACCELERATIONS)
-
-
-def _is_unit(text: str) -> bool:
-    name = unit(text)
-    in_tables = name in (*SPEEDS, "counts") or _is_of(ACCELERATIONS, name) or _is_of(RATES, name)
-    return in_tables or tick_ns(name) > 0 or bool(counts_per(text)) or "/" in text
-
-
-def stated_unit(name: str) -> str:
-    """The unit in a column's name, or ""."""
-    in_brackets, last = unit(unit_in(name)), unit(name.rpartition("_")[2])
-    bare = plain(name)
-    if in_brackets and _is_unit(in_brackets):
-        return in_brackets
-    if "_" in name and _is_unit(last):
-        return last
-    if "gyroadc" in bare:  # Betaflight
-        return "deg/s"
-    for word, unit_name in (("milli", "ms"), ("micro", "us"), ("nano", "ns"), ("minutes", "min"), ("hours", "h")):
-        if word in bare:
-            return unit_name
-    if bare.endswith("ms"):
-        return "ms"
-    return unit(bare) if unit(bare) in TIMES else ""
-
-
-def _kind(stem: str) -> str:
-    sensor, _, stem = stem.rpartition(":")
-    for text in (re.sub(r"[ \d]", "", stem), *re.sub(r"\d", "", stem).split()[-1:], sensor):
-        for kind, words in _KINDS.items():
-            if text and re.search(words, text):
-                return kind
-    return ""
-
-
 # Accelerometer and gyro
 
 
 def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> None:
     """Add the accelerometer and the gyro to findings, and note what is missing."""
-    threes = _find_triples(sheet)
-    kinds = {kind: [three for three in threes if three.kind == kind] for kind in (*_KINDS, "")}
+    threes = find_triples(sheet)
+    kinds = {kind: [three for three in threes if three.kind == kind] for kind in (*KINDS, "")}
     scales = _scales(sheet)
     possible = [*kinds["accel"], *kinds["either"], *([] if kinds["accel"] else kinds[""])]
     without = kinds["linear"] or kinds["accel"]
     accel = _first_with_gravity(possible, seconds)
-    accel = accel or next((three for three in kinds["linear"] if _has_gravity(three, seconds, near=True)), None)
+    accel = accel or next((three for three in kinds["linear"] if three.has_gravity(seconds, near=True)), None)
     exchanged = None if accel else _first_with_gravity(kinds["gyro"], seconds)
-    accel = accel or exchanged or next((three for three in kinds["accel"] if not _is_linear(three, seconds)), None)
+    accel = accel or exchanged or next((three for three in kinds["accel"] if not three.is_linear(seconds)), None)
     unnamed = [three for three in (*kinds["either"], *kinds[""]) if three is not accel]
-    others = [three for three in unnamed if accel is None or not _is_second(three, accel, seconds)]
+    others = [three for three in unnamed if accel is None or not three.is_second(accel, seconds)]
     rates = _partner(accel, kinds["gyro"]) or _partner(accel, others)
     if exchanged is not None and without:
         rates = without[0]
@@ -562,79 +311,24 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
         findings.found["g"] = of_gyro
 
 
-def _partner(accel: _Triple | None, gyros: Sequence[_Triple]) -> _Triple | None:
+def _partner(accel: Triple | None, gyros: Sequence[Triple]) -> Triple | None:
     """The gyro whose names are most like those of the accelerometer, because a table may have two sensors."""
     stem = "" if accel is None else accel.stem
     return max(gyros, key=lambda gyro: difflib.SequenceMatcher(None, stem, gyro.stem).ratio(), default=None)
 
 
-def _names(sheet: Sheet, three: _Triple) -> list[str]:
+def _names(sheet: Sheet, three: Triple) -> list[str]:
     names = sheet.columns
     return [names[place] if names.count(names[place]) == 1 else f"#{place + 1}" for place in three.places]
 
 
-def _first_with_gravity(threes: Sequence[_Triple], seconds: Array | None) -> _Triple | None:
+def _first_with_gravity(threes: Sequence[Triple], seconds: Array | None) -> Triple | None:
     """The first group whose vectors are as long as gravity in some unit. Without such a group, the first group with a
     constant length."""
     return next(
-        (three for three in threes if _has_gravity(three, seconds, near=True)),
-        next((three for three in threes if _has_gravity(three, seconds, near=False)), None),
+        (three for three in threes if three.has_gravity(seconds, near=True)),
+        next((three for three in threes if three.has_gravity(seconds, near=False)), None),
     )
-
-
-def _has_gravity(three: _Triple, seconds: Array | None, near: bool) -> bool:
-    """Return True if the values contain gravity: their length is constant in calm stretches, and hardly ever near 0.
-
-    near: True if the length must also be gravity's length in some unit. If False, the length must be more constant.
-    """
-    values = three.values[np.all(np.isfinite(three.values), axis=1)]
-    if len(values) < 3:
-        return False
-    means = np.linalg.norm(moving_mean(values, _rows_in(CALM_S, seconds, len(three.values))), axis=1)
-    length = float(np.median(np.linalg.norm(values, axis=1)))
-    if length <= 0.0 or float(np.percentile(means, 10.0)) < LINEAR * length:
-        return False
-    most = NEAR if _are_whole(values) else LEANT  # raw counts differ by a factor of 2
-    if near and not any(1.0 / NEAR < length / gravity < most for gravity in _gravities().values()):
-        return False
-    return float(np.std(means)) / length < (0.25 if near else 0.02)
-
-
-def _is_second(three: _Triple, accel: _Triple, seconds: Array | None) -> bool:
-    """True for another accelerometer beside accel: its values are as long, and contain gravity."""
-    lengths = [float(np.nanmedian(np.linalg.norm(each.values, axis=1))) for each in (three, accel)]
-    return 1.0 / NEAR < lengths[0] / max(lengths[1], 1e-9) < NEAR and _has_gravity(three, seconds, near=True)
-
-
-def _is_linear(three: _Triple, seconds: Array | None) -> bool:
-    """True if the mean of the values over some seconds is short, because they do not contain gravity."""
-    values = three.values[np.all(np.isfinite(three.values), axis=1)]
-    if len(values) < 3:
-        return True
-    means = np.linalg.norm(moving_mean(values, _rows_in(10.0 * CALM_S, seconds, len(three.values))), axis=1)
-    return float(np.median(means)) < LINEAR * float(np.median(np.linalg.norm(values, axis=1)))
-
-
-def _rows_in(span_s: float, seconds: Array | None, count: int) -> int:
-    """The number of rows in span_s. Without a time column, 25 rows, but at most a tenth of all rows."""
-    if seconds is None or not np.any(np.isfinite(seconds)):
-        return max(1, min(25, count // 10))
-    span = float(np.nanmax(seconds) - np.nanmin(seconds))
-    return max(1, min(count // 3, round(span_s * count / max(span, 1e-6))))
-
-
-def calm_length(values: Array, seconds: Array | None) -> float:
-    """The median length of vectors, shape (n, 3), in calm stretches, in which their length changes least."""
-    values = values[np.all(np.isfinite(values), axis=1)]
-    lengths = np.linalg.norm(values, axis=1)
-    spread = moving_spread(lengths, _rows_in(CALM_S, seconds, len(values)))
-    return float(np.median(lengths[spread <= np.quantile(spread, CALMEST)]))
-
-
-def _gravities() -> dict[str, float]:
-    """Length of gravity in each unit of acceleration."""
-    gravities = {"g": 1.0, "m/s2": STANDARD_GRAVITY, "mg": 1000.0}
-    return gravities | {f"counts/{size:g}": size for size in COUNTS_PER_G}
 
 
 def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> ColumnFinding:
@@ -643,10 +337,10 @@ def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> Col
     values: the accelerations, shape (n, 3). stated: the unit in the names of their columns.
     """
     length = calm_length(values, seconds)
-    if stated and not (_is_of(ACCELERATIONS, stated) or counts_per(stated) or stated == "counts"):
+    if stated and not (is_of(ACCELERATIONS, stated) or counts_per(stated) or stated == "counts"):
         return ColumnFinding([], "?", f"its unit {stated} is not known", False)
-    counts = _are_whole(values)
-    gravities = {name: size for name, size in _gravities().items() if counts or not name.startswith("counts")}
+    counts = are_whole(values)
+    gravities = {name: size for name, size in GRAVITIES.items() if counts or not name.startswith("counts")}
     near = min(gravities, key=lambda name: abs(np.log(length / gravities[name])))
     why = f"gravity at rest is {length:.4g} long"
     if counts_per(stated) or stated in RARE_ACCELERATIONS:
@@ -660,22 +354,17 @@ def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> Col
     return ColumnFinding([], near, why, certain)
 
 
-def _are_whole(values: Array) -> bool:
-    good = values[np.isfinite(values)]
-    return len(good) > 0 and bool(np.all(good == np.rint(good))) and float(np.max(np.abs(good))) > 20.0
-
-
 def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None, stated: str = "") -> ColumnFinding:
     """Find the unit of rates from the turns of gravity or from the columns' names, otherwise from their size.
 
     rates: shape (n, 3). accel: the finding of the accelerometer. The returned finding names no columns.
     """
     fit = RateFit() if seconds is None else fit_rates(seconds, force, rates)
-    if "/" in stated and not (_is_of(RATES, stated) or counts_per(stated)):
+    if "/" in stated and not (is_of(RATES, stated) or counts_per(stated)):
         return ColumnFinding([], "?", f"its unit {stated} is not known", False)
     candidates = gyro_units(rates, accel)
     by_fit = fit.unit_among(candidates)
-    if _is_of(RATES, stated) or counts_per(stated):
+    if is_of(RATES, stated) or counts_per(stated):
         also = f", and so do the turns of gravity: {by_fit}" if by_fit == stated else ""
         size = factor(stated, RATES, "g")
         apart = by_fit and not 0.7 < candidates[by_fit] / size < 1.4
@@ -693,7 +382,7 @@ def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None
 def gyro_units(rates: Array, accel: ColumnFinding) -> dict[str, float]:
     """The possible units of rates, shape (n, 3), with their factors to deg/s. Counts are possible if the accelerometer
     has counts."""
-    if counts_per(accel.unit) and _are_whole(rates):
+    if counts_per(accel.unit) and are_whole(rates):
         return {f"counts/{size:g}": 1.0 / size for size in COUNTS_PER_DPS}
     return dict(RATES)
 

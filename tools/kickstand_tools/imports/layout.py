@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..common.errors import InputError
-from ..logs.csv_reader import Cells, cells_of, columns_of, columns_of_text, filled, numbers_of, separator_of
+from ..logs.csv_reader import cells_of, columns_of, columns_of_text, filled, numbers_of, separator_of
+from .columns import stated_unit
 from .files import RecordingFile
-from .findings import stated_unit
-from .recording import Sheet, plain
+from .recording import Sheet, increases, plain
 from .units import ACCELERATIONS, MOMENT, RATES, SPEEDS, TIME_NAME, TIMES, tick_ns, times_ns, unit
 
 LOOKED_AT = 400  # lines used to find the layout
@@ -308,17 +308,10 @@ def _names_sensors(sheet: Sheet, place: int, names: Mapping[str, Sequence[str]])
 def _is_time(sheet: Sheet, place: int, kinds: NDArray[Any]) -> bool:
     """True if a column increases, perhaps in each sensor's rows."""
     numbers = numbers_of(sheet.cells[place])
-    return _increases(numbers) or (
+    return increases(numbers) or (
         bool(TIME_NAME.search(plain(sheet.columns[place])))
-        and all(_increases(numbers[kinds == kind]) for kind in dict.fromkeys(kinds.tolist()))
+        and all(increases(numbers[kinds == kind]) for kind in dict.fromkeys(kinds.tolist()))
     )
-
-
-def _increases(numbers: Cells) -> bool:
-    """True if a column can be a time, because it increases and hardly ever decreases."""
-    good = numbers[np.isfinite(numbers.astype(float))].astype(float)
-    steps = np.diff(good)
-    return len(steps) > 2 and bool(np.mean(steps < 0.0) < 0.02 and np.mean(steps > 0.0) > 0.01 and good[-1] > good[0])
 
 
 # Labels before the values

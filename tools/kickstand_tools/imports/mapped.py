@@ -10,6 +10,7 @@ from ..common.errors import InputError
 from ..common.messages import Remedy
 from ..signals import Array
 from . import findings
+from .columns import completed, stated_unit
 from .files import RecordingFile
 from .findings import ACCEL, GYRO, OPTIONAL, REQUIRED, Findings
 from .layout import FEWEST_CELLS, joined_sheet, sheet_in
@@ -96,10 +97,10 @@ def table_in(files: list[RecordingFile]) -> Findings | None:
     """Return the findings in the table of sensors in these files, or None without a table. If the tables of several
     files do not belong together, the largest is used."""
     sheet = sheet_in(max(files, key=lambda file: len(file.text)))
-    result = None if sheet is None else findings.find(findings.completed(sheet))
+    result = None if sheet is None else findings.find(completed(sheet))
     if len(files) > 1 and (result is None or result.lacking):
         joined = joined_sheet(files)
-        of_all = None if joined is None else findings.find(findings.completed(joined))
+        of_all = None if joined is None else findings.find(completed(joined))
         if of_all and (result is None or len(of_all.lacking) < len(result.lacking)):
             of_all.joined = True
             return of_all
@@ -112,7 +113,7 @@ def sheet_of(files: list[RecordingFile], name: str, columns: Mapping[str, str]) 
     """The table with these columns, from one file or joined from several. name: for messages. Raises InputError."""
     wanted = [column.strip() for column in columns.values() if not column.strip().startswith("#")]
     sheet = sheet_in(files[0], wanted) if len(files) == 1 else joined_sheet(files)
-    sheet = sheet and findings.completed(sheet)
+    sheet = sheet and completed(sheet)
     if len(files) > 1 and (sheet is None or not set(wanted) <= set(sheet.columns)):
         raise InputError(f"{name} holds {len(files)} files: give --columns with one, such as {files[0].name}")
     if sheet is None:
@@ -243,7 +244,7 @@ def _units(sheet: Sheet, places: Mapping[str, int], given: Mapping[str, str]) ->
     for key in places.keys() & {"t", "speed", *ACCEL, *GYRO}:
         column = sheet.columns[places[key]]
         stated = given.get(key, given.get(key[0] if key in (*ACCEL, *GYRO) else key))
-        units[key] = stated or unit_in(column) or findings.stated_unit(column)
+        units[key] = stated or unit_in(column) or stated_unit(column)
     for key in (*ACCEL, *GYRO):
         if not {key, key[0]} & given.keys() and unit(units[key]) not in UNIT_KEYS[key]:
             unknown.setdefault(key[0], []).append(sheet.columns[places[key]])

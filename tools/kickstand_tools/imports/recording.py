@@ -88,6 +88,13 @@ def plain(name: str) -> str:
     return re.sub(r"[\W_]", "", re.sub(r"[(\[].*?[)\]]", "", name).lower())
 
 
+def increases(numbers: Cells) -> bool:
+    """True if a column can be a time, because it increases and hardly ever decreases."""
+    good = numbers[np.isfinite(numbers.astype(float))].astype(float)
+    steps = np.diff(good)
+    return len(steps) > 2 and bool(np.mean(steps < 0.0) < 0.02 and np.mean(steps > 0.0) > 0.01 and good[-1] > good[0])
+
+
 def unit_in(name: str) -> str:
     """The unit in brackets in a column's name, or ""."""
     match = re.search(r"[(\[]([^)\]]*)[)\]]\s*$", name)

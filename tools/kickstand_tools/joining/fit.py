@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..signals import Array
-from .compare import Comparison
-from .motion import BinMotion
+from .motion import BinMotion, Comparison
 from .track import Course, Segments
 
 AROUND_S = 6.0  # largest distance from the rough shift, including the drift at the ends of the ride

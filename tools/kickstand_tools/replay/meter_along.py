@@ -106,7 +106,7 @@ def static_lean_deg(left: Array, up: Array) -> Array:
 def formula_lean_deg(left: Array, up: Array, yaw_rate: Array) -> Array:
     """Compute the lean from each single reading by Nicolae's equations (25) and (26).
 
-    The lean is in degrees, positive to the right. kickstand.lean.formula does the same for one reading.
+    The lean is in degrees, positive to the right. kickstand.lean.bike_model does the same for one reading.
     """
     square = left * left + up * up
     size = np.sqrt(np.maximum(0.0, square - 1.0))

@@ -18,7 +18,7 @@ import sys
 from math import degrees, radians, sqrt
 
 from kickstand.calibration.parameters import Calibration
-from kickstand.lean.formula import static_lean_deg
+from kickstand.lean.bike_model import static_lean_deg
 from kickstand.lean.lean_filter import DELAY_S
 from kickstand.lean.meter import LeanMeter
 

@@ -12,7 +12,7 @@ from ..common import firmware_path
 from ..common.errors import DISTRIBUTION
 from ..common.output import check_directory, new_directory, whole_file
 from ..common.templates import filled, source_hash
-from . import archives, npm_packages, sample_ride
+from . import archives, sample_ride
 from .documents import documents
 
 PAGE = Path(__file__).resolve().parent / "page"
@@ -38,7 +38,7 @@ def site_files() -> dict[str, bytes]:
     >>> sorted(site_files())[:2]  # doctest: +SKIP
     ['bike.mjs', 'board.mjs']
     """
-    files = npm_packages.find()
+    files = archives.npm_files()
     files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in sorted(PAGE.rglob("*.*"))}
     files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # a browser shows a file with the suffix .txt
     values = {"home": home(), "preview": sample_ride.preview()}

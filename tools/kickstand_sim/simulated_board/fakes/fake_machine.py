@@ -159,12 +159,7 @@ class _Controller:
         return bytes(buf)
 
     def writeto_mem(self, addr, memaddr, buf, addrsize=8):
-        self._bytes = 1 + len(buf)
-        self._start(addr, False)
-        self._send(memaddr)
-        for value in buf:
-            self._send(value)
-        self._bus.stop()
+        self.writeto(addr, bytes([memaddr]) + bytes(buf))
 
     def writeto(self, addr, buf, stop=True):
         self._bytes = len(buf)
@@ -253,7 +248,6 @@ class SoftI2C(_Controller):
         self._held = False
 
     readfrom_mem_into = _in_one_go(_Controller.readfrom_mem_into)
-    writeto_mem = _in_one_go(_Controller.writeto_mem)
     writeto = _in_one_go(_Controller.writeto)
     readfrom_into = _in_one_go(_Controller.readfrom_into)
 

@@ -1,19 +1,22 @@
-"""Writes the ride as one HTML page with charts that you can zoom. The page needs no other file.
+"""Writes the ride as one HTML page with charts that you can zoom, which needs no other file, and as a picture.
 
 If the log has positions, a map is beside the charts. If you point at a moment in the map or in a chart, the page marks
 this moment in the map and in the charts.
 """
 
 from importlib.resources import files
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...common.errors import InputError, extra
+from ...common.output import check_directory, new_directory, whole_file
 from ...common.templates import filled, source_hash
 from ...signals import EARTH_M
 from ..overview import Overview
-from . import interactive, track_map
+from . import interactive, picture, track_map
 from .charts import charts
 
 _HERE = Path(__file__).parent
@@ -23,6 +26,27 @@ SCRIPTS = tuple((_HERE / name).read_text(encoding="utf-8") for name in ("page.js
 TILES_HOST = "https://basemaps.cartocdn.com"
 TILES_URL = TILES_HOST + "/rastertiles/voyager/{z}/{x}/{y}.png"
 MOST_ZOOM = 19
+
+
+def check_drawing(directory: Path) -> None:
+    """Raise InputError if drawing or writing to the directory is impossible."""
+    missing = [name for name in ("matplotlib", "plotly") if not find_spec(name)]
+    if missing:
+        raise InputError(f"pictures need {' and '.join(missing)}: {extra('rides')}")
+    if directory.suffix in (".png", ".html"):
+        raise InputError(f"{directory}: a picture and a page are written: give the directory for them")
+    check_directory(directory)
+
+
+def draw_ride(overview: Overview, directory: Path, tiles: bool = False) -> list[Path]:
+    """Write both files and return their paths. tiles: see draw(). Raises InputError."""
+    paths = [directory / f"{overview.ride.stem}.png", directory / f"{overview.ride.stem}.html"]
+    with new_directory(directory):
+        with whole_file(paths[0]) as path:
+            picture.draw(path, overview)
+        with whole_file(paths[1]) as path:
+            draw(path, overview, tiles)
+    return paths
 
 
 def draw(path: Path, overview: Overview, tiles: bool = False) -> None:

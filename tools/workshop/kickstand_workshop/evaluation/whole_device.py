@@ -82,6 +82,7 @@ def _read(leans: list[float]) -> NDArray[np.float64]:
     read = np.array(leans)
     absent = np.isnan(read)
     for k in range(1, len(read)):
-        if absent[k] and not absent[max(0, k - WRITING) : k].all() and not np.isnan(read[k - 1]):
+        half_written = absent[k] and not absent[max(0, k - WRITING) : k].all()  # otherwise the display shows no lean
+        if half_written:
             read[k] = read[k - 1]
     return read

@@ -7,7 +7,7 @@ has a speed of 0.
 import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY
-from kickstand_tools.analysis.stops.brake_test import (
+from kickstand_tools.analysis.stops import (
     closes,
     find_stops,
     mfdd_mps2,

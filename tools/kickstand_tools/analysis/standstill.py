@@ -8,8 +8,8 @@ find 91 %.
 
 import numpy as np
 
-from ...signals import STANDING_MPS, Array, Bools, intervals, smoothed, window_means, window_spreads
-from ..channels import Channels, spacing_s
+from ..signals import STANDING_MPS, Array, Bools, intervals, smoothed, window_means, window_spreads
+from .channels import Channels, spacing_s
 
 STALE_S = 3.0  # an older speed is not used
 

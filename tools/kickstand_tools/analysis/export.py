@@ -1,5 +1,10 @@
-"""Writes a ride in the format of another program."""
+"""Writes a ride in the format of another program, or with Kickstand's own columns as CSV or Apache Parquet.
 
+The own columns are the calibrated log in the vehicle's axes, and the lean that the display shows. In Parquet, the
+metadata of each field has its unit. pandas.read_parquet opens the file: https://arrow.apache.org/docs/python/parquet.html
+"""
+
+import gzip
 import time
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
@@ -7,23 +12,17 @@ from pathlib import Path
 
 import numpy as np
 
-from ...common.errors import InputError, extra
-from ...common.messages import Message, kind
-from ...common.output import whole_file
-from ...logs.source import Progress
-from ..channels import Channels, downsampled, rounded_to
-from ..ride import Ride
-from ..track import track
-from . import export_columns, export_gpx, export_racechrono, export_vbo
+from ..common.errors import InputError, extra
+from ..common.messages import Message, kind
+from ..common.output import whole_file
+from ..logs.csv_lines import csv_lines
+from ..logs.log import float_schema
+from ..logs.source import Progress
+from .channels import Channels, downsampled, rounded_to, track
+from .export_formats import write_gpx, write_racechrono, write_vbo
+from .ride import Ride
 
 STEP_S = {"csv": 0.0, "gpx": 0.0, "parquet": 0.0, "racechrono": 0.001, "vbo": 0.01}  # resolution of the time
-_WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
-    "csv": export_columns.write_csv,
-    "gpx": export_gpx.write,
-    "parquet": export_columns.write_parquet,
-    "racechrono": export_racechrono.write,
-    "vbo": export_vbo.write,
-}
 _NEEDS = {"gpx": ("GPX", "gpxpy"), "parquet": ("Parquet", "pyarrow")}  # name and library of a format
 _DATED = ("gpx", "racechrono", "vbo")  # formats that need date and time
 _CLOCK_S = 1e8  # a time in a log is Unix time if it is larger than this (March 1973)
@@ -35,6 +34,67 @@ RowsShare = kind(
     "this format holds times to {step_s:g} s: {samples} samples became {rows} rows, those with the same time their "
     "mean",
 )
+
+# Number of decimals and unit of each column.
+COLUMNS = {
+    "t_s": (6, "s"),
+    "lean_deg": (3, "deg"),
+    "lean_formula_deg": (3, "deg"),
+    "left_g": (5, "g"),
+    "up_g": (5, "g"),
+    "forward_g": (5, "g"),
+    "lateral_g": (5, "g"),
+    "pitch_rate_dps": (4, "deg/s"),
+    "yaw_rate_dps": (4, "deg/s"),
+    "roll_rate_dps": (4, "deg/s"),
+    "speed_mps": (3, "m/s"),
+    "temp_c": (2, "Cel"),
+    "shown_g": (5, "g"),
+    "lean_sigma_deg": (3, "deg"),
+    "lat_deg": (7, "deg"),
+    "lon_deg": (7, "deg"),
+    "utc_s": (3, "s"),
+}
+
+
+_FINE = ("t_s", "lat_deg", "lon_deg", "utc_s")  # 64-bit floats, because a 32-bit float resolves positions only to 1 m
+
+
+def write_csv(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
+    """Write CSV, gzipped if the name ends in .gz."""
+    opened = gzip.open if path.suffix == ".gz" else open
+    digits = [digit for digit, _ in COLUMNS.values()]
+    with opened(path, "wb") as file:
+        file.write((",".join(COLUMNS) + "\n").encode("ascii"))
+        for block in blocks:
+            block.t_s = block.t_s + start_s
+            file.writelines(csv_lines(np.column_stack([getattr(block, name) for name in COLUMNS]), digits))
+
+
+def write_parquet(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
+    """Write Parquet, one row group per block.
+
+    Times and positions are 64-bit floats, all other columns 32-bit floats. A missing value is NaN.
+    """
+    import pyarrow
+    from pyarrow.parquet import ParquetWriter
+
+    about = {"made_by": "kickstand", "axes": "left, up, forward; lean > 0 to the right"}
+    schema = float_schema({name: unit for name, (_, unit) in COLUMNS.items()}, _FINE, about)
+    with ParquetWriter(path, schema) as writer:
+        for block in blocks:
+            block.t_s = block.t_s + start_s
+            columns = [pyarrow.array(getattr(block, field.name), type=field.type) for field in schema]
+            writer.write_table(pyarrow.table(columns, schema=schema))
+
+
+_WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
+    "csv": write_csv,
+    "gpx": write_gpx,
+    "parquet": write_parquet,
+    "racechrono": write_racechrono,
+    "vbo": write_vbo,
+}
 
 
 def export(ride: Ride, form: str, out: Path | str, progress: Progress | None = None) -> int:

@@ -17,14 +17,20 @@ If the log has a speed, the integrated speed is fitted to it (speed_fit.py). Oth
 because integration from a wrong standstill can give any speed and distance.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from ...signals import STANDING_MPS, Array, integral, intervals, smoothed
-from ..channels import Channels, thinned
+from ..calibration.file import CalibrationFile
+from ..checks.log import check_log
+from ..logs.log import Source
+from ..logs.reader import read_log
+from ..signals import STANDING_MPS, Array, integral, intervals, smoothed
+from .channels import Channels, channels, downsampled, joined, thinned
+from .ride import Ride
 from .speed_fit import fitted_speed, speed_delay_s
 from .standstill import standing
 
@@ -89,10 +95,10 @@ class Stop:
         return self.stop_s - self.start_s
 
 
-def find_stops(channels: Channels) -> list[Stop]:
+def find_stops(ride: Channels) -> list[Stop]:
     """Find every stop from over 10 km/h with at least 1 m/s2, measured by UN Regulation No. 13 (see the module).
 
-    channels: a whole ride, from vehicle_channels(). pandas.DataFrame accepts the returned list.
+    ride: a whole ride, from vehicle_channels(). pandas.DataFrame accepts the returned list.
 
     >>> from kickstand_tools.api import Log, fit_two_positions, simulate_ride, vehicle_channels
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)
@@ -103,8 +109,38 @@ def find_stops(channels: Channels) -> list[Stop]:
     >>> stops[-1].speed_from, stops[-1].initial_speed_mps > 3.0, stops[-1].mfdd_mps2 > 1.0
     ('log', True, True)
     """
-    ride = thinned(channels, RATE_S)
+    ride = thinned(ride, RATE_S)
     return stops_of(ride, standing(ride))
+
+
+def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
+    """Find every stop of a log from over 10 km/h, and measure it by UN Regulation No. 13 (see find_stops).
+
+    The firmware's lean filter takes most of the time. The filter runs only for motorcycles, because a car has no lean.
+
+    calibration: must be aligned.
+    Raises InputError.
+
+    >>> from kickstand_tools.api import Log, fit_two_positions, simulate_ride
+    >>> ride = simulate_ride("street", seed=1, seconds=60.0)
+    >>> poses = [Log.from_readings(pose, ride.rate_hz) for pose in (ride.kickstand, ride.upright)]
+    >>> log = Log.from_readings(ride.readings, ride.rate_hz)
+    >>> log.speed_mps[::200] = ride.truth["speed_mps"][::200]  # once per second
+    >>> stops = brake_tests(log, fit_two_positions(*poses).calibration)
+    >>> stops[-1].initial_speed_mps > 3.0, stops[-1].mfdd_mps2 > 1.0
+    (True, True)
+    """
+    ride = Ride(check_log(read_log(log), axes=False), calibration)
+    parts = _car_channels(ride) if ride.car else ride.read().parts()
+    return find_stops(joined(downsampled(parts, RATE_S)))
+
+
+def _car_channels(ride: Ride) -> Iterator[Channels]:
+    """Yield the channels of a car's ride, without a lean."""
+    for _, part in ride.log.parts(ride.checked.measured):
+        lean: dict[str, Array] = {name: np.zeros(len(part.t_s)) for name in ("shown_g", "resting", "sure")}
+        if len(part.t_s):
+            yield channels(part, ride.calibration, lean, car=True)
 
 
 def stops_of(ride: Channels, still: NDArray[np.bool_]) -> list[Stop]:

@@ -7,8 +7,8 @@ changes between them. The acceleration shows these changes, but its integral dri
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ...signals import Array, best_lag, integral, smoothed
-from ..channels import Channels
+from ..signals import Array, best_lag, integral, smoothed
+from .channels import Channels
 
 SMOOTH_S = 0.2  # averaging time of the acceleration a(t) in fitted_speed()
 LEAD_S = 4.0  # the fit also uses the logged speeds in this time before the braking

@@ -1,1 +1,0 @@
-"""Writes a ride in the formats of other programs, one module per format."""
