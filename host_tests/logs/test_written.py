@@ -28,29 +28,16 @@ from kickstand_tools.logs.reader import time_texts
 from support import command
 
 
-def numbers(digits):
-    random = np.random.default_rng(digits)
-    return np.concatenate([random.normal(scale=scale, size=300) for scale in (1e-6, 1e-2, 1.0, 30.0, 1e6, 1.7e9)])
-
-
-@given(st.lists(st.floats(allow_nan=False), min_size=1, max_size=20), st.integers(0, 7))
-def test_any_number_is_written_as_python_writes_it(values, digits):
-    lines = b"".join(csv_lines(np.reshape(values, (-1, 1)), [digits])).decode().split("\n")[:-1]
+@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=20), st.integers(0, 7))
+def test_any_number_is_written_and_read_as_python_does(values, digits):
+    text = b"".join(csv_lines(np.reshape(values, (-1, 1)), [digits]))
+    lines = text.decode().split("\n")[:-1]
     assert lines == [f"{value:.{digits}f}" for value in values]
+    read, expected = np.ravel(np.array(numbers_in(text, 1))), np.array(lines, dtype=float)
+    assert np.array_equal(read, expected) and np.array_equal(np.signbit(read), np.signbit(expected))
 
 
-@pytest.mark.parametrize("digits", range(8))
-def test_numbers_are_read_as_python_reads_them(digits):
-    texts = [f"{value:.{digits}f}" for value in numbers(digits).tolist()]
-    texts += ["-0.0", "7", "-12"] if digits == 0 else [f"-.{'5' * digits}", f"00.{'1' * digits}"]
-    table = numbers_in("".join(f"{text},,\n" for text in texts).encode(), 3)
-    assert table is not None and len(table) == len(texts)
-    values = np.array([float(text) for text in texts])
-    assert np.array_equal(table[:, 0], values) and np.array_equal(np.signbit(table[:, 0]), np.signbit(values))
-    assert np.all(np.isnan(table[:, 1:]))
-
-
-@pytest.mark.parametrize("text", ["1.25,,-3\n,2,4", "1.5,2,1234567890123456789\n1.,-.5,0.1234567890123456\n"])
+@pytest.mark.parametrize("text", ["1.25,,-3\n,2,-0.0", "1.5,2,1234567890123456789\n00.,-.5,0.1234567890123456\n"])
 def test_plain_numbers_are_read_with_empty_cells(text):
     values = [[float(cell or "nan") for cell in line.split(",")] for line in text.strip().split("\n")]
     assert np.array_equal(np.array(numbers_in(text.encode(), 3)), values, equal_nan=True)
