@@ -87,8 +87,8 @@ _SPREAD = const(0.4)
 # bends, and on straights that look like bends.
 _ONE_SIDE = const(0.12)
 _ONE_SIDE_S = const(2.5)  # s: time after which such a lean is hidden. Larger: fewer leans are hidden.
-# rad: a lean above this value is hidden only after _LONG_S, because the upward force confirms it. Smaller: fewer leans
-# are hidden.
+# rad: a lean above this value is not hidden if the bike rolled to the side to which it turns, because the upward force
+# confirms it. Smaller: fewer leans are hidden.
 _SURE_LEAN = const(0.3)
 # ratio: limit to which larger forces to the side are reduced. Larger: a single blow counts for more.
 _MOST_SIDEWAYS = const(0.25)
@@ -98,11 +98,14 @@ _STRICT = const(0.85)  # ratio: factor on the limits after a doubt. Larger: a la
 _FIT = const(0.6)
 # s: time for which everything must fit after the first doubt, after the second doubt, and so on. Larger: after a fault
 # the lean stays hidden for longer.
-HOLDS_S = (3.0, 4.0, 4.0, 20.0, 60.0)
+HOLDS_S = (3.0, 4.0, 5.0, 20.0, 60.0)
 # s: time for which everything must fit after a gap in the readings. Larger: after a gap the lean stays hidden for
 # longer.
 _GAP_S = const(4.5)
-# Number of doubts after which only time in bends counts as fitting, because on a straight nearly everything fits.
+# s: a misfit within this time after a misfit has the same cause, so it is not counted. Larger: after a fault that ends
+# the lean is shown again sooner, and a lasting fault is named later.
+_SAME_S = const(3.0)
+# From this number of doubts on only riding in bends counts as fitting, because on a straight nearly everything fits.
 MILD = 3
 # s: shortest time between two doubts after more than MILD doubts. The time between two doubts is needed to detect rest.
 # Larger: errors of the sensor that have changed are found later.
@@ -163,7 +166,7 @@ class Consistency:
         self.odd = None
         self.doubts = 0
         self._fits_s = 0.0
-        self._since_s = 0.0  # time since the last doubt
+        self._since_s = 0.0  # time since the last misfit that was counted
         self._in_rest = True  # True if time at rest counts as fitting
         self._turned = False  # True if the sides are exchanged
         self._side_s = 0.0  # sum of the force to the side
@@ -174,7 +177,7 @@ class Consistency:
     def _forget_means(self):
         self._left, self._up = Innovations((LEFT_SHORT, LEFT_LONG)), Innovations((UP_SHORT, UP_LONG))
         self._pitch, self._slope = Mean(_LONG_S), Mean(_SHORT_S)
-        self._lean = self._one_side_s = 0.0
+        self._one_side_s = 0.0
 
     def gap(self, in_rest=True):
         """Doubt until everything has fitted for a while, because the filter has restarted. in_rest: True if time at
@@ -187,8 +190,7 @@ class Consistency:
     @property
     def one_sided(self):
         """True if a misfit is not yet forgotten, and the lean has stayed on one side for too long."""
-        least_s = _LONG_S if abs(self._lean) > _SURE_LEAN else _ONE_SIDE_S
-        return self.doubts > 0 and abs(self._one_side_s) > least_s
+        return self.doubts > 0 and abs(self._one_side_s) > _ONE_SIDE_S
 
     @property
     def _slip(self):
@@ -218,7 +220,7 @@ class Consistency:
             left, up: innovations of the forces to the left and up, in standard deviations.
             sideways: force to the side divided by force up that trim, tyres and rider do not explain. None if the bike
                 need not be in balance.
-            pitch, lean: in rad.
+            pitch, lean: of the bike, in rad.
             push: estimated forward acceleration in g.
             yaw_rate: in rad/s.
         """
@@ -234,10 +236,9 @@ class Consistency:
         self._pitch.add(pitch, seconds)
         # pitch * pitch is added if the forward force confirms none of the pitch
         self._slope.add(-pitch * max(-abs(pitch), min(abs(pitch), push)), seconds)
-        self._lean = lean
         if lean * self._one_side_s < 0.0 or abs(lean) < 0.5 * _ONE_SIDE:
             self._one_side_s = 0.0
-        elif abs(lean) > _ONE_SIDE:
+        elif _ONE_SIDE < abs(lean) and (abs(lean) < _SURE_LEAN or self._roll_out > 0.0 or self.doubts >= MILD):
             self._one_side_s += seconds if lean > 0.0 else -seconds
         wrong_roll = abs(left) / _WRONG_ROLL if self._roll_out > _ROLL_OUT else 0.0
         left = max(self._left.add(left, seconds), wrong_roll)
@@ -258,7 +259,7 @@ class Consistency:
             return True
         elif self.doubt and worst > _FIT:
             self._fits_s = 0.0
-        elif (self.doubts <= MILD or abs(yaw_rate) > _TURNING) and not self.one_sided:
+        elif (self.doubts < MILD or abs(yaw_rate) > _TURNING) and not self.one_sided:
             self._fit(seconds)
         return False
 
@@ -271,9 +272,10 @@ class Consistency:
 
     def fail(self, code):
         """Doubt because of a misfit. code: see odd."""
+        if not self.doubt or self._since_s > _SAME_S:
+            self._since_s = 0.0
+            self.doubts = min(self.doubts + 1, len(HOLDS_S))
         self.gap()
-        self._since_s = 0.0
-        self.doubts = min(self.doubts + 1, len(HOLDS_S))
         if self.doubts >= MILD:
             self._blame(code)
 

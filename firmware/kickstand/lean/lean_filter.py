@@ -28,7 +28,7 @@ from .bike_model import (
     possible_pitch,
     predict,
 )
-from .consistency import Consistency
+from .consistency import MILD, Consistency
 from .kalman import Covariance, UprightTrim
 
 _WINDOW_US = const(200_000)
@@ -42,7 +42,7 @@ _MAX_SPEED = const(250.0)
 
 # What LeanFilter.start() keeps
 ALL = 2  # after missing readings: everything but lean and pitch
-ERRORS = 1  # the speed, and the sensor's errors of some time ago, because a fault may be over
+ERRORS = 1  # the speed, and the sensor's errors from before the fault, because the fault may be over
 NONE = 0  # nothing about sensor and bike, because a bias may have jumped
 
 
@@ -159,9 +159,10 @@ class LeanFilter:
         p.add_noise(SPEED, (measurements.SIGMA_LOST_FORCE * STANDARD_GRAVITY * seconds) ** 2)
 
     def _remember(self, seconds):
-        """Store the sensor's errors of some time ago, while everything fits."""
+        """Store the sensor's errors of some time ago, while everything fits. The errors from before a misfit are kept
+        until it is forgotten, or until the filter starts with NONE."""
         self._good_s += seconds
-        if self.consistency.doubt:
+        if self.consistency.doubt or 0 < self.consistency.doubts < MILD:
             self._good_s = 0.0
         elif self._good_s >= measurements.REMEMBER_S:
             self._good_s = 0.0
@@ -262,7 +263,7 @@ class LeanFilter:
             state.failed = True
         if state.failed:
             # The first two times the fault may be over. Later a bias may have jumped
-            self.start(ERRORS if self.consistency.doubts <= 2 else NONE)
+            self.start(ERRORS if self.consistency.doubts < MILD else NONE)
             return
         roll_acceleration = (state.roll_rate - state.last_roll_rate) / seconds
         state.last_roll_rate = state.roll_rate
@@ -371,7 +372,9 @@ class LeanFilter:
                 # The equations do not hold in a wheelie, so only the duration of the pitch is judged
                 misfit = up_misfit = 0.0
             lean = x[LEAN] - state.upright
-            pitch, turning = x[PITCH], model.yaw_rate
+            # The yaw error turns a part of lean and yaw rate into the sensor's pitch and forward force
+            push += model.sideways * x[YAW_ERROR]
+            pitch, turning = x[PITCH] + x[YAW_ERROR] * model.sin_lean, model.yaw_rate
             self.consistency.add_rates(means[2], means[3], means[4], seconds)
             state.failed = self.consistency.add(misfit, up_misfit, unbalanced, pitch, push, lean, turning, seconds)
         self._remember(seconds)

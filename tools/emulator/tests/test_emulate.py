@@ -1,7 +1,6 @@
 """Tests the command `kickstand emulate`, and the commands flash and status on an emulated board, through mpremote."""
 
 import socket
-import subprocess
 import sys
 
 import pytest
@@ -40,11 +39,3 @@ def test_without_its_library_an_esp32_is_refused(words, tmp_path, monkeypatch):
     monkeypatch.setenv(esp32_library.VARIABLE, str(tmp_path))
     refusal = command.refused(tmp_path, *words, words="no emulated ESP32: libqemu-xtensa.so is missing")
     assert str(tmp_path) in refusal
-
-
-def test_an_esp32_needs_no_emulator_of_the_pico():
-    """The modules for an ESP32 are imported without rp2040py."""
-    script = "import sys; sys.modules['rp2040py'] = None\nfrom kickstand_emulator.emulate import device_class\n"
-    script += "import kickstand_emulator.bench\nprint(device_class('esp32').NAME)"
-    process = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
-    assert (process.stdout, process.stderr) == ("ESP32\n", "")
