@@ -28,7 +28,7 @@ _HALF_PERIOD_US = 5  # half a period of SCL while a bus is freed, so SCL runs at
 # time-out is for each bit. The default of 50 ms would stop the loop for too long.
 _TIMEOUT_BITS = 2000
 _TURN_BYTES = 2300  # bytes of heap that one pass of the app's loop uses, at most 2270 on a Pico
-_FEWEST_TURNS = 3
+_FEWEST_TURNS = 6
 
 _WATCHDOG_MS = 8000  # the watchdog of a Pico allows at most 8388 ms
 _WEEK_MS = 604_800_000  # a week. An ESP32 counts a time-out in 32 bits, with four counts per ms, so it allows 12 days
