@@ -26,9 +26,6 @@ from .ui.pages import Screen
 from .units import const
 
 LOOP_US = 10_000  # length of a pass of the loop in us; the chip's FIFO can keep samples for much longer
-# Bytes of heap that a pass of the loop uses, the second while aligning by driving
-_PASS_BYTES = const(2200)
-_PASS_BYTES_DRIVING = const(3000)
 _PLAN_EVERY = const(8)  # number of collections between two checks of the free heap; a check takes 3 to 7 ms
 _PAGE_MS = const(100)
 # A lean on the display must be at most half a second old. So a page shows no lean if its own delay plus the age of the
@@ -173,8 +170,7 @@ class App:
     def _plan_collection(self):
         """Set the number of passes until the next garbage collection."""
         if self._collections % _PLAN_EVERY == 0:
-            used = _PASS_BYTES_DRIVING if self.drive else _PASS_BYTES
-            self._planned_turns = port.turns_to_collect(used)
+            self._planned_turns = port.turns_to_collect()
         self._collections += 1
         self._turns_left = self._planned_turns
 

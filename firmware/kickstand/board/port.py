@@ -27,7 +27,8 @@ _HALF_PERIOD_US = 5  # half a period of SCL while a bus is freed, so SCL runs at
 # Time-out in bit times. On a Pico the time-out is for a whole transfer, which has at most 136 bytes. On an ESP32 the
 # time-out is for each bit. The default of 50 ms would stop the loop for too long.
 _TIMEOUT_BITS = 2000
-_FEWEST_TURNS = 3
+_TURN_BYTES = 2300  # bytes of heap that one pass of the app's loop uses, at most 2270 on a Pico
+_FEWEST_TURNS = 6
 
 _WATCHDOG_MS = 8000  # the watchdog of a Pico allows at most 8388 ms
 _WEEK_MS = 604_800_000  # a week. An ESP32 counts a time-out in 32 bits, with four counts per ms, so it allows 12 days
@@ -99,22 +100,18 @@ def open_i2c(controller, sda_pin, scl_pin, frequency):
     return machine.I2C(controller, sda=sda, scl=scl, freq=frequency, timeout=timeout_us)
 
 
-def turns_to_collect(turn_bytes):
+def turns_to_collect():
     """Return the number of passes of the app's loop between two garbage collections.
 
-    These passes use most of the free heap. If they used it up, a collection would run in the middle of a pass. An
-    ESP32's heap starts with 64 KB and grows only after a collection that frees too little.
-
-    Args:
-        turn_bytes: bytes of heap that a pass uses.
-    """
+    These passes use three quarters of the free heap. If they used it up, a collection would run in the middle of a
+    pass. An ESP32's heap starts with 64 KB and grows only after a collection that frees too little."""
     free = gc.mem_free()
     if IS_ESP32:
         import esp32  # type: ignore[import-not-found]
 
         # mem_free() also counts the possible growth of the heap, which is the largest block of ESP-IDF's heap
         free -= max(region[2] for region in esp32.idf_heap_info(esp32.HEAP_DATA))
-    return max(_FEWEST_TURNS, free * 5 // (6 * turn_bytes))
+    return max(_FEWEST_TURNS, free * 3 // (4 * _TURN_BYTES))
 
 
 def start_watchdog():
