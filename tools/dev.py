@@ -27,7 +27,7 @@ PYTHON = os.path.join(VENV, "Scripts", "python.exe") if os.name == "nt" else os.
 STAMP = os.path.join(VENV, "installed.txt")
 LOG = os.path.join(VENV, "install.log")
 OLDEST = (3, 11)
-# {name: what is installed}; each contains the earlier ones
+# {task: what pip installs for it}. A later entry contains the earlier ones
 INSTALLATIONS = {"": ["."], "test": [".[test]", "tools/fleet[s3,test]", "tools/emulator"]}
 NAMES = list(INSTALLATIONS)
 REPORT_S = 5  # time between two lines of progress while installing

@@ -87,8 +87,8 @@ _SPREAD = const(0.4)
 # bends, and on straights that look like bends.
 _ONE_SIDE = const(0.12)
 _ONE_SIDE_S = const(2.5)  # s: time after which such a lean is hidden. Larger: fewer leans are hidden.
-# rad: a lean above this value is not hidden if the bike rolled to the side to which it turns, because the upward force
-# confirms it. Smaller: fewer leans are hidden.
+# rad: with fewer than MILD doubts, a lean above this value is not hidden if the bike rolled to the side to which it
+# turns, because the upward force confirms it. Smaller: fewer leans are hidden.
 _SURE_LEAN = const(0.3)
 # ratio: limit to which larger forces to the side are reduced. Larger: a single blow counts for more.
 _MOST_SIDEWAYS = const(0.25)

@@ -1,7 +1,8 @@
 """The guided calibrations: takes one pose after another, and computes and saves the result.
 
 The flow of a guided calibration is a generator. The generator waits by `yield`, and is continued with an event: the
-counts of a sample while a pose is taken, True for a press, and None in each pass of the app's loop.
+counts of a sample while a pose is taken, True for a press, and None when time has passed: after the samples of a pass,
+before and after a press, and with each page.
 
 Between two poses the wizard integrates the gyro's rates. The result must agree with the turn that gravity shows between
 the two poses.
@@ -28,7 +29,7 @@ TAKE = "take"  # gets each sample
 NOTICE = "notice"  # shows a notice for a moment, then asks for the next pose
 REFUSED = "refused"  # shows the reason until a press, then starts again
 RESULT = "result"  # shows the result for some seconds, then ends
-COMPUTE = "compute"  # computes one step in each pass of the loop
+COMPUTE = "compute"  # computes one step each time that it is continued
 
 
 class Wizard:
