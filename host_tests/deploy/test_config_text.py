@@ -4,8 +4,8 @@ import re
 
 import pytest
 from hypothesis import given, strategies
-from kickstand_tools.common import firmware_path
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common import installation
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.deploy import config_text
 
 OWN = '''"""Mine."""
@@ -26,7 +26,7 @@ def settings_of(text):
 
 
 def test_each_setting_can_be_set_and_unset():
-    text = (firmware_path.PACKAGE.parent / "config.py").read_text()
+    text = (installation.PACKAGE.parent / "config.py").read_text()
     names = re.findall(r"(?m)^# ([A-Z_0-9]+) = ", text)
     assert len(names) > 30 and config_text.values(text) == {}
     full = config_text.with_values(text, {name: f"({i}, 'x')" for i, name in enumerate(names)})

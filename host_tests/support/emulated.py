@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from kickstand_sim.simulation.scripted.script import Ride, upright
 from kickstand_sim.simulation.scripted.sensor_errors import Sensor
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.deploy import bytecode
 
 PART = Sensor(seed=1, share=0.5)  # an ordinary sensor, mounted at some angle

@@ -22,9 +22,8 @@ from typing import TYPE_CHECKING, Any
 
 from kickstand_sim.simulated_board.simulator import Board
 
-from ..common import firmware_path
-from ..common.errors import InputError
-from ..common.messages import Remedy
+from ..common import installation
+from ..common.messages import InputError, Remedy
 from . import bytecode
 from .config_text import cleaned
 
@@ -58,7 +57,7 @@ def judge(path: Path, port: str, machine: str) -> Judged:
     try:
         process = subprocess.run(
             [sys.executable, "-P", "-m", __name__, port, machine, str(path)],
-            env=os.environ | {"PYTHONPATH": firmware_path.search_path()},
+            env=os.environ | {"PYTHONPATH": installation.search_path()},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

@@ -4,8 +4,7 @@ import ast
 import codecs
 import re
 
-from ..common.errors import InputError
-from ..common.messages import Remedy
+from ..common.messages import InputError, Remedy
 
 
 def cleaned(data: bytes) -> bytes:

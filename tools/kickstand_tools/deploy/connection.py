@@ -14,8 +14,7 @@ from mpremote.transport import TransportError, TransportExecError
 from mpremote.transport_serial import SerialTransport
 from serial.tools import list_ports
 
-from ..common.errors import InputError, cause
-from ..common.messages import Message, Remedy
+from ..common.messages import InputError, Message, Remedy, cause
 
 # A function that is called with the current action, the number of finished bytes and the number of all bytes
 Progress = Callable[[str, int, int], None]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from kickstand import __version__
 
-from ..common import firmware_path
+from ..common import installation
 from . import bytecode
 
 PACKAGE = "/kickstand"
@@ -22,8 +22,8 @@ def firmware_files() -> dict[str, Path]:
 
     main.py comes last, because it starts the other files.
     """
-    root = firmware_path.directory()
-    package = firmware_path.PACKAGE
+    root = installation.firmware()
+    package = installation.PACKAGE
     files = {f"{PACKAGE}/{path.relative_to(package).as_posix()}": path for path in sorted(package.rglob("*.py"))}
     return files | {CONFIG: root / "config.py", MAIN: root / "main.py"}
 
@@ -59,5 +59,5 @@ def mip_package() -> dict[str, object]:
 
 
 if __name__ == "__main__":
-    list_path = firmware_path.directory() / "package.json"
+    list_path = installation.firmware() / "package.json"
     list_path.write_text(json.dumps(mip_package(), indent=2) + "\n")

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from mpremote.transport_serial import SerialTransport
 
-from ..common import firmware_path
-from ..common.errors import InputError
+from ..common import installation
+from ..common.messages import InputError
 from . import bytecode, config_check, others
 from .config_text import cleaned
 from .connection import Port, Progress, ask, connected, describe, restart
@@ -74,7 +74,7 @@ def flash(
     """
     with connected(port) as (transport, name):
         board = describe_supported(transport, name)
-        source = firmware_path.config()
+        source = installation.config()
         try:
             names = "(lambda s: (s.platform, getattr(s.implementation, '_machine', '')))(__import__('sys'))"
             machine = ask(transport, names, (str, str))

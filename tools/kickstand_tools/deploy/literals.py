@@ -20,7 +20,7 @@ import struct
 from pathlib import Path
 from typing import Any
 
-from ..common import firmware_path
+from ..common import installation
 
 # Names that programs outside the package use on a board: `kickstand bench`, the replay on a Pico, and tests
 KEPT = {"drive_alignment.alignment.STEP_US", "lean.lean_filter.DELAY_S"}
@@ -41,7 +41,7 @@ class _Variable(Exception):
     """The value of an expression is not known before the firmware runs."""
 
 
-def text(source: Path, package: Path = firmware_path.PACKAGE) -> str:
+def text(source: Path, package: Path = installation.PACKAGE) -> str:
     """Return the text of a module. In a module of the package, values replace the names of constants."""
     if package not in source.parents:
         return source.read_text(encoding="utf-8")

@@ -10,9 +10,8 @@ from pathlib import Path
 
 from mpremote.transport_serial import SerialTransport
 
-from ..common import firmware_path
-from ..common.errors import InputError
-from ..common.messages import Remedy
+from ..common import installation
+from ..common.messages import InputError, Remedy
 from .config_check import CORRECT, Judged
 from .config_text import cleaned
 from .firmware_files import CONFIG, MAIN, PACKAGE
@@ -121,13 +120,13 @@ def _check_config(content: bytes, judge: Callable[[Path], Judged]) -> tuple[byte
 
 def _is_own_main(content: bytes) -> bool:
     text = content.replace(b"\r\n", b"\n")
-    current = (firmware_path.directory() / "main.py").read_bytes().replace(b"\r\n", b"\n")
+    current = (installation.firmware() / "main.py").read_bytes().replace(b"\r\n", b"\n")
     return text == current or hashlib.sha256(text).hexdigest()[:16] in _OWN_MAIN
 
 
 def _settings_named(content: bytes) -> int:
     """Return the number of Kickstand's settings in a config.py, including settings behind a '#'."""
-    shipped = (firmware_path.directory() / "config.py").read_text(encoding="utf-8")
+    shipped = (installation.firmware() / "config.py").read_text(encoding="utf-8")
     setting = r"^(?:# )?([A-Z][A-Z_0-9]+) = "
     text = content.decode("utf-8", "replace").replace("\r\n", "\n")
     return len({*re.findall(setting, shipped, re.M)}.intersection(re.findall(r"^#? *([A-Z][A-Z_0-9]+) *=", text, re.M)))

@@ -14,8 +14,7 @@ from pathlib import PurePosixPath
 
 from mpremote.transport_serial import SerialTransport
 
-from ..common.errors import InputError
-from ..common.messages import Remedy
+from ..common.messages import InputError, Remedy
 from .connection import literal
 from .firmware_files import CONFIG, MAIN, MODULE_ENDINGS, PACKAGE, unfinished
 

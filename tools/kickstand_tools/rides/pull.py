@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from mpremote.transport import TransportExecError
 
-from ..common.errors import InputError
+from ..common.messages import InputError
 from ..common.output import check_directory, make_directory
 from ..deploy.board_console import BrokenOff, lines
 from ..deploy.connection import UPDATE, ConnectedBoard, Port, Progress, connected, literal, printed, restart

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from io import TextIOBase
 
 from ..calibration.file import CalibrationFile
-from ..common.errors import InputError, cause
+from ..common.messages import InputError, cause
 from ..deploy.board_console import BrokenOff, lines
 from ..deploy.connection import ConnectedBoard, refuse_unfit_firmware
 from ..logs.cells import TRACK

@@ -24,8 +24,9 @@ import jinja2
 import markupsafe
 import mpremote
 
-from ..common import firmware_path
-from ..common.errors import InputError, cause, extra
+from ..common import installation
+from ..common.installation import extra
+from ..common.messages import InputError, cause
 from ..deploy import bytecode
 from ..deploy.firmware_files import firmware_files
 
@@ -77,12 +78,12 @@ def tools(*modules: str) -> dict[str, Path]:
 
     Returns {path below tools/: file}, also with the templates, scripts and style sheets in the modules' folders.
     """
-    finder = _ToolsFinder([str(firmware_path.TOOLS)])
+    finder = _ToolsFinder([str(installation.TOOLS)])
     for name in modules:
         finder.import_hook("kickstand_tools." + name.removesuffix(".py").replace("/", "."))
     paths = {Path(path) for module in finder.modules.values() if (path := vars(module)["__file__"])}
     resources = {file for path in paths for file in path.parent.iterdir() if file.suffix in (".html", ".js", ".css")}
-    return {path.relative_to(firmware_path.TOOLS).as_posix(): path for path in sorted(paths | resources)}
+    return {path.relative_to(installation.TOOLS).as_posix(): path for path in sorted(paths | resources)}
 
 
 def zipped(contents: Mapping[str, bytes]) -> bytes:
@@ -120,7 +121,7 @@ def _compiled() -> dict[str, bytes]:
     The first architecture has all files, the others only those with machine code. Without a compiler the result is
     empty, and the board gets the sources.
     """
-    sources = sorted(firmware_path.PACKAGE.rglob("*.py"))
+    sources = sorted(installation.PACKAGE.rglob("*.py"))
     first, *remaining = ARCHITECTURES
     try:
         with ThreadPoolExecutor() as pool:
@@ -130,7 +131,7 @@ def _compiled() -> dict[str, bytes]:
                 files |= {(other, source): bytecode.cross_compiled(source, other) for other in remaining}
     except bytecode.CannotCompile:
         return {}
-    package = firmware_path.PACKAGE
+    package = installation.PACKAGE
     return {
         f"compiled/{architecture}/{source.relative_to(package).with_suffix('.mpy').as_posix()}": data
         for (architecture, source), data in files.items()
@@ -150,7 +151,7 @@ def rides_archive() -> bytes:
         raise InputError("the page Rides needs fitdecode and gpxpy: " + extra("web")) from error
     files = tools("web/browser_rides.py")
     libraries = (Path(library.__path__[0]) for library in (fitdecode, gpxpy, jinja2, markupsafe))
-    for package in (firmware_path.PACKAGE, *libraries):
+    for package in (installation.PACKAGE, *libraries):
         files |= {path.relative_to(package.parent).as_posix(): path for path in package.rglob("*.py")}
     return zipped({name: path.read_bytes() for name, path in files.items()})
 

@@ -12,7 +12,7 @@ from datetime import datetime
 from pathlib import Path
 
 from ..calibration.file import calibration_path, write_calibration
-from ..common.errors import InputError
+from ..common.messages import InputError
 from ..deploy.connection import connected, describe, restart
 from ..rides import pull as pulling, ride_log, stream
 from .browser_serial import BrowserBoard

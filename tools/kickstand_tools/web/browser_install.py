@@ -9,8 +9,8 @@ import re
 import sys
 from pathlib import Path
 
-from ..common import firmware_path
-from ..common.errors import InputError
+from ..common import installation
+from ..common.messages import InputError
 from ..deploy import (
     bytecode,
     check as board_check,
@@ -52,7 +52,7 @@ class Installation:
                     connection.restart(transport)
         except InputError as error:
             return json.dumps({"refused": error.line(page=True)})
-        self._path = firmware_path.config()
+        self._path = installation.config()
         self._template = self._path.read_text(encoding="utf-8")
         for module in [module for module in sys.modules if module.startswith("kickstand.")]:
             del sys.modules[module]  # the firmware identifies its board at import, so import it again
@@ -147,7 +147,7 @@ def _written(value):
 def _compiled(source, architecture):
     """Read a compiled file from the archive. Only files with machine code differ between the boards."""
     folders = [ROOT / "compiled" / one for one in (architecture, COMMON)]
-    path = source.relative_to(firmware_path.PACKAGE).with_suffix(".mpy")
+    path = source.relative_to(installation.PACKAGE).with_suffix(".mpy")
     if not folders[0].is_dir():
         raise bytecode.CannotCompile("this page has nothing compiled for this board")
     return next(folder / path for folder in folders if (folder / path).is_file()).read_bytes()
