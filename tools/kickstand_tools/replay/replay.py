@@ -16,7 +16,7 @@ from ..calibration.mount import read_ride
 from ..checks.log import CheckedLog
 from ..common import installation
 from ..common.messages import InputError, Message, kind
-from ..logs.csv_lines import write_lean
+from ..logs.csv_text import write_lean
 from ..logs.log import Source, Table
 from ..logs.reader import time_texts
 from ..logs.source import Progress

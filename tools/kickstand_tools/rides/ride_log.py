@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..calibration.file import CalibrationFile, calibration_path, write_calibration
-from ..logs.cells import COLUMNS, TRACK
-from ..logs.csv_lines import write_table
+from ..logs.csv_text import COLUMNS, TRACK, write_table
 from .block_reader import StoredBlock, StoredTurn
 
 

@@ -12,7 +12,7 @@ from ..calibration.file import CalibrationFile
 from ..common.messages import InputError, cause
 from ..deploy.board_console import BrokenOff, lines
 from ..deploy.connection import ConnectedBoard, refuse_unfit_firmware
-from ..logs.cells import TRACK
+from ..logs.csv_text import TRACK
 from ..replay.replay_engine import NO_SPEED, Replay
 from . import ride_log, stream_guest
 from .block_reader import BadBlock, StoredBlock, missing_note, parse
