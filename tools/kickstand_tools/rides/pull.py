@@ -17,7 +17,7 @@ from ..common.output import check_directory, make_directory
 from ..deploy.board_console import BrokenOff, lines
 from ..deploy.connection import UPDATE, ConnectedBoard, Port, Progress, connected, literal, printed, restart
 from . import ride_log
-from .block_reader import CUT_SHORT, StoredBlock, missing_note, read
+from .ride_log import CUT_SHORT, StoredBlock, missing_note, read
 
 _SILENT_S = 60  # longest wait for an answer in s; an emulated board is slow
 
