@@ -15,8 +15,14 @@ from pathlib import Path
 from ..calibration.file import CalibrationFile, write_calibration
 from ..common.messages import InputError, cause
 from ..common.output import check_output, whole_file
-from ..deploy.board_console import BrokenOff, lines
-from ..deploy.connection import ConnectedBoard, connected, refuse_unfit_firmware, restart
+from ..deploy.connection import (
+    BrokenOff,
+    ConnectedBoard,
+    connected,
+    printed_lines,
+    refuse_unfit_firmware,
+    restart,
+)
 from ..logs.cells import TRACK
 from ..replay.replay_engine import NO_SPEED, Replay
 from . import ride_log, stream_guest
@@ -159,7 +165,7 @@ def _lines(transport: ConnectedBoard, name: str, notes: list[str], stopped: thre
     """Yield the lines that the app on the board prints."""
     prefix = f"{name}: " if name else ""
     try:
-        yield from lines(transport, _START, _SILENT_S, stopped)
+        yield from printed_lines(transport, _START, _SILENT_S, stopped)
         if not stopped.is_set():
             notes.append(f"{prefix}the board stopped on its own: the log up to there is kept")
     except OSError as error:
