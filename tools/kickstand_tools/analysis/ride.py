@@ -26,7 +26,7 @@ from ..logs.csv_text import MOST_DPS, MOST_G
 from ..logs.log import ROOM_TEMP_C, Log, Source, Stretch, Table
 from ..logs.reader import check_first_line
 from ..logs.source import File, Progress, log_stem, name_of
-from ..replay.meter_along import MeterAlong, Misfit, formula_lean_deg
+from ..replay.replay import MeterAlong, Misfit, formula_lean_deg
 from ..signals import Array, Bools
 
 _LAST = ("lat_deg", "lon_deg", "utc_s")
