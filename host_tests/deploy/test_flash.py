@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from kickstand_tools.common import installation
-from kickstand_tools.deploy import bytecode, firmware_files
+from kickstand_tools.deploy import firmware_files
 from support import command, fake_board
 from support.watched_stderr import Watched
 
@@ -19,7 +19,7 @@ BOOT = {"/boot.py": b"# boot\n"}
 
 
 @functools.cache
-def wanted(mpy=bytecode.PICO):
+def wanted(mpy=firmware_files.PICO):
     return firmware_files.contents(mpy)
 
 

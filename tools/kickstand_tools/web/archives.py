@@ -1,8 +1,8 @@
 """Collects what the pages need: packages for browsers from npm, and tools in ZIP files.
 
 npm/package-lock.json has the versions and hashes of MicroPython, CPython and the other packages. install_archive()
-packs the files with which browser_install.py and browser_cable.py talk to a board, rides_archive() those with which
-browser_rides.py shows a ride. The same content always gives the same ZIP file.
+packs the files with which browser_board.py talks to a board, rides_archive() those with which browser_rides.py shows a
+ride. The same content always gives the same ZIP file.
 """
 
 import hashlib
@@ -27,8 +27,7 @@ import mpremote
 from ..common import installation
 from ..common.installation import extra
 from ..common.messages import InputError, cause
-from ..deploy import bytecode
-from ..deploy.firmware_files import firmware_files
+from ..deploy.firmware_files import CannotCompile, cross_compiled, firmware_files
 
 _DATE = (1980, 1, 1, 0, 0, 0)
 # The boards of these architectures, in this order: Pico; Pico 2 (Arm); ESP32-C3, C6, H2 and Pico 2 (RISC-V); all other
@@ -105,7 +104,7 @@ def install_archive() -> bytes:
     mpremote/, serial/: mpremote, and a replacement of pyserial.
     """
     files = {f"mpremote/{name}": Path(mpremote.__file__).parent / name for name in _MPREMOTE}
-    files |= {f"tools/{name}": path for name, path in tools("web/browser_cable.py", "web/browser_install.py").items()}
+    files |= {f"tools/{name}": path for name, path in tools("web/browser_board.py").items()}
     files |= {f"firmware{path}": source for path, source in firmware_files().items()}
     return zipped({name: path.read_bytes() for name, path in files.items()} | _STANDS_IN | _compiled())
 
@@ -125,11 +124,12 @@ def _compiled() -> dict[str, bytes]:
     first, *remaining = ARCHITECTURES
     try:
         with ThreadPoolExecutor() as pool:
-            compiled = dict(zip(sources, pool.map(lambda source: bytecode.cross_compiled(source, first), sources)))
+            contents = pool.map(lambda source: cross_compiled(source, first), sources)
+            compiled = dict(zip(sources, contents))
             files = {(first, source): data for source, data in compiled.items()}
             for source in [source for source, data in compiled.items() if data[2]]:
-                files |= {(other, source): bytecode.cross_compiled(source, other) for other in remaining}
-    except bytecode.CannotCompile:
+                files |= {(other, source): cross_compiled(source, other) for other in remaining}
+    except CannotCompile:
         return {}
     package = installation.PACKAGE
     return {
