@@ -71,7 +71,7 @@ TOOLS = {
     },
     "overlay": {"common", "signals", "logs", "checks.log", "calibration.file", "joining.motion", "analysis"},
     "simulated_board": set(),
-    "simulation": {"common", "logs.cells"},
+    "simulation": {"common", "signals", "logs.cells"},
     "demo": {"common", "simulated_board", "simulation.scripted"},
     "deploy": {"common", "simulated_board"},  # tries config.py on the simulated board
     "rides": {"common", "logs", "calibration.file", "deploy", "replay.replay_engine"},
