@@ -177,7 +177,7 @@ class App:
     def turn(self):
         """Process the samples in the FIFO and one press, and do at most one transfer to the display. Never wait."""
         now_us, now_ms = ticks_us(), ticks_ms()
-        n = self.sensor.fetch(now_ms)
+        n, dt_us = self.sensor.fetch(now_ms), 0
         if self.sensor.clipped:
             self.clock.skip(self.sensor.clipped)
             self.sensor.clipped = 0
@@ -201,8 +201,11 @@ class App:
             self.screen.press(event, now_ms)
             if self.user:
                 self.user.call("on_press", event)
+        if self.screen.wizard:
+            self.screen.guide(n, dt_us, now_ms)
+        # Begin another ride before the next samples and speeds. So a saved calibration meets none of the earlier ones.
         if self.calibration.changed:
-            self._calibration_changed()
+            self.rides.split()
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self._show(now_ms)
         self.lcd.tick(now_ms)
@@ -247,9 +250,7 @@ class App:
             self.calibration.keep_trim(now_ms)
 
     def _pass_on(self, n, dt_us, now_ms):
-        """Pass the sum of n new samples to the meter, and each single sample to a wizard.
-
-        dt_us: time from the previous sample to the last new sample."""
+        """Pass on the sum of n new samples. dt_us: time from the previous sample to the last new sample."""
         chip = self.sensor.chip
         self.meter.update_sum(chip.sums, n, dt_us)
         if self.rides.recorder.active:
@@ -258,15 +259,6 @@ class App:
             self.drive.feed(chip.sums, n, dt_us, now_ms)
         if self.live and self.live.period_ms:
             self.live.feed(chip.sums, n)
-        if self.screen.wizard:
-            self._pass_each(n, dt_us, now_ms)
-
-    def _pass_each(self, n, dt_us, now_ms):
-        chip, wizard = self.sensor.chip, self.screen.wizard
-        for k in range(n):
-            chip.take(k)
-            wizard.sample(chip.counts)
-        wizard.follow(chip.sums, n, dt_us, now_ms)
 
     def _sensor_started(self):
         """Handle a chip that was set up at the start or after a fault. After a fault the chip may be another one than
@@ -277,16 +269,7 @@ class App:
         if self.recording:
             self.rides.recorder.mark_gap()
         if self.calibration.chip_started(self.sensor.chip):
-            self._calibration_changed()
+            self.rides.split()
             self.rides.start_due()
         # Delay the first page, because a page shown now would only say that there is no lean yet
         self._page_ms = ticks_add(ticks_ms(), _FIRST_PAGE_MS)
-
-    def _calibration_changed(self):
-        replaced = self.calibration.changed == self.calibration.REPLACED
-        self.calibration.changed = None
-        self.rides.split()
-        if replaced:
-            self.meter.reset_maxima()
-            if self.drive:
-                self.drive.begin()
