@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 from kickstand_sim.simulated_board.i2c import OPEN, Registers
 from kickstand_sim.simulated_board.mpu6050 import FIFO_COUNTH, FIFO_COUNTL, Fifo
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.deploy import check
 from support import command
 from support.checked_board import CheckedBoard, part

@@ -10,7 +10,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from kickstand_tools.common import firmware_path
+from kickstand_tools.common import installation
 from kickstand_tools.deploy import firmware_files
 from kickstand_tools.web.documents import documents
 from support import command
@@ -77,7 +77,7 @@ def test_wheel_carries_firmware_pages_and_documents(wheel):
             assert archive.read(inside) == source.read_bytes()
         commands = archive.read(f"kickstand_lean-{VERSION}.dist-info/entry_points.txt").decode()
     assert {"kickstand_tools/cli/main.py", "kickstand_tools/py.typed"} <= names
-    web = firmware_path.TOOLS / "kickstand_tools" / "web"
+    web = installation.TOOLS / "kickstand_tools" / "web"
     pages = [path for name in ("npm", "page") for path in (web / name).rglob("*") if path.is_file()]
     assert {f"kickstand_tools/web/{path.relative_to(web).as_posix()}" for path in pages} <= names
     texts = [*documents.PATHS, *(f"tools/pictures/{path.name}" for path in (ROOT / "tools" / "pictures").iterdir())]

@@ -3,7 +3,7 @@ whose unit the motion shows."""
 
 import numpy as np
 import pytest
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.imports import columns, findings, units
 from kickstand_tools.imports.recording import Sheet
 from kickstand_tools.imports.unit_fits import RateFit, fit_rates, unit_by_positions

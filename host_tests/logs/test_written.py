@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 from kickstand_tools.api import Log, read_log, write_log
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.logs import csv_reader
 from kickstand_tools.logs.csv_lines import (
     csv_lines,

@@ -9,7 +9,7 @@ import pytest
 from kickstand.calibration.store import Store
 from kickstand.rides import block as block_format
 from kickstand_tools.calibration.file import read_calibration
-from kickstand_tools.deploy import config_check
+from kickstand_tools.deploy import config_file
 from kickstand_tools.rides import block_reader, ride_log
 from support.recordings import ride_writer
 
@@ -145,5 +145,5 @@ CONFIG = (
 
 def test_settings_file_stays_valid(tmp_path):
     (tmp_path / "config.py").write_text(CONFIG.replace("; ", "\n"))
-    verdict = config_check.judge(tmp_path / "config.py", "rp2", "Raspberry Pi Pico with RP2040")
-    assert verdict == config_check.Judged(None, [])
+    verdict = config_file.judge(tmp_path / "config.py", "rp2", "Raspberry Pi Pico with RP2040")
+    assert verdict == config_file.Judged(None, [])

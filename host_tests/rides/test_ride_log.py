@@ -9,7 +9,7 @@ import pytest
 from kickstand.calibration import store
 from kickstand.calibration.parameters import Calibration
 from kickstand_tools.calibration.file import read_calibration
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.replay.replay import replay
 from kickstand_tools.rides import block_reader, ride_log
 from kickstand_tools.rides.block_reader import Place, StoredBlock, StoredTurn

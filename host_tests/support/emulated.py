@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from kickstand_sim.simulation.scripted.script import Ride, upright
 from kickstand_sim.simulation.scripted.sensor_errors import Sensor
-from kickstand_tools.common.errors import InputError
-from kickstand_tools.deploy import bytecode
+from kickstand_tools.common.messages import InputError
+from kickstand_tools.deploy import firmware_files
 
 PART = Sensor(seed=1, share=0.5)  # an ordinary sensor, mounted at some angle
 
@@ -58,7 +58,7 @@ def esp32(world: Callable[[float], tuple] | None = None, files: dict[str, bytes]
 
 
 CHIPS = {"pico": pico, "esp32": esp32}
-MPY = {"pico": bytecode.PICO, "esp32": bytecode.ESP32}
+MPY = {"pico": firmware_files.PICO, "esp32": firmware_files.ESP32}
 
 
 @functools.cache

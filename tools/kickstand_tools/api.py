@@ -38,8 +38,12 @@ from .calibration.poses import (
 )
 from .calibration.procedure import fit_procedure as fit_procedure
 from .checks.log import CheckedLog as CheckedLog, check_log as check_log
-from .common.errors import InputError as InputError, RefusedInput as RefusedInput
-from .common.messages import Message as Message, sentence as sentence
+from .common.messages import (
+    InputError as InputError,
+    Message as Message,
+    RefusedInput as RefusedInput,
+    sentence as sentence,
+)
 from .estimation.alignment import RideFit as RideFit, fit_ride as fit_ride
 from .estimation.smooth import SmoothedRide as SmoothedRide, smooth as smooth
 from .imports.importing import (

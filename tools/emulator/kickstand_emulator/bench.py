@@ -14,7 +14,7 @@ from kickstand.calibration.parameters import Calibration
 from kickstand_sim.simulated_board.mpu6050 import Mpu6050
 from kickstand_sim.simulation.scripted.script import Ride, accelerate, turn, upright
 from kickstand_sim.simulation.scripted.sensor_errors import Sensor
-from kickstand_tools.deploy.bytecode import architecture, cross_compiled
+from kickstand_tools.deploy.firmware_files import architecture, cross_compiled
 from rich.table import Table
 
 from . import flash_image

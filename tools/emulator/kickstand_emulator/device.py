@@ -36,7 +36,7 @@ class EmulatedDevice(ABC):
 
     NAME: str  # name of the board
     FLASH: FileSystem  # location of the file system in its flash
-    MPY: int  # version of the bytecode that the board accepts, see bytecode.py
+    MPY: int  # version of the bytecode that the board accepts, see firmware_files.py
     # Code for the board that defines a class Sink. Sink.write() passes bytes to the function given to listen().
     SINK: str
 

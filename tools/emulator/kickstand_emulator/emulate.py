@@ -26,7 +26,7 @@ from kickstand_sim.demo.screen import lcd_lines, screen
 from kickstand_sim.simulated_board.oled import Oled
 from kickstand_sim.simulation.scripted.script import Ride
 from kickstand_sim.simulation.scripted.sensor_errors import Sensor
-from kickstand_tools.common.errors import InputError, cause
+from kickstand_tools.common.messages import InputError, cause
 from rich.live import Live
 
 from .device import EmulatedDevice

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
-from kickstand_tools.deploy.bytecode import cross_compiled
+from kickstand_tools.deploy.firmware_files import cross_compiled
 from kickstand_tools.logs.source import Progress
 from kickstand_tools.replay import replay_engine
 

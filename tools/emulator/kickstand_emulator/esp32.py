@@ -19,7 +19,7 @@ from typing import Any
 from kickstand_sim.simulated_board.clock import Clock, to_us
 from kickstand_sim.simulated_board.i2c import Bus
 from kickstand_sim.simulated_board.simulator import Board
-from kickstand_tools.deploy import bytecode
+from kickstand_tools.deploy import firmware_files
 
 from . import esp32_library, esp32_machine as machine, flash_image
 from .device import LEVEL, EmulatedDevice
@@ -42,7 +42,7 @@ class Stopped(Exception):
 class Esp32(EmulatedDevice):
     """An emulated ESP32. See EmulatedDevice."""
 
-    NAME, FLASH, MPY = "ESP32", flash_image.ESP32, bytecode.ESP32
+    NAME, FLASH, MPY = "ESP32", flash_image.ESP32, firmware_files.ESP32
     # The code uses the console, because registers such as those of host_link.py cannot be added to QEMU
     SINK = """
 from binascii import hexlify

@@ -9,8 +9,8 @@ import os
 import sys
 from pathlib import Path
 
-from kickstand_tools.common import firmware_path
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common import installation
+from kickstand_tools.common.messages import InputError
 
 from .image import need_compiler
 
@@ -25,7 +25,7 @@ def find() -> Path:
     """Return the folder with all FILES. Raises InputError, which names the missing file and where to get it."""
     need_compiler()
     named = os.environ.get(VARIABLE)
-    folder = Path(named) if named else firmware_path.directory().parent.parent / "shared" / "esp32"
+    folder = Path(named) if named else installation.firmware().parent.parent / "shared" / "esp32"
     missing = [name for name in FILES if not (folder / name).is_file()]
     if missing or sys.platform != "linux":
         raise InputError(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from kickstand.calibration.parameters import Calibration
 from kickstand.calibration.store import Store
-from kickstand_tools.deploy import bytecode, firmware_files
+from kickstand_tools.deploy import firmware_files
 from littlefs import LittleFS, UserContext
 
 
@@ -80,7 +80,7 @@ PICO = FileSystem(0xA0000, 352, 256)
 ESP32 = FileSystem(0x200000, 512, 32)
 
 
-def firmware(compiled: bool = False, mpy: int = bytecode.PICO) -> dict[str, bytes]:
+def firmware(compiled: bool = False, mpy: int = firmware_files.PICO) -> dict[str, bytes]:
     """Return the files that `kickstand flash` copies to a board.
 
     compiled: True compiles the package to .mpy files with mpy-cross.

@@ -5,7 +5,7 @@ import importlib.util
 import urllib.request
 from pathlib import Path
 
-from kickstand_tools.common.errors import InputError, cause
+from kickstand_tools.common.messages import InputError, cause
 from kickstand_tools.common.output import whole_file
 
 NAME = "RPI_PICO-20250911-v1.26.1.uf2"

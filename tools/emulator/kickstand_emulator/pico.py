@@ -5,7 +5,7 @@ from typing import Any
 
 from kickstand_sim.simulated_board.i2c import Bus
 from kickstand_sim.simulated_board.simulator import Board
-from kickstand_tools.deploy import bytecode
+from kickstand_tools.deploy import firmware_files
 from rp2040py.gpio_pin import GPIOPinState
 from rp2040py.memory_map import RAM_START_ADDRESS
 from rp2040py.peripherals.peripheral import BasePeripheral
@@ -120,7 +120,7 @@ class HostLink(BasePeripheral):
 class Pico(EmulatedDevice):
     """An emulated Pico. See EmulatedDevice."""
 
-    NAME, FLASH, MPY, SINK = "Pico", flash_image.PICO, bytecode.PICO, GUEST
+    NAME, FLASH, MPY, SINK = "Pico", flash_image.PICO, firmware_files.PICO, GUEST
 
     def __init__(
         self, world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any

@@ -9,7 +9,7 @@ from kickstand_emulator import image
 from kickstand_emulator.emulate import ConsoleServer
 from kickstand_sim.simulated_board.clock import Clock
 from kickstand_sim.simulated_board.i2c import Bus
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 
 ADDRESS = 0x27
 

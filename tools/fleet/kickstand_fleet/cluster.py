@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterator, Sequence
 from multiprocessing import resource_tracker
 from typing import Any
 
-from kickstand_tools.common.errors import InputError, cause
+from kickstand_tools.common.messages import InputError, cause
 
 from . import KEPT
 

@@ -12,7 +12,8 @@ from typing import IO, Any, cast
 from urllib.parse import quote
 
 from kickstand_tools.checks.log import read_with_notices
-from kickstand_tools.common.errors import InputError, cause, leaf
+from kickstand_tools.common.installation import leaf
+from kickstand_tools.common.messages import InputError, cause
 from kickstand_tools.common.output import whole_file
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.source import open_input

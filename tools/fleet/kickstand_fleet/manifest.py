@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 
 from . import files
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from kickstand import __version__
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.common.output import check_directory, new_directory
 
 from . import KEPT, files, tables

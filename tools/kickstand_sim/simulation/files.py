@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.common.output import check_directory, make_directory, whole_file
 from kickstand_tools.logs.cells import COLUMNS, TRACK
 from numpy.typing import NDArray

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..common.errors import InputError, extra
-from ..common.messages import Message, kind
+from ..common.installation import extra
+from ..common.messages import InputError, Message, kind
 from ..common.output import whole_file
 from ..logs.csv_lines import csv_lines
 from ..logs.log import float_schema

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..calibration.file import BY_RIDE
 from ..calibration.mount import SWAPPED_DEG
+from ..common.markup import clock
 from ..common.messages import Remedy, WrongAxes, WrongMount, as_data as remarks_as_data
-from ..common.times import clock
 from ..estimation.smooth import PoseOff
 from .alignment_quality import LeanCost, Quality, lean_cost
 from .overview import Overview

@@ -13,8 +13,7 @@ from kickstand.units import GAP_US
 from ..calibration.file import ALIGN, CalibrationFile, calibration_path, read_calibration
 from ..calibration.mount import read_ride
 from ..checks.log import CheckedLog
-from ..common.errors import InputError
-from ..common.messages import Message, Remedy, kind
+from ..common.messages import InputError, Message, Remedy, kind
 from ..estimation.smooth import COLUMNS, Smoother
 from ..logs.cells import MOST_DPS, MOST_G
 from ..logs.log import Log, Source, Stretch

@@ -11,8 +11,7 @@ from kickstand.errors import Refusal
 
 from ..checks.log import read_with_notices
 from ..checks.sensor import without_frozen
-from ..common.errors import InputError, RefusedInput
-from ..common.messages import Message
+from ..common.messages import InputError, Message, RefusedInput
 from ..logs.log import Log, Source
 from ..logs.source import Progress
 from ..signals import Array

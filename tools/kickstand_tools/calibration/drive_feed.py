@@ -14,7 +14,7 @@ from kickstand.drive_alignment.alignment import MOVED_MPS, STALE_US, DriveAlignm
 from kickstand.drive_alignment.events import BIN_US
 from kickstand.units import GAP_US
 
-from ..common.errors import InputError
+from ..common.messages import InputError
 from ..logs.log import Log
 from ..logs.source import Progress
 from .drive_events import DriveWatch

@@ -15,7 +15,7 @@ from kickstand.errors import CaptureError, Refusal
 from kickstand.units import AXES
 
 from ..checks.log import check_log
-from ..common.errors import InputError, RefusedInput
+from ..common.messages import InputError, RefusedInput
 from ..logs.log import ROOM_TEMP_C, Source
 from ..logs.reader import read_log
 from ..signals import Array

@@ -12,7 +12,7 @@ from kickstand.calibration.six_position import SIDES, SensorFit
 from kickstand.errors import Refusal
 
 from ..checks.log import check_log
-from ..common.errors import InputError, RefusedInput
+from ..common.messages import InputError, RefusedInput
 from ..logs.log import Log, Source
 from ..logs.reader import read_log
 from .file import CalibrationFile

@@ -13,8 +13,7 @@ import numpy as np
 from kickstand.drive_alignment.quality import speed_unit_problem
 from kickstand.units import STANDARD_GRAVITY
 
-from ..common.errors import InputError, RefusedInput
-from ..common.messages import Message, Remedy, kind
+from ..common.messages import InputError, Message, RefusedInput, Remedy, kind
 from ..logs.cells import MOST_DPS, MOST_G
 from ..logs.log import Log, Source
 from ..logs.reader import read_log, read_with_rows

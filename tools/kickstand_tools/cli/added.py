@@ -20,21 +20,22 @@ from pathlib import Path
 
 import click
 
-from ..common import plugins
-from ..common.errors import DISTRIBUTION, InputError, cause
+from ..common import installation
+from ..common.installation import DISTRIBUTION
+from ..common.messages import InputError, cause
 
 GROUP = "kickstand.commands"
 
 
 def entry_points() -> dict[str, EntryPoint]:
     """Return the entry points of all installed commands, by the command's name."""
-    return plugins.entry_points(GROUP)
+    return installation.entry_points(GROUP)
 
 
 def command(entry_point: EntryPoint) -> click.Command:
     """Load the command of an entry point. Raises InputError, which names the package, if loading fails."""
     try:
-        loaded = plugins.load(entry_point)
+        loaded = installation.load(entry_point)
     except InputError:
         raise
     except (Exception, SystemExit) as error:
@@ -97,7 +98,7 @@ def owner(error: Exception) -> str:
     packages = {top: _package(entry_point) for entry_point, top in tops.items()}
     for frame, _ in traceback.walk_tb(error.__traceback__):
         package = packages.get(frame.f_globals.get("__name__", "").partition(".")[0], DISTRIBUTION)
-        if package not in plugins.OURS:
+        if package not in installation.OURS:
             return package
     return "kickstand"
 

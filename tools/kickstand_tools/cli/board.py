@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
-from ..common import firmware_path
-from ..common.errors import InputError
+from ..common import installation
+from ..common.messages import InputError
 from ..common.progress import Bar
 from ..deploy.check import check, verdict
 from ..deploy.flash import flash
@@ -34,7 +34,7 @@ def flash_command(port: str | None, config: bool, yes: bool) -> None:
         echo(f"kept: {line}")
     if result.config:
         echo(f"config.py is {result.config}")
-        if firmware_path.installed() and result.config.parent == firmware_path.directory():
+        if installation.installed() and result.config.parent == installation.firmware():
             echo("to change settings, copy that file to a folder of your own, edit it, and run this command there")
     for setting in result.unused:
         echo(f"note: {setting} is not used, because a '#' is in front of it: remove it, and flash --config")

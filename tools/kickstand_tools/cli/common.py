@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..common.errors import printable
-from ..common.messages import Message
+from ..common.messages import Message, printable
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -13,8 +13,9 @@ from importlib.metadata import EntryPoint
 
 import click
 
-from ..common import plugins
-from ..common.errors import DISTRIBUTION, InputError, cause, printable
+from ..common import installation
+from ..common.installation import DISTRIBUTION
+from ..common.messages import InputError, cause, printable
 from . import added
 
 # The commands of each module, which contains the functions NAME_command. A module is imported only if one of its
@@ -43,8 +44,8 @@ class CommandGroup(click.Group):
         if cmd_name in COMMANDS:
             return COMMANDS[cmd_name].load()
         entry_point = added.entry_points().get(cmd_name)
-        if entry_point is None and cmd_name in plugins.LEAVES:
-            raise plugins.not_installed(cmd_name)
+        if entry_point is None and cmd_name in installation.LEAVES:
+            raise installation.not_installed(cmd_name)
         return added.command(entry_point) if entry_point else None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

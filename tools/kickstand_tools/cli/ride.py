@@ -17,8 +17,7 @@ from ..analysis.report import as_data, page
 from ..analysis.ride import Ride, calibration_beside, open_ride
 from ..calibration.file import CalibrationFile, calibration_path, read_calibration
 from ..checks.log import check_log
-from ..common.errors import InputError
-from ..common.messages import WrongAxes
+from ..common.messages import InputError, WrongAxes
 from ..common.output import check_output, whole_file
 from ..common.progress import Bar, spinner
 from ..estimation.alignment import fit_ride

@@ -9,8 +9,8 @@ from kickstand_sim.simulation.physics.chip import MOUNTS
 from kickstand_sim.simulation.physics.road import CLASSES
 from kickstand_sim.simulation.profiles import MAIN, PROFILES
 
-from ..common import plugins
-from ..common.errors import InputError
+from ..common import installation
+from ..common.messages import InputError
 from ..common.progress import Bar, spinner
 from .common import OUT_DIRECTORY, Command, echo
 
@@ -60,7 +60,7 @@ def simulate_command(profile: str | None, seed: int, vehicles: int | None, out: 
     if vehicles is not None:
         _check_fleet(out)
         with Bar("simulating vehicles", lines_s=LINES_S) as bar:
-            fleet = plugins.part(plugins.SIMULATIONS, "fleet")(out, vehicles, seed, progress=bar.reach)
+            fleet = installation.part(installation.SIMULATIONS, "fleet")(out, vehicles, seed, progress=bar.reach)
         logs = sum(len(vehicle.paths) for vehicle in fleet)
         echo(f"written: {out}/MANIFEST.csv and TRUTH.csv, {vehicles} vehicles, {logs} logs")
         return

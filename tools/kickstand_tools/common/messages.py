@@ -1,4 +1,6 @@
-"""Notices and refusals. Each kind of message is a line of a table in the module of the check that returns it:
+"""Notices and refusals, and the errors with their text.
+
+Each kind of message is a line of a table in the module of the check that returns it:
 
 SpeedLate = kind("speed-late", "late_s", "the speed is {late_s:.1f} s late", Remedy("under 2 s are needed"))
 
@@ -75,9 +77,13 @@ class Message:
         return todo.filled(**vars(self)) if isinstance(todo, Remedy) else todo(self)
 
     def line(self, page: bool = False) -> str:
-        """Return sentence and remedy in one line, without a full stop.
+        """Return the message in one line without a full stop: what is wrong and, if there is a remedy, what to do.
 
         page: True for a page, which has no commands.
+
+        >>> from kickstand_tools.calibration.refusals import SamePose
+        >>> SamePose(0.4).line()
+        'both poses are the same (0.4 degrees apart): take one on the kickstand and one upright'
         """
         remedy = self.remedy().words(page)
         return f"{self.sentence()}: {remedy}" if remedy else self.sentence()
@@ -132,16 +138,7 @@ class Plain(Message):
     todo = staticmethod(lambda message: message.what_to_do)
 
 
-def sentence(message: Message, page: bool = False) -> str:
-    """Return the message in one line without a full stop: what is wrong and, if there is a remedy, what to do.
-
-    page: True for a page, which has no commands.
-
-    >>> from kickstand_tools.calibration.refusals import SamePose
-    >>> sentence(SamePose(0.4))
-    'both poses are the same (0.4 degrees apart): take one on the kickstand and one upright'
-    """
-    return message.line(page)
+sentence = Message.line  # as a function, for programs that use the API
 
 
 def by_code(*kinds: type[Message]) -> dict[str, type[Any]]:
@@ -164,3 +161,60 @@ def as_data(messages: Iterable[Message]) -> list[dict[str, object]]:
         {"code": message.code, "values": [plain(value) for value in message.values], "words": message.line()}
         for message in messages
     ]
+
+
+class InputError(Exception):
+    """Input from the user that cannot be used. The text is one line: what is wrong, and what to do.
+
+    what: a Message, or a text that says what is wrong.
+    remedy: what to do. Leave it out if `what` already says what to do, in words for both a terminal and a page.
+    """
+
+    def __init__(self, what: Message | str, remedy: Remedy = NOTHING_TO_DO) -> None:
+        super().__init__(what, remedy)
+        self.message = Plain(what, remedy) if isinstance(what, str) else what
+
+    def __str__(self) -> str:
+        return self.line()
+
+    def line(self, page: bool = False) -> str:
+        """See Message.line()."""
+        return self.message.line(page)
+
+
+class RefusedInput(InputError):
+    """Data that a check or the firmware's own modules refuse.
+
+    message: the reason, with its code and its fields.
+    where: text before the message, usually the file.
+    advice: text after the message.
+    """
+
+    def __init__(self, message: Message, where: str = "", advice: str = "") -> None:
+        super().__init__(message)
+        self.args = message, where, advice  # needed for pickling, because another process may raise the error
+        self.where, self.advice = where, advice
+
+    @property
+    def code(self) -> str:
+        """The code of the reason."""
+        return self.message.code
+
+    def at(self, where: str) -> "RefusedInput":
+        """Return the same refusal, with `where` before its message."""
+        return RefusedInput(self.message, where, self.advice)
+
+    def line(self, page: bool = False) -> str:
+        """See Message.line()."""
+        line = f"{self.message.line(page)}{self.advice}"
+        return f"{self.where}: {line}" if self.where else line
+
+
+def cause(error: BaseException) -> str:
+    """Return the reason of an operating system's error without its number, such as "Permission denied"."""
+    return getattr(error, "strerror", None) or str(error) or type(error).__name__
+
+
+def printable(text: str) -> str:
+    """Replace characters that control a terminal, such as ESC, by their codes."""
+    return "".join(c if c in "\n\t" or c.isprintable() else ascii(c)[1:-1] for c in text)

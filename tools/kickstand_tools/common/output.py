@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from .errors import InputError, cause
+from .messages import InputError, cause
 
 _MOST_LINKS = 40  # number of links that are followed, as in Linux
 

@@ -7,8 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..common.errors import InputError
-from ..common.messages import Remedy
+from ..common.messages import InputError, Remedy
 from . import check_guest
 from .check_limits import BAD, GOOD, JUDGES, LOOK, SKIPPED, Finding
 from .connection import UPDATE, Port, connected, describe, last_line, refuse_unfit_firmware, restart

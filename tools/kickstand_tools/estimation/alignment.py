@@ -18,8 +18,7 @@ from ..calibration.file import CalibrationFile
 from ..checks.axes import AxesMisfit, LeftHanded, RatesMisfit
 from ..checks.log import read_with_notices
 from ..checks.sensor import without_frozen
-from ..common.errors import InputError, RefusedInput
-from ..common.messages import AT_REST, Message, Remedy, kind
+from ..common.messages import AT_REST, InputError, Message, RefusedInput, Remedy, kind
 from ..logs.cells import MOST_DPS, MOST_G
 from ..logs.log import Log, Source
 from ..logs.source import Progress

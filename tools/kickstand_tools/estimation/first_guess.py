@@ -9,8 +9,7 @@ from kickstand.units import STANDARD_GRAVITY
 from ..checks.axes import RatesInRadians
 from ..checks.log import SpeedStuck, SpeedUnit
 from ..checks.turning import bias_dps
-from ..common.errors import RefusedInput
-from ..common.messages import Remedy, kind
+from ..common.messages import RefusedInput, Remedy, kind
 from ..signals import Array, Bools, motionless
 from ..signals.leaning import WINDOW_S, Leaning, averaged, leaning_of, speed_in_radians, without_drift
 from .windows import Windows

@@ -11,8 +11,7 @@ from kickstand.lean.measurements import ROLLING_SIGMAS, ROLLING_SPEED
 from ..calibration.file import ALIGN, CalibrationFile
 from ..calibration.mount import read_ride
 from ..checks.log import CheckedLog
-from ..common.errors import InputError
-from ..common.messages import Message, Remedy, is_explained, kind
+from ..common.messages import InputError, Message, Remedy, is_explained, kind
 from ..logs.csv_lines import write_lean
 from ..logs.log import PART_SAMPLES, Log, Source, Table
 from ..logs.reader import time_texts

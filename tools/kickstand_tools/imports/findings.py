@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..common.errors import InputError
+from ..common.messages import InputError
 from ..logs.csv_reader import as_text
 from ..signals import Array
 from .columns import (

@@ -11,8 +11,7 @@ import numpy as np
 
 from ..checks.axes import log_agrees
 from ..checks.log import check_log
-from ..common.errors import InputError
-from ..common.messages import AT_REST, Message, Remedy, kind
+from ..common.messages import AT_REST, InputError, Message, Remedy, kind
 from ..estimation.first_guess import MIN_RIDING_S
 from ..logs.csv_lines import write_log
 from ..logs.log import Log

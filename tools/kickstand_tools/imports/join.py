@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from kickstand.units import LOST_US
 
-from ..common.errors import InputError
+from ..common.messages import InputError
 from ..logs.cells import MOST_DPS, MOST_G, TRACK
 from ..logs.even_times import even_times
 from ..logs.log import Log

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.errors import InputError
+from ..common.messages import InputError
 from ..logs.csv_reader import cells_of, columns_of, columns_of_text, filled, numbers_of, separator_of
 from .columns import stated_unit
 from .files import RecordingFile

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..common.errors import InputError
-from ..common.messages import Message
+from ..common.messages import InputError, Message
 from ..logs.csv_reader import Cells, cells_of, columns_of_text, numbers_of, separator_of
 from ..signals import Array
 from .files import RecordingFile

@@ -11,7 +11,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from ..common.errors import InputError
+from ..common.messages import InputError
 from ..logs.csv_reader import Cells, as_text, filled, numbers_of
 from ..signals import Array, Ints
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from ..calibration.file import CalibrationFile
 from ..calibration.mount import read_ride
-from ..common.errors import InputError, extra
-from ..common.messages import Message, as_data
-from ..common.times import clock, tick_s
+from ..common.installation import extra
+from ..common.markup import clock, tick_s
+from ..common.messages import InputError, Message, as_data
 from ..estimation.smooth import SmoothedRide, smooth_checked
 from ..logs.log import Source
 from ..logs.source import Progress, name_of

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..calibration.file import CalibrationFile
-from ..common.errors import InputError
+from ..common.messages import InputError
 from ..signals import Array, Bools, correlations, log_likelihood_ratio, moving_mean, peaks, rotation_angle
 from .fit import USUAL_DRIFT
 from .match import LEAST_EVIDENCE, LEAST_LEAD, LEAST_S, MOST_DRIFT

@@ -9,8 +9,7 @@ import numpy as np
 from kickstand.units import LOST_US
 
 from ..checks.log import check_log
-from ..common.errors import InputError
-from ..common.messages import Message
+from ..common.messages import InputError, Message
 from ..common.output import write_packed
 from ..logs.csv_lines import write_log
 from ..logs.log import Log, Source

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ..common.errors import InputError
-from ..common.messages import OPPOSITE_SIGN
+from ..common.messages import OPPOSITE_SIGN, InputError
 from ..signals import Array, Bools, correlations, log_likelihood_ratio, moving_mean, peaks
 from .fit import AROUND_S, TrackFit, cost_of_one_shift, fitted
 from .motion import STEP_S, BinMotion

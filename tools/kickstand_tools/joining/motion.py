@@ -12,7 +12,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
 from ..checks.log import CheckedLog
-from ..common.errors import InputError
+from ..common.messages import InputError
 from ..signals import Array, Bools, binned, moving_mean
 from .track import Course, Segments, without_trend
 

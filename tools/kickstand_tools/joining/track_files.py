@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..common.errors import InputError, cause, extra
+from ..common.installation import extra
+from ..common.messages import InputError, cause
 from ..logs.source import Progress, open_input
 from .track import FASTEST_MPS, Track
 

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..common.errors import InputError
-from ..common.messages import Remedy
+from ..common.messages import InputError, Remedy
 from ..signals import Array
 from .csv_reader import cells_of, number_of
 

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..common.errors import InputError
+from ..common.messages import InputError
 from ..signals import Array, Bools
 
 # The n cells of one column. The type is int64, or float64 with NaN for an empty cell, or object with a str per cell, ""

@@ -11,8 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..common.errors import InputError
-from ..common.messages import kind
+from ..common.messages import InputError, kind
 from ..signals import Array, Ints, window_means
 
 COARSE = 0.05  # share of the time between samples; times with a smaller tick are not changed

@@ -9,8 +9,8 @@ import numpy as np
 from kickstand.units import AXES
 from numpy.typing import ArrayLike, NDArray
 
-from ..common.errors import InputError, extra
-from ..common.messages import Message
+from ..common.installation import extra
+from ..common.messages import InputError, Message
 from ..signals import Array, Bools, Ints
 from .cells import TRACK
 from .source import File, name_of

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..common.errors import InputError
-from ..common.messages import Message, kind
+from ..common.messages import InputError, Message, kind
 from ..signals import Array
 from . import cells
 from .cells import COLUMNS, OPTIONAL, TRACK

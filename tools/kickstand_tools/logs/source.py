@@ -10,8 +10,7 @@ from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import IO, Any, cast
 
-from ..common.errors import InputError, cause
-from ..common.messages import Message, Remedy, kind
+from ..common.messages import InputError, Message, Remedy, cause, kind
 
 # Most bytes without a line end. A file system may leave NUL bytes at the end of a file after a power cut
 MOST_PENDING = 16_000_000

@@ -14,9 +14,8 @@ import numpy as np
 from ..calibration.file import CalibrationFile
 from ..calibration.mount import read_ride
 from ..checks.log import CheckedLog
-from ..common import plugins, unix_port
-from ..common.errors import InputError
-from ..common.messages import Message, kind
+from ..common import installation
+from ..common.messages import InputError, Message, kind
 from ..logs.csv_lines import write_lean
 from ..logs.log import Source, Table
 from ..logs.reader import time_texts
@@ -157,7 +156,7 @@ class _Replay:
             meter = MeterAlong(self._calibration)
             yield from (meter.columns(part) for _, part in parts)
             return
-        run = _BY_RECORDS[self._engine] or plugins.part(plugins.ENGINES, self._engine)
+        run = _BY_RECORDS[self._engine] or installation.part(installation.ENGINES, self._engine)
         with run(self._records(), self._progress) as file:
             for _, part in parts:
                 size = _RESULT_BYTES * len(part.t_s)
@@ -184,14 +183,14 @@ class _Replay:
 def micropython(records: Iterator[bytes], _progress: Progress | None) -> Iterator[IO[bytes]]:
     """Replay on MicroPython's unix port. Yields a file with the results. Raises InputError if MicroPython is not
     installed."""
-    if not unix_port.available():
+    if not installation.has_micropython():
         raise InputError("engine micropython has no package for this system: use --engine cpython")
     with tempfile.TemporaryDirectory() as directory:
         path = Path(directory) / "records"
         with path.open("wb") as file:
             file.writelines(records)
-        command = unix_port.command(replay_engine.__file__, str(path))
-        with subprocess.Popen(command, env=unix_port.environment(), stdout=subprocess.PIPE) as process:
+        command, environment = installation.micropython(replay_engine.__file__, str(path))
+        with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE) as process:
             assert process.stdout is not None
             yield process.stdout
 

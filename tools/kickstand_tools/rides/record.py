@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.live import Live
 
 from ..calibration.file import write_calibration
-from ..common.errors import InputError
+from ..common.messages import InputError
 from ..common.output import check_output, whole_file
 from ..deploy.connection import connected, restart
 from . import ride_log

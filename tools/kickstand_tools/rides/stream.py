@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from io import TextIOBase
 
 from ..calibration.file import CalibrationFile
-from ..common.errors import InputError, cause
-from ..deploy.board_console import BrokenOff, lines
-from ..deploy.connection import ConnectedBoard, refuse_unfit_firmware
+from ..common.messages import InputError, cause
+from ..deploy.connection import BrokenOff, ConnectedBoard, printed_lines, refuse_unfit_firmware
 from ..logs.cells import TRACK
 from ..replay.replay_engine import NO_SPEED, Replay
 from . import ride_log, stream_guest
@@ -154,7 +153,7 @@ def _lines(transport: ConnectedBoard, name: str, notes: list[str], stopped: thre
     """Yield the lines that the app on the board prints."""
     prefix = f"{name}: " if name else ""
     try:
-        yield from lines(transport, _START, _SILENT_S, stopped)
+        yield from printed_lines(transport, _START, _SILENT_S, stopped)
         if not stopped.is_set():
             notes.append(f"{prefix}the board stopped on its own: the log up to there is kept")
     except OSError as error:

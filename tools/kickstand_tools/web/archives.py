@@ -1,8 +1,8 @@
 """Collects what the pages need: packages for browsers from npm, and tools in ZIP files.
 
 npm/package-lock.json has the versions and hashes of MicroPython, CPython and the other packages. install_archive()
-packs the files with which browser_install.py and browser_cable.py talk to a board, rides_archive() those with which
-browser_rides.py shows a ride. The same content always gives the same ZIP file.
+packs the files with which browser_board.py talks to a board, rides_archive() those with which browser_rides.py shows a
+ride. The same content always gives the same ZIP file.
 """
 
 import hashlib
@@ -24,10 +24,10 @@ import jinja2
 import markupsafe
 import mpremote
 
-from ..common import firmware_path
-from ..common.errors import InputError, cause, extra
-from ..deploy import bytecode
-from ..deploy.firmware_files import firmware_files
+from ..common import installation
+from ..common.installation import extra
+from ..common.messages import InputError, cause
+from ..deploy.firmware_files import CannotCompile, cross_compiled, firmware_files
 
 _DATE = (1980, 1, 1, 0, 0, 0)
 # The boards of these architectures, in this order: Pico; Pico 2 (Arm); ESP32-C3, C6, H2 and Pico 2 (RISC-V); all other
@@ -77,12 +77,12 @@ def tools(*modules: str) -> dict[str, Path]:
 
     Returns {path below tools/: file}, also with the templates, scripts and style sheets in the modules' folders.
     """
-    finder = _ToolsFinder([str(firmware_path.TOOLS)])
+    finder = _ToolsFinder([str(installation.TOOLS)])
     for name in modules:
         finder.import_hook("kickstand_tools." + name.removesuffix(".py").replace("/", "."))
     paths = {Path(path) for module in finder.modules.values() if (path := vars(module)["__file__"])}
     resources = {file for path in paths for file in path.parent.iterdir() if file.suffix in (".html", ".js", ".css")}
-    return {path.relative_to(firmware_path.TOOLS).as_posix(): path for path in sorted(paths | resources)}
+    return {path.relative_to(installation.TOOLS).as_posix(): path for path in sorted(paths | resources)}
 
 
 def zipped(contents: Mapping[str, bytes]) -> bytes:
@@ -104,7 +104,7 @@ def install_archive() -> bytes:
     mpremote/, serial/: mpremote, and a replacement of pyserial.
     """
     files = {f"mpremote/{name}": Path(mpremote.__file__).parent / name for name in _MPREMOTE}
-    files |= {f"tools/{name}": path for name, path in tools("web/browser_cable.py", "web/browser_install.py").items()}
+    files |= {f"tools/{name}": path for name, path in tools("web/browser_board.py").items()}
     files |= {f"firmware{path}": source for path, source in firmware_files().items()}
     return zipped({name: path.read_bytes() for name, path in files.items()} | _STANDS_IN | _compiled())
 
@@ -120,17 +120,18 @@ def _compiled() -> dict[str, bytes]:
     The first architecture has all files, the others only those with machine code. Without a compiler the result is
     empty, and the board gets the sources.
     """
-    sources = sorted(firmware_path.PACKAGE.rglob("*.py"))
+    sources = sorted(installation.PACKAGE.rglob("*.py"))
     first, *remaining = ARCHITECTURES
     try:
         with ThreadPoolExecutor() as pool:
-            compiled = dict(zip(sources, pool.map(lambda source: bytecode.cross_compiled(source, first), sources)))
+            contents = pool.map(lambda source: cross_compiled(source, first), sources)
+            compiled = dict(zip(sources, contents))
             files = {(first, source): data for source, data in compiled.items()}
             for source in [source for source, data in compiled.items() if data[2]]:
-                files |= {(other, source): bytecode.cross_compiled(source, other) for other in remaining}
-    except bytecode.CannotCompile:
+                files |= {(other, source): cross_compiled(source, other) for other in remaining}
+    except CannotCompile:
         return {}
-    package = firmware_path.PACKAGE
+    package = installation.PACKAGE
     return {
         f"compiled/{architecture}/{source.relative_to(package).with_suffix('.mpy').as_posix()}": data
         for (architecture, source), data in files.items()
@@ -150,7 +151,7 @@ def rides_archive() -> bytes:
         raise InputError("the page Rides needs fitdecode and gpxpy: " + extra("web")) from error
     files = tools("web/browser_rides.py")
     libraries = (Path(library.__path__[0]) for library in (fitdecode, gpxpy, jinja2, markupsafe))
-    for package in (firmware_path.PACKAGE, *libraries):
+    for package in (installation.PACKAGE, *libraries):
         files |= {path.relative_to(package.parent).as_posix(): path for path in package.rglob("*.py")}
     return zipped({name: path.read_bytes() for name, path in files.items()})
 

@@ -22,7 +22,7 @@ from ..analysis.overview import overview
 from ..analysis.plot.page import page
 from ..analysis.ride import open_ride
 from ..calibration.file import calibration_path, read_calibration, write_calibration
-from ..common.errors import InputError
+from ..common.messages import InputError
 from ..estimation.alignment import fit_ride
 from ..estimation.smooth import COLUMNS, DIGITS, smooth_to_csv
 from ..imports import mapped

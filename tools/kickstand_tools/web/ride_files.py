@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..calibration.file import calibration_path, read_calibration
-from ..common.errors import InputError
+from ..common.messages import InputError
 from ..imports import mapped
 from ..imports.files import RecordingFile, read_files
 from ..imports.findings import Findings

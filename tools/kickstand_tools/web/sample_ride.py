@@ -12,7 +12,7 @@ from kickstand_sim.simulation.ride import SimulatedRide
 
 from ..calibration.file import write_calibration
 from ..calibration.poses import fit_six_positions, fit_two_positions
-from ..common.svg import drawing, element, path
+from ..common.markup import drawing, element, path
 
 LOG, CALIBRATION = "simulated-ride.csv.gz", "simulated-ride.cal.json"
 PROFILE, SEED, SECONDS = "street", 2, 180.0

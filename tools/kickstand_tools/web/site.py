@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from ..analysis.plot import page
-from ..common import firmware_path
-from ..common.errors import DISTRIBUTION
+from ..common import installation
+from ..common.installation import DISTRIBUTION
+from ..common.markup import filled, source_hash
 from ..common.output import check_directory, new_directory, whole_file
-from ..common.templates import filled, source_hash
 from . import archives, sample_ride
 from .documents import documents
 
@@ -26,7 +26,7 @@ _WHEN_READ = (*LATER, documents.FOLDER)  # the service worker stores these when 
 
 def python_files() -> dict[str, str]:
     """Return {path for import: source} of the firmware's package and of the tools' modules that the page Try runs."""
-    package = firmware_path.PACKAGE
+    package = installation.PACKAGE
     files = {path.relative_to(package.parent).as_posix(): path for path in sorted(package.rglob("*.py"))}
     return {name: path.read_text(encoding="utf-8") for name, path in (files | archives.tools("web/device.py")).items()}
 
@@ -77,7 +77,7 @@ def shop_boards() -> dict[str, dict[str, str]]:
     >>> shop_boards()["Waveshare RP2040-Zero"]["BUTTON_PIN"]
     '15'
     """
-    text = (firmware_path.documents() / "firmware" / "docs" / "settings.md").read_text(encoding="utf-8")
+    text = (installation.documents() / "firmware" / "docs" / "settings.md").read_text(encoding="utf-8")
     boards = {}
     for line in re.findall(r"(?m)^\| board \| `SENSOR_SDA`.*\n\|.*\n((?:\|.*\n)+)", text)[0].splitlines():
         name, sensor, display, button, options, _ = (cell.strip() for cell in line.strip("|").split("|"))

@@ -10,8 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from kickstand_tools.common.svg import drawing, element
-from kickstand_tools.common.templates import filled, source_hash
+from kickstand_tools.common.markup import drawing, element, filled, source_hash
 from markupsafe import Markup
 
 from ..period import MOVED, PeriodResult, Row

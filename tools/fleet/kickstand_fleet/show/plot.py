@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from kickstand_tools.common.svg import drawing, element, path
+from kickstand_tools.common.markup import drawing, element, path
 from markupsafe import Markup
 
 from ..files import file_stem, write_bytes

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...common.times import clock, tick_s
+from ...common.markup import clock, tick_s
 from ...signals import Array, smoothed
 from ..channels import spacing_s
 from ..overview import Overview

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from ...common.errors import InputError, extra
+from ...common.installation import extra
+from ...common.markup import filled, source_hash
+from ...common.messages import InputError
 from ...common.output import check_directory, new_directory, whole_file
-from ...common.templates import filled, source_hash
 from ...signals import EARTH_M
 from ..overview import Overview
 from . import interactive, picture, track_map

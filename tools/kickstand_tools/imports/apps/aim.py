@@ -8,7 +8,7 @@ VerticalAcc points up and keeps its sign. The signs of the other channels do not
 
 import numpy as np
 
-from ...common.errors import InputError
+from ...common.messages import InputError
 from ..files import RecordingFile
 from ..recording import AppRecording, names_in, names_line, plain, read_sheet, sensor_of, track_of, unit_in
 from ..units import SPEEDS, unit

@@ -9,7 +9,8 @@ import io
 
 import numpy as np
 
-from ...common.errors import InputError, extra
+from ...common.installation import extra
+from ...common.messages import InputError
 from ...logs.cells import COLUMNS
 from ...logs.csv_reader import MOST_CELLS
 from ..files import RecordingFile

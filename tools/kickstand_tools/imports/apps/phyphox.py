@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...common.errors import InputError
+from ...common.messages import InputError
 from ...logs.csv_reader import as_text
 from ..files import RecordingFile
 from ..join import with_gravity

@@ -8,7 +8,7 @@ unit; the unit is found from the positions.
 
 from collections.abc import Mapping
 
-from ...common.errors import InputError
+from ...common.messages import InputError
 from ..files import RecordingFile
 from ..recording import AppRecording, names_line, plain, read_sheet, sensor_of, track_of, unit_in
 from ..unit_fits import speed_of

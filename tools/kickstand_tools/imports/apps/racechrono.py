@@ -7,7 +7,7 @@ lateral_acc and longitudinal_acc are calculated from positions and do not contai
 phone or the box. Kickstand's own export also has this format.
 """
 
-from ...common.errors import InputError
+from ...common.messages import InputError
 from ..files import RecordingFile
 from ..recording import AppRecording, names_in, names_line, plain, read_sheet, sensor_of, track_of
 

@@ -8,7 +8,7 @@ m/s2 and rad/s. At rest with the screen up, z is +9.8.
 
 import re
 
-from ...common.errors import InputError
+from ...common.messages import InputError
 from ..files import RecordingFile
 from ..join import with_gravity
 from ..recording import AppRecording, RecordedSensor, first_names, read_sheet, sensor_of

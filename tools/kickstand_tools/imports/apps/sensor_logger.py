@@ -6,7 +6,7 @@ acceleration and gravity have the opposite sign, and AccelerometerUncalibrated i
 Frames" was on.
 """
 
-from ...common.errors import InputError
+from ...common.messages import InputError
 from ..files import RecordingFile
 from ..join import with_gravity
 from ..recording import AppRecording, RecordedSensor, first_names, names_in, read_sheet, sensor_of, track_of

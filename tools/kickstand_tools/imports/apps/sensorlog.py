@@ -9,7 +9,7 @@ acceleration, which the file also contains. Rates are in rad/s, right-handed.
 
 import numpy as np
 
-from ...common.errors import InputError
+from ...common.messages import InputError
 from ..files import RecordingFile
 from ..join import with_gravity
 from ..recording import (

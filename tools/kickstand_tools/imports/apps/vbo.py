@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from ...common.errors import InputError
+from ...common.messages import InputError
 from ...logs.csv_reader import columns_of
 from ..files import RecordingFile
 from ..recording import AppRecording, Sheet, plain, sensor_of, track_of

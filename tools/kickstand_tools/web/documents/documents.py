@@ -13,8 +13,8 @@ from pathlib import Path
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
-from ...common import firmware_path
-from ...common.templates import filled
+from ...common import installation
+from ...common.markup import filled
 
 FOLDER = "docs/"  # in the site
 ALL = "all.html"
@@ -84,7 +84,7 @@ def document_files(home: str) -> dict[str, bytes]:
         out.
     Returns {path in the site: content}.
     """
-    root = firmware_path.documents()
+    root = installation.documents()
     documents = {path: _converted(root, path, home) for path in PATHS}
     groups = [(title, [Entry(documents[path].title, page_of(path), path) for path in paths]) for title, paths in GROUPS]
     pages = {page_of(path): (document, path) for path, document in documents.items()}

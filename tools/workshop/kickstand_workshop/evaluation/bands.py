@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from kickstand_sim.simulation.ride import ride
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import InputError
 from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
