@@ -19,7 +19,6 @@ from .board.display import STOPPED
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
 from .errors import report
-from .imu.sensor import SampleClock
 from .lean.meter import LeanMeter
 from .rides.rides import Rides
 from .ui.pages import Screen
@@ -70,7 +69,7 @@ class App:
         self.calibration = ActiveCalibration(self.meter)
         self.drive = self._open_drive() if settings.SPEED else None
         self.rides = Rides(self, writer)
-        self.clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
+        self.clock = sensor.clock
         self.late = False
         self._restarts = 0
         self._least_wait_us = LOOP_US
@@ -111,8 +110,8 @@ class App:
             self.lcd.end(*STOPPED)
             global worst
             chip = self.sensor.chip
-            peaks, share = chip.axes.shaken()
-            worst = LOOP_US - self._least_wait_us, chip.least_free_samples(), (tuple(peaks), share)
+            shaken = chip.axes.shaken(self.clock.skipped)
+            worst = LOOP_US - self._least_wait_us, chip.least_free_samples(), shaken
             # Ctrl-C ends the firmware; after an error the board is restarted instead
             if not isinstance(error, Exception):
                 port.rest_watchdog()
@@ -178,9 +177,6 @@ class App:
         """Process the samples in the FIFO and one press, and do at most one transfer to the display. Never wait."""
         now_us, now_ms = ticks_us(), ticks_ms()
         n, dt_us = self.sensor.fetch(now_ms), 0
-        if self.sensor.clipped:
-            self.clock.skip(self.sensor.clipped)
-            self.sensor.clipped = 0
         if n:
             if self._restarts != self.sensor.restarts:
                 self._sensor_started()
