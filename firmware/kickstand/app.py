@@ -157,9 +157,14 @@ class App:
             self._due_us = ticks_us()
 
     @property
+    def shown_deg(self):
+        """As lean_deg, but 0 for a car whose readings may be shown."""
+        return self.meter.shown_deg(self.late, self.sensor.fault)
+
+    @property
     def lean_deg(self):
-        """The lean in degrees, positive to the right, or None if it may not be shown."""
-        return self.meter.shown_deg(self.late, self.sensor.fault) if self.settings.leans else None
+        """The lean in degrees, positive to the right, or None if it may not be shown. None for a car."""
+        return self.shown_deg if self.settings.leans else None
 
     @property
     def trusted(self):

@@ -133,7 +133,7 @@ class LeanMeter:
             fault: the sensor's fault, or None.
         """
         hidden = late or fault is not None or self.fallen or not (self.calibration.aligned and self.trusted)
-        return None if hidden or abs(self.lean_deg) > FALLEN_DEG else self.lean_deg
+        return None if hidden or abs(self.lean_deg) >= FALLEN_DEG else self.lean_deg
 
     def keep_trim(self):
         """Copy the trim to the calibration, and the gyro's errors that the filter has found to its gyro_matrix.

@@ -334,7 +334,7 @@ class Screen:
         app, meter, glance = self._app, self._app.meter, self._pictures()
         if meter.fallen:
             return FALLEN
-        if meter.shown_deg(app.late) is None:
+        if app.shown_deg is None:
             lines = unsure(meter.suppressed_reason or meter.odd)
             return lines + (glance.unsure(*lines),) if glance else lines
         line1, line2 = page(meter)
