@@ -111,11 +111,7 @@ def test_too_little_memory_for_the_settings_is_shown_before_a_restart(without, r
 
 
 @pytest.mark.parametrize(
-    ("module", "entry", "error"),
-    [
-        ("ui.wizard", 0, ImportError),
-        ("calibration.poses", 1, MemoryError),
-    ],
+    ("module", "entry", "error"), [("ui.wizard", 0, ImportError), ("calibration.poses", 1, MemoryError)]
 )
 def test_failed_import_of_a_menu_entry_is_shown_each_time(module, entry, error, without, run):
     """entry: its position in the menu."""
