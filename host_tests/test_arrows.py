@@ -67,7 +67,7 @@ TOOLS = {
         "checks",
         "calibration",
         "estimation",
-        "replay.meter_along",
+        "replay.replay",
     },
     "overlay": {"common", "signals", "logs", "checks.log", "calibration.file", "joining.motion", "analysis"},
     "simulated_board": set(),

@@ -24,7 +24,7 @@ from .analysis.ride import Ride as Ride, open_ride as open_ride, vehicle_channel
 from .analysis.stops import Stop as Stop, brake_tests as brake_tests, find_stops as find_stops
 from .analysis.summary import Summary as Summary, summary as summary
 from .calibration.drive import DriveFit as DriveFit, fit_drive as fit_drive
-from .calibration.drive_events import DriveEvent as DriveEvent
+from .calibration.drive_feed import DriveEvent as DriveEvent
 from .calibration.file import (
     CalibrationFile as CalibrationFile,
     read_calibration as read_calibration,
@@ -33,10 +33,10 @@ from .calibration.file import (
 from .calibration.poses import (
     SixPositions as SixPositions,
     TwoPositions as TwoPositions,
+    fit_procedure as fit_procedure,
     fit_six_positions as fit_six_positions,
     fit_two_positions as fit_two_positions,
 )
-from .calibration.procedure import fit_procedure as fit_procedure
 from .checks.log import CheckedLog as CheckedLog, check_log as check_log
 from .common.messages import (
     InputError as InputError,

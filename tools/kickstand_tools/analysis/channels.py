@@ -12,7 +12,7 @@ from kickstand.lean.meter import FALLEN_DEG
 
 from ..calibration.file import CalibrationFile
 from ..logs.log import ROOM_TEMP_C, Log, Table
-from ..replay.meter_along import formula_lean_deg
+from ..replay.replay import formula_lean_deg
 from ..signals import Array, Bools
 
 _LAST = ("lat_deg", "lon_deg", "utc_s")

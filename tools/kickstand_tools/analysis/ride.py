@@ -19,7 +19,7 @@ from ..logs.cells import MOST_DPS, MOST_G
 from ..logs.log import Log, Source, Stretch
 from ..logs.reader import check_first_line
 from ..logs.source import File, Progress, log_stem, name_of
-from ..replay.meter_along import MeterAlong, Misfit
+from ..replay.replay import MeterAlong, Misfit
 from ..signals import Array
 from .channels import Channels, channels, joined
 

@@ -10,12 +10,18 @@ from kickstand.drive_alignment import alignment
 from kickstand.units import AXES
 
 from ..analysis import alignment_quality
-from ..calibration import drive_events as events
+from ..calibration import drive_feed as events
 from ..calibration.drive import DriveFit, fit_drive
 from ..calibration.file import CalibrationFile, read_calibration, write_calibration
 from ..calibration.mount import contradiction, of_calibration
-from ..calibration.poses import GOOD_FREE_POSE_G, SixPositions, TwoPositions, fit_six_positions, fit_two_positions
-from ..calibration.procedure import fit_procedure
+from ..calibration.poses import (
+    GOOD_FREE_POSE_G,
+    SixPositions,
+    TwoPositions,
+    fit_procedure,
+    fit_six_positions,
+    fit_two_positions,
+)
 from ..checks.log import check_log
 from ..common.messages import OPPOSITE_SIGN
 from ..common.output import check_output
