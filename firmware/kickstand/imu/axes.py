@@ -168,4 +168,4 @@ class AxisWatch:
         gc.collect()  # without a collection the imported module, which stays loaded, would be placed behind garbage
         from .axis_judge import AxisJudge
 
-        self._judge = AxisJudge(*self._settings)
+        self._judge = AxisJudge(lives, *self._settings)

@@ -10,7 +10,6 @@ from micropython import const
 
 from ..errors import Notice
 from ..units import AXES
-from .axes import lives
 
 # Bits of the counts that were seen, as in axes.py, which imports this module when an axis looks suspicious
 _HIGH_BYTE = const(0x10000)
@@ -43,11 +42,13 @@ class AxisJudge:
     """Decides which axes are faulty.
 
     Args:
+        lives: the function of axes.py.
         gyro_range: 0 (250 deg/s) to 3 (2000 deg/s).
         dlpf: the low-pass, as for Mpu6050.
     """
 
-    def __init__(self, gyro_range, dlpf):
+    def __init__(self, lives, gyro_range, dlpf):
+        self._lives = lives
         self._limits = _ACCEL_LOOKS[dlpf - 1], _GYRO_LOOKS[gyro_range][dlpf - 1]
         # _quiet: number of successive quiet looks, per column
         # _seen: bits seen since the first of them, per column
@@ -104,7 +105,7 @@ class AxisJudge:
             if limit == 1 and not differ >> i & 1:
                 equal |= 1 << i | 1 << (i - 1 if i & 3 else i + 2)
             self._seen[i] = bits = self._seen[i] | seen[i]
-            if not lives(bits):
+            if not self._lives(bits):
                 if quiet[i] < 255:
                     quiet[i] += 1
                 if quiet[i] < limit or not limit:
