@@ -37,7 +37,7 @@ FIRMWARE = {
         "ui.messages",
     },
     "app": {
-        *("board", "calibration", "drive_alignment", "imu", "lean"),
+        *("board", "calibration", "drive_alignment", "lean"),
         *("rides", "speed", "ui"),
         "user_code",
     },
