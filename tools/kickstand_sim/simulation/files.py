@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from kickstand_tools.common.messages import InputError
 from kickstand_tools.common.output import check_directory, make_directory, whole_file
-from kickstand_tools.logs.cells import COLUMNS, TRACK
+from kickstand_tools.logs.csv_text import COLUMNS, TRACK
 from numpy.typing import NDArray
 
 from .profiles import check_profile

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from kickstand_tools.common.messages import InputError, cause
 from kickstand_tools.common.output import check_directory, make_directory, whole_file
-from kickstand_tools.logs.csv_lines import write_table
+from kickstand_tools.logs.csv_text import write_table
 from kickstand_tools.logs.log import Log
 from kickstand_tools.signals import Array, rotation_matrix
 
