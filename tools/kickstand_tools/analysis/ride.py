@@ -299,7 +299,7 @@ class Ride:
 
 
 class RideReading:
-    """Computes the channels of a ride by parts(), so that memory hardly grows with its length. notices() come after them."""
+    """Computes the channels of a ride by parts(), so that memory hardly grows with its length; then its notices()."""
 
     def __init__(self, ride: Ride, progress: Progress | None, keep: Callable[[Array], None] | None) -> None:
         self._ride, self._progress, self._keep = ride, progress, keep
