@@ -112,7 +112,7 @@ class BackgroundAlignment:
             self.fresh_speed(now_ms)
             if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > _LOOK_MS:
                 self._begin_again()  # begin again now, because after 6 days without a reading ticks_diff() is negative
-            notice = attempt(self._look, now_ms)
+            notice = attempt(None, self._look, now_ms)
             if notice:
                 self._say(notice)
         return speed
