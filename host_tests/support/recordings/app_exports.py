@@ -1,6 +1,6 @@
 """Writes a known ride as apps and loggers export it. Each writer follows the documentation of the format's maker.
 
-The addresses of these documents are in the modules of kickstand_tools.imports.apps and in the tests. No data in this
+The addresses of these documents are in kickstand_tools.imports.phone_apps and vehicle_loggers, and in the tests. No data in this
 module is copied from an export.
 """
 
