@@ -6,7 +6,7 @@ from collections.abc import Callable, Container, Iterator
 import numpy as np
 
 from ..common.messages import InputError
-from ..logs.csv_reader import as_text
+from ..logs.csv_text import as_text
 from .files import RecordingFile
 from .join import in_order, on_clock, step_ns
 from .recording import (

@@ -9,8 +9,7 @@ import numpy as np
 
 from ..common.installation import extra
 from ..common.messages import InputError
-from ..logs.cells import COLUMNS
-from ..logs.csv_reader import MOST_CELLS, columns_of
+from ..logs.csv_text import COLUMNS, MOST_CELLS, columns_of
 from .files import RecordingFile
 from .recording import (
     App,

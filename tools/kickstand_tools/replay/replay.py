@@ -21,7 +21,7 @@ from ..calibration.mount import read_ride
 from ..checks.log import CheckedLog
 from ..common import installation
 from ..common.messages import InputError, Message, Remedy, is_explained, kind
-from ..logs.csv_lines import write_lean
+from ..logs.csv_text import write_lean
 from ..logs.log import Log, Source, Table
 from ..logs.reader import time_texts
 from ..logs.source import Progress

@@ -17,8 +17,7 @@ from kickstand.calibration.parameters import Calibration
 from kickstand.rides import block as block_format
 
 from ..calibration.file import CalibrationFile, calibration_path, write_calibration
-from ..logs.cells import COLUMNS, TRACK
-from ..logs.csv_lines import write_table
+from ..logs.csv_text import COLUMNS, TRACK, write_table
 
 _HEAD_LENGTH = struct.calcsize(block_format.HEAD)
 _TAIL_LENGTH = struct.calcsize(block_format.TAIL)

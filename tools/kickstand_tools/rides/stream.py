@@ -23,7 +23,7 @@ from ..deploy.connection import (
     refuse_unfit_firmware,
     restart,
 )
-from ..logs.cells import TRACK
+from ..logs.csv_text import TRACK
 from ..replay.replay_engine import NO_SPEED, Replay
 from . import ride_log, stream_guest
 from .ride_log import BadBlock, StoredBlock, missing_note, parse

@@ -29,7 +29,7 @@ from ..imports import mapped
 from ..imports.findings import Findings
 from ..imports.importing import import_recording, write_imported
 from ..joining.joined import join_track, write_joined
-from ..logs.csv_lines import write_lean
+from ..logs.csv_text import write_lean
 from ..logs.reader import read_log, time_texts
 from ..logs.source import log_stem
 from .ride_files import sorted_out

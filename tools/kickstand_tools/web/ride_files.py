@@ -12,7 +12,7 @@ from ..imports import mapped
 from ..imports.files import RecordingFile, read_files
 from ..imports.findings import Findings
 from ..imports.importing import recordings
-from ..joining.track_files import read_track
+from ..joining.track import read_track
 from ..logs.reader import is_log
 
 
