@@ -270,12 +270,12 @@ def find_stops(ride: Channels) -> list[Stop]:
 
     ride: a whole ride, from vehicle_channels(). pandas.DataFrame accepts the returned list.
 
-    >>> from kickstand_tools.api import Log, fit_two_positions, simulate_ride, vehicle_channels
+    >>> from kickstand_tools.api import CalibrationFile, Log, simulate_ride, vehicle_channels
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)
-    >>> poses = [Log.from_readings(pose, ride.rate_hz) for pose in (ride.kickstand, ride.upright)]
     >>> log = Log.from_readings(ride.readings, ride.rate_hz)
     >>> log.speed_mps[::200] = ride.truth["speed_mps"][::200]  # once per second
-    >>> stops = find_stops(vehicle_channels(log, fit_two_positions(*poses).calibration))
+    >>> calibration = CalibrationFile(vehicle_from_sensor=ride.vehicle_from_sensor, aligned=True)
+    >>> stops = find_stops(vehicle_channels(log, calibration))
     >>> stops[-1].speed_from, stops[-1].initial_speed_mps > 3.0, stops[-1].mfdd_mps2 > 1.0
     ('log', True, True)
     """
@@ -287,6 +287,14 @@ def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
     """Call find_stops() for a log with an aligned calibration. Raises InputError.
 
     The firmware's lean filter takes most of the time. It runs only for motorcycles, because a car has no lean.
+
+    >>> from kickstand_tools.api import Log, simulate_ride
+    >>> ride = simulate_ride("street", seed=1, seconds=60.0)
+    >>> log = Log.from_readings(ride.readings, ride.rate_hz)
+    >>> log.speed_mps[::200] = ride.truth["speed_mps"][::200]  # once per second
+    >>> calibration = CalibrationFile(vehicle_from_sensor=ride.vehicle_from_sensor, aligned=True)
+    >>> brake_tests(log, calibration)[-1].mfdd_mps2 > 1.0
+    True
     """
     ride = Ride(check_log(read_log(log), axes=False), calibration)
     parts = _car_channels(ride) if ride.car else ride.read().parts()
