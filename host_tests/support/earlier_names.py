@@ -15,6 +15,7 @@ MOVED = {
     "kickstand_sim.simulation.physics.kinematics": "kickstand_sim.simulation.physics.bike",
     "kickstand_sim.simulation.physics.mount": "kickstand_sim.simulation.physics.chip",
     "kickstand_tools.common.errors": "kickstand_tools.common.messages",
+    "kickstand_tools.common.progress": "kickstand_tools.cli.common",
     "kickstand_tools.common.times": "kickstand_tools.common.markup",
     "kickstand_tools.deploy.board_console": "kickstand_tools.deploy.connection",
     "kickstand_tools.deploy.bytecode": "kickstand_tools.deploy.firmware_files",
