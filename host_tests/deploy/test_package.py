@@ -59,7 +59,7 @@ def wheel(tmp_path_factory):
 
 @pytest.mark.parametrize(
     ("name", "parts"),
-    [("fleet", ["fleet = kickstand_fleet.", "show/page.html"]), ("emulator", ["bench = ", "emulate = ", "rp2040 = "])],
+    [("fleet", ["fleet = kickstand_fleet.", "page.html"]), ("emulator", ["bench = ", "emulate = ", "rp2040 = "])],
 )
 def test_a_package_beside_the_core_has_its_entry_points_and_files(tmp_path, name, parts):
     with zipfile.ZipFile(built(ROOT / "tools" / name, tmp_path)) as archive:

@@ -26,11 +26,11 @@ def need(chip: str) -> None:
 @functools.cache  # cached, so that a missing package is not downloaded for each test
 def _lacking(chip: str) -> str:
     """Return the reason why this chip cannot be emulated, or "" if it can."""
-    from kickstand_emulator import esp32_library, image
+    from kickstand_emulator import image
 
     try:
         if chip == "esp32":
-            esp32_library.find()
+            image.find_esp32()
         else:
             image.find()
             importlib.import_module("kickstand_emulator.pico")
@@ -64,9 +64,7 @@ MPY = {"pico": firmware_files.PICO, "esp32": firmware_files.ESP32}
 @functools.cache
 def firmware(chip: str = "pico") -> dict[str, bytes]:
     """Return the firmware's compiled files. With compiled files, a board starts in half the time."""
-    from kickstand_emulator import flash_image
-
-    return flash_image.firmware(True, MPY[chip])
+    return firmware_files.contents(MPY[chip])
 
 
 def modules(chip: str = "pico") -> dict[str, bytes]:

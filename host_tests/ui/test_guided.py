@@ -86,6 +86,19 @@ def test_an_alignment_ends_by_a_long_press_or_a_fault():
     assert panel.lines() == ("Calibration", "stopped: fault") and panel.screen.wizard is None
 
 
+def test_without_memory_an_alignment_ends_with_a_notice(capsys):
+    panel = on_the_stand()
+    take_stand(panel)
+
+    def take(k):
+        raise MemoryError("memory allocation failed")
+
+    panel.sensor.chip.take = take
+    assert panel.hold(0.1) == ("No memory for it", "restart it") and panel.screen.wizard is None
+    assert "no memory for that (memory allocation failed)" in capsys.readouterr().out
+    assert panel.lines(panel.now_ms + 2000)[0].startswith("Raw")
+
+
 def test_a_faulty_gyro_is_also_explained_on_the_console(capsys):
     """The gyro reads nothing while the bike is brought upright."""
     panel = on_the_stand()

@@ -15,7 +15,7 @@ from kickstand_sim.simulation.files import positions
 from kickstand_tools import api
 from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.plot import charts, interactive
-from kickstand_tools.logs.csv_lines import write_log
+from kickstand_tools.logs.reader import write_log
 from support.command import works
 from support.recordings import analysis_rides, app_exports, phone_tracks
 from support.web.rider import LAPTOP, Rider

@@ -96,10 +96,10 @@ class Rides:
             self.start()
 
     def split(self):
-        """End the ride and begin another, because the calibration has changed and a ride has only one calibration. The
-        meter restarts too, because a replay of the new ride does not know the poses that were just taken."""
+        """End the ride and begin another, because the calibration has changed and a ride has only one calibration. With
+        the new calibration the lean filter has begun anew, as a replay of the new ride does."""
+        self._app.calibration.changed = False
         if self.recorder.active:
-            self._app.calibration.restart()
             self.recorder.start(self._app.sensor.chip, self._app.calibration.value)
 
     def stop(self):

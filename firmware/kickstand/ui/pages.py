@@ -259,10 +259,6 @@ class Screen:
             self.notice = None
         if app.notices and not self.notice:
             self.notice, self._notice_ms = app.notices.pop(0), ticks_add(now_ms, _NOTICE_MS)
-        if self.wizard:
-            self.wizard.tick(now_ms)
-            if self.wizard.ended:
-                self.wizard = None
         if self._menu and ticks_diff(now_ms, self._menu_ms) >= 0:
             self._menu = None
         self._update()
@@ -272,6 +268,8 @@ class Screen:
     def _update(self):
         """Find the view in front."""
         app = self._app
+        if self.wizard and self.wizard.ended:
+            self.wizard = None
         ring = self._ring()
         self._at %= len(ring)
         self._page = page = ring[self._at]
@@ -336,7 +334,7 @@ class Screen:
         app, meter, glance = self._app, self._app.meter, self._pictures()
         if meter.fallen:
             return FALLEN
-        if meter.shown_deg(app.late) is None:
+        if app.shown_deg is None:
             lines = unsure(meter.suppressed_reason or meter.odd)
             return lines + (glance.unsure(*lines),) if glance else lines
         line1, line2 = page(meter)
@@ -369,10 +367,28 @@ class Screen:
             now_ms: ticks_ms().
         """
         self.tick(now_ms)
-        notice = attempt(self._press, event, now_ms)
+        self._attempt(self._press, event, now_ms)
+        self.tick(now_ms)
+
+    def guide(self, n, dt_us, now_ms):
+        """Pass the samples and the time to the wizard, once per pass of the loop. If memory is too short, the wizard
+        ends with a notice.
+
+        Args:
+            n: number of new samples, which the chip has, or 0.
+            dt_us: microseconds since the previous samples.
+            now_ms: ticks_ms().
+        """
+        if self._attempt(self.wizard.follow, n, dt_us, now_ms):
+            self.wizard = None
+            self._update()
+
+    def _attempt(self, function, *arguments):
+        """Call a function as attempt() does, and show its Notice."""
+        notice = attempt(function, *arguments)
         if notice:
             self._app.notices.append(notice)
-        self.tick(now_ms)
+        return notice
 
     def _press(self, event, now_ms):
         if self.notice:  # the press ends the notice and is for the view below

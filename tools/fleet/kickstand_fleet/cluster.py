@@ -142,7 +142,7 @@ class Cluster:
             self._stack.close()
 
     def run(self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]]) -> Iterator[Outcome]:
-        """Yield the same outcomes as run_tasks(). The function and the items must be picklable.
+        """Yield the outcomes of run_tasks(). The function and the items must be picklable.
 
         Raises InputError if the connection to the scheduler is lost, or if no worker is left.
         """
@@ -170,7 +170,7 @@ class Cluster:
         future.add_done_callback(self._ended.put)
 
     def _collect(self, suspects: list[int]) -> Iterator[Outcome]:
-        """Wait up to _LOOK_S for a task to end, and yield its outcome. Also yield the outcomes of overdue tasks.
+        """Yield the outcome of a task that ends within _LOOK_S, and the outcomes of overdue tasks.
 
         suspects: the index of each task whose worker died is appended.
         """

@@ -103,5 +103,5 @@ def is_pattern(path: str) -> bool:
 
 
 def _matching_logs(path: str) -> list[str]:
-    """Return the files that match a pattern. If none matches, return the path itself: the run reports it as missing."""
+    """Return the files that match a pattern, or the path itself: the run reports a missing file."""
     return (files.matches(path) or [path]) if is_pattern(path) else [path]

@@ -9,10 +9,8 @@ from ..calibration.mount import SWAPPED_DEG
 from ..common.markup import clock
 from ..common.messages import Remedy, WrongAxes, WrongMount, as_data as remarks_as_data
 from ..estimation.smooth import PoseOff
-from .alignment_quality import LeanCost, Quality, lean_cost
-from .overview import Overview
+from .overview import LeanCost, Overview, Peak, Quality, lean_cost
 from .stops import Stop, stops_by_speed
-from .summary import Peak
 
 if TYPE_CHECKING:
     from rich.console import Group

@@ -1,4 +1,18 @@
-"""Measures stops as in a brake test: initial speed, distance, mean fully developed deceleration.
+"""Detects standstills, for the stops of a ride.
+
+The limits are relative to the shaking of the ride. In simulated rides, these limits find all of the standing time. The
+fixed limits of signals.motionless, in deg/s and g, find only 54 to 92 % of this time. Relative limits are worse only if
+an idling engine shakes as much as the road. Then relative limits find 17 to 41 % of the standing time, and fixed limits
+find 91 %.
+
+
+Corrects a speed integrated from the acceleration by the speed in the log.
+
+A log with one speed per second has only two or three speeds in a hard stop. These few values do not show how the speed
+changes between them. The acceleration shows these changes, but its integral drifts.
+
+
+Measures stops as in a brake test: initial speed, distance, mean fully developed deceleration.
 
 UN Regulation No. 13, Annex 4, paragraph 1.1.2, defines the mean fully developed deceleration dm. Braking starts at the
 speed v0. The speed falls to vb = 0.8 v0 after the distance sb, and to ve = 0.1 v0 after the distance se.
@@ -28,11 +42,180 @@ from ..calibration.file import CalibrationFile
 from ..checks.log import check_log
 from ..logs.log import Source
 from ..logs.reader import read_log
-from ..signals import STANDING_MPS, Array, integral, intervals, smoothed
-from .channels import Channels, channels, downsampled, joined, thinned
-from .ride import Ride
-from .speed_fit import fitted_speed, speed_delay_s
-from .standstill import standing
+from ..signals import STANDING_MPS, Array, Bools, best_lag, integral, intervals, smoothed, window_means, window_spreads
+from .ride import Channels, Ride, channels, downsampled, joined, spacing_s, thinned
+
+STALE_S = 3.0  # an older speed is not used
+
+# Without a speed, standstills are found by the shaking. At a standstill, the shaking over QUIET_S is less than a share
+# of the shaking while moving.
+QUIET_S = 1.0
+QUIET_SHARE = 0.15  # the share for the rates of pitch and yaw
+# The share for the vertical force. After a stop the fork shakes less than this. Smooth roads and idling engines cause
+# more shaking.
+QUIET_UP_SHARE = 0.2
+RIDING_PERCENTILE = 90.0  # this percentile of the shaking comes from a moving vehicle, even with long pauses
+# Limits of the road's shaking. Shaking faster than ENGINE_S is the engine's. Changes slower than BEND_S are bends and
+# the dive of the fork
+ENGINE_S, BEND_S = 0.1, 0.5
+STILL_DPS, STILL_G = 1.0, 0.01  # at a standstill, largest rate, and largest change of the forward force over QUIET_S
+MAX_OFF_G = 0.05  # at a standstill, largest difference from the force at rest; even gentle braking and bends exceed it
+UNCALIBRATED_G = 0.12  # for a ride without a rest: largest difference from 1 g, also of an uncalibrated sensor
+
+
+def standing(ride: Channels) -> Bools:
+    """Find the standstills by the log's speed or, without a speed, by the shaking.
+
+    Returns True where the vehicle stands still, shape (n).
+    """
+    still = _quiet(ride)
+    if not np.any(still):
+        still = _rests_of_filter(ride)
+    valid = ~np.isnan(ride.speed_mps)
+    latest = np.maximum.accumulate(np.where(valid, np.arange(len(valid)), 0))
+    recent = valid[latest] & (ride.t_s - ride.t_s[latest] < STALE_S)
+    return np.where(recent, ride.speed_mps[latest] < STANDING_MPS, still)
+
+
+def _quiet(ride: Channels) -> Bools:
+    still = np.zeros(len(ride.t_s), dtype=bool)
+    second = max(4, round(QUIET_S / spacing_s(ride)))
+    if len(still) < 2 * second:
+        return still
+    quiet = np.ones(len(still) - second + 1, dtype=bool)
+    for rate in ride.pitch_rate_dps, ride.yaw_rate_dps:
+        slow = smoothed(rate, ride.t_s, ENGINE_S)
+        quiet &= (np.abs(window_means(slow, second)) < STILL_DPS) & _is_calm(slow, second, QUIET_SHARE)
+        quiet &= _is_calm(_shaking_by_road(rate, ride.t_s), second, QUIET_SHARE)
+    quiet &= _is_calm(_shaking_by_road(ride.up_g, ride.t_s), second, QUIET_UP_SHARE)
+    half = second // 2
+    forward = window_means(ride.forward_g, half)
+    quiet &= np.abs(forward[second - half :] - forward[: len(quiet)]) < STILL_G
+    quiet &= _has_force_at_rest(ride, second) & (window_means(ride.rolling, second) < 0.5)
+    for shift in range(second):  # mark every sample of a quiet window
+        still[shift : shift + len(quiet)] |= quiet
+    return still
+
+
+def _rests_of_filter(ride: Channels) -> Bools:
+    """Return the rests that the lean filter finds, for a road that is too smooth to detect standstills by shaking.
+
+    Each rest is extended back to the time when the forward force reached its value at rest.
+    """
+    still = ride.resting > 0.5
+    forward = smoothed(ride.forward_g, ride.t_s, ENGINE_S)
+    for start, _ in intervals(still):
+        weight = np.median(forward[start : start + 10])
+        moving = np.flatnonzero(np.abs(forward[:start] - weight) > 2 * STILL_G)
+        still[(int(moving[-1]) + 1 if len(moving) else 0) : start] = True
+    return still
+
+
+def _shaking_by_road(values: Array, time: Array) -> Array:
+    """Return only the road's shaking: remove the engine's faster shaking, and slower bends and braking."""
+    slow = smoothed(values, time, ENGINE_S)
+    return slow - smoothed(slow, time, BEND_S)
+
+
+def _is_calm(values: Array, n: int, share: float) -> Bools:
+    """Return True where the standard deviation of n successive samples is below a share of its value while moving."""
+    spread = window_spreads(values, n)
+    return spread < share * np.percentile(spread, RIDING_PERCENTILE)
+
+
+def _has_force_at_rest(ride: Channels, n: int) -> Bools:
+    """True where the mean force over n samples is the force at rest, within the errors of the calibration."""
+    size = np.sqrt(sum(window_means(axis, n) ** 2 for axis in (ride.left_g, ride.up_g, ride.forward_g)))
+    rests = size[window_means(ride.resting, n) > 0.99]
+    weight = float(np.median(rests)) if len(rests) else 1.0
+    return np.abs(size - weight) < (MAX_OFF_G if len(rests) else UNCALIBRATED_G)
+
+
+SMOOTH_S = 0.2  # averaging time of the acceleration a(t) in fitted_speed()
+LEAD_S = 4.0  # the fit also uses the logged speeds in this time before the braking
+DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # delays of the speed to try, in s
+# A delay is searched only with at least ENOUGH_SPEEDS speeds, one per second. The standard deviation of the changes
+# from one speed to the next must be at least ENOUGH_CHANGE_MPS.
+ENOUGH_SPEEDS, ENOUGH_CHANGE_MPS = 30, 0.5
+
+# Standard deviations of each fitted parameter, and of a logged speed
+SIGMA_SCALE, SIGMA_SLOPE_MPS2, SIGMA_DELAY_S, SIGMA_SPEED_MPS = 0.01, 0.05, 0.05, 0.05
+# The random walk of the acceleration error, per square root of a second, and the time between its knots
+SIGMA_WALK_MPS2, KNOT_S = 0.1, 0.5
+
+
+def speed_delay_s(ride: Channels) -> float:
+    """Find the delay at which the changes of the log's speed best match the integrated longitudinal force.
+
+    Returns the delay in s; 0 if the ride does not show a delay.
+    """
+    valid = np.flatnonzero(~np.isnan(ride.speed_mps))
+    valid = valid[np.unique(np.floor(ride.t_s[valid]), return_index=True)[1]]  # one speed per second
+    time, changes = ride.t_s[valid], np.diff(ride.speed_mps[valid])
+    pushed = integral(ride.t_s, STANDARD_GRAVITY * ride.forward_g)
+    if len(valid) < ENOUGH_SPEEDS or np.std(changes) < ENOUGH_CHANGE_MPS:
+        return 0.0
+
+    def earlier(by_s: float) -> tuple[Array, Array] | None:
+        pushes = np.diff(np.interp(time - by_s, ride.t_s, pushed))
+        return (changes, pushes[:, None]) if np.std(pushes) >= ENOUGH_CHANGE_MPS else None
+
+    lag = best_lag(DELAYS_S, earlier)
+    return lag.lag_s if lag and lag.inside else 0.0
+
+
+def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, delay_s: float) -> Array | None:
+    """Correct an integrated speed by the log's speed.
+
+    Least squares with a prior find the correction. The log's speed at the time t is
+
+        u(t) = (1 + k) v(t) + integral of b from t to the end - d a(t)
+
+    v is the integrated speed, and a the measured acceleration. The unknowns are the scale error k, the acceleration
+    error b (m/s2) and the delay error d (s). Slopes and fork dive that the gyro did not measure cause the error b. The
+    model of b is a random walk backwards in time. The error b is nearly 0 at standstill, and linear between knots. Its
+    basis functions are hat functions (linear B-splines).
+
+    part: the ride up to a standstill.
+    begin: index at which braking begins.
+    speed: integrated speed, shape (n), in m/s.
+    acceleration: measured acceleration, shape (n), in m/s2.
+    delay_s: delay of the log's speed.
+    Returns the corrected speed, shape (n), in m/s; None if the log has too few speeds during the stop.
+    """
+    time = part.t_s
+    values = np.flatnonzero(~np.isnan(part.speed_mps))
+    # Indices of the samples at which the vehicle really had the logged speeds.
+    sample_index = np.minimum(np.searchsorted(time, time[values] - delay_s - 1e-6), len(time) - 1)
+    values, sample_index = (these[time[sample_index] >= time[begin] - LEAD_S] for these in (values, sample_index))
+    if len(sample_index) < 2 or sample_index[-1] < begin:
+        return None
+    knots = np.arange(float(time[-1]), float(min(time[sample_index[0]], time[begin])) - KNOT_S, -KNOT_S)
+    hats = np.column_stack([np.interp(time, knots[::-1], row[::-1]) for row in np.eye(len(knots))])
+    pushed = np.column_stack([integral(time, hat) for hat in hats.T])
+    pushed = pushed[-1] - pushed  # the integral from each sample to the end
+    terms = np.column_stack((speed, pushed, -smoothed(acceleration, time, SMOOTH_S)))[sample_index]
+    error = part.speed_mps[values] - speed[sample_index]
+    prior = _prior(len(knots))
+    weighted = np.vstack((terms / SIGMA_SPEED_MPS, prior))
+    right_side = np.concatenate((error / SIGMA_SPEED_MPS, np.zeros(len(prior))))
+    solution = np.linalg.lstsq(weighted, right_side, rcond=None)[0]
+    scale, slope = 1.0 + solution[0], solution[1:-1]
+    return scale * speed + pushed @ slope
+
+
+def _prior(knots: int) -> Array:
+    """Return the matrix of the prior, shape (knots + 2, knots + 2).
+
+    The unknowns are k, then b at each knot, the last knot first, then d. The product of the matrix and the unknowns has
+    a prior with mean 0 and standard deviation 1.
+    """
+    walk = [SIGMA_WALK_MPS2 * KNOT_S**0.5] * (knots - 1)
+    sigma = np.array([SIGMA_SCALE, SIGMA_SLOPE_MPS2, *walk, SIGMA_DELAY_S])
+    prior = np.eye(knots + 2)
+    prior[range(2, knots + 1), range(1, knots)] = -1.0
+    return prior / sigma[:, None]
+
 
 RATE_S = 0.02  # time between samples for the search of stops
 MIN_SPEED_MPS = 10.0 / 3.6

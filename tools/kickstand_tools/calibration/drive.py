@@ -15,8 +15,7 @@ from ..common.messages import InputError, Message, RefusedInput
 from ..logs.log import Log, Source
 from ..logs.source import Progress
 from ..signals import Array
-from .drive_events import DriveEvent, DriveWatch
-from .drive_feed import Steps, feed, standing
+from .drive_feed import DriveEvent, DriveWatch, Steps, feed, standing
 from .file import CalibrationFile
 from .poses import refuse_same_file
 from .published import PublishedAlignment

@@ -14,13 +14,12 @@ from kickstand.drive_alignment.quality import speed_unit_problem
 from kickstand.units import STANDARD_GRAVITY
 
 from ..common.messages import InputError, Message, RefusedInput, Remedy, kind
-from ..logs.cells import MOST_DPS, MOST_G
-from ..logs.log import Log, Source
+from ..logs.csv_text import MOST_DPS, MOST_G
+from ..logs.log import Log, LogBins, Source, log_bins
 from ..logs.reader import read_log, read_with_rows
 from ..logs.source import Progress
 from ..signals import Array, Bools, best_lag
 from .axes import wrong_axes
-from .bins import LogBins, log_bins
 from .sensor import find_faulty
 
 FIRST = 15_000  # number of samples by which the units of force and time are judged

@@ -2,10 +2,12 @@
 
 import contextlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import click
+from rich.console import Console
+from rich.live import Live
 
 from ..common import installation
 from ..common.messages import InputError
@@ -13,8 +15,7 @@ from ..deploy.check import check
 from ..deploy.flash import flash
 from ..deploy.status import status
 from ..rides.pull import PulledRide, pull
-from ..rides.record import live_line, record
-from ..rides.stream import LiveReading
+from ..rides.stream import LiveReading, record
 from .common import OUT, PATH, PORT, Bar, echo, warning
 
 _NAMED_ONE_BY_ONE = 5
@@ -117,12 +118,30 @@ def record_command(port: str | None, out: Path) -> None:
 
         def begin(name: str) -> None:
             echo(f"recording from {name}: press Ctrl-C to stop")
-            show.append(stack.enter_context(live_line()))
+            show.append(stack.enter_context(_live_line()))
 
         result = record(port, out, begin, lambda reading: show[0](_live_text(reading)))
     for note in result.notes:
         warning(note)
     echo(f"written: {result.log}, {result.seconds:.1f} s, {result.readings} readings, and {result.calibration.name}")
+
+
+@contextlib.contextmanager
+def _live_line() -> Iterator[Callable[[str], None]]:
+    """A context that gives a function to redraw a line on standard error, if that is a terminal."""
+    console = Console(stderr=True) if sys.stderr.isatty() else Console(quiet=True)
+    line = Live(console=console, auto_refresh=False, transient=True)
+
+    def show(text: str) -> None:
+        with contextlib.suppress(OSError):
+            line.update(text, refresh=True)
+
+    line.start()
+    try:
+        yield show
+    finally:
+        with contextlib.suppress(OSError):
+            line.stop()
 
 
 def _live_text(reading: LiveReading) -> str:

@@ -9,13 +9,19 @@ from kickstand.calibration.six_position import SIDES
 from kickstand.drive_alignment import alignment
 from kickstand.units import AXES
 
-from ..analysis import alignment_quality
-from ..calibration import drive_events as events
+from ..analysis.overview import yaw_cost_deg
+from ..calibration import drive_feed as events
 from ..calibration.drive import DriveFit, fit_drive
 from ..calibration.file import CalibrationFile, read_calibration, write_calibration
 from ..calibration.mount import contradiction, of_calibration
-from ..calibration.poses import GOOD_FREE_POSE_G, SixPositions, TwoPositions, fit_six_positions, fit_two_positions
-from ..calibration.procedure import fit_procedure
+from ..calibration.poses import (
+    GOOD_FREE_POSE_G,
+    SixPositions,
+    TwoPositions,
+    fit_procedure,
+    fit_six_positions,
+    fit_two_positions,
+)
 from ..checks.log import check_log
 from ..common.messages import OPPOSITE_SIGN
 from ..common.output import check_output
@@ -156,7 +162,7 @@ def _two_lines(fit: TwoPositions) -> Iterable[str]:
     yield "gyro bias  " + _along_axes(calibration.gyro_bias_dps, "%+.2f deg/s")
     yield from _matrix_lines(calibration.vehicle_from_sensor)
     if fit.tilt_deg < WARN_TILT_DEG:
-        cost_deg = alignment_quality.yaw_cost_deg(7.0)
+        cost_deg = yaw_cost_deg(7.0)
         yield (
             f"warning: under {WARN_TILT_DEG:.0f} degrees, 1 degree of pitch turns forward by over 7, which usually "
             f"costs about {cost_deg:.1f} degrees of lean: lean further, or calibrate drive after it"
@@ -182,7 +188,7 @@ def _drive_lines(fit: DriveFit, has_several_logs: bool) -> Iterable[str]:
         elif fit.poses.verdict == alignment.MOVED:
             yield f"warning: the mount is {yaw_deg:.0f} degrees off its place in the two poses: was it moved since?"
         else:
-            cost_deg = alignment_quality.yaw_cost_deg(yaw_deg)
+            cost_deg = yaw_cost_deg(yaw_deg)
             costs = f", which usually costs about {cost_deg:.1f} degrees of lean" if cost_deg >= 0.05 else ""
             yield f"the two poses had forward {yaw_deg:.1f} degrees off{costs}: now corrected"
     yield from _matrix_lines(fit.calibration.vehicle_from_sensor)

@@ -24,10 +24,9 @@ from ..estimation.smooth import smooth_to_csv
 from ..imports.importing import NAMES, Imported, import_of_app, import_recording, write_imported
 from ..joining import agreement
 from ..joining.joined import Joined, join_track, write_joined
-from ..joining.track_files import read_track
-from ..logs.csv_lines import copy_rows
+from ..joining.track import read_track
 from ..logs.log import Log, Source, Stretch
-from ..logs.reader import is_log, read_log
+from ..logs.reader import copy_rows, is_log, read_log
 from ..overlay.overlay import overlay
 from ..replay.replay import replay_to_csv
 from . import common

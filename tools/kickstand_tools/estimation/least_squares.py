@@ -10,12 +10,30 @@ from dataclasses import replace
 import numpy as np
 
 from ..signals import Array, Bools, Ints, intervals, rotation_matrix
-from .equations import BALANCED, RESTING, RESTING_RATE, ROWS, SLIDING, jacobian, process_and_measurements
-from .first_guess import lean_and_speed, standing
+from .model import (
+    BALANCED,
+    BIAS,
+    CAMBER,
+    FORWARD,
+    LEAN,
+    LEFT,
+    PARAMETERS,
+    PITCH,
+    RESTING,
+    RESTING_RATE,
+    ROTATION,
+    ROWS,
+    SLIDING,
+    STATES,
+    UP,
+    Hypotheses,
+    Prior,
+    jacobian,
+    process_and_measurements,
+)
 from .noise import BRIEF_S, LONG_S, Noise
 from .solver import RandomWalks, Reduced, covariances, posterior_covariance, reduce_windows, solve
-from .unknowns import BIAS, CAMBER, FORWARD, LEAN, LEFT, PARAMETERS, PITCH, ROTATION, STATES, UP, Hypotheses, Prior
-from .windows import Windows
+from .windows import Windows, lean_and_speed, standing
 
 BLOCK = 50  # number of windows per block; see solver.py
 PART = 12  # number of blocks whose derivatives are computed at once
@@ -50,7 +68,7 @@ class Estimate:
     def __init__(self, windows: Windows, prior: Prior, hypotheses: Hypotheses) -> None:
         """Run the estimation. Raises LinAlgError if the equations have no solution.
 
-        hypotheses: see unknowns.py. The first steps use only the first hypothesis.
+        hypotheses: see model.py. The first steps use only the first hypothesis.
         """
         self._length = min(BLOCK, len(windows))
         self._windows = windows = windows.padded(self._length)
@@ -68,7 +86,7 @@ class Estimate:
         self._use_own_noise()
 
     def unknowns(self, number: Ints, states: Array) -> Array:
-        """Return k columns of states and parameters, in the order of equations.py.
+        """Return k columns of states and parameters, in the order of model.py.
 
         number: index of the window of each row of `states`, shape (k).
         states: shape (k, STATES).
@@ -183,7 +201,7 @@ class Estimate:
     def _turn_axes(self) -> None:
         """Rotate the readings by the estimated rotation, then set the rotation to 0.
 
-        equations.py is valid for small rotations only.
+        The model is valid for small rotations only.
         """
         rotation = self.parameters[0, ROTATION].copy()
         self.parameters[:, ROTATION] -= rotation

@@ -1,5 +1,5 @@
-"""Defines the process noise and the measurement noise of equations.py, with all their parameters. The random walk of
-the mount and of the sensor's errors is in unknowns.py.
+"""Defines the process noise and the measurement noise of model.py, with all their parameters. The random walk of the
+mount and of the sensor's errors is there, too.
 
 Each line has the form: symbol = default # meaning, unit. All values are standard deviations. A disturbance that lasts
 for tau seconds appears in many windows of T seconds. Measurements that share an error are not independent. Therefore
@@ -8,12 +8,11 @@ the variance in each window is sigma^2 2 tau / T.
 
 import numpy as np
 
+from ..checks.leaning import WINDOW_S, averaged
 from ..signals import Array, Bools, moving_mean
-from ..signals.leaning import WINDOW_S, averaged
-from . import equations as eq
-from .first_guess import in_hand
-from .unknowns import BIAS, FORWARD, LEAN, LEFT, PITCH, UP
-from .windows import Windows
+from . import model as eq
+from .model import BIAS, FORWARD, LEAN, LEFT, PITCH, UP
+from .windows import Windows, in_hand
 
 # Process noise, per square root of a second
 ANGLE_ROOT = np.radians(0.2)  # lean and pitch, due to vibration of the gyro, in rad
@@ -70,10 +69,10 @@ LASTING_MISFIT_S, MISFIT_MPS, USUAL_MISFIT, MOST_MISFIT = 2.0, 25.0, 0.25, 6.0
 # If the misfit is over 1, the roughness is at least MISFIT_ROUGHNESS times the misfit. The residuals alone would give
 # less, because lasting errors have small residuals.
 MISFIT_ROUGHNESS = 0.14
-# The unbalance of a ride is estimated in the same way. Subtract from BALANCED its mean over LASTS_S, which is
-# unknowns.BESIDE, and divide it by its standard deviation. Average the result over BRIEF_S or LONG_S. The unbalance
-# follows from the rms of these averages. Longer averages remove errors that change sign, such as a rider's corrections.
-# So BRIEF_S overestimates the noise, for caution, and LONG_S does not.
+# The unbalance of a ride is estimated in the same way. Subtract from BALANCED its mean over LASTS_S, which is BESIDE,
+# and divide it by its standard deviation. Average the result over BRIEF_S or LONG_S. The unbalance follows from the rms
+# of these averages. Longer averages remove errors that change sign, such as a rider's corrections. So BRIEF_S
+# overestimates the noise, for caution, and LONG_S does not.
 BRIEF_S, LONG_S, LASTS_S = 3.0, 10.0, 40.0
 LEAST_UNBALANCE, MOST_UNBALANCE = 0.12, 6.0
 LEAST_WINDOWS = 50  # with fewer windows of balanced riding, the unbalance stays 1

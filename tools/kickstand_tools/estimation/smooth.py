@@ -12,15 +12,14 @@ from ..calibration.file import ALIGN, CalibrationFile
 from ..calibration.mount import read_ride
 from ..checks.log import CheckedLog
 from ..common.messages import InputError, Message, Remedy, is_explained, kind
-from ..logs.csv_lines import write_lean
+from ..logs.csv_text import write_lean
 from ..logs.log import PART_SAMPLES, Log, Source, Table
 from ..logs.reader import time_texts
 from ..logs.source import Progress
 from ..signals import Array, Ints
-from .equations import corrected_rates
 from .least_squares import Estimate
+from .model import ALL, FORWARD, GYRO, LEAN, PITCH, ROLL, Prior, corrected_rates
 from .noise import jolted
-from .unknowns import ALL, FORWARD, GYRO, LEAN, PITCH, ROLL, Prior
 from .windows import Windows, windows_of
 
 SLOWEST_HZ = 10.0  # a log with a lower sample rate is not smoothed
@@ -96,7 +95,7 @@ class SmoothedRide(Table):
 def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None = None) -> SmoothedRide:
     """Compute the lean of a motorcycle from all readings of its ride, with a standard deviation for each sample.
 
-    The method is least squares over the whole ride, see equations.py.
+    The method is least squares over the whole ride, see model.py.
 
     log: see read_log. A speed improves the result, but is optional.
     calibration: an aligned calibration of a motorcycle.

@@ -1,11 +1,13 @@
-"""Averages a stretch of a ride over windows of a fifth of a second, which removes the vibration of the engine."""
+"""Averages a ride over windows of a fifth of a second, and finds standstills, hands, rough lean and speed in them."""
 
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 
-from ..signals import Array, Bools, Ints, bin_numbers, rotated
-from ..signals.leaning import WINDOW_S
+from ..checks.leaning import WINDOW_S, averaged
+from ..signals import STANDING_MPS, Array, Bools, Ints, bin_numbers, moving_spread, rotated
 
 GAP_S = 0.17  # if the time between two samples is longer, readings are missing
 
@@ -152,3 +154,105 @@ def _rolled_back(vectors: Array, roll: Array) -> Array:
     """
     (left, up, forward), c, s = vectors.T, np.cos(roll), np.sin(roll)
     return np.column_stack((c * left - s * up, s * left + c * up, forward))
+
+
+STILL_S = 1.6  # least length of a standstill; a shorter standstill looks like smooth riding
+STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # largest standard deviations over STILL_S on a standing bike
+STANDS = 4.0  # factor on both limits if the speed is under STANDING_MPS
+BIAS_RADPS = np.radians(4.0)  # largest bias of the gyro since its calibration; a higher mean rate is a bend
+MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # largest angle between up and the mean force over MOUNTED_S, for a mounted sensor
+BETWEEN_S = 20.0  # a shorter time between two movements in a hand also counts as time in the hand
+SURELY_S = 4.0  # a movement longer than this is certainly in a hand; a shorter movement may be riding or a fall
+SLOW_S = 4.0  # changes of lean slower than this are computed from the yaw rate, faster changes from the roll rate
+TURNS_S = 40.0  # the speed is computed from the bends within this time
+# The prior of the speed from the bends is USUAL_MPS. The prior has the weight of bends with the yaw rate USUAL_RADPS.
+USUAL_MPS, USUAL_RADPS = 10.0, 0.14
+
+
+def motionless(
+    rate: Array, force: Array, n: int, most_rate: float, most_force: float, speed_mps: Array | None = None
+) -> Bools:
+    """Find the samples at which the bike seems to stand still, because the readings around them hardly change.
+
+    Each sample must be a mean over a fifth of a second, which averages out an idling engine. A constant rate counts as
+    a standstill, because it may be a bias. In a steady bend the rate is constant too, so the caller must also check the
+    mean rate.
+
+    rate: rate of each of the m samples, shape (m, 3).
+    force: force of each sample, shape (m, 3).
+    n: number of samples around each sample.
+    most_rate: largest standard deviation of each component of the rate.
+    most_force: largest standard deviation of each component of the force.
+    speed_mps: speed at each sample, shape (m), in m/s; NaN if unknown.
+    Returns True where the bike seems to stand still, shape (m).
+    """
+    speed = np.full(len(rate), np.nan) if speed_mps is None else speed_mps
+    allowed = np.where(speed < STANDING_MPS, STANDS, 1.0)
+    calm = np.max(moving_spread(rate, n), axis=1) < allowed * most_rate
+    calm &= np.max(moving_spread(force, n), axis=1) < allowed * most_force
+    return calm & ~(speed >= STANDING_MPS)
+
+
+def standing(w: Windows) -> Bools:
+    """Find the windows in which the bike stands still, for zero-velocity updates.
+
+    Rates and forces do not change, the mean rate is under BIAS_RADPS, and the speed, if known, agrees.
+
+    Returns True where the bike stands, shape (n).
+    """
+    return calm(w) & (np.linalg.norm(averaged(w.rate, STILL_S), axis=1) < BIAS_RADPS)
+
+
+def calm(w: Windows) -> Bools:
+    """Return True for the windows around which the readings hardly change, shape (n)."""
+    count = 2 * round(0.5 * STILL_S / WINDOW_S) + 1
+    return ~w.gap & motionless(w.rate, w.force, count, STILL_RADPS, STILL_G, w.known_speed)
+
+
+def in_hand(w: Windows) -> tuple[Bools, Bools]:
+    """Find the windows in which a hand moves the sensor, or in which the bike has fallen.
+
+    In these windows, up is far from its usual direction. On a balanced bike, the force points along the bike's own up
+    at any lean.
+
+    Returns:
+        surely: True where a hand certainly moves the sensor, or the bike has fallen, shape (n).
+        perhaps: the same, but also True in the seconds around these windows, because the bike may not be riding there.
+    """
+    valid = ~w.gap
+    mean = averaged(w.force * valid[:, None], MOUNTED_S)
+    tilted = valid & (mean[:, 1] < np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(mean, axis=1))
+    moved = np.flatnonzero(tilted)
+    # If the time between two movements in a hand is short, the sensor was perhaps in the hand all this time. The same
+    # holds for the time from the beginning of the log to the first movement, and from the last movement to the end.
+    if len(moved):
+        ends = np.concatenate(([0], moved, [len(w) - 1]))
+        for begin, end in itertools.pairwise(ends):
+            if w.edges[end + 1] - w.edges[begin] < BETWEEN_S:
+                tilted[begin : end + 1] = True
+    share = tilted.astype(float)
+    return averaged(share, SURELY_S) > 0.99, averaged(share, MOUNTED_S) > 0.01
+
+
+def lean_and_speed(w: Windows, still: Bools) -> tuple[Array, Array]:
+    """Approximate the lean and the speed in n windows.
+
+    If the log has no speed, the bends give it. In balance, the force is 1 / cos(lean) in g, and speed x yaw rate =
+    g tan(lean).
+
+    still: see standing(), shape (n).
+    Returns:
+        lean: shape (n), in rad.
+        speed: shape (n), in m/s.
+    """
+    log_speed, yaw = w.known_speed, w.rate[:, 1]
+    force = averaged(np.linalg.norm(w.force[:, :2], axis=1), 2.0)
+    steep = np.tan(np.arccos(np.clip(1.0 / np.maximum(force, 0.1), 0.3, 1.0)))
+    turning = np.abs(averaged(yaw, 1.0))
+    weighted = averaged(steep * turning, TURNS_S) * STANDARD_GRAVITY + USUAL_RADPS**2 * USUAL_MPS
+    speed = np.clip(weighted / (averaged(turning**2, TURNS_S) + USUAL_RADPS**2), 3.0, 50.0)
+    speed = np.where(still, 0.0, np.where(np.isnan(log_speed), speed, log_speed))
+    slow = np.arctan(-speed * yaw / STANDARD_GRAVITY)
+    slow = np.where(still, np.arctan2(w.force[:, 0], w.force[:, 1]), slow)
+    rolled = np.cumsum(w.rate[:, 2] * w.seconds)
+    return np.clip(rolled - averaged(averaged(rolled - slow, SLOW_S), SLOW_S), -1.3, 1.3), speed

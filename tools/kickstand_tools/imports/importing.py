@@ -12,9 +12,9 @@ import numpy as np
 from ..checks.axes import log_agrees
 from ..checks.log import check_log
 from ..common.messages import AT_REST, InputError, Message, Remedy, kind
-from ..estimation.first_guess import MIN_RIDING_S
-from ..logs.csv_lines import write_log
+from ..estimation.alignment import MIN_RIDING_S
 from ..logs.log import Log
+from ..logs.reader import write_log
 from ..signals import Array
 from . import mapped
 from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo

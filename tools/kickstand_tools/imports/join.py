@@ -8,7 +8,7 @@ import numpy as np
 from kickstand.units import LOST_US
 
 from ..common.messages import InputError
-from ..logs.cells import MOST_DPS, MOST_G, TRACK
+from ..logs.csv_text import MOST_DPS, MOST_G, TRACK
 from ..logs.even_times import even_times
 from ..logs.log import Log
 from ..signals import Array, Bools, Ints

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..common.messages import InputError, Message
-from ..logs.csv_reader import Cells, cells_of, columns_of_text, numbers_of, separator_of
+from ..logs.csv_text import Cells, cells_of, columns_of_text, numbers_of, separator_of
 from ..signals import Array
 from .files import RecordingFile
 from .units import ACCELERATIONS, NO_TIME, RATES, REPEATED, SPEEDS, Nanoseconds, factor, times_ns

@@ -1,4 +1,4 @@
-"""Reads recorded logs: CSV with the columns of COLUMNS, plain or gzipped. It judges nothing: see checks.log."""
+"""Reads recorded logs, plain or gzipped, and writes logs and parts of logs. It judges nothing: see checks.log."""
 
 import contextlib
 import itertools
@@ -10,9 +10,19 @@ import numpy as np
 
 from ..common.messages import InputError, Message, kind
 from ..signals import Array
-from . import cells
-from .cells import COLUMNS, OPTIONAL, TRACK
-from .csv_reader import cells_of, numbers_in
+from .csv_text import (
+    COLUMNS,
+    OPTIONAL,
+    TRACK,
+    cells_of,
+    check_text,
+    csv_lines,
+    header_names,
+    is_plausible,
+    numbers_by_line,
+    numbers_in,
+    write_lines,
+)
 from .even_times import TimesSpread, even_times
 from .log import Log, Source, Sparse, Stretch
 from .source import File, Progress, chunks, name_of, total_bytes
@@ -239,11 +249,11 @@ def _header(name: str, first: bytes) -> tuple[list[str], bytes]:
     if not first.strip():
         raise InputError(f"{name} is empty: a log starts with the line {','.join(COLUMNS)}")
     header, _, rest = first.partition(b"\n")
-    cells.check_text(name, header, 0)
+    check_text(name, header, 0)
     try:
-        return cells.header(name, header.decode()), rest
+        return header_names(name, header.decode()), rest
     except InputError:
-        cells.check_text(name, first, 0)
+        check_text(name, first, 0)
         raise
 
 
@@ -256,10 +266,10 @@ def _numbers(name: str, text: bytes, names: list[str], index: dict[str, int], li
     Returns the columns in the order of `index`, shape (n, number of columns).
     """
     table = numbers_in(text, len(names))
-    if table is not None and cells.plausible(table[:, list(index.values())], list(index), last_us):
+    if table is not None and is_plausible(table[:, list(index.values())], list(index), last_us):
         return table[:, list(index.values())]
-    cells.check_text(name, text, line)
-    return cells.read(name, text.decode(), len(names), index, line, last_us)
+    check_text(name, text, line)
+    return numbers_by_line(name, text.decode(), len(names), index, line, last_us)
 
 
 def _last_marked(parts: Iterator[tuple[bytes, int]]) -> Iterator[tuple[bytes, int, bool]]:
@@ -294,7 +304,7 @@ def _without_cut_line(text: bytes, names: list[str], index: dict[str, int]) -> t
 
 def _readable(line: bytes, names: list[str], index: dict[str, int]) -> bool:
     try:
-        return len(cells.read("", line.decode(), len(names), index, 0, None)) == 1
+        return len(numbers_by_line("", line.decode(), len(names), index, 0, None)) == 1
     except (InputError, UnicodeDecodeError):
         return False
 
@@ -302,3 +312,70 @@ def _readable(line: bytes, names: list[str], index: dict[str, int]) -> bool:
 def _digits(line: bytes) -> int:
     """The number of decimals in the last cell; 0 for an empty cell."""
     return len(line.rpartition(b",")[2].strip().partition(b".")[2])
+
+
+_DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
+
+
+def write_log(path: Path | str, log: Log) -> None:
+    """Write a log in memory to a CSV file, gzipped if the name ends in .gz. Raises InputError.
+
+    After an error, no incomplete file remains. Optional columns without any value are left out. The column t_s has the
+    recorder's own time.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     write_log(Path(directory, "log.csv"), Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2))
+    ...     print(Path(directory, "log.csv").read_text().splitlines()[1])
+    0.000000,0.000000,1.000000,0.000000,0.000000,0.000000,0.000000
+    """
+    values = log.columns()
+    values["t_s"] = values["t_s"] + log.start_s
+    names = [*COLUMNS, *[name for name in OPTIONAL if np.any(np.isfinite(values[name]))]]
+    digits = [_DIGITS.get(name, 6) for name in names]
+    table = np.column_stack([values[name] for name in names])
+    write_lines(Path(path), names, csv_lines(table, digits))
+
+
+def cut_log(
+    source: Path | str,
+    out: Path,
+    from_s: float | None = None,
+    to_s: float | None = None,
+    progress: Progress | None = None,
+) -> tuple[int, float]:
+    """Copy the lines of a stretch of a log to the file `out`, gzipped if its name ends in .gz. Raises InputError.
+
+    After an error, no incomplete file remains.
+
+    Args:
+        from_s, to_s: limits of the stretch, see Stretch.
+        progress: called with the bytes read and the bytes of the file.
+
+    Returns the number of samples, and the time from the first to the last sample in s.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     log = Path(directory, "log.csv")
+    ...     _ = log.write_text("t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\\n0,0,1,0,0,0,0\\n1,0,1,0,0,0,0\\n")
+    ...     cut_log(log, Path(directory, "cut.csv"), from_s=0.5)
+    (1, 0.0)
+    """
+    log = read_log(source, 1, progress)
+    rows = log.rows_between(from_s, to_s)
+    copy_rows(source, out, rows)
+    return rows.stop - rows.start, float(log.t_s[rows.stop - 1] - log.t_s[rows.start])
+
+
+def copy_rows(source: Path | str, out: Path, rows: slice) -> None:
+    """Copy the lines of some samples of a log to the file `out`, as cut_log()."""
+    texts = text_rows(source)
+    names, first = next(texts)
+
+    def lines() -> Iterator[bytes]:
+        begin, end = rows.start, rows.stop
+        for many in itertools.chain([first], (many for _, many in texts)):
+            yield "".join(f"{line}\n" for line in many[max(0, begin) : max(0, end)]).encode()
+            begin, end = begin - len(many), end - len(many)
+
+    write_lines(out, names, lines())

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..analysis.overview import HELD_S
 from ..analysis.ride import RideReading, open_ride
-from ..analysis.summary import HELD_S
 from ..calibration.file import CalibrationFile
 from ..checks.log import CheckedLog
 from ..common.messages import InputError, Message

@@ -27,7 +27,7 @@ from ..deploy.connection import (
     restart,
 )
 from . import ride_log
-from .block_reader import CUT_SHORT, StoredBlock, missing_note, read
+from .ride_log import CUT_SHORT, StoredBlock, missing_note, read
 
 _SILENT_S = 60  # longest wait for an answer in s; an emulated board is slow
 

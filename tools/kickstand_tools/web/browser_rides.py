@@ -32,8 +32,8 @@ from ..imports.files import RecordingFile, read_files
 from ..imports.findings import Findings
 from ..imports.importing import import_recording, recordings, write_imported
 from ..joining.joined import join_track, write_joined
-from ..joining.track_files import read_track
-from ..logs.csv_lines import write_lean
+from ..joining.track import read_track
+from ..logs.csv_text import write_lean
 from ..logs.reader import is_log, read_log, time_texts
 from ..logs.source import log_stem
 

@@ -13,10 +13,7 @@ _PAD_S = 4.0
 
 
 def smoothstep(u: Signal) -> Signal:
-    """Return a step from 0 to 1 while u goes from 0 to 1. Below 0 and above 1 the step is constant.
-
-    Its value and its first and second derivative have no jumps.
-    """
+    """Return a step from 0 to 1 while u goes from 0 to 1. The step and its first two derivatives have no jumps."""
     u = np.clip(u, 0.0, 1.0)
     return u * u * u * (10.0 + u * (6.0 * u - 15.0))
 
@@ -26,7 +23,7 @@ def derivative(x: Signal, rate_hz: float) -> Signal:
 
 
 def integral(x: Signal, rate_hz: float) -> Signal:
-    """Return the integral of x over time, by the trapezoidal rule. The integral is 0 at the start."""
+    """Integrate x over time from the first sample to each sample, by the trapezoidal rule."""
     return np.concatenate(([0.0], np.cumsum((x[1:] + x[:-1]) / (2.0 * rate_hz))))
 
 
@@ -62,10 +59,7 @@ def second_order(x: Signal, natural_hz: float, damping: float, rate_hz: float) -
 
 
 def band_noise(chance: np.random.Generator, n: int, low_hz: float, high_hz: float, rate_hz: float) -> Signal:
-    """Return n samples of normally distributed noise between two frequencies, with an rms of 1.
-
-    Outside these frequencies, the amplitude falls as with a second-order filter.
-    """
+    """Return n samples of normal noise with an rms of 1, filtered with second order outside the two frequencies."""
 
     def transfer(f: Signal) -> NDArray:
         low = (f / low_hz) ** 2

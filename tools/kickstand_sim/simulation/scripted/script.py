@@ -18,6 +18,8 @@ from math import cos, degrees, pi, radians, sin, sqrt, tan
 
 from kickstand.units import STANDARD_GRAVITY
 
+from .sensor_errors import glide
+
 KICKSTAND_DEG = -12.0  # lean on the kickstand, to the left as on most bikes
 MOVE_S = 2.0  # time for moving the bike from the kickstand to upright, or back
 STANDING_SWAY_DEG = 0.1  # amplitude of the lean's changes while the rider holds the bike upright
@@ -81,15 +83,6 @@ def brake(speed_mps, seconds):
     return (Segment("brake", seconds, 0.0, speed_mps, sway_deg=sway),)
 
 
-def _glide(start, end, u, seconds):
-    """Return the value of a smooth change from start to end at 0 <= u <= 1, and its derivative per second."""
-    change = end - start
-    if change == 0.0:
-        return start, 0.0
-    value = start + change * u * u * u * (10.0 + u * (6.0 * u - 15.0))
-    return value, change * 30.0 * u * u * (1.0 - u) * (1.0 - u) / seconds
-
-
 def yaw_rate_in_balance(lean, lift_mps2, speed_mps):
     """Return the yaw rate that balances a lean, in rad/s about the road's normal. The yaw rate is negative in a right
     turn.
@@ -104,7 +97,7 @@ def yaw_rate_in_balance(lean, lift_mps2, speed_mps):
         return 0.0
     share = 1.0
     if speed_mps < RIDING_MPS:
-        share, _ = _glide(0.0, 1.0, (speed_mps - WALKING_MPS) / (RIDING_MPS - WALKING_MPS), 1.0)
+        share, _ = glide(0.0, 1.0, (speed_mps - WALKING_MPS) / (RIDING_MPS - WALKING_MPS), 1.0)
     return -share * lift_mps2 * tan(lean) / speed_mps
 
 
@@ -178,18 +171,18 @@ class Ride:
         start, segment, initial, final, distance = self._find(t_s)
         seconds = segment.seconds
         u = min(1.0, max(0.0, (t_s - start) / seconds)) if seconds else 1.0
-        lean, lean_rate = _glide(initial[0], final[0], u, seconds)
-        speed, acceleration = _glide(initial[1], final[1], u, seconds)
-        slope, slope_rate = _glide(initial[2], final[2], u, seconds)
-        sway, sway_rate = _glide(initial[3], final[3], u, seconds)
-        engine, _ = _glide(initial[4], final[4], u, seconds)
+        lean, lean_rate = glide(initial[0], final[0], u, seconds)
+        speed, acceleration = glide(initial[1], final[1], u, seconds)
+        slope, slope_rate = glide(initial[2], final[2], u, seconds)
+        sway, sway_rate = glide(initial[3], final[3], u, seconds)
+        engine, _ = glide(initial[4], final[4], u, seconds)
         for hz, share, phase in _SWAY:
             angle = 2.0 * pi * hz * t_s + phase
             lean += sway * share * sin(angle)
             lean_rate += share * (sway_rate * sin(angle) + sway * 2.0 * pi * hz * cos(angle))
         lean, lean_rate = radians(lean), radians(lean_rate)
         slope, slope_rate = radians(slope), radians(slope_rate)
-        # The distance needs the integral of _glide(), which is u^6 - 3 u^5 + 2.5 u^4
+        # The distance needs the integral of glide(), which is u^6 - 3 u^5 + 2.5 u^4
         glided = u * u * u * u * (2.5 + u * (u - 3.0))
         distance += seconds * (initial[1] * u + (final[1] - initial[1]) * glided)
         if t_s > self.seconds:

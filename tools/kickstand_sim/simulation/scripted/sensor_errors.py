@@ -130,6 +130,15 @@ def resting(sensor, up):
     return sensor.world(lambda t_s: motion)
 
 
+def glide(start, end, u, seconds):
+    """Return the value of a smooth change from start to end at 0 <= u <= 1, and its derivative per second."""
+    change = end - start
+    if change == 0.0:
+        return start, 0.0
+    value = start + change * u * u * u * (10.0 + u * (6.0 * u - 15.0))
+    return value, change * 30.0 * u * u * (1.0 - u) * (1.0 - u) / seconds
+
+
 def turning(sensor, first, last, begin_s, end_s):
     """Return the function world(t_s) of a sensor that a hand turns by the shortest way, slowly at both ends.
 
@@ -149,8 +158,7 @@ def turning(sensor, first, last, begin_s, end_s):
 
     def motion(t_s):
         u = min(1.0, max(0.0, (t_s - begin_s) / (end_s - begin_s)))
-        turned = angle * u * u * u * (10.0 + u * (6.0 * u - 15.0))
-        rate = angle * 30.0 * u * u * (1.0 - u) * (1.0 - u) / (end_s - begin_s)
+        turned, rate = glide(0.0, angle, u, end_s - begin_s)
         up = [cos(turned) * a[i] + sin(turned) * across[i] for i in range(3)]
         # Negative, because `up` seems to turn in the direction opposite to the sensor's rotation
         turn = [-degrees(rate) * n[i] for i in range(3)]

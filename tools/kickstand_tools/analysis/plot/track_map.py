@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ...signals import EARTH_M, Array, Ints
-from ..channels import LogTrack, track
 from ..overview import Overview
+from ..ride import LogTrack, track
 from .charts import LEFT_COLOUR, RIGHT_COLOUR, SPEED_COLOUR, lean_limit, shown_lean_deg
 from .interactive import PAPER, plain
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from ...common.installation import extra
 from ...common.messages import InputError
-from ...logs.cells import COLUMNS
-from ...logs.csv_reader import MOST_CELLS
+from ...logs.csv_text import COLUMNS, MOST_CELLS
 from ..files import RecordingFile
 from ..recording import AppRecording, Sheet, first_names, read_sheet, sensor_of, track_of
 from ..units import EPOCH_NS, Nanoseconds

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...common.messages import InputError
-from ...logs.csv_reader import as_text
+from ...logs.csv_text import as_text
 from ..files import RecordingFile
 from ..join import with_gravity
 from ..recording import (

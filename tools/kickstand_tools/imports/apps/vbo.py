@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from ...common.messages import InputError
-from ...logs.csv_reader import columns_of
+from ...logs.csv_text import columns_of
 from ..files import RecordingFile
 from ..recording import AppRecording, Sheet, plain, sensor_of, track_of
 from ..units import ACCELERATIONS, RATES, SPEEDS, of_day, unit

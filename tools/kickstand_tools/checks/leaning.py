@@ -2,7 +2,8 @@
 
 A bike leans when it begins to turn: tan(lean) = -speed x yaw rate / g. The rate about forward changes the lean, so it
 correlates with minus the change of the yaw rate. The sign distinguishes forward from backward. The rate of a leaning
-bike about its own left is yaw rate x sin(lean). This product shows the handedness and the unit of the rates.
+bike about its own left is yaw rate x sin(lean). Rates in rad/s are 57 times too small. Then this product is 57 x 57
+times too small, but the rate about left only 57 times. Logs of a parked vehicle or of a car are never judged.
 """
 
 from dataclasses import dataclass
@@ -10,7 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from . import Array, Bools, moving_mean, moving_spread
+from ..common.messages import Message, Remedy, WrongAxes, kind
+from ..logs.log import BIN_S, LogBins
+from ..signals import Array, Bools, moving_mean, moving_spread
 
 WINDOW_S = 0.2  # length of the windows over which rates and forces are averaged
 SMOOTH_S = 0.6  # length of the moving mean that smooths rates before their changes are compared
@@ -134,3 +137,71 @@ def _windows(seconds: float) -> int:
 
 def _unit(vector: Array) -> Array:
     return vector / max(float(np.linalg.norm(vector)), 1e-12)
+
+
+# Unit of the rates
+
+JUDGED_S, RIDING_S = 1800.0, 15.0  # the last JUDGED_S are judged if they have RIDING_S of riding
+# The bike is riding if the standard deviation of its rates over MOVES_S is over MOVES times its 95th percentile.
+MOVES_S, MOVES = 1.6, 0.1
+# The calmest seconds are the share CALMEST of all seconds, but at least LEAST seconds. In calm_rates(), the standard
+# deviation CALM_G of the force counts as much as the standard deviation calm_rate of the rates.
+CALMEST, LEAST, CALM_G = 0.2, 3, 0.02
+# The gyro's bias is known if the share AGREE of the calmest seconds is within AGREE_DPS. Otherwise the FEW calmest
+# seconds are tried. In a ride that is mostly one long, steady bend, these few seconds are a standstill.
+AGREE, FEW, AGREE_DPS = 0.8, 5, 3.0
+
+RatesInRadians = kind(
+    "rates-in-radians",
+    "speed_mps",  # the impossible speed in bends that these rates would mean in deg/s
+    "in bends the rates are those of {speed_mps:.0f} m/s",
+    Remedy("are they in rad/s? deg/s are needed"),
+    WrongAxes,
+)
+
+
+def bends(bins: LogBins) -> Message | None:
+    """Return a notice if the rates seem to be in rad/s.
+
+    Returns None if the rates seem right, or if the log is not enough to judge them.
+    """
+    force, rate, _ = bins.means(round(WINDOW_S / BIN_S))
+    valid = np.flatnonzero(~np.isnan(force[:, 0]))[-round(JUDGED_S / WINDOW_S) :]
+    force, rate = force[valid], np.radians(rate[valid])
+    if len(rate) * WINDOW_S < RIDING_S:
+        return None
+    changes = moving_deviation(rate, MOVES_S)
+    moves = MOVES * np.percentile(changes, 95)  # the limit is relative, because the unit of the rates is unknown
+    if np.count_nonzero(changes > moves) * WINDOW_S < RIDING_S:
+        return None
+    count = len(rate) // 5 * 5  # in whole seconds
+    calm = calm_rates(force[:count].reshape(-1, 5, 3), rate[:count].reshape(-1, 5, 3), moves)
+    bias = calm_bias(np.degrees(calm))
+    if bias is None:
+        return None
+    rate -= np.radians(bias)
+    speed = speed_in_radians(leaning_of(rate, force, changes > moves))
+    return None if speed is None else RatesInRadians(speed)
+
+
+def calm_bias(calm: Array) -> Array | None:
+    """Return the gyro's bias, shape (3), in deg/s; None if the rates differ too much.
+
+    calm: the result of calm_rates(), in deg/s.
+    """
+    for rates in (calm, calm[:FEW]):
+        bias = np.median(rates, axis=0)
+        if np.mean(np.linalg.norm(rates - bias, axis=1) < AGREE_DPS) > AGREE:
+            return bias
+    return None
+
+
+def calm_rates(force: Array, rate: Array, calm_rate: float) -> Array:
+    """Return the mean rates in the k calmest of m seconds, the calmest second first.
+
+    force, rate: shape (m, bins, 3).
+    calm_rate: the standard deviation of the rates that counts as much as a standard deviation CALM_G of the force.
+    Returns an array of shape (k, 3).
+    """
+    changes = np.sum(np.std(force, axis=1), axis=1) / CALM_G + np.sum(np.std(rate, axis=1), axis=1) / calm_rate
+    return np.mean(rate, axis=1)[np.argsort(changes)[: max(LEAST, round(CALMEST * len(changes)))]]

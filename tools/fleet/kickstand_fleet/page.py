@@ -13,7 +13,7 @@ import numpy as np
 from kickstand_tools.common.markup import drawing, element, filled, source_hash
 from markupsafe import Markup
 
-from ..period import MOVED, PeriodResult, Row
+from .period import MOVED, PeriodResult, Row
 from .plot import Panel, date_text
 
 _WORST, _MOST_MOVED, _MOST_ROWS, _MOST_DOTS, _NAMED_ERRORS = 25, 200, 2000, 3000, 3
@@ -45,14 +45,11 @@ class FleetSummary:
 
     count: Number of results.
     driven_s: Length of all logs that were used.
-    statuses: Number of results with each status.
-    reasons: Number of results with each pair of status and reason.
-    moved_count: Number of rows in the table of moved mounts.
+    statuses, reasons: Number of results with each status, and with each pair of status and reason.
+    moved_count, errors: Number of rows in the tables of moved mounts and of errors.
     moved_vehicles: Number of mounts that moved, including those with an unknown time of the move.
-    errors: Number of rows in the table of errors.
-    first_errors: The first errors. Each has the name of the log or vehicle, and the message.
-    decelerations: Two columns with one value per brake test: the time in s since 1970, or NaN, and the deceleration in
-        m/s2.
+    first_errors: Pairs of the name of the log or vehicle, and the message.
+    decelerations: The times of brake tests in s since 1970, or NaN, and their decelerations in m/s2.
     worst: Rows of the least certain alignments.
     moved: Rows of the largest rotations of mounts, each with the path of the vehicle's picture.
     below: The folder at the start of all names, with its slash. None before the first result.

@@ -1,8 +1,7 @@
 """Functions on arrays of samples, for all other packages. The functions use only numpy, neither logs nor files.
 
 This module has moving means, standard deviations and integrals, means over bins of time, lag and correlation of two
-signals, rotation vectors and matrices, standstills, and distances. leaning.py relates a motorcycle's lean to its yaw
-rate.
+signals, rotation vectors and matrices, and distances.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -382,34 +381,7 @@ def _twice_the_sine(matrix: Array) -> Array:
     return np.stack([matrix[..., i, j] - matrix[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=-1)
 
 
-# At a standstill, the readings hardly change. Standstills are used for zero-velocity updates and for the gyro's bias.
-
 STANDING_MPS = 0.3  # speed under which a vehicle counts as standing, because a receiver's speed is never exactly 0
-STANDS = 4.0  # factor on both limits of motionless() if the speed is under STANDING_MPS
-
-
-def motionless(
-    rate: Array, force: Array, n: int, most_rate: float, most_force: float, speed_mps: Array | None = None
-) -> Bools:
-    """Find the samples at which the bike seems to stand still, because the readings around them hardly change.
-
-    Each sample must be a mean over a fifth of a second, which averages out an idling engine. A constant rate counts as
-    a standstill, because it may be a bias. In a steady bend the rate is constant too, so the caller must also check the
-    mean rate.
-
-    rate: rate of each of the m samples, shape (m, 3).
-    force: force of each sample, shape (m, 3).
-    n: number of samples around each sample.
-    most_rate: largest standard deviation of each component of the rate.
-    most_force: largest standard deviation of each component of the force.
-    speed_mps: speed at each sample, shape (m), in m/s; NaN if unknown.
-    Returns True where the bike seems to stand still, shape (m).
-    """
-    speed = np.full(len(rate), np.nan) if speed_mps is None else speed_mps
-    allowed = np.where(speed < STANDING_MPS, STANDS, 1.0)
-    calm = np.max(moving_spread(rate, n), axis=1) < allowed * most_rate
-    calm &= np.max(moving_spread(force, n), axis=1) < allowed * most_force
-    return calm & ~(speed >= STANDING_MPS)
 
 
 # Distances on the Earth.

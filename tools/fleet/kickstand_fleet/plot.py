@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from kickstand_tools.common.markup import drawing, element, path
 from markupsafe import Markup
 
-from ..files import file_stem, write_bytes
-from ..period import PeriodResult
+from .files import file_stem, write_bytes
+from .period import PeriodResult
 
 Point = tuple[float, float]
 _LETTER = 7.0  # largest width of a digit
@@ -18,27 +18,18 @@ _QUIET, _RULE = "#777", "#8883"
 
 @dataclass
 class Panel:
-    """A panel of a picture.
-
-    x, y, width, height: Position and size of the panel in the picture.
-    across: Values at the left and right edge.
-    along: Values at the lower and upper edge.
-    title: Text above the panel.
-    unit: Label of the horizontal axis.
-    unit_along: Label of the vertical axis.
-    words: Function that formats a value of the horizontal axis.
-    """
+    """A panel of a picture, with its position and size in the picture."""
 
     x: float
     y: float
     width: float
     height: float
-    across: Point
-    along: Point
+    across: Point  # values at the left and right edge
+    along: Point  # values at the lower and upper edge
     title: str
-    unit: str
-    unit_along: str
-    words: Callable[[float], str] = "{:g}".format
+    unit: str  # label of the horizontal axis
+    unit_along: str  # label of the vertical axis
+    words: Callable[[float], str] = "{:g}".format  # formats a value of the horizontal axis
     _parts: list[Markup] = field(default_factory=list)
 
     def __post_init__(self) -> None:
