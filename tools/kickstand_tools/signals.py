@@ -1,7 +1,6 @@
-"""Functions on arrays of samples, for all other packages. The functions use only numpy, neither logs nor files.
+"""Functions on arrays of samples: means, integrals, bins of time, lag and correlation, rotations, and distances.
 
-This module has moving means, standard deviations and integrals, means over bins of time, lag and correlation of two
-signals, rotation vectors and matrices, and distances.
+The functions use only numpy, neither logs nor files.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -21,22 +20,14 @@ Ints = NDArray[np.integer[Any]]
 
 
 def window_means(values: Array, n: int) -> Array:
-    """Average each window of n successive values.
-
-    values: m values, shape (m, ...).
-    Returns one mean per window, shape (m - n + 1, ...).
-    """
+    """Average each window of n successive values: (m, ...) -> (m - n + 1, ...)."""
     sums = np.zeros((len(values) + 1, *values.shape[1:]))
     np.cumsum(values, axis=0, out=sums[1:])
     return (sums[n:] - sums[:-n]) / n
 
 
 def window_spreads(values: Array, n: int) -> Array:
-    """Compute the standard deviation of each window of n successive values.
-
-    values: m values, shape (m, ...).
-    Returns one standard deviation per window, shape (m - n + 1, ...).
-    """
+    """Compute the standard deviation of each window of n successive values: (m, ...) -> (m - n + 1, ...)."""
     # Subtract the mean first, because the rounding errors of large squares would hide a small standard deviation
     values = values - np.mean(values, axis=0)
     squared = window_means(values, n)
@@ -47,40 +38,27 @@ def window_spreads(values: Array, n: int) -> Array:
 
 
 def moving_mean(values: Array, n: int) -> Array:
-    """Compute the moving mean over n values.
+    """Compute the moving mean over n values, of the shape of `values`.
 
     The window of value i begins at value i - n // 2. Beyond the ends, the first and the last value are repeated.
-
-    values: m values, shape (m, ...).
-    Returns one mean per value, shape (m, ...).
     """
     return values if n < 2 or not len(values) else window_means(_padded(values, n), n)
 
 
 def moving_spread(values: Array, n: int) -> Array:
-    """Compute the moving standard deviation, shape (m, ...), over the same n values as in moving_mean()."""
+    """Compute the moving standard deviation over the same n values as in moving_mean()."""
     return np.zeros(values.shape) if n < 2 or not len(values) else window_spreads(_padded(values, n), n)
 
 
 def smoothed(values: Array, time_s: Array, over_s: float) -> Array:
-    """Compute the moving mean over about over_s seconds. The window has an odd number of samples.
-
-    values: m values, shape (m).
-    time_s: times of the values, shape (m), in s.
-    Returns one mean per value, shape (m).
-    """
+    """Compute the moving mean of values, shape (m), over an odd number of samples that last about over_s seconds."""
     if len(values) < 2:
         return values
     return moving_mean(values, 2 * round(0.5 * over_s / float(np.median(np.diff(time_s)))) + 1)
 
 
 def integral(time_s: Array, values: Array) -> Array:
-    """Integrate values from the first sample to each sample, by the trapezoidal rule.
-
-    time_s: times of the samples, shape (m), in s.
-    values: values of the samples, shape (m).
-    Returns the integral up to each sample, shape (m).
-    """
+    """Integrate values from the first sample to each sample, shape (m), by the trapezoidal rule."""
     return np.append(0.0, np.cumsum(np.diff(time_s) * (values[1:] + values[:-1]) / 2.0))
 
 
@@ -114,18 +92,12 @@ def intervals(true: Bools) -> Ints:
 
 @dataclass
 class Bins:
-    """n successive bins of time. Some may have no samples.
+    """n successive bins of time. Some may have no samples."""
 
-    first: number of the first bin.
-    count: number of samples in each bin, shape (n).
-    means: averaged values of each bin, shape (n, k); NaN in a bin without samples.
-    latest: last values of each bin, shape (n, j); NaN in a bin without this value.
-    """
-
-    first: int
-    count: Array
-    means: Array
-    latest: Array
+    first: int  # number of the first bin
+    count: Array  # number of samples in each bin, shape (n)
+    means: Array  # averaged values of each bin, shape (n, k); NaN in a bin without samples
+    latest: Array  # last values of each bin, shape (n, j); NaN in a bin without this value
 
     def merged(self, by: int) -> "Bins":
         """Merge the bins into bins that are `by` times as long, and begin at multiples of `by`.
@@ -188,21 +160,15 @@ def binned(
 
 @dataclass
 class Correlation:
-    """The correlation of a cause with its effect.
+    """The correlation of a cause with its effect."""
 
-    value: correlation, 0 to 1.
-    direction: unit vector along which the cause has the largest covariance with the effect, shape (k).
-    """
-
-    value: float
-    direction: Array
+    value: float  # 0 to 1
+    direction: Array  # unit vector along which the cause has the largest covariance with the effect, shape (k)
 
 
 def correlation(effect: Array, cause: Array, whole: bool = False) -> Correlation:
-    """Correlate an effect with one component of its cause, the component with the largest covariance with the effect.
+    """Correlate an effect, shape (n), with the component of its cause, shape (n, k), of the largest covariance with it.
 
-    effect: n values, shape (n).
-    cause: n vectors, shape (n, k).
     whole: True to normalise by the variance of all components of the cause, not only of the component along
         `direction`. The value is then smaller if the cause also varies in other directions.
     """
@@ -216,26 +182,20 @@ def correlation(effect: Array, cause: Array, whole: bool = False) -> Correlation
 
 @dataclass
 class Lag(Correlation):
-    """The delay of an effect against its cause.
+    """The delay of an effect against its cause."""
 
-    lag_s: the delay, in s.
-    inside: True if the delay is neither the first nor the last of the tried lags.
-    """
-
-    lag_s: float
-    inside: bool
+    lag_s: float  # the delay, in s
+    inside: bool  # True if the delay is neither the first nor the last of the tried lags
 
 
 def best_lag(
     lags_s: Iterable[float], pair_at: Callable[[float], tuple[Array, Array] | None], whole: bool = False
 ) -> Lag | None:
-    """Find the lag with the largest correlation.
-
-    The lag is interpolated by a parabola through three neighbouring squared correlations.
+    """Find the lag with the largest correlation, interpolated by a parabola through three squared correlations.
 
     lags_s: lags to try, evenly spaced and increasing.
-    pair_at: called with a lag. It returns the effect, shape (n), and the cause earlier by this lag, shape (n, k). It
-        returns None if there are too few values.
+    pair_at: returns for a lag the effect, shape (n), and the cause earlier by this lag, shape (n, k); None if there are
+        too few values.
     whole: see correlation().
     Returns None if pair_at returns None for all lags.
     """
@@ -263,17 +223,12 @@ def peak_offset(three: Array) -> float:
 
 
 def correlations(first: Array, first_good: Bools, second: Array, second_good: Bools) -> tuple[Array, Array]:
-    """Correlate two signals of zero mean and equal sample rate at each shift.
+    """Correlate two signals of zero mean and equal sample rate, shapes (n) and (m), at each shift.
 
     At shift j, sample second[i] is compared with sample first[i + j - (m - 1)].
 
-    first: first signal, shape (n).
-    first_good: True for the samples of `first` to use, shape (n).
-    second: second signal, shape (m).
-    second_good: True for the samples of `second` to use, shape (m).
-    Returns:
-        correlation: correlation at each shift, shape (n + m - 1).
-        count: number of samples in each correlation, shape (n + m - 1).
+    first_good, second_good: True for the samples to use.
+    Returns the correlation at each shift, and the number of samples in it, both of shape (n + m - 1).
     """
     size = 1 << int(np.ceil(np.log2(len(first) + len(second))))
     a, b = np.where(first_good, first, 0.0), np.where(second_good, second, 0.0)
@@ -304,10 +259,7 @@ def log_likelihood_ratio(correlation: Array, count: Array, per_sample: float) ->
 
 
 def peaks(values: Array, apart: int, most: int) -> list[int]:
-    """Find at most `most` maxima over 0. Any two of them are more than `apart` indices apart.
-
-    Returns their indices, the largest maximum first.
-    """
+    """Return the indices of at most `most` maxima over 0, the largest first, more than `apart` indices apart."""
     remaining, indices = values.copy(), []
     while len(indices) < most and np.max(remaining) > 0.0:
         index = int(np.argmax(remaining))
@@ -322,21 +274,12 @@ def peaks(values: Array, apart: int, most: int) -> list[int]:
 
 
 def rotated(matrix: Array, *vectors: Array) -> tuple[Array, ...]:
-    """Express vectors along other axes.
-
-    matrix: the rows are the new axes, as in vehicle_from_sensor, shape (3, 3).
-    vectors: one or more arrays of shape (n, 3).
-    Returns one array of shape (n, 3) for each of these arrays.
-    """
+    """Express vectors, each of shape (n, 3), along other axes: the rows of `matrix`, as in vehicle_from_sensor."""
     return tuple(vector @ matrix.T for vector in vectors)
 
 
 def cross_matrix(vector: Array) -> Array:
-    """Return the skew-symmetric matrices K of vectors: K @ other = vector x other.
-
-    vector: shape (..., 3).
-    Returns an array of shape (..., 3, 3).
-    """
+    """Return the skew-symmetric matrices of vectors, shape (..., 3): matrix @ other = vector x other."""
     matrix = np.zeros((*vector.shape, 3))
     x, y, z = np.moveaxis(vector, -1, 0)
     matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -z, y, -x
@@ -345,11 +288,7 @@ def cross_matrix(vector: Array) -> Array:
 
 
 def rotation_matrix(vector: Array) -> Array:
-    """Convert rotation vectors to matrices by Rodrigues' formula (the exponential map).
-
-    vector: shape (..., 3), in rad.
-    Returns an array of shape (..., 3, 3).
-    """
+    """Convert rotation vectors in rad, shape (..., 3), to matrices by Rodrigues' formula (the exponential map)."""
     angle = np.linalg.norm(vector, axis=-1)[..., None, None] / np.pi
     cross = cross_matrix(vector)
     # numpy's sinc(x) is sin(pi x) / (pi x), which is exact near 0
@@ -357,27 +296,19 @@ def rotation_matrix(vector: Array) -> Array:
 
 
 def rotation_vector(matrix: Array) -> Array:
-    """Convert rotation matrices to rotation vectors (the logarithm). Each rotation must be under 180 degrees.
-
-    matrix: shape (..., 3, 3).
-    Returns an array of shape (..., 3), in rad.
-    """
+    """Convert rotation matrices to rotation vectors in rad (the logarithm). Each rotation must be under 180 degrees."""
     axis = _twice_the_sine(matrix)
     return axis / np.maximum(np.linalg.norm(axis, axis=-1), 1e-12)[..., None] * rotation_angle(matrix)[..., None]
 
 
 def rotation_angle(matrix: Array) -> Array:
-    """Return the angles of rotation matrices, from 0 to pi. They are exact for 180 degrees, too.
-
-    matrix: shape (..., 3, 3).
-    Returns an array of shape (...), in rad.
-    """
+    """Return the angles of rotation matrices in rad, from 0 to pi. They are exact for 180 degrees, too."""
     sine = np.linalg.norm(_twice_the_sine(matrix), axis=-1)
     return np.arctan2(sine, np.trace(matrix, axis1=-2, axis2=-1) - 1.0)
 
 
 def _twice_the_sine(matrix: Array) -> Array:
-    """Return the axes of rotation matrices, shape (..., 3). Their length is twice the sine of the angle."""
+    """Return the axes of rotation matrices. Their length is twice the sine of the angle."""
     return np.stack([matrix[..., i, j] - matrix[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=-1)
 
 
@@ -390,14 +321,9 @@ EARTH_M = 6_371_000.0
 
 
 def distance_m(lat: Array, lon: Array, next_lat: Array, next_lon: Array) -> tuple[Array, Array]:
-    """Compute the distance from each position to the next one. The result is exact enough for distances of up to some
-    kilometres.
+    """Return how far east and north the next positions are, in m. It is exact enough for some kilometres.
 
-    lat, lon: positions, shape (n), in degrees.
-    next_lat, next_lon: next positions, shape (n), in degrees.
-    Returns:
-        east: metres to the east, shape (n).
-        north: metres to the north, shape (n).
+    lat, lon, next_lat, next_lon: positions, shape (n), in degrees.
     """
     apart_deg = (next_lon - lon + 180.0) % 360.0 - 180.0  # correct also across the meridian of 180 degrees
     east = np.radians(apart_deg) * np.cos(np.radians(lat)) * EARTH_M

@@ -1,4 +1,8 @@
-"""Writes a ride in the formats of other programs. Each function writes one file, from the blocks of a ride.
+"""Writes a ride in the format of another program, or with Kickstand's own columns as CSV or Apache Parquet.
+
+The own columns are the calibrated log in the vehicle's axes, and the lean that the display shows. In Parquet, the
+metadata of each field has its unit. pandas.read_parquet opens the file:
+https://arrow.apache.org/docs/python/parquet.html
 
 GPX 1.1 is for maps, route planners and programs that put data on videos: https://www.topografix.com/GPX/1/1/. Each
 position of the log becomes a track point. GPX 1.1 has no element for the speed, so the speed is written in Garmin's
@@ -6,16 +10,15 @@ TrackPointExtension, https://www8.garmin.com/xmlschemas/TrackPointExtensionv2.xs
 the right, is written in Kickstand's own element.
 
 CSV v3 is the table that RaceChrono exports and related programs read. The file has metadata, a blank line, and three
-heading lines: names, units, and sources ("100: gps", "calc", "101: acc", "102: gyro"). A cell is empty if its source
-has no new value. Names and units are the same as in RaceChrono's own files: see
-https://github.com/ClassicMiniDIY/UltraLog/pull/85 and https://apexlog.io/blog/what-to-do-with-racechrono-data. Also
-https://racechrono.com/article/2572 gives acc in G and gyro in deg/s. As in RaceChrono's files, lateral_acc is positive
-in a left turn, and longitudinal_acc when speeding up. RaceChrono itself imports sessions as .vbo.
+heading lines: names, units, and sources. A cell is empty if its source has no new value. Names and units are the same
+as in RaceChrono's own files: see https://github.com/ClassicMiniDIY/UltraLog/pull/85 and
+https://apexlog.io/blog/what-to-do-with-racechrono-data. Also https://racechrono.com/article/2572 gives acc in G and
+gyro in deg/s. As in RaceChrono's files, lateral_acc is positive in a left turn, and longitudinal_acc when speeding up.
 
 VBO is Racelogic's, which Circuit Tools opens and RaceChrono imports. Sections and standard channels follow
-https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.html. Standard channels have no units. All
-other channels have units. Columns and signs follow
-https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and the user guide of the VBOX HD Lite:
+https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.html. All other channels have units.
+Columns and signs follow https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and the user guide
+of the VBOX HD Lite:
 
 * time: HHMMSS.SS; velocity: km/h
 * latitude and longitude: minutes, north and west positive
@@ -24,14 +27,8 @@ https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and 
 * other channels: with mantissa and exponent
 
 A log does not contain the number of satellites. The file says 4, because a position needs at least 4. Without a
-position, satellites and position are written as 0. Other columns without values are left out. VBO requires a velocity.
-If the log has no speed, the velocity is 0, and a comment in the file says so.
-
-
-Writes a ride in the format of another program, or with Kickstand's own columns as CSV or Apache Parquet.
-
-The own columns are the calibrated log in the vehicle's axes, and the lean that the display shows. In Parquet, the
-metadata of each field has its unit. pandas.read_parquet opens the file: https://arrow.apache.org/docs/python/parquet.html
+position, satellites and position are written as 0. VBO requires a velocity. If the log has no speed, it is 0, and a
+comment in the file says so.
 """
 
 import gzip
@@ -302,10 +299,7 @@ def write_csv(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
 
 
 def write_parquet(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """Write Parquet, one row group per block.
-
-    Times and positions are 64-bit floats, all other columns 32-bit floats. A missing value is NaN.
-    """
+    """Write Parquet, one row group per block."""
     import pyarrow
     from pyarrow.parquet import ParquetWriter
 

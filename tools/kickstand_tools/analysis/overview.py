@@ -1,15 +1,11 @@
-"""Summarises a ride block by block: maxima with their times, time at large leans, and a histogram of the lean.
+"""A ride in numbers, for its report and its pictures: maxima, times, and how far the aligned axes are off.
 
-Estimates from a ride how far the aligned axes are from the bike's own axes.
-
+The errors of the axes are estimated from the forces.
 * roll: on a straight, a balanced bike is upright, so the mean force points along the bike's own up axis.
 * yaw: on a straight, braking and speeding up push along the bike's own forward axis.
 * pitch: between two standstills on level ground, speeding up and braking cancel out. The remaining mean forward force
   shows the pitch error.
 * gravity: at standstill, the force must be 1 g.
-
-
-Reads a ride once and keeps the data for its report and its pictures.
 """
 
 from collections.abc import Callable, Iterator
@@ -36,11 +32,7 @@ BINS_DEG = np.arange(-70.0, 70.0 + BIN_DEG, BIN_DEG)
 
 @dataclass
 class Peak:
-    """The largest value so far, and its time in the log.
-
-    value: 0 without a value.
-    time_s: None without a value.
-    """
+    """The largest value so far, 0 without a value, and its time in the log."""
 
     value: float = 0.0
     time_s: float | None = None
@@ -58,11 +50,9 @@ class Summary:
 
     The maxima of lean and force count only while the display would show the lean.
 
-    samples: number of samples.
     duration_s: time from the first to the last sample.
     left_deg, right_deg: largest lean to each side that lasted for HELD_S.
     brake_g, accel_g: largest forces, smoothed as on the display.
-    speed_mps: largest speed.
     riding_s: time in which the lean filter finds no rest. Unlike Overview.riding_s, it includes stops with a shaking
         engine.
     beyond_s: time at or above each lean. The key is the lean in degrees.
@@ -162,23 +152,16 @@ ENOUGH_G = 0.05  # a smaller standard deviation of the forward force on straight
 
 @dataclass
 class Quality:
-    """Angles by which the aligned axes seem to be off. An angle is None if the ride does not show it.
+    """Angles by which the aligned axes seem to be off. An angle is None if the ride does not show it."""
 
-    roll_deg: positive if the aligned up axis leans to the right of the bike's own up.
-    pitch_deg: positive if the aligned forward axis points up.
-    yaw_deg: positive if the aligned forward axis points to the right of the direction in which the bike speeds up.
-    gravity_g: mean force at rest; None without a standstill.
-    straight_s: seconds of straight riding, which show roll and yaw.
-    lateral_g, forward_g: forces during straight riding, averaged over SMOOTH_S.
-    """
-
-    roll_deg: float | None
-    pitch_deg: float | None
+    roll_deg: float | None  # positive if the aligned up axis leans to the right of the bike's own up
+    pitch_deg: float | None  # positive if the aligned forward axis points up
+    # positive if the aligned forward axis points to the right of the direction in which the bike speeds up
     yaw_deg: float | None
-    gravity_g: float | None
-    straight_s: float
-    lateral_g: Array
-    forward_g: Array
+    gravity_g: float | None  # mean force at rest; None without a standstill
+    straight_s: float  # seconds of straight riding, which show roll and yaw
+    lateral_g: Array  # forces during straight riding, averaged over SMOOTH_S
+    forward_g: Array  # as lateral_g
 
 
 @dataclass
@@ -260,7 +243,6 @@ MOVES_MPS = 1.0
 class Overview:
     """The data of a ride for its report and its pictures.
 
-    ride: the log with its calibration.
     summary: summary of all samples.
     course: channels averaged over RATE_S. Columns that neither report nor pictures need are NaN; vehicle_channels() has
         them.
@@ -330,12 +312,9 @@ def overview(ride: Ride, progress: Progress | None = None, keep: Callable[[Array
 
 
 def _riding_s(ride: Channels, standing: Bools, whole_ride: bool = True) -> float:
-    """Return the time for which a vehicle was moving, in s.
+    """Return the time for which a vehicle was moving, in s. For ride and standing see quality().
 
-    ride: evenly spaced samples (see downsampled()).
-    standing: True where the vehicle stands still, shape (n).
-    whole_ride: True for a whole ride. In a stretch of a ride, a vehicle may go straight ahead, or keep the same turn,
-        from start to end.
+    whole_ride: False for a stretch, in which a vehicle may go straight ahead, or keep the same turn, from start to end.
     """
     if whole_ride and not _has_moved(ride):
         return 0.0
@@ -354,8 +333,5 @@ def _has_moved(ride: Channels) -> bool:
 
 
 def _changes(means: Array) -> float:
-    """Return the largest difference of the means from their median.
-
-    The median is the gyro's bias, or the force due to the slope of the ground.
-    """
+    """Return the largest difference of the means from their median, which is the gyro's bias or the ground's slope."""
     return float(np.max(np.abs(means - np.median(means))))

@@ -1,12 +1,7 @@
-"""Converts a ride to the vehicle's axes for plot, report and export, and averages it to a lower sample rate.
+"""A recorded ride, which is a log with its calibration, in the vehicle's axes, part by part.
 
-The lean of each sample is the firmware's lean or the smoothed lean. numpy computes everything that does not depend on
+The lean of each sample is the displayed lean or the smoothed lean. numpy computes everything that does not depend on
 earlier samples. A test compares these values with the firmware's values.
-
-
-Computes the channels of a recorded ride part by part.
-
-A ride is a log with its calibration. Its lean is the displayed lean or the smoothed lean.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -136,10 +131,7 @@ def channels(log: Log, calibration: CalibrationFile, lean: dict[str, Array], car
 
 
 def joined(parts: Iterable[Channels]) -> Channels:
-    """Join the parts of a ride.
-
-    A column without any value uses no memory, and is read-only.
-    """
+    """Join the parts of a ride. A column without any value uses no memory, and is read-only."""
     columns: list[list[Array]] = [[] for _ in fields(Channels)]
     for part in parts:
         for column, field in zip(columns, fields(Channels)):
@@ -219,24 +211,16 @@ def _means(block: Channels, step: Array) -> Channels:
 
 @dataclass
 class LogTrack:
-    """m positions. Each field has the shape (m).
-
-    t_s: seconds since the log's first sample.
-    lat_deg: degrees north.
-    lon_deg: degrees east.
-    """
+    """m positions, in degrees north and east, with their times in s since the log's first sample."""
 
     t_s: Array
     lat_deg: Array
     lon_deg: Array
 
     def at(self, t_s: Array) -> tuple[Array, Array]:
-        """Interpolate the positions along straight lines, also across 180 degrees.
+        """Interpolate latitude and longitude at n times along straight lines, also across 180 degrees.
 
         Results are NaN before the first position, after the last position, and in gaps of over GAP_S.
-
-        t_s: times, shape (n).
-        Returns latitude and longitude, each of shape (n), in degrees.
         """
         none = np.full(len(t_s), np.nan)
         if not len(self.t_s):
@@ -299,12 +283,10 @@ class Ride:
 
     @property
     def car(self) -> bool:
-        """True for a car, which has no lean; False for a motorcycle."""
         return self.calibration.vehicle == "car"
 
     @property
     def is_stretch(self) -> bool:
-        """True if the ride is a stretch of the log."""
         return self.checked.rows != slice(None)
 
     def read(self, progress: Progress | None = None, keep: Callable[[Array], None] | None = None) -> "RideReading":
@@ -317,8 +299,7 @@ class Ride:
 
 
 class RideReading:
-    """Computes the channels of a ride part by part, so that memory hardly grows with its length. Call parts(), and at
-    its end notices()."""
+    """Computes the channels of a ride by parts(), so that memory hardly grows with its length; then its notices()."""
 
     def __init__(self, ride: Ride, progress: Progress | None, keep: Callable[[Array], None] | None) -> None:
         self._ride, self._progress, self._keep = ride, progress, keep
@@ -411,13 +392,12 @@ class RideReading:
 
 
 class _Smoothed:
-    """The forward force, smoothed as on the display, part by part."""
+    """The forward force in g, smoothed as on the display, part by part."""
 
     def __init__(self) -> None:
         self._last_s, self._last_g = -1e9, 0.0
 
     def of(self, log: Log, calibration: CalibrationFile) -> Array:
-        """Return the smoothed force for the samples of the next part, shape (n), in g."""
         steps = np.diff(log.t_s, prepend=self._last_s)
         gains = np.where(steps > GAP_US * 1e-6, 1.0, steps / (SMOOTH_US * 1e-6 + steps))
         smooth, column = self._last_g, []
@@ -490,8 +470,6 @@ def vehicle_channels(
     log: Source, calibration: CalibrationFile | File | None = None, progress: Progress | None = None
 ) -> Channels:
     """Return the whole ride in the vehicle's axes, with the firmware's lean.
-
-    Forces are computed by Nicolae's formulas (18)-(20) and the matrix vehicle_from_sensor.
 
     log, calibration: see open_ride(), which raises the same errors.
     progress: called with (done, total) of the log's samples.

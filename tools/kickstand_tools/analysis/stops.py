@@ -1,18 +1,4 @@
-"""Detects standstills, for the stops of a ride.
-
-The limits are relative to the shaking of the ride. In simulated rides, these limits find all of the standing time. The
-fixed limits of signals.motionless, in deg/s and g, find only 54 to 92 % of this time. Relative limits are worse only if
-an idling engine shakes as much as the road. Then relative limits find 17 to 41 % of the standing time, and fixed limits
-find 91 %.
-
-
-Corrects a speed integrated from the acceleration by the speed in the log.
-
-A log with one speed per second has only two or three speeds in a hard stop. These few values do not show how the speed
-changes between them. The acceleration shows these changes, but its integral drifts.
-
-
-Measures stops as in a brake test: initial speed, distance, mean fully developed deceleration.
+"""Finds standstills, and measures stops as in a brake test: initial speed, distance, mean fully developed deceleration.
 
 UN Regulation No. 13, Annex 4, paragraph 1.1.2, defines the mean fully developed deceleration dm. Braking starts at the
 speed v0. The speed falls to vb = 0.8 v0 after the distance sb, and to ve = 0.1 v0 after the distance se.
@@ -27,8 +13,12 @@ integrated backwards from the standstill. Because the pitch is known, the dive o
 The symbols are lean t (positive to the right), pitch q (positive if the nose is up), speed v, rates w, and specific
 force f. The axes are left (x), up (y) and forward (z).
 
-If the log has a speed, the integrated speed is fitted to it (speed_fit.py). Otherwise the result must be plausible,
+If the log has a speed, the integrated speed is fitted to it (fitted_speed()). Otherwise the result must be plausible,
 because integration from a wrong standstill can give any speed and distance.
+
+The limits of a standstill are relative to the shaking of the ride. In simulated rides, they find all of the standing
+time, where the fixed limits of estimation.windows find 54 to 92 %. Relative limits are worse only if an idling engine
+shakes as much as the road: they find 17 to 41 % then, and fixed limits 91 %.
 """
 
 from collections.abc import Iterator
@@ -64,10 +54,7 @@ UNCALIBRATED_G = 0.12  # for a ride without a rest: largest difference from 1 g,
 
 
 def standing(ride: Channels) -> Bools:
-    """Find the standstills by the log's speed or, without a speed, by the shaking.
-
-    Returns True where the vehicle stands still, shape (n).
-    """
+    """Find the standstills, shape (n), by the log's speed or, without a speed, by the shaking."""
     still = _quiet(ride)
     if not np.any(still):
         still = _rests_of_filter(ride)
@@ -165,7 +152,7 @@ def speed_delay_s(ride: Channels) -> float:
 
 
 def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, delay_s: float) -> Array | None:
-    """Correct an integrated speed by the log's speed.
+    """Correct a speed integrated from the acceleration, whose integral drifts, by the log's speed, one per second.
 
     Least squares with a prior find the correction. The log's speed at the time t is
 
@@ -173,8 +160,8 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
 
     v is the integrated speed, and a the measured acceleration. The unknowns are the scale error k, the acceleration
     error b (m/s2) and the delay error d (s). Slopes and fork dive that the gyro did not measure cause the error b. The
-    model of b is a random walk backwards in time. The error b is nearly 0 at standstill, and linear between knots. Its
-    basis functions are hat functions (linear B-splines).
+    model of b is a random walk backwards in time. It is nearly 0 at standstill, and linear between knots. Its basis
+    functions are hat functions (linear B-splines).
 
     part: the ride up to a standstill.
     begin: index at which braking begins.
@@ -283,12 +270,12 @@ def find_stops(ride: Channels) -> list[Stop]:
 
     ride: a whole ride, from vehicle_channels(). pandas.DataFrame accepts the returned list.
 
-    >>> from kickstand_tools.api import Log, fit_two_positions, simulate_ride, vehicle_channels
+    >>> from kickstand_tools.api import CalibrationFile, Log, simulate_ride, vehicle_channels
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)
-    >>> poses = [Log.from_readings(pose, ride.rate_hz) for pose in (ride.kickstand, ride.upright)]
     >>> log = Log.from_readings(ride.readings, ride.rate_hz)
     >>> log.speed_mps[::200] = ride.truth["speed_mps"][::200]  # once per second
-    >>> stops = find_stops(vehicle_channels(log, fit_two_positions(*poses).calibration))
+    >>> calibration = CalibrationFile(vehicle_from_sensor=ride.vehicle_from_sensor, aligned=True)
+    >>> stops = find_stops(vehicle_channels(log, calibration))
     >>> stops[-1].speed_from, stops[-1].initial_speed_mps > 3.0, stops[-1].mfdd_mps2 > 1.0
     ('log', True, True)
     """
@@ -297,21 +284,17 @@ def find_stops(ride: Channels) -> list[Stop]:
 
 
 def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
-    """Find every stop of a log from over 10 km/h, and measure it by UN Regulation No. 13 (see find_stops).
+    """Call find_stops() for a log with an aligned calibration. Raises InputError.
 
-    The firmware's lean filter takes most of the time. The filter runs only for motorcycles, because a car has no lean.
+    The firmware's lean filter takes most of the time. It runs only for motorcycles, because a car has no lean.
 
-    calibration: must be aligned.
-    Raises InputError.
-
-    >>> from kickstand_tools.api import Log, fit_two_positions, simulate_ride
+    >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)
-    >>> poses = [Log.from_readings(pose, ride.rate_hz) for pose in (ride.kickstand, ride.upright)]
     >>> log = Log.from_readings(ride.readings, ride.rate_hz)
     >>> log.speed_mps[::200] = ride.truth["speed_mps"][::200]  # once per second
-    >>> stops = brake_tests(log, fit_two_positions(*poses).calibration)
-    >>> stops[-1].initial_speed_mps > 3.0, stops[-1].mfdd_mps2 > 1.0
-    (True, True)
+    >>> calibration = CalibrationFile(vehicle_from_sensor=ride.vehicle_from_sensor, aligned=True)
+    >>> brake_tests(log, calibration)[-1].mfdd_mps2 > 1.0
+    True
     """
     ride = Ride(check_log(read_log(log), axes=False), calibration)
     parts = _car_channels(ride) if ride.car else ride.read().parts()
@@ -378,10 +361,7 @@ def plausible(initial_speed_mps: float, side_m: float, heading_deg: float) -> bo
 
 
 def stops_by_speed(ride: Channels) -> bool:
-    """True if the log's speed shows a stop from over 10 km/h that is certainly hard enough for a brake test.
-
-    The force may not show this stop.
-    """
+    """True if the log's speed shows a stop from over 10 km/h that is certainly hard enough for a brake test."""
     valid = ~np.isnan(ride.speed_mps)
     time, speed = ride.t_s[valid], ride.speed_mps[valid]
     for end in np.flatnonzero((speed[1:] < STANDING_MPS) & (speed[:-1] >= STANDING_MPS)) + 1:
@@ -449,13 +429,7 @@ def _stop(part: Channels, standstill: int, delay_s: float, from_rest: bool) -> S
 
 
 def _acceleration(part: Channels, standstill: int) -> tuple[Array, Array, Array]:
-    """Compute acceleration and rates. The values at standstill are subtracted.
-
-    Returns:
-        acceleration: along the road, shape (n), in m/s2.
-        pitch_rate: rate of pitch, shape (n), in deg/s.
-        yaw_rate: yaw rate, shape (n), in deg/s.
-    """
+    """Return the acceleration along the road in m/s2, pitch and yaw rate in deg/s, without their values at rest."""
     time = part.t_s
     settled = int(np.searchsorted(time, time[standstill] + SETTLE_S))
     still = slice(settled if settled < len(time) - 5 else standstill, len(time))

@@ -50,16 +50,11 @@ SMALLER, LEAST_STEP = 0.3, 0.1  # a step that increases the cost is tried again,
 
 @dataclass
 class TurningFit:
-    """The result of the least squares in w windows for one permutation of the gyro's axes.
+    """The result of the least squares in w windows for one permutation of the gyro's axes."""
 
-    residual: mean square of the force that the rates do not explain in each window, shape (w), in g2.
-    bias: the gyro's bias, along the axes of its readings, shape (3), in deg/s.
-    cost: the sum of the squares, with the prior.
-    """
-
-    residual: Array
-    bias: Array
-    cost: float
+    residual: Array  # mean square of the force that the rates do not explain in each window, shape (w), in g2
+    bias: Array  # the gyro's bias, along the axes of its readings, shape (3), in deg/s
+    cost: float  # the sum of the squares, with the prior
 
 
 def liveliest(force: Array, rate: Array, valid: Bools, bin_s: float) -> tuple["Turning", list[Array]] | None:
@@ -67,10 +62,9 @@ def liveliest(force: Array, rate: Array, valid: Bools, bin_s: float) -> tuple["T
 
     A phone has no bias. In other logs, the median rate is a guess: most of a ride is nearly straight.
 
-    force: mean force of each bin, shape (n, 3), in g.
+    force: mean force of each bin of bin_s seconds, shape (n, 3), in g.
     rate: mean rate of each bin, shape (n, 3), in deg/s.
     valid: False for the bins in gaps, shape (n).
-    bin_s: duration of a bin.
     """
     rows = windows(valid, round(WINDOW_S / bin_s))
     rows = rows if len(rows) else windows(valid, round(SHORT_WINDOW_S / bin_s))
@@ -97,21 +91,13 @@ def bias_dps(force: Array, rate: Array, valid: Bools, bin_s: float) -> Array | N
 
 
 def windows(valid: Bools, length: int) -> Ints:
-    """Find the windows of `length` bins without an unknown bin.
-
-    Returns the indices of the bins of each window, shape (windows, length).
-    """
+    """Return the indices of the bins of the windows without an unknown bin, shape (windows, length)."""
     starts = [k for begin, end in intervals(valid) for k in range(begin, end - length + 1, length)]
     return np.array(starts, dtype=int).reshape(-1, 1) + np.arange(length)
 
 
 class Turning:
-    """Fits rates to forces in w windows of n bins.
-
-    force: shape (w, n, 3), in g.
-    rate: shape (w, n, 3), in deg/s.
-    bin_s: duration of a bin.
-    """
+    """Fits rates (deg/s) to forces (g), both of shape (w, n, 3), in w windows of n bins of bin_s seconds."""
 
     def __init__(self, force: Array, rate: Array, bin_s: float) -> None:
         self._force, self._rate, self._cell_s = force, rate, bin_s
@@ -156,28 +142,18 @@ _WEIGHT = (FORCE_G / UP_G) ** 2
 
 @dataclass
 class _Fit:
-    """The least squares in w windows for one bias. The velocity has k coefficients.
+    """The least squares in w windows for one bias. The velocity has k coefficients."""
 
-    along_up: the direction of `up` before this fit, shape (w, 3), or 0 if its length was not used.
-    velocity: the coefficients of the velocity, shape (w, k).
-    inverse: the inverse of the normal equations, shape (w, k, k).
-    up: shape (w, 3), in g.
-    residual, cost: see TurningFit.
-    """
-
-    along_up: Array
-    velocity: Array
-    inverse: Array
-    up: Array
-    residual: Array
+    along_up: Array  # the direction of `up` before this fit, shape (w, 3), or 0 if its length was not used
+    velocity: Array  # the coefficients of the velocity, shape (w, k)
+    inverse: Array  # the inverse of the normal equations, shape (w, k, k)
+    up: Array  # shape (w, 3), in g
+    residual: Array  # see TurningFit, as cost
     cost: float
 
 
 class _Model:
-    """How the force in w windows depends on the velocity, for one bias.
-
-    sign: 1, or -1 to reverse all rates.
-    """
+    """How the force in w windows depends on the velocity, for one bias. sign: 1, or -1 to reverse all rates."""
 
     def __init__(self, sign: float, readings: Array, bias: Array, bin_s: float) -> None:
         self.bias, self._sign, self._cell_s = bias, sign, bin_s
@@ -279,12 +255,7 @@ def _permuted(force: Array, sign: float, permutation: Array) -> Array:
 
 
 def _turn(rate: Array, bin_s: float) -> Array:
-    """Integrate rates to rotations.
-
-    rate: shape (w, n, 3), in rad/s.
-    Returns the rotation from the axes in the middle of each bin to the axes at the beginning of the window, shape
-    (w, n, 3, 3).
-    """
+    """Integrate rates in rad/s, shape (w, n, 3), to rotations from the middle of each bin to the window's beginning."""
     half = rotation_matrix(rate * (bin_s / 2.0))
     turns = half @ half  # the rotation over each bin
     reach = 1
@@ -394,7 +365,7 @@ Mirrored = kind(
 def wrong_axes(bins: LogBins) -> Message | None:
     """Return a notice if the axes, their signs or the unit of the rates seem wrong.
 
-    Returns None if they seem right, or if the log is not enough to judge them.
+    Returns None if they seem right, or if the log is not enough to judge them. So do the checks that it calls.
     """
     mirrored = Mirrored() if course_agrees(bins) is False else None
     return handedness(bins) or bends(bins) or mirrored
@@ -411,10 +382,7 @@ PERMUTATIONS = _permutations()  # true rate = permutation @ reading of the gyro
 
 
 def handedness(bins: LogBins) -> Message | None:
-    """Return a notice that says what is wrong with the axes.
-
-    Returns None if the axes seem right, or if the log is not enough to judge them.
-    """
+    """Return a notice that says what is wrong with the axes; None as wrong_axes()."""
     liveliest_windows = liveliest(bins.force, bins.rate, bins.valid, BIN_S)
     fits = None if liveliest_windows is None else fit_permutations(*liveliest_windows)
     if fits is None or not is_wrong(fits):

@@ -29,25 +29,17 @@ LEAST_LEAN = np.radians(2.0 / 57.3)
 
 @dataclass
 class Leaning:
-    """How a motorcycle's lean relates to its yaw rate.
+    """How a motorcycle's lean relates to its yaw rate."""
 
-    matrix: rough rotation from sensor to vehicle axes, shape (3, 3). The rows are left, up and forward.
-    rolled: lean without its slow changes (see without_drift()), shape (n), in rad.
-    turned: yaw rate without its slow changes, positive to the left, shape (n), in rad/s.
-    correlation: correlation of rolled and -turned while riding.
-    speed: speed at which yaw rate and lean balance, by regression, in m/s.
-    share: ratio of the rate about left to yaw rate x sin(lean), by regression. It is 1 if the axes are right-handed and
-        the rates in deg/s.
-    sigmas: |share| divided by its standard deviation.
-    """
-
-    matrix: Array
-    rolled: Array
-    turned: Array
-    correlation: float
-    speed: float
+    matrix: Array  # rough rotation from sensor to vehicle axes, shape (3, 3). The rows are left, up and forward.
+    rolled: Array  # lean without its slow changes (see without_drift()), shape (n), in rad
+    turned: Array  # yaw rate without its slow changes, positive to the left, shape (n), in rad/s
+    correlation: float  # of rolled and -turned while riding
+    speed: float  # at which yaw rate and lean balance, by regression, in m/s
+    # ratio of the rate about left to yaw rate x sin(lean), by regression. It is 1 if the axes are right-handed and
+    # the rates in deg/s.
     share: float
-    sigmas: float
+    sigmas: float  # |share| divided by its standard deviation
 
 
 def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
@@ -55,8 +47,7 @@ def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
 
     rate: rates without bias, shape (n, 3), in rad/s.
     force: forces in any unit, shape (n, 3).
-    riding: True for the windows from which axes, speed and share are computed, shape (n). The lean itself is integrated
-        over all windows.
+    riding: True for the windows from which axes, speed and share are computed. The lean is integrated over all windows.
     """
     up = _unit(force[riding].mean(axis=0))
     yaw = averaged(rate @ up, SMOOTH_S)
@@ -87,10 +78,9 @@ def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
 
 
 def speed_in_radians(leaning: Leaning) -> float | None:
-    """Detect rates in rad/s that are labelled deg/s, so they are 57 times too small.
+    """Return the impossible speed in bends, in m/s, that rates in rad/s would mean if they were labelled deg/s.
 
-    Returns the impossible speed in bends, in m/s, that these rates would mean in deg/s. Returns None if the rates are
-    not surely in rad/s.
+    Returns None if the rates are not surely in rad/s.
     """
     wrong = leaning.share > SHARE and leaning.sigmas > SIGMAS and leaning.correlation > CORRELATION
     return float(np.degrees(leaning.speed)) if wrong and leans(leaning) else None
@@ -112,7 +102,7 @@ def leaned(rolled: Array, yaw: Array, speed: Array | float) -> Array:
 
 
 def averaged(values: Array, seconds: float) -> Array:
-    """Compute the moving mean of the windows' values over some seconds. values: shape (n) or (n, k)."""
+    """Compute the moving mean of the windows' values, shape (n) or (n, k), over some seconds."""
     return moving_mean(values, _windows(seconds))
 
 
@@ -122,11 +112,7 @@ def without_drift(values: Array) -> Array:
 
 
 def moving_deviation(values: Array, over_s: float) -> Array:
-    """Compute the moving standard deviation of three components over over_s seconds.
-
-    values: three components at each time, shape (n, 3).
-    Returns the largest of the three standard deviations at each time, shape (n).
-    """
+    """Return the largest of the moving standard deviations of three components, shape (n, 3), over over_s seconds."""
     return moving_spread(values, _windows(over_s)).max(axis=1, initial=0.0)
 
 
@@ -161,10 +147,7 @@ RatesInRadians = kind(
 
 
 def bends(bins: LogBins) -> Message | None:
-    """Return a notice if the rates seem to be in rad/s.
-
-    Returns None if the rates seem right, or if the log is not enough to judge them.
-    """
+    """Return a notice if the rates seem to be in rad/s; None if they seem right, or the log is not enough to judge."""
     force, rate, _ = bins.means(round(WINDOW_S / BIN_S))
     valid = np.flatnonzero(~np.isnan(force[:, 0]))[-round(JUDGED_S / WINDOW_S) :]
     force, rate = force[valid], np.radians(rate[valid])
@@ -185,10 +168,7 @@ def bends(bins: LogBins) -> Message | None:
 
 
 def calm_bias(calm: Array) -> Array | None:
-    """Return the gyro's bias, shape (3), in deg/s; None if the rates differ too much.
-
-    calm: the result of calm_rates(), in deg/s.
-    """
+    """Return the gyro's bias, shape (3), in deg/s, from calm_rates() in deg/s; None if the rates differ too much."""
     for rates in (calm, calm[:FEW]):
         bias = np.median(rates, axis=0)
         if np.mean(np.linalg.norm(rates - bias, axis=1) < AGREE_DPS) > AGREE:
@@ -197,11 +177,10 @@ def calm_bias(calm: Array) -> Array | None:
 
 
 def calm_rates(force: Array, rate: Array, calm_rate: float) -> Array:
-    """Return the mean rates in the k calmest of m seconds, the calmest second first.
+    """Return the mean rates in the k calmest of m seconds, shape (k, 3), the calmest second first.
 
     force, rate: shape (m, bins, 3).
     calm_rate: the standard deviation of the rates that counts as much as a standard deviation CALM_G of the force.
-    Returns an array of shape (k, 3).
     """
     changes = np.sum(np.std(force, axis=1), axis=1) / CALM_G + np.sum(np.std(rate, axis=1), axis=1) / calm_rate
     return np.mean(rate, axis=1)[np.argsort(changes)[: max(LEAST, round(CALMEST * len(changes)))]]

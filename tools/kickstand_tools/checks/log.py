@@ -57,20 +57,13 @@ SpeedStuck = kind(
 
 @dataclass
 class CheckedLog:
-    """A log of n samples with the results of its checks.
+    """A log of n samples with the results of its checks."""
 
-    log: the whole log.
-    measured: False for readings that were not measured and must be left out, shape (n).
-    notices: remarks about the log.
-    rows: the rows of the stretch that is asked for.
-    bins: averages of the log for further checks; None if the log has no readings for them.
-    """
-
-    log: Log
-    measured: Bools
-    notices: list[Message]
-    rows: slice = field(default_factory=lambda: slice(None))
-    bins: LogBins | None = None
+    log: Log  # the whole log
+    measured: Bools  # False for readings that were not measured and must be left out, shape (n)
+    notices: list[Message]  # remarks about the log
+    rows: slice = field(default_factory=lambda: slice(None))  # the rows of the stretch that is asked for
+    bins: LogBins | None = None  # averages of the log for further checks; None if the log has no readings for them
 
 
 def check_log(log: Log, axes: bool = True, sensor: bool = True) -> CheckedLog:
@@ -122,8 +115,7 @@ def read_with_notices(source: Source, axes: bool = True, sensor: bool = False) -
 
 
 def _bins(log: Log, measured: Bools) -> LogBins | None:
-    """Return the bins of the measured readings within the sensors' ranges: a single huge reading would outweigh a whole
-    ride, and a log made in Python may have one."""
+    """Return the bins of the measured readings within the sensors' ranges: one huge reading would outweigh a ride."""
     used = measured.copy()
     for vectors, limit in ((log.accel_g, MOST_G), (log.gyro_dps, MOST_DPS)):
         for values in vectors.T:
@@ -150,10 +142,7 @@ def _check_units(log: Log) -> None:
 
 
 def speed_unit(bins: LogBins) -> Message | None:
-    """Return a refusal if the speed changes too much during most of the strong forces.
-
-    Returns None if the speed seems right, or if the log is not enough to judge it.
-    """
+    """Return a refusal if the speed changes too much during most of the strong forces; None as wrong_axes()."""
     time_s, mps = bins.speeds.T
     seconds = np.diff(time_s)
     good = (seconds > SHORTEST_S) & (seconds < LONGEST_S)

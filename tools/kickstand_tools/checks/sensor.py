@@ -94,7 +94,7 @@ def find_faulty(log: Log) -> tuple[Bools, list[Message]]:
 
 
 def without_frozen(log: Log) -> Log:
-    """The log without frozen readings, which become gaps. Returns the same log if it has no frozen readings."""
+    """Return the log without frozen readings, which become gaps, or the same log if it has none."""
     axes = _axes(log)
     frozen, _ = _frozen(log.t_s, axes, _steps(axes))
     return log.part(~frozen) if np.any(frozen) else log

@@ -1,9 +1,9 @@
 """Finds the alignment of a motorcycle's sensor, with its covariance, from an ordinary ride. It needs no poses.
 
-The readings are rotated by a first guess of the axes(). Then the misalignment is estimated together with
-the motion, the gyro's bias and the errors of sensor and bike. The prior of the misalignment is so wide that it adds no
-information. The lean follows the gyro through the bends. On straights the bike is balanced, so the mean lean on
-straights shows the bike's own up. The residual force across the bike is the bias of the accelerometer.
+First, axes() finds rough axes. Then the misalignment relative to them is estimated together with the motion, the gyro's
+bias and the errors of sensor and bike. Its prior is so wide that it adds no information. The lean follows the gyro
+through the bends. On straights the bike is balanced, so the mean lean on straights shows the bike's own up. The
+residual force across the bike is the bias of the accelerometer.
 
 Two errors cannot be distinguished from a misalignment. A centre of mass beside the middle of the bike looks like a roll
 misalignment. Cross-axis errors of the sensor look like any misalignment, and cause most of the alignment's standard
@@ -94,23 +94,16 @@ RideContradicts = kind(
 
 @dataclass
 class Axes:
-    """The vehicle's axes and the gyro's bias.
-
-    matrix: rotation from sensor to vehicle axes, shape (3, 3). The rows are left, up and forward.
-    bias: the gyro's bias along the sensor's axes, shape (3), in rad/s.
-    """
-
-    matrix: Array
-    bias: Array
+    matrix: Array  # rotation from sensor to vehicle axes, shape (3, 3). The rows are left, up and forward.
+    bias: Array  # the gyro's bias along the sensor's axes, shape (3), in rad/s
 
 
 def axes(w: Windows) -> Axes:
-    """Find the vehicle's axes, within some degrees, and the gyro's bias.
+    """Find the vehicle's axes, within some degrees, and the gyro's bias, from windows along the sensor's axes.
 
     In balance, the specific force points along the bike's own up, so the mean force while riding shows "up". For
     forward and the handedness see checks/leaning.py.
 
-    w: windows along the sensor's axes.
     Raises RefusedInput if the ride is not a motorcycle's, or has too little lean.
     """
     bias = _rough_bias(w)
@@ -173,9 +166,7 @@ def _refuse_no_motorcycle(found: Leaning, sideways: Array, tilt: float, riding: 
 
 
 def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array, pushed: Array) -> None:
-    """Raise RefusedInput if the log's speed is stuck or not in m/s.
-
-    The log's speed is compared with the speed at which yaw rate and lean balance in the bends.
+    """Raise RefusedInput if the log's speed is stuck, or not the speed at which yaw rate and lean balance in the bends.
 
     known: the log's speed, in m/s; NaN without a speed.
     pushed: the changes of speed by the force along the vehicle, in m/s.
@@ -249,13 +240,11 @@ PhoneUpsideDown = kind(
 
 @dataclass
 class RideFit:
-    """The alignment from a ride, with its quality.
-
-    Upright is the balanced position on straights. Angles are in degrees.
+    """The alignment from a ride, with its quality. Upright is the balanced position on straights.
 
     calibration: the alignment.
-    roll_deg, pitch_deg, yaw_deg: its standard errors about forward, left and up. These errors come mostly from errors
-        of the sensor that a ride does not show.
+    roll_deg, pitch_deg, yaw_deg: its standard errors about forward, left and up, mostly from errors of the sensor that
+        a ride does not show.
     halves_deg: roll, pitch and yaw from the second half of the ride minus those from the first half.
     offset_g: bias of the accelerometer along left, up and forward, shape (3). The calibration subtracts it.
     offset_sigma_g: standard errors of offset_g, shape (3).
@@ -293,8 +282,7 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
     log: see read_log. A speed improves the result, but is optional.
     phone: the phone's mounting, "portrait", "landscape" or "flat" (see PHONES); None if unknown.
     progress: called with (steps done, all steps).
-    Raises InputError. Raises its subclass RefusedInput, with a Message, if the ride does not determine the sensor's
-    mounting.
+    Raises InputError. Raises its subclass RefusedInput, with a Message, if the ride does not determine the mounting.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("city", seed=3, seconds=240.0)
@@ -326,10 +314,7 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
 
 
 def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) -> Estimate:
-    """Estimate the motion, and the misalignment relative to a first guess.
-
-    The alignment is the result's matrix times the guess's matrix. The accelerometer's offset may change from block to
-    block. The other parameters are almost the same in all blocks of the result.
+    """Estimate the motion, and the misalignment relative to a first guess: multiply the result's matrix by the guess's.
 
     windows: along the sensor's axes.
     expected: rotation from sensor to vehicle axes of the mounting that the user named, shape (3, 3); None if unknown.
@@ -353,8 +338,8 @@ def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) ->
 def mounted_windows(log: Log) -> Windows:
     """Return the windows of the part of a log in which the sensor was mounted, along the sensor's axes.
 
-    This part is the longest stretch in which the mean force keeps its direction. Before and after this part, a hand
-    held the sensor. Readings beyond MOST_G and MOST_DPS are left out. Raises RefusedInput.
+    This part is the longest stretch in which the mean force keeps its direction. Before and after it, a hand held the
+    sensor. Readings beyond MOST_G and MOST_DPS are left out. Raises RefusedInput.
     """
     log = log.part(np.all(np.abs(log.accel_g) < MOST_G, axis=1) & np.all(np.abs(log.gyro_dps) < MOST_DPS, axis=1))
     windows = _windows(log)
@@ -373,7 +358,6 @@ def mounted_windows(log: Log) -> Windows:
 
 
 def _windows(log: Log, part: Bools | slice = slice(None)) -> Windows:
-    """Return the windows of a part of the log, along the sensor's axes. Raises RefusedInput."""
     t_s, rate = log.t_s[part], np.radians(log.gyro_dps[part])
     if len(t_s) < 2:
         raise RefusedInput(RideShort(0.0, MIN_RIDING_S))

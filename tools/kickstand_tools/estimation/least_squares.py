@@ -61,7 +61,6 @@ class Estimate:
     states: states at the edges, shape (n + 1, STATES).
     parameters: parameters of each of the B blocks of BLOCK windows, shape (B, PARAMETERS).
     matrix: the rotation that was applied to the windows, shape (3, 3). The identity if the prior comes from a pose.
-    noise: the Noise of the windows.
     change: the largest change of an angle in the last step, in rad.
     """
 
@@ -86,11 +85,10 @@ class Estimate:
         self._use_own_noise()
 
     def unknowns(self, number: Ints, states: Array) -> Array:
-        """Return k columns of states and parameters, in the order of model.py.
+        """Return k columns of states and parameters, in the order of model.py, shape (STATES + PARAMETERS, k).
 
         number: index of the window of each row of `states`, shape (k).
         states: shape (k, STATES).
-        Returns an array of shape (STATES + PARAMETERS, k).
         """
         return np.concatenate((states.T, self.parameters[number // self._length].T))
 
@@ -113,10 +111,7 @@ class Estimate:
         return sigma
 
     def split(self) -> Array:
-        """Estimate a change of the misalignment in the middle of the ride.
-
-        Returns the misalignment in the second half minus the misalignment in the first half, shape (3), in rad.
-        """
+        """Return the misalignment in the second half of the ride minus that in the first half, shape (3), in rad."""
         walks = self._likely.random_walks(self.prior, self.parameters)
         middle = len(self.parameters) // 2
         walks.variance[:, middle - 1 : middle, ROTATION] = 1.0
@@ -136,10 +131,7 @@ class Estimate:
         self._converge()
 
     def _false_standstill(self, still: Bools) -> Bools:
-        """Find brief standstills that the motion around them contradicts.
-
-        Returns True in these standstills, shape (n).
-        """
+        """Return True in brief standstills that the motion around them contradicts, shape (n)."""
         contradicted = np.max(np.abs(self._residuals() / self.noise.sigma())[:, CONTRADICTING], axis=1) > CONTRADICTED
         false = np.zeros_like(still)
         for begin, end in intervals(still):
@@ -164,10 +156,10 @@ class Estimate:
         return bool(np.max(self.noise.misfit) > 1.0)
 
     def _use_own_noise(self) -> None:
-        """Set the noise from this ride's residuals.
+        """Set the noise from this ride's residuals, for the covariance only.
 
-        Only the covariance uses this noise. The states are kept. The states were estimated with the larger noise of a
-        rough ride. That noise gives less weight to lasting errors that the model lacks.
+        The states were estimated with the larger noise of a rough ride, which gives less weight to lasting errors that
+        the model lacks.
         """
         residuals = self._residuals()
         self.noise.count_own_misfit()
@@ -199,10 +191,7 @@ class Estimate:
             self._turn_axes()
 
     def _turn_axes(self) -> None:
-        """Rotate the readings by the estimated rotation, then set the rotation to 0.
-
-        The model is valid for small rotations only.
-        """
+        """Rotate the readings by the estimated rotation, then set it to 0: the model is for small rotations only."""
         rotation = self.parameters[0, ROTATION].copy()
         self.parameters[:, ROTATION] -= rotation
         self.prior.mean[ROTATION] -= rotation

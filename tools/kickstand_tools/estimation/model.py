@@ -1,31 +1,18 @@
-"""Defines the unknowns of the estimation: states and parameters, and hypotheses about the parameters' changes.
+"""The model of a ride: unknowns with their priors, hypotheses about mount and wind, equations and their Jacobian.
 
-The states describe the motion at the edges of the windows. The parameters are errors of sensor and bike, and have a
-prior. The parameters are constant within a block of windows, and follow a random walk from block to block.
-
-On straights, a bike seems to lean if the sensor's mount has yielded, or if wind pushes the bike to the side for
-minutes. A hypothesis combines a mount with a strength of the wind. Its posterior weight follows from its prior
-probability and from the likelihood of the readings. If the readings do not distinguish two hypotheses, the result is
-between the results of the two hypotheses. The standard deviation of the result then grows with the difference between
-them.
-
-
-The process model and the measurement model of a motorcycle, and their Jacobian.
-
-The states are the lean t, the pitch q, and three velocities of the sensor: l to the left, u up and v forward. The
-velocities are in level axes that yaw with the bike at the yaw rate p. Rates w and forces f are the measured values
-(w_m, f_m) without the sensor's errors. R is the rotation by ROTATION, to second order. The acceleration a is the force
-in level axes, minus 1 g upwards.
+The states are the lean t, the pitch q, three velocities of the sensor, l to the left, u up and v forward, and the
+gyro's bias. The velocities are in level axes that yaw with the bike at the yaw rate p. Rates w and forces f are the
+measured values (w_m, f_m) without the sensor's errors. R is the rotation by ROTATION, to second order. The acceleration
+a is the force in level axes, minus 1 g upwards.
 
     w = R w_m + GYRO w_m - bias        f = R f_m + ACCEL f_m + offset
     p = (w_x sin t + w_y cos t) / cos q        t' = w_z - p sin q        q' = w_y sin t - w_x cos t
     l' = a_l - p v        v' = a_f + p l        u' = a_u
 
-The firmware's kickstand.lean.bike_model has the same equations, and assumes no motion sideways or up. Here, "no motion
-sideways or up" is a measurement of the velocity, with noise. It would be worse to measure the acceleration. The
-velocity differs from 0 only briefly, but the acceleration differs from 0 at every bump. The wheels' velocity is the
-sensor's velocity minus the rates times the sensor's position (rigid body). The measurements are differences that should
-be 0:
+The firmware's kickstand.lean.bike_model has the same equations, and assumes no motion sideways or up. Here, this is a
+measurement of the velocity, with noise, because the acceleration differs from 0 at every bump, but the velocity only
+briefly. The wheels' velocity is the sensor's velocity minus the rates times the sensor's position (rigid body). The
+measurements are differences that should be 0:
 
     SLIDING         the wheels' velocity sideways, because wheels do not slide
     CLIMBING        the wheels' velocity up minus the part due to the chassis' pitch. The chassis points along the road,
@@ -37,6 +24,11 @@ be 0:
     RESTING         the velocity of a standing bike (zero-velocity update)
     RESTING_RATE    the rates of a standing bike
     BACKWARD        a speed under 0
+
+The parameters are errors of sensor and bike. They are constant within a block of windows, and follow a random walk from
+block to block. On straights, a bike seems to lean if the sensor's mount has yielded, or if wind pushes it to the side
+for minutes. A hypothesis combines a mount with a strength of the wind. If the readings do not distinguish two
+hypotheses, the result is between their results, and its standard deviation grows with the difference.
 """
 
 from dataclasses import dataclass
@@ -112,16 +104,11 @@ LEAST_SHARE = 0.02  # least posterior weight of a hypothesis that is kept
 
 @dataclass
 class Prior:
-    """The prior of the parameters.
+    """The prior of the parameters."""
 
-    mean: shape (PARAMETERS).
-    sigma: standard deviations, shape (PARAMETERS). A parameter whose standard deviation is 0 is not estimated.
-    posed: True if the alignment comes from an upright pose.
-    """
-
-    mean: Array
-    sigma: Array
-    posed: bool
+    mean: Array  # shape (PARAMETERS)
+    sigma: Array  # standard deviations, shape (PARAMETERS). A parameter whose standard deviation is 0 is not estimated.
+    posed: bool  # True if the alignment comes from an upright pose
 
     @classmethod
     def of_pose(cls, six_done: bool, gyro_sigma: Array | None = None) -> "Prior":
@@ -147,9 +134,9 @@ class Prior:
         """Return the information matrix (inverse covariance) of the prior, shape (m, m).
 
         The upright pose was measured with a biased accelerometer. Therefore the prior is about the sum of misalignment
-        and bias. This sum is the lean and pitch that the sensor reads in the pose.
+        and bias, which is the lean and pitch that the sensor reads in the pose.
 
-        sigma: standard deviations of the prior, shape (PARAMETERS). A hypothesis may have enlarged some of them.
+        sigma: the prior's, some perhaps enlarged by a hypothesis.
         """
         matrix = np.diag(np.divide(1.0, sigma**2, out=np.zeros(PARAMETERS), where=sigma > 0.0))
         if self.posed:
@@ -162,26 +149,16 @@ class Prior:
 
 @dataclass
 class Hypotheses:
-    """G hypotheses. Each field has the shape (G).
+    """G hypotheses. Each field has the shape (G)."""
 
-    turning: process noise per block of the mount's rotation about left and up, in rad.
-    rolling: process noise per block of the mount's rotation about forward, in rad.
-    pushed: standard deviation of the lasting force to the side, in g.
-    minus_two_log_prior: minus twice the logarithm of the prior probability.
-    weight: posterior weights, whose sum is 1.
-    """
-
-    turning: Array
-    rolling: Array
-    pushed: Array
-    minus_two_log_prior: Array
-    weight: Array
+    turning: Array  # process noise per block of the mount's rotation about left and up, in rad
+    rolling: Array  # process noise per block of the mount's rotation about forward, in rad
+    pushed: Array  # standard deviation of the lasting force to the side, in g
+    minus_two_log_prior: Array  # minus twice the logarithm of the prior probability
+    weight: Array  # posterior weights, whose sum is 1
 
     def select(self, index: Ints, weight: Array) -> "Hypotheses":
-        """Return k of the hypotheses, with new posterior weights.
-
-        index: indices of the hypotheses, shape (k). weight: their posterior weights, shape (k).
-        """
+        """Return the hypotheses with these indices, with new posterior weights."""
         return Hypotheses(
             self.turning[index], self.rolling[index], self.pushed[index], self.minus_two_log_prior[index], weight
         )
@@ -204,11 +181,7 @@ class Hypotheses:
         return self.select(likely, weight[likely] / np.sum(weight[likely]))
 
     def random_walks(self, prior: Prior, parameters: Array) -> RandomWalks:
-        """Return the random walks of the estimated parameters, for the solver.
-
-        They hold the prior of each hypothesis, the variances of the changes from block to block, and the current
-        differences between blocks. parameters: see weighted().
-        """
+        """Return the random walks of the estimated parameters, for the solver. parameters: see weighted()."""
         unknown = prior.unknown
         sigma = np.tile(prior.sigma, (len(self.weight), 1))
         sigma[:, BESIDE] = np.hypot(sigma[:, BESIDE], self.pushed)
@@ -247,11 +220,9 @@ STEP = 1e-6  # step of the finite differences, in the units of the unknowns
 
 
 def process_and_measurements(windows: Windows, x: Array) -> Array:
-    """Evaluate both models in n windows.
+    """Evaluate both models in n windows, shape (ROWS, n): the states' rates of change, then the measurements.
 
     x: states in the middle of each window, then parameters, shape (STATES + PARAMETERS, n).
-    Returns an array of shape (ROWS, n). The first STATES rows are the states' rates of change. The other rows are the
-    measurements.
     """
     return _models(windows, x, _readings(windows, x))
 
@@ -264,7 +235,6 @@ def _readings(windows: Windows, x: Array) -> Array:
 
 
 def _models(windows: Windows, x: Array, readings: Array) -> Array:
-    """Evaluate process_and_measurements() with these _readings()."""
     t, q, left, up, forward = x[: BIAS.start]
     p, (wx, wy, wz, fx, fy, fz) = x[STATES:], readings
     st, ct, sq, cq = np.sin(t), np.cos(t), np.sin(q), np.cos(q)
@@ -295,13 +265,12 @@ def _models(windows: Windows, x: Array, readings: Array) -> Array:
 
 
 def jacobian(windows: Windows, x: Array, unknown: Ints) -> Array:
-    """Compute the derivatives of process_and_measurements() by some rows of x.
+    """Return the derivatives of process_and_measurements() by some rows of x, shape (len(unknown), ROWS, n).
 
     Most unknowns are errors of the sensor, which only change the corrected readings. So the derivatives by the readings
     are computed first, as finite differences.
 
     unknown: indices of these rows of x.
-    Returns an array of shape (len(unknown), ROWS, n).
     """
     readings, moved, derivatives = _readings(windows, x), x.copy(), np.empty((len(unknown), ROWS, x.shape[1]))
     base, by_reading = _models(windows, x, readings), np.empty((6, *derivatives.shape[1:]))
@@ -324,8 +293,7 @@ def jacobian(windows: Windows, x: Array, unknown: Ints) -> Array:
 
 
 def _errors(windows: Windows) -> dict[int, tuple[int, Array]]:
-    """Return, for each row of x that is an error of one axis, the index of its reading, and this reading's derivative
-    by the row."""
+    """Return the index of the reading, and its derivative, for each row of x that is an error of one axis."""
     warm, errors = windows.warm, {}
     for k in range(3):
         errors[BIAS.start + k] = k, -np.ones(len(warm))
@@ -339,12 +307,10 @@ def _errors(windows: Windows) -> dict[int, tuple[int, Array]]:
 
 
 def corrected_rates(rate: Array, x: Array, warm: Array) -> Array:
-    """Remove the gyro's errors from n measured rates.
+    """Remove the gyro's errors from n measured rates, shape (3, n), in rad/s.
 
-    rate: measured rates, shape (3, n), in rad/s.
     x: states, then parameters, shape (STATES + PARAMETERS, n).
     warm: see Windows, shape (n).
-    Returns the rates about left, up and forward, shape (3, n), in rad/s.
     """
     return _corrected(rate, x[STATES:], GYRO) - x[BIAS] - x[STATES:][BIAS_PER_C] * warm
 

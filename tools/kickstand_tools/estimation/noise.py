@@ -1,5 +1,4 @@
-"""Defines the process noise and the measurement noise of model.py, with all their parameters. The random walk of the
-mount and of the sensor's errors is there, too.
+"""The process noise and the measurement noise of model.py, with all their parameters.
 
 Each line has the form: symbol = default # meaning, unit. All values are standard deviations. A disturbance that lasts
 for tau seconds appears in many windows of T seconds. Measurements that share an error are not independent. Therefore
@@ -79,12 +78,9 @@ LEAST_WINDOWS = 50  # with fewer windows of balanced riding, the unbalance stays
 
 
 class Noise:
-    """The standard deviations of n windows.
+    """The standard deviations of n windows. All fields but unbalance have the shape (n).
 
-    Set lean, pitch and speed before you call sigma(). All fields but unbalance have the shape (n).
-
-    lean, pitch: estimates in rad.
-    speed: estimate in m/s.
+    lean, pitch, speed: estimates in rad and m/s. Set them before you call sigma().
     riding: True where the bike may be riding.
     still: True where the bike stands.
     roughness: factor on the noise of vibration; 1 for a rough ride.
@@ -148,10 +144,7 @@ class Noise:
         return sigma * np.hypot(1.0, off / sigma / limit)
 
     def estimate_roughness(self, residual: Array) -> None:
-        """Set the roughness from the mean square of the residuals around each window.
-
-        residual: residuals divided by their standard deviations, shape (n, ROWS).
-        """
+        """Set the roughness from the mean square around each window of residuals divided by sigma(), (n, ROWS)."""
         squares = np.mean((residual[:, ROUGH] / EXPECTED) ** 2, axis=1) * self.roughness**2
         share = averaged(self.riding.astype(float), ROUGHNESS_S)
         mean_square = averaged(np.where(self.riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
@@ -159,13 +152,11 @@ class Noise:
         self.roughness = np.where(share > 0.02, np.clip(np.sqrt(mean_square), least, MOST_ROUGHNESS), 1.0)
 
     def estimate_misfit(self, off: Array) -> None:
-        """Estimate the misfit: how much the accelerations differ from a bike's.
+        """Estimate from the residuals, shape (n, ROWS), how much the accelerations differ from a bike's.
 
         The misfit for the states comes from CLIMBING divided by its standard deviation, which grows with speed. Slow
         rides then get too little weight, but the states become only slightly worse. The misfit for the covariance comes
-        from CLIMBING divided by a constant. This second misfit is used after count_own_misfit().
-
-        off: residuals, shape (n, ROWS).
+        from CLIMBING divided by a constant. It is used after count_own_misfit().
         """
         limit = OUTLIER / self._lasting[:, eq.CLIMBING]
 
@@ -179,7 +170,6 @@ class Noise:
         self.doubtful = self.riding & (self.misfit >= MOST_MISFIT)
 
     def count_own_misfit(self) -> None:
-        """Make sigma() use the misfit of CLIMBING divided by a constant from now on."""
         self.misfit = self._own_misfit
 
     def _misfit(self, residual: Array) -> Array:
@@ -194,10 +184,7 @@ class Noise:
         return np.clip(ratio, 1.0, MOST_MISFIT)
 
     def estimate_unbalance(self, force: Array, over_s: float) -> None:
-        """Set the unbalance, which is the factor on the standard deviation of BALANCED. An average ride has an
-        unbalance of 1.
-
-        With too few balanced windows the unbalance stays 1.
+        """Set the unbalance; with too few balanced windows to 1.
 
         force: the measurement BALANCED, shape (n), in g.
         over_s: BRIEF_S or LONG_S.
@@ -216,10 +203,7 @@ class Noise:
 
     @property
     def _wheelie_factor(self) -> Array:
-        """The factor on the noise of the wheels' upward motion, shape (n).
-
-        In a wheelie the chassis does not point along the road.
-        """
+        """Factor on the noise of the wheels' upward motion: in a wheelie the chassis does not point along the road."""
         return 1.0 + (self.pitch / STEEP) ** 4
 
     @property
@@ -232,8 +216,5 @@ class Noise:
 
 
 def jolted(windows: Windows) -> Array:
-    """Return the possible error of the angles in each window, shape (n), in rad.
-
-    A jolt, or a gyro at the end of its range, causes this error.
-    """
+    """Return the error of the angles in rad that a jolt, or a gyro at the end of its range, may cause, shape (n)."""
     return JOLTED_S * np.maximum(windows.jolt - JOLTED_RADPS, 0.0)

@@ -1,5 +1,4 @@
-"""Computes the smoothed lean of a recorded ride. Each lean is computed from all readings of the ride, earlier and
-later."""
+"""Computes the smoothed lean of a recorded ride: each lean from all readings of the ride, earlier and later."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -80,7 +79,6 @@ class SmoothedRide(Table):
     pitch_deg: pitch caused by road and suspension, positive if the nose is up.
     speed_mps: forward speed of the sensor.
     doubtful: 1 where the accelerations differ from a bike's, so the lean is less exact; otherwise 0.
-    notices: remarks about the ride.
     """
 
     t_s: Array
@@ -122,10 +120,7 @@ def smooth_checked(ride: CheckedLog, calibration: CalibrationFile, progress: Pro
 def smooth_to_csv(
     log: Source, calibration: CalibrationFile, out: Path, progress: Progress | None = None
 ) -> tuple[int, list[Message]]:
-    """Write LEAN.csv with the log's own times and COLUMNS.
-
-    Returns the number of samples and the notices. Raises InputError.
-    """
+    """Write LEAN.csv with the log's own times and COLUMNS. Returns the number of samples and the notices."""
     ride = read_ride(log, calibration)
     smoother = Smoother(ride, calibration)
     count = write_lean(out, COLUMNS, DIGITS, time_texts(log, ride.log, ride.rows), smoother.rows(progress))
@@ -165,7 +160,7 @@ class Smoother:
         """Smooth the whole log in batches of several segments of SEGMENT_S.
 
         Yields rows of the log, at most PART_SAMPLES, and their values: those of COLUMNS, then STANDING and ROLLING.
-        Frozen readings have NaN. The values are None if there are too few samples per second.
+            Frozen readings have NaN. The values are None if there are too few samples per second.
         """
         log = self._ride.log
         number = np.searchsorted(log.t_s, np.arange(0.0, log.t_s[-1] + SEGMENT_S, SEGMENT_S))
@@ -203,11 +198,9 @@ class Smoother:
         return [*notices, PoseOff(pose_deg)] if abs(pose_deg) > POSE_DEG else notices
 
     def _estimated(self, log: Log, own: slice) -> Array | None:
-        """Estimate the values of the samples of a part of the log.
+        """Estimate the values of a part of the log, see batches(); NaN where the readings are not from riding.
 
         own: the samples that need a lean. The other samples only improve the estimate, and remarks do not count them.
-        Returns the values, see batches(); NaN where the readings are not from riding. Returns None if there are fewer
-        than SLOWEST_HZ samples per second.
         """
         t_s, temperature = log.t_s, log.temperature_c
         nothing = np.full((len(t_s), len(COLUMNS) + 2), np.nan)
@@ -266,10 +259,7 @@ def at_samples(windows: Windows, rate: Array, estimate: Estimate, lean_sigma: Ar
     window = np.cumsum(last) - last
 
     def integral(rate: Array) -> tuple[Array, Array]:
-        """Integrate `rate`, shape (samples).
-
-        Returns the integral from the start of each sample's window to the sample, and the integral over that window.
-        """
+        """Integrate from the start of each sample's window to the sample, and over that window."""
         until = np.cumsum(rate * duration)
         edges = np.concatenate(([0.0], until[last]))
         return until - rate * windows.after - edges[window], np.diff(edges)[window]

@@ -14,29 +14,18 @@ GAP_S = 0.17  # if the time between two samples is longer, readings are missing
 
 @dataclass
 class Windows:
-    """n successive windows. A stretch without readings is one window whose `gap` is True.
+    """n successive windows. A stretch without readings is one window whose `gap` is True."""
 
-    edges: times at which the windows start and end, shape (n + 1), in s.
-    rate: mean rates along the vehicle's axes, shape (n, 3), in rad/s.
-    force: mean forces along the vehicle's axes, shape (n, 3), in g.
-    jolt: largest difference of a sample's rate from the mean of its window, shape (n), in rad/s.
-    speed: shape (n), in m/s; NaN if unknown.
-    warm: temperature minus the temperature at the start of the log, shape (n), in C; 0 if unknown.
-    gap: True where readings are missing, shape (n).
-    number: index of each sample's window, shape (samples).
-    before, after: time that each sample represents before and after it, shape (samples), in s.
-    """
-
-    edges: Array
-    rate: Array
-    force: Array
-    jolt: Array
-    speed: Array
-    warm: Array
-    gap: Bools
-    number: Ints
-    before: Array
-    after: Array
+    edges: Array  # times at which the windows start and end, shape (n + 1), in s
+    rate: Array  # mean rates along the vehicle's axes, shape (n, 3), in rad/s
+    force: Array  # mean forces along the vehicle's axes, shape (n, 3), in g
+    jolt: Array  # largest difference of a sample's rate from the mean of its window, shape (n), in rad/s
+    speed: Array  # shape (n), in m/s; NaN if unknown
+    warm: Array  # temperature minus the temperature at the start of the log, shape (n), in C; 0 if unknown
+    gap: Bools  # True where readings are missing, shape (n)
+    number: Ints  # index of each sample's window, shape (samples)
+    before: Array  # time that each sample represents before it, shape (samples), in s
+    after: Array  # time that each sample represents after it, shape (samples), in s
 
     def __len__(self) -> int:
         return len(self.gap)
@@ -53,21 +42,14 @@ class Windows:
 
     @property
     def known_speed(self) -> Array:
-        """Speed in each window, interpolated between the logged speeds, shape (n), in m/s.
-
-        All values are NaN if the log has fewer than two speeds.
-        """
+        """Speed in each window, interpolated between the logged speeds, in m/s; NaN with fewer than two speeds."""
         logged, middle = ~np.isnan(self.speed), 0.5 * (self.edges[1:] + self.edges[:-1])
         if np.count_nonzero(logged) < 2:
             return np.full(len(self), np.nan)
         return np.interp(middle, middle[logged], self.speed[logged])
 
     def turned(self, matrix: Array, bias: Array | float = 0.0) -> "Windows":
-        """Return a copy with corrected rates, in other axes.
-
-        matrix: the rows are the new axes, shape (3, 3).
-        bias: subtracted from the rates before they are rotated, shape (3), in rad/s.
-        """
+        """Return a copy in the axes that are the rows of `matrix`, with the bias (rad/s) subtracted from the rates."""
         rate, force = rotated(matrix, self.rate - bias, self.force)
         return replace(self, rate=rate, force=force)
 
@@ -91,9 +73,7 @@ class Windows:
 
 
 def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array, aligned: bool = False) -> Windows:
-    """Average samples over windows.
-
-    Each sample represents the time up to half way to its neighbours, so the sum over a window is the integral.
+    """Average samples over windows. Each sample represents the time up to half way to its neighbours.
 
     t_s: times of the samples, in s.
     force: shape (samples, 3), in g.
@@ -147,11 +127,7 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array,
 
 
 def _rolled_back(vectors: Array, roll: Array) -> Array:
-    """Express vectors in the axes that the bike had before it rolled.
-
-    vectors: left, up and forward components, shape (samples, 3).
-    roll: angle by which the bike has rolled to the right, shape (samples), in rad.
-    """
+    """Express vectors (left, up, forward) in the axes that the bike had before it rolled to the right, by rad."""
     (left, up, forward), c, s = vectors.T, np.cos(roll), np.sin(roll)
     return np.column_stack((c * left - s * up, s * left + c * up, forward))
 
@@ -172,19 +148,15 @@ USUAL_MPS, USUAL_RADPS = 10.0, 0.14
 def motionless(
     rate: Array, force: Array, n: int, most_rate: float, most_force: float, speed_mps: Array | None = None
 ) -> Bools:
-    """Find the samples at which the bike seems to stand still, because the readings around them hardly change.
+    """Find the windows around which the readings hardly change, so that the bike seems to stand still, shape (m).
 
-    Each sample must be a mean over a fifth of a second, which averages out an idling engine. A constant rate counts as
-    a standstill, because it may be a bias. In a steady bend the rate is constant too, so the caller must also check the
-    mean rate.
+    A constant rate counts as a standstill, because it may be a bias. In a steady bend the rate is constant too, so the
+    caller must also check the mean rate.
 
-    rate: rate of each of the m samples, shape (m, 3).
-    force: force of each sample, shape (m, 3).
-    n: number of samples around each sample.
-    most_rate: largest standard deviation of each component of the rate.
-    most_force: largest standard deviation of each component of the force.
-    speed_mps: speed at each sample, shape (m), in m/s; NaN if unknown.
-    Returns True where the bike seems to stand still, shape (m).
+    rate, force: means of each window, shape (m, 3).
+    n: number of windows around each window.
+    most_rate, most_force: largest standard deviation of each component.
+    speed_mps: speed in each window, shape (m), in m/s; NaN if unknown.
     """
     speed = np.full(len(rate), np.nan) if speed_mps is None else speed_mps
     allowed = np.where(speed < STANDING_MPS, STANDS, 1.0)
@@ -194,11 +166,9 @@ def motionless(
 
 
 def standing(w: Windows) -> Bools:
-    """Find the windows in which the bike stands still, for zero-velocity updates.
+    """Find the windows in which the bike stands still, shape (n), for zero-velocity updates.
 
     Rates and forces do not change, the mean rate is under BIAS_RADPS, and the speed, if known, agrees.
-
-    Returns True where the bike stands, shape (n).
     """
     return calm(w) & (np.linalg.norm(averaged(w.rate, STILL_S), axis=1) < BIAS_RADPS)
 
@@ -210,14 +180,12 @@ def calm(w: Windows) -> Bools:
 
 
 def in_hand(w: Windows) -> tuple[Bools, Bools]:
-    """Find the windows in which a hand moves the sensor, or in which the bike has fallen.
+    """Find the windows in which a hand moves the sensor, or the bike has fallen: up is far from its usual direction.
 
-    In these windows, up is far from its usual direction. On a balanced bike, the force points along the bike's own up
-    at any lean.
+    On a balanced bike, the force points along the bike's own up at any lean.
 
-    Returns:
-        surely: True where a hand certainly moves the sensor, or the bike has fallen, shape (n).
-        perhaps: the same, but also True in the seconds around these windows, because the bike may not be riding there.
+    Returns True where this is certain, shape (n); and also in the seconds around, because the bike may not be riding
+    there.
     """
     valid = ~w.gap
     mean = averaged(w.force * valid[:, None], MOUNTED_S)
@@ -235,15 +203,10 @@ def in_hand(w: Windows) -> tuple[Bools, Bools]:
 
 
 def lean_and_speed(w: Windows, still: Bools) -> tuple[Array, Array]:
-    """Approximate the lean and the speed in n windows.
+    """Approximate the lean, in rad, and the speed, in m/s, in n windows. still: see standing().
 
-    If the log has no speed, the bends give it. In balance, the force is 1 / cos(lean) in g, and speed x yaw rate =
-    g tan(lean).
-
-    still: see standing(), shape (n).
-    Returns:
-        lean: shape (n), in rad.
-        speed: shape (n), in m/s.
+    If the log has no speed, the bends give it. In balance, the force is 1 / cos(lean) in g, and speed x yaw rate = g
+    tan(lean).
     """
     log_speed, yaw = w.known_speed, w.rate[:, 1]
     force = averaged(np.linalg.norm(w.force[:, :2], axis=1), 2.0)

@@ -1,15 +1,12 @@
-"""Finds the shift and the drift between the clocks of two sensors on one bike.
+"""Compares the leans of two devices on one bike, to test a lean meter without a reference.
 
-First, every shift is tried with the magnitude of the rates, which does not depend on the sensors' mounting. Then shift
-and drift are fitted by least squares to the rates about A's axes. The rates also give the rotation of B relative to A.
-All results are in the time and the axes of sensor A; B is the other sensor.
+The comparison does not show errors that both devices share, such as errors of the bike's model. It shows the errors
+that each device has alone: of its sensor, its mount and its calibration. If both devices are equally good, each
+device's error is the difference divided by the square root of two.
 
-
-Compares the leans of two devices on one bike, to test a lean meter without a reference.
-
-The comparison does not show errors that both devices share, such as errors of the bike's model. The comparison shows
-the errors that each device has alone: of its sensor, its mount and its calibration. If both devices are equally good,
-each device's error is the difference divided by the square root of two.
+First, clocks() finds the shift and the drift between the clocks. Every shift is tried with the magnitude of the rates,
+which does not depend on the sensors' mounting. Then shift and drift are fitted by least squares to the rates about A's
+axes. The rates also give the rotation of B relative to A.
 """
 
 from collections.abc import Iterator
@@ -44,19 +41,13 @@ _ROUNDS = 8
 
 @dataclass
 class Clocks:
-    """The relation of the clocks of sensors A and B.
+    """The relation of the clocks of sensors A and B."""
 
-    later_s: time of B's first sample minus the time of A's first sample, in s.
-    drift: seconds per second that B's clock loses against A's.
-    correlation: correlation of the rates.
-    common_s: time for which both have samples, without gaps and frozen readings, in s.
-    apart_deg: angle between two results for B's rotation relative to A: from the calibrations, and from the gyros.
-    """
-
-    later_s: float
-    drift: float
-    correlation: float
-    common_s: float
+    later_s: float  # time of B's first sample minus the time of A's first sample, in s
+    drift: float  # seconds per second that B's clock loses against A's
+    correlation: float  # correlation of the rates
+    common_s: float  # time for which both have samples, without gaps and frozen readings, in s
+    # angle between two results for B's rotation relative to A: from the calibrations, and from the gyros
     apart_deg: float = 0.0
 
     def of_b(self, a_s: Array) -> Array:
@@ -65,8 +56,10 @@ class Clocks:
 
 
 def clocks(a: BinMotion, b: BinMotion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
-    """The Clocks of two recordings. Raises InputError if they are from different rides, or if the ride cannot be proved
-    to be the same. Callers put both names in front of the error's text."""
+    """Return the Clocks of two recordings. Callers put both names in front of the error's text.
+
+    Raises InputError if they are from different rides, or if the ride cannot be proved to be the same.
+    """
     size = [_size(motion) for motion in (a, b)]
     correlation, count = correlations(size[0], a.valid, size[1], b.valid)
     correlation = np.where(count * STEP_S >= LEAST_S, correlation, 0.0)
@@ -110,8 +103,7 @@ def _along(motion: BinMotion, axes: Array) -> Array:
 
 
 def _rotation(a: BinMotion, b: BinMotion, later_s: float) -> Array:
-    """Return the rotation from B's axes to A's, shape (3, 3), that brings B's rates nearest to A's (Kabsch's
-    algorithm)."""
+    """Return the rotation from B's axes to A's that brings B's rates nearest to A's (Kabsch's algorithm)."""
     valid = _valid_at(b, a.t_s - later_s) & a.valid
     rates_a, rates_b = (
         _along(a, np.eye(3))[valid],
@@ -122,7 +114,7 @@ def _rotation(a: BinMotion, b: BinMotion, later_s: float) -> Array:
 
 
 def _fitted(a: BinMotion, b: BinMotion, of_a: Array, of_b: Array, later_s: float) -> Clocks:
-    """The Clocks, found by Gauss-Newton steps from a rough shift."""
+    """Find the Clocks by Gauss-Newton steps from a rough shift."""
     at_s, drift = a.t_s, 0.0
     derivative = np.gradient(of_b, STEP_S, axis=0)
     error = np.zeros(0)
@@ -153,7 +145,7 @@ def _fitted(a: BinMotion, b: BinMotion, of_a: Array, of_b: Array, later_s: float
 
 
 def _correlation_at(a: BinMotion, b: BinMotion, of_a: Array, of_b: Array, later_s: float, drift: float = 0.0) -> float:
-    """The correlation of the rates of both sensors about the same axes. of_a: shape (n, 3). of_b: shape (m, 3)."""
+    """Return the correlation of the rates of both sensors about the same axes, of shapes (n, 3) and (m, 3)."""
     on_b = (a.t_s - later_s) * (1.0 - drift)
     valid = _valid_at(b, on_b) & a.valid
     rates_a, rates_b = of_a[valid], _interpolated_at(b.t_s, of_b, on_b[valid])
@@ -184,31 +176,19 @@ _LEANED_DEG = 3.0  # delay and slope are computed only for a larger rms of the l
 
 @dataclass
 class Difference:
-    """B's lean minus A's lean, in degrees.
+    """B's lean minus A's lean, in degrees."""
 
-    seconds: time of riding that is compared.
-    rms_deg: rms of the difference.
-    constant_deg: mean of the difference, caused by poses and mounts.
-    moving_deg: rms of the difference without its mean.
-    p95_deg: 95 % of the absolute differences without the mean are below this value.
-    worst_deg: the largest absolute difference without the mean.
-    slope: B's lean divided by A's lean, None if the ride leans too little.
-    delay_s: delay of B's lean in s, None if the ride leans too little.
-    expected_deg: the rms predicted by both standard deviations.
-    within_1, within_2: shares of the differences within one and two standard deviations.
-    """
-
-    seconds: float
-    rms_deg: float
-    constant_deg: float
-    moving_deg: float
-    p95_deg: float
-    worst_deg: float
-    slope: float | None
-    delay_s: float | None
-    expected_deg: float
-    within_1: float
-    within_2: float
+    seconds: float  # time of riding that is compared
+    rms_deg: float  # rms of the difference
+    constant_deg: float  # mean of the difference, caused by poses and mounts
+    moving_deg: float  # rms of the difference without its mean
+    p95_deg: float  # 95 % of the absolute differences without the mean are below this value
+    worst_deg: float  # the largest absolute difference without the mean
+    slope: float | None  # B's lean divided by A's lean, None if the ride leans too little
+    delay_s: float | None  # delay of B's lean in s, None if the ride leans too little
+    expected_deg: float  # the rms predicted by both standard deviations
+    within_1: float  # share of the differences within one standard deviation
+    within_2: float  # share of the differences within two standard deviations
 
 
 @dataclass
@@ -218,7 +198,7 @@ class Agreement:
     live: Difference of the displayed leans while both devices show a lean. None without such a time.
     smoothed: Difference of the smoothed leans.
     t_s: seconds since A's first sample, shape (n).
-    The leans at these times are in degrees, shape (n), NaN if unknown.
+    leans: the leans at these times in degrees, shape (n), NaN if unknown.
     names: the names of A's and B's logs.
     """
 
@@ -231,7 +211,7 @@ class Agreement:
     names: tuple[str, str] = ("", "")
 
     def as_data(self) -> dict[str, Any]:
-        """All fields except the leans, for JSON."""
+        """Return all fields except the leans, for JSON."""
         live = None if self.live is None else asdict(self.live)
         remarks = {name: as_data(notices) for name, notices in self.notices.items()}
         return {"clocks": asdict(self.clocks), "live": live, "smoothed": asdict(self.smoothed), "remarks": remarks}
@@ -246,8 +226,9 @@ def compare_rides(
 ) -> Agreement:
     """Compare two recordings of one ride by two devices. The clocks of the devices may differ by any time.
 
-    a, b: see read_log. progress: called with (done, total) of the samples, ride by ride. Raises InputError, also if the
-    recordings are of different rides.
+    a, b: see read_log.
+    progress: called with (done, total) of the samples, ride by ride.
+    Raises InputError, also if the recordings are of different rides.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> made = simulate_ride("street", seed=1, seconds=90.0)
@@ -355,15 +336,14 @@ def _at_times(t_s: Array, values: Array, at_s: Array) -> Array:
 
 
 def _lean_while_riding(ride: SmoothedRide | LeanTable, at_s: Array, riding: Bools) -> tuple[Array, Array]:
-    """Return the lean and its standard deviation in degrees, both of shape (n). Both are NaN if the lean or the
-    standard deviation is unknown, or the bike is not riding."""
+    """Return the lean and its standard deviation in degrees; both NaN if one is unknown or the bike is not riding."""
     lean, sigma = (_at_times(ride.t_s, values, at_s) for values in (ride.lean_deg, ride.lean_sigma_deg))
     valid = riding & ~np.isnan(sigma)
     return np.where(valid, lean, np.nan), np.where(valid, sigma, np.nan)
 
 
 def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | None:
-    """The Difference of two leans with their standard deviations; None if they have under _LEAST_S in common."""
+    """Return the Difference of two leans with their standard deviations; None if they have under _LEAST_S in common."""
     valid = ~np.isnan(a[0]) & ~np.isnan(b[0])
     if np.count_nonzero(valid) * GRID_S < _LEAST_S:
         return None
@@ -388,8 +368,10 @@ def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | 
 
 
 def _slope_and_delay(a: Array, b: Array, both: Bools) -> tuple[float | None, float | None]:
-    """Slope and delay of B's lean relative to A's. Both leans are treated as equally exact: the slope is the slope of
-    the principal axis, and the delay is fitted to the mean of both roll rates."""
+    """Return slope and delay of B's lean relative to A's. Both leans are treated as equally exact.
+
+    The slope is that of the principal axis. The delay is fitted to the mean of both roll rates.
+    """
     lean_a, lean_b = a[both] - a[both].mean(), b[both] - b[both].mean()
     if _rms(lean_a) < _LEANED_DEG or _rms(lean_b) < _LEANED_DEG:
         return None, None

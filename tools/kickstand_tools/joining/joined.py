@@ -36,21 +36,15 @@ _MOST_SIGMA_S = 0.3
 
 @dataclass
 class Match:
-    """The time of a track in a ride.
+    """The time of a track in a ride."""
 
-    start_utc_s: the track's time at the ride's first sample, in s since 1970. This time is corrected for the receiver's
-        delay, so positions are where the bike is.
-    drift: seconds per second that the ride's clock loses.
-    sigma_s: standard deviation of start_utc_s.
-    correlation: correlation of the changes of course, 0 to 1.
-    common_s: time that ride and track have in common, in s.
-    """
-
+    # the track's time at the ride's first sample, in s since 1970, corrected for the receiver's delay, so positions
+    # are where the bike is
     start_utc_s: float
-    drift: float
-    sigma_s: float
-    correlation: float
-    common_s: float
+    drift: float  # seconds per second that the ride's clock loses
+    sigma_s: float  # standard deviation of start_utc_s
+    correlation: float  # correlation of the changes of course, 0 to 1
+    common_s: float  # time that ride and track have in common, in s
 
     def ride_s(self, utc_s: Array) -> Array:
         """Convert Universal Times to seconds since the ride's first sample."""
@@ -58,8 +52,10 @@ class Match:
 
 
 def match(motion: BinMotion, track: Track) -> Match:
-    """The Match of a track with a ride. Raises InputError if the track does not belong to the ride, or if this is
-    uncertain. Callers put both names in front of the error's text."""
+    """Return the Match of a track with a ride. Callers put both names in front of the error's text.
+
+    Raises InputError if the track does not belong to the ride, or if this is uncertain.
+    """
     track = track.once_a_second()
     steps = course(track)
     parts = segments(steps)
@@ -132,9 +128,10 @@ def _rough_shifts(motion: BinMotion, steps: Course) -> tuple[bool, list[float]]:
 
 
 def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
-    """Return two arrays with a value every _GRID_S: the change of course within _SPAN_S, and True where it is known.
+    """Return the change of course within _SPAN_S every _GRID_S, and True where it is known.
 
-    The change is in degrees, as the gyro of a leaning bike would measure it."""
+    The change is in degrees, as the gyro of a leaning bike would measure it.
+    """
     middle_s, at_s = (steps.begin_s + steps.end_s) / 2.0, np.arange(0.0, steps.end_s[-1], _GRID_S)
     half = _SPAN_S / 2.0
     heading = np.cumsum(steps.turn_deg)
@@ -147,8 +144,7 @@ def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
 
 
 def _changes_of_ride(motion: BinMotion) -> tuple[Array, Bools]:
-    """Return two arrays with a value every _GRID_S: the rotation of the ride about its up within _SPAN_S, in degrees,
-    and True where it is known."""
+    """Return the ride's rotation about its up within _SPAN_S every _GRID_S, and True where it is known."""
     at_s, half = np.arange(0.0, motion.seconds, _GRID_S), _SPAN_S / 2.0
     edges_s = np.arange(len(motion.valid) + 1) * STEP_S
     turned = np.append(0.0, np.cumsum(motion.rate_dps @ motion.up)) * STEP_S
@@ -164,20 +160,17 @@ _FORMAT = {SPEED: "%.3f", "lat_deg": "%.7f", "lon_deg": "%.7f", "utc_s": "%.3f"}
 
 @dataclass
 class Joined:
-    """A ride, its track, and their Match.
-
-    own_speed: True if the log already has a speed. Then this speed is kept.
-    """
+    """A ride, its track, and their Match."""
 
     ride: File | Log
     track: Track
     match: Match
-    own_speed: bool
+    own_speed: bool  # True if the log already has a speed, which is then kept
     notices: list[Message]
 
     @property
     def columns(self) -> dict[str, Array]:
-        """Return the track's values by the names of the log's columns, each of shape (m)."""
+        """The track's values by the names of the log's columns, each of shape (m)."""
         track = self.track
         values = {SPEED: track.speeds_mps(), "lat_deg": track.lat_deg, "lon_deg": track.lon_deg, "utc_s": track.utc_s}
         return {name: value for name, value in values.items() if name != SPEED or not self.own_speed}
@@ -186,9 +179,12 @@ class Joined:
 def join_track(ride: Source, track: Path | str | Track, progress: Progress | None = None) -> Joined:
     """Find the time of a phone's or watch's track in a ride, from the yaw and the acceleration of ride and track.
 
-    ride: see read_log; it needs neither a calibration nor a speed. track: a .gpx or .fit file. The clocks of ride and
-    track may differ by any time, and drift. progress: called with (done, total) of the ride's bytes. Raises InputError
-    if the track is another ride's, or if the match is not certain.
+    The clocks of ride and track may differ by any time, and drift.
+
+    ride: see read_log; it needs neither a calibration nor a speed.
+    track: a .gpx or .fit file.
+    progress: called with (done, total) of the ride's bytes.
+    Raises InputError if the track is another ride's, or if the match is not certain.
 
     >>> from kickstand_tools.api import simulate_ride
     >>> ride = simulate_ride("hills", seed=1, seconds=120.0)
@@ -196,8 +192,7 @@ def join_track(ride: Source, track: Path | str | Track, progress: Progress | Non
     >>> north, east = (np.cumsum(ride.truth["speed_mps"] * way(course)) / ride.rate_hz for way in (np.sin, np.cos))
     >>> lat, lon = np.degrees(north / 6_371_000.0)[::200], np.degrees(east / 6_371_000.0)[::200]
     >>> track = Track(1.7e9 + np.arange(len(lat)), lat, lon, np.full(len(lat), np.nan), "track")
-    >>> joined = join_track(Log.from_readings(ride.readings, ride.rate_hz), track)
-    >>> round(joined.match.start_utc_s - 1.7e9)
+    >>> round(join_track(Log.from_readings(ride.readings, ride.rate_hz), track).match.start_utc_s - 1.7e9)
     0
     """
     track = track if isinstance(track, Track) else read_track(track)
@@ -215,11 +210,12 @@ def join_track(ride: Source, track: Path | str | Track, progress: Progress | Non
 
 
 def write_joined(out: Path | str, joined: Joined, progress: Progress | None = None) -> int:
-    """Write the lines of the ride, with the track's values in the nearest rows. The file is written whole or not at
-    all.
+    """Write the lines of the ride, with the track's values in the nearest rows. Returns the number of positions.
 
-    It is gzipped if its name ends in .gz. Returns the number of positions written. progress: called with (done, total)
-    of the ride. Raises InputError.
+    The file is gzipped if its name ends in .gz, and written whole or not at all.
+
+    progress: called with (done, total) of the ride.
+    Raises InputError.
 
     >>> import tempfile
     >>> log = Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2)
@@ -246,9 +242,8 @@ def write_joined(out: Path | str, joined: Joined, progress: Progress | None = No
 def _lines(
     file: Path | str, columns: list[str], count: int, ends: dict[int, str], progress: Progress | None
 ) -> Iterator[bytes]:
-    """Yield the lines of a log with the new columns at their end.
+    """Yield the lines of a log of `count` samples with the new columns at their end.
 
-    count: number of samples.
     ends: the cells of the new columns, by the number of the sample.
     """
     begin, empty = 0, "," * (len(columns) - 1)
@@ -265,7 +260,7 @@ def _lines(
 
 
 def _nearest(time_us: Ints, at_us: Ints) -> tuple[Ints, Ints]:
-    """Rows, and the index of the point for each. Only points within the log's time, and not in a gap, are used."""
+    """Return rows, and the index of the point for each: points within the log's time, and not in a gap."""
     points = np.flatnonzero((at_us >= time_us[0]) & (at_us <= time_us[-1]))
     following = np.clip(np.searchsorted(time_us, at_us[points]), 1, max(len(time_us) - 1, 1))
     if len(time_us) < 2:

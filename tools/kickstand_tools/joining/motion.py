@@ -1,9 +1,11 @@
 """The motion of a ride from the sensor alone, and its fit to a track. The sensor may be mounted at any angle.
 
 Up is the mean direction of the force in bends, because a motorcycle leans until the force points along its own up. The
-rate about up is the yaw rate times the cosine of the lean. The shift between the clocks of ride and track is known to
-some seconds before the fit. First, the shifts around it are tried. Then least squares find the shift to hundredths of a
-second, with the drift, the tilt of the ride's up, and the sensor's forward axis.
+rate about up is the yaw rate times the cosine of the lean.
+
+The fit begins at a rough shift between the clocks of ride and track. First, the shifts around it are tried. Then least
+squares find the shift to hundredths of a second, with the drift, the tilt of the ride's up, and the sensor's forward
+axis.
 """
 
 from dataclasses import dataclass
@@ -24,17 +26,11 @@ _MOST_SINE = 0.87  # largest sine of the lean; over 60 degrees, the speed or the
 
 @dataclass
 class BinMotion:
-    """A ride in n bins of STEP_S from its first sample.
+    """A ride in n bins of STEP_S from its first sample."""
 
-    force_g: mean force of each bin along the sensor's axes, shape (n, 3).
-    rate_dps: mean rate of each bin about the sensor's axes, minus the gyro's bias, shape (n, 3).
-    valid: False in a bin without samples or with frozen readings, shape (n). Its force and rate are 0.
-    has_speed, has_positions: True if the log has them.
-    """
-
-    force_g: Array
-    rate_dps: Array
-    valid: Bools
+    force_g: Array  # mean force of each bin along the sensor's axes, shape (n, 3)
+    rate_dps: Array  # mean rate of each bin about the sensor's axes, minus the gyro's bias, shape (n, 3)
+    valid: Bools  # False in a bin without samples or with frozen readings, whose force and rate are 0, shape (n)
     has_speed: bool
     has_positions: bool
 
@@ -50,15 +46,17 @@ class BinMotion:
 
     @property
     def up(self) -> Array:
-        """Return the bike's up in the sensor's axes, shape (3). The direction is exact to a few degrees only, because
-        it includes the accelerometer's bias."""
+        """The bike's up in the sensor's axes, shape (3). It includes the accelerometer's bias, of a few degrees."""
         turning = np.minimum(np.linalg.norm(self.rate_dps, axis=1), _MOST_DPS)
         up: Array = turning @ self.force_g
         return up / max(float(np.linalg.norm(up)), 1e-9)
 
 
 def motion(ride: CheckedLog) -> BinMotion:
-    """The BinMotion of a checked log. Raises InputError if all readings are frozen, or for a ride that is too long."""
+    """Return the BinMotion of a checked log.
+
+    Raises InputError if all readings are frozen, or for a ride that is too long.
+    """
     log, measured = ride.log, ride.measured
     if log.t_s[-1] > _LONGEST_S:
         raise InputError(f"{log.name} is longer than {_LONGEST_S / 3600:.0f} hours: cut it first")
@@ -76,8 +74,7 @@ def motion(ride: CheckedLog) -> BinMotion:
 
 
 class Comparison:
-    """Compares a ride with a track. A shift is the track's time at the ride's first sample, in s since the track's
-    first point.
+    """Compares a ride with a track. A shift is the track's time at the ride's first sample, in s since its first point.
 
     given: the segments of the track that are within the ride for every shift within margin_s.
     """
@@ -96,15 +93,15 @@ class Comparison:
         self._edges_s = np.arange(len(motion.valid) + 1) * STEP_S
 
     def turned(self, shift_s: float, drift: float = 0.0, axes: int = 3) -> Array:
-        """Return the ride's rotation about its up and about two axes across it, in degrees, shape (axes, p, STEPS).
+        """Return the ride's rotation about its up and about two axes across it, to compare with Segments.turned_deg.
 
-        Compare it with Segments.turned_deg. drift: seconds per second that the ride's clock loses against the
-        track's."""
+        drift: seconds per second that the ride's clock loses against the track's.
+        Returns degrees, shape (axes, p, STEPS).
+        """
         return self._means(range(axes), shift_s, drift, self.given.course_weight)
 
     def sped_up(self, shift_s: float, drift: float = 0.0) -> Array:
-        """Return the integral of the force along the sensor's axes, in m/s, shape (3, p, STEPS). Compare it with
-        Segments.speed_mps."""
+        """Return the integral of the force along the sensor's axes, to compare with Segments.speed_mps."""
         return self._means(range(3, 6), shift_s, drift, self.given.speed_weight)
 
     def _means(self, columns: range, shift_s: float, drift: float, weight: Array) -> Array:
@@ -123,10 +120,9 @@ def _double_sums(motion: BinMotion, course: Course, shift_s: float) -> Array:
     """Return six integrals over time, of angles and speeds, shape (n + 1, 6).
 
     The mean of an angle or a speed between two times is the difference of its integral, divided by the duration.
-
     Columns 0 to 2 integrate the rotation about up and about two axes across it, in degrees. Columns 3 to 5 integrate
-    the speed that the force along the sensor's axes causes, in m/s. The rate about up is the yaw rate times the cosine
-    of the lean. The lean of a balanced bike follows from the track's speed and the yaw rate.
+    the speed that the force along the sensor's axes causes, in m/s. The lean of a balanced bike follows from the
+    track's speed and the yaw rate.
     """
     up = motion.up
     across = np.asarray(np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))]), dtype=float)
@@ -146,10 +142,7 @@ def _double_sums(motion: BinMotion, course: Course, shift_s: float) -> Array:
 
 
 def _sums(values: Array) -> Array:
-    """Integrate each column from the first edge to each edge.
-
-    values: one row per bin, shape (n, k). Returns one row per edge, shape (n + 1, k).
-    """
+    """Integrate each column, one row per bin, shape (n, k), from the first edge to each edge, shape (n + 1, k)."""
     return np.vstack((np.zeros(values.shape[1]), np.cumsum(values * STEP_S, axis=0)))
 
 
@@ -173,28 +166,21 @@ _STEPS_ALIKE = 4.0  # number of neighbouring steps that share an error, because 
 
 @dataclass
 class TrackFit:
-    """The best fit of a track to a ride.
+    """The best fit of a track to a ride."""
 
-    shift_s: the track's time at the ride's first sample, in s since the track's first point.
-    drift: seconds per second that the ride's clock loses.
-    sigma_s: standard deviation of a track point's time in the ride, for the end of the ride with the larger one.
-    correlation: correlation of the courses' changes.
-    evidence: logarithm of the courses' likelihood with the ride's yaw, minus its logarithm without the ride's yaw.
-    tilt: tilt of the ride's up about two axes, in rad, shape (2).
-    segments: number of compared segments.
-    """
-
-    shift_s: float
-    drift: float
+    shift_s: float  # the track's time at the ride's first sample, in s since the track's first point
+    drift: float  # seconds per second that the ride's clock loses
+    # standard deviation of a track point's time in the ride, for the end of the ride with the larger one
     sigma_s: float
-    correlation: float
+    correlation: float  # correlation of the courses' changes
+    # logarithm of the courses' likelihood with the ride's yaw, minus its logarithm without the ride's yaw
     evidence: float
-    tilt: Array
-    segments: int
+    tilt: Array  # tilt of the ride's up about two axes, in rad, shape (2)
+    segments: int  # number of compared segments
 
 
 def fitted(motion: BinMotion, course: Course, segments: Segments, rough_s: float) -> TrackFit | None:
-    """The best fit within AROUND_S of a rough shift. None if ride and track hardly overlap at these shifts."""
+    """Return the best fit within AROUND_S of a rough shift. None if ride and track hardly overlap at these shifts."""
     compared = Comparison(motion, course, segments, rough_s, AROUND_S + 1.0)
     if len(compared.given.begin_s) < _FEWEST:
         return None
@@ -203,8 +189,7 @@ def fitted(motion: BinMotion, course: Course, segments: Segments, rough_s: float
 
 
 def cost_of_one_shift(motion: BinMotion, course: Course, segments: Segments, fit: TrackFit) -> float:
-    """Return by how much the cost per segment falls if each segment gets its own shift. The unit is the mean cost of
-    one error.
+    """Return by how much the cost per segment falls if each has its own shift, in units of an error's mean cost.
 
     The result is under 2 if the track belongs to the ride, and over 4 for the same road at another time.
     """
@@ -218,7 +203,7 @@ def cost_of_one_shift(motion: BinMotion, course: Course, segments: Segments, fit
 
 
 def _try_shifts(compared: Comparison, rough_s: float) -> tuple[float, float, float]:
-    """The best of the tried shifts and drifts, and its evidence (see TrackFit)."""
+    """Return the best of the tried shifts and drifts, and its evidence (see TrackFit)."""
     track, middle_s = compared.given, compared.middle_s
     costs = _costs(compared, rough_s, 0.0, np.ones(1))
     since_s = track.middle_s.mean(axis=1) - middle_s
@@ -240,8 +225,10 @@ def _try_shifts(compared: Comparison, rough_s: float) -> tuple[float, float, flo
 
 
 def _costs(compared: Comparison, shift_s: float, drift: float, along: Array) -> Array:
-    """Return the cost of each segment at each of _SHIFTS around a shift, shape (shifts, p). along: coefficients of the
-    ride's rotations about the three axes."""
+    """Return the cost of each segment at each of _SHIFTS around a shift, shape (shifts, p).
+
+    along: coefficients of the ride's rotations about the three axes.
+    """
     track = compared.given
     return np.array(
         [
@@ -252,30 +239,22 @@ def _costs(compared: Comparison, shift_s: float, drift: float, along: Array) -> 
 
 
 def _cost(given: Segments, error_deg: Array) -> Array:
-    """Return the cost of each segment, shape (p): minus the log-likelihood of its errors by Student's distribution.
-
-    error_deg: the error of each step, shape (p, STEPS).
-    """
+    """Return minus the log-likelihood of each segment's errors, shape (p, STEPS), by Student's distribution."""
     square = error_deg * error_deg * given.course_weight
     return 0.5 * (_FREEDOM + 1.0) * np.log1p(square / _FREEDOM).sum(axis=1)
 
 
 @dataclass
 class _Step:
-    """The linearisation at one state of the seven unknowns: shift, drift, tilt (2), the sensor's forward axis (3).
+    """The linearisation at one state of the seven unknowns: shift, drift, tilt (2), the sensor's forward axis (3)."""
 
-    model_deg: the predicted courses, shape (p, STEPS).
-    pulls: the gradient of each segment's cost, shape (p, 7).
-    inverse: the inverse of the normal matrix, shape (7, 7).
-    """
-
-    model_deg: Array
-    pulls: Array
-    inverse: Array
+    model_deg: Array  # the predicted courses, shape (p, STEPS)
+    pulls: Array  # the gradient of each segment's cost, shape (p, 7)
+    inverse: Array  # the inverse of the normal matrix, shape (7, 7)
 
 
 def _refine(compared: Comparison, shift_s: float, drift: float, evidence: float) -> TrackFit:
-    """The best fit by Gauss-Newton steps. Each step down-weights outliers."""
+    """Find the best fit by Gauss-Newton steps. Each step down-weights outliers."""
     track = compared.given
     forward = _least(compared.sped_up(shift_s, drift), track.speed_mps, track.speed_weight)
     now = np.array([shift_s, drift, 0.0, 0.0, *forward])
@@ -312,8 +291,10 @@ def _step(compared: Comparison, now: Array) -> _Step:
 
 
 def _with_sigma(compared: Comparison, evidence: float, now: Array, step: _Step) -> TrackFit:
-    """The TrackFit with its standard deviation. Errors within a segment may be correlated, so the variance is computed
-    from the scatter of the segments' gradients at the solution."""
+    """Return the TrackFit with its standard deviation.
+
+    Errors within a segment may be correlated, so the variance is computed from the scatter of the segments' gradients.
+    """
     track, count, drift = compared.given, len(step.pulls), float(now[1])
     spread = step.pulls.T @ step.pulls * count / max(count - 2, 1) + np.diag(_PRIOR)
     covariance = (step.inverse @ spread @ step.inverse)[:2, :2]
@@ -333,10 +314,7 @@ def _with_sigma(compared: Comparison, evidence: float, now: Array, step: _Step) 
 
 
 def _least(columns: Array, values: Array, weight: Array) -> Array:
-    """Fit values by a weighted sum of k columns, by weighted least squares.
-
-    columns: shape (k, p, STEPS). Returns the coefficient of each column, shape (k).
-    """
+    """Return the coefficients of k columns, (k, p, STEPS), whose sum fits the values by weighted least squares."""
     root = np.sqrt(weight)
     coefficients = np.linalg.lstsq((columns * root).reshape(len(columns), -1).T, (values * root).ravel(), rcond=None)[0]
     return np.asarray(coefficients, dtype=float)

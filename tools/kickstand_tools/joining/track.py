@@ -34,8 +34,10 @@ _FEWEST_STEPS = 8  # least number of steps in a segment
 class Track(Table):
     """n points in chronological order.
 
-    utc_s: s since 1970, increasing. lat_deg, lon_deg: north and east. speed_mps: from the file, NaN if missing. name:
-    the file's name.
+    utc_s: s since 1970, increasing.
+    lat_deg, lon_deg: north and east.
+    speed_mps: from the file, NaN if missing.
+    name: the file's name.
     """
 
     utc_s: Array
@@ -45,10 +47,10 @@ class Track(Table):
     name: str
 
     def speeds_mps(self) -> Array:
-        """Return the file's speeds, shape (n). If the file has no speeds, return mean speeds over the neighbouring
-        points.
+        """Return the file's speeds, shape (n), or without any speed the mean speeds over the neighbouring points.
 
-        Such a speed is NaN over a jump or a gap, or if it is not larger than the positions' errors."""
+        Such a speed is NaN over a jump or a gap, or if it is not larger than the positions' errors.
+        """
         if np.any(np.isfinite(self.speed_mps)):
             return self.speed_mps
         speed = np.full(len(self.utc_s), np.nan)
@@ -62,8 +64,7 @@ class Track(Table):
         return speed
 
     def once_a_second(self) -> "Track":
-        """The track with at most one point per second. Between closer points, the errors exceed the change of
-        the course."""
+        """Return the track with at most one point per second: errors of closer points exceed the course's change."""
         if len(self.utc_s) < 2 or np.median(np.diff(self.utc_s)) > _OFTEN_S:
             return self
         first = np.unique(np.floor(self.utc_s - self.utc_s[0]), return_index=True)[1]
@@ -76,28 +77,18 @@ class Track(Table):
 
 @dataclass
 class Course:
-    """m steps between the m + 1 points of a track.
+    """m steps between the m + 1 points of a track. All arrays have shape (m)."""
 
-    All arrays have shape (m).
-
-    begin_s, end_s: times of each step, in s since the track's first point.
-    sigma_deg: standard deviation of the course of a good step.
-    speed_mps: the step's length divided by its duration.
-    good: False for a step that is too slow, a gap or a jump.
-    turn_deg: change of the course from the previous step, positive to the left. The change is 0 unless both steps are
-        good.
-    """
-
-    begin_s: Array
-    end_s: Array
-    sigma_deg: Array
-    speed_mps: Array
-    good: Bools
-    turn_deg: Array
+    begin_s: Array  # begin of each step, in s since the track's first point
+    end_s: Array  # end of each step, in s since the track's first point
+    sigma_deg: Array  # standard deviation of the course of a good step
+    speed_mps: Array  # the step's length divided by its duration
+    good: Bools  # False for a step that is too slow, a gap or a jump
+    turn_deg: Array  # change of the course from the previous step, positive to the left; 0 unless both steps are good
 
 
 def course(track: Track) -> Course:
-    """The Course of a track of at least two points."""
+    """Return the Course of a track of at least two points."""
     since_s = track.utc_s - track.utc_s[0]
     east, north = track.steps_m()
     step_s, length_m = np.diff(since_s), np.hypot(east, north)
@@ -112,33 +103,24 @@ def course(track: Track) -> Course:
 
 @dataclass
 class Segments(Table):
-    """p segments of up to STEPS successive good steps. All arrays are (p, STEPS). Weights are 0 beyond the end of a
-    shorter segment.
-
-    begin_s, end_s: times of each step, in s since the track's first point.
-    turned_deg: course of each step minus the course of the segment's first step, > 0 to the left.
-    course_weight: weight of turned_deg, in 1/deg2.
-    speed_mps: speed in each step.
-    speed_weight: weight of speed_mps, 1 or 0.
+    """p segments of up to STEPS successive good steps. All arrays are (p, STEPS), with weights of 0 where unused.
 
     Mean and trend of turned_deg and speed_mps are subtracted.
     """
 
-    begin_s: Array
-    end_s: Array
-    turned_deg: Array
-    course_weight: Array
-    speed_mps: Array
-    speed_weight: Array
+    begin_s: Array  # begin of each step, in s since the track's first point
+    end_s: Array  # end of each step, in s since the track's first point
+    turned_deg: Array  # course of each step minus the course of the segment's first step, > 0 to the left
+    course_weight: Array  # weight of turned_deg, in 1/deg2
+    speed_mps: Array  # speed in each step
+    speed_weight: Array  # weight of speed_mps, 1 or 0
 
     @property
     def middle_s(self) -> Array:
-        """Return the time of the middle of each step, shape (p, STEPS)."""
         return (self.begin_s + self.end_s) / 2.0
 
 
 def segments(course: Course) -> Segments:
-    """The segments of a course."""
     rows = [
         np.arange(start, min(start + STEPS, end))
         for begin, end in intervals(course.good)
@@ -177,9 +159,12 @@ Point = tuple[float, float, float, float]
 
 
 def read_track(path: Path | str, progress: Progress | None = None) -> Track:
-    """Read a .gpx or .fit file. progress: called with the bytes read and the bytes of the file. Raises InputError.
+    """Read a .gpx or .fit file.
 
     Points without a time or a position are left out. If several points have the same time, the first is kept.
+
+    progress: called with the bytes read and the bytes of the file.
+    Raises InputError.
 
     >>> import tempfile
     >>> point = '<trkpt lat="48.1" lon="11.{0:02}"><time>2026-05-17T09:30:{0:02}Z</time></trkpt>'
@@ -242,8 +227,7 @@ def _gpx(path: Path, progress: Progress | None) -> Iterator[Point]:
 
 
 def _gpx_speed(point: Any) -> float:
-    """The speed of a point, m/s. GPX 1.0 has an element for the speed; in GPX 1.1 the speed is in an extension,
-    Garmin's or another."""
+    """Return the speed of a point in m/s, from GPX 1.0's element, or from an extension of GPX 1.1 (e.g. Garmin's)."""
     if point.speed is not None:
         return float(point.speed)
     for extension in point.extensions:
@@ -279,7 +263,7 @@ def _fit(path: Path, progress: Progress | None) -> Iterator[Point]:
 
 
 def _words(error: Exception) -> str:
-    """The beginning of a library's message, which may quote a whole file."""
+    """Return the beginning of a library's message, which may quote a whole file."""
     return ascii(" ".join(str(error).split())[:60])[1:-1] or type(error).__name__
 
 
@@ -287,7 +271,7 @@ _FIT_FIELDS = ("timestamp", "position_lat", "position_long", "speed", "enhanced_
 
 
 def _utc_s(time: datetime) -> float:
-    """Seconds since 1970. A time without a zone is UTC, as in both formats."""
+    """Return the seconds since 1970. A time without a zone is UTC, as in both formats."""
     return (time if time.tzinfo else time.replace(tzinfo=UTC)).timestamp()
 
 

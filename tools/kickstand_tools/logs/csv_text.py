@@ -65,8 +65,7 @@ def number_of(cell: str) -> float | None:
 def numbers_in(text: bytes, count: int) -> Array | None:
     """Convert n lines of `count` plain numbers, as float() does. An empty cell becomes NaN.
 
-    Returns the numbers, shape (n, count), or None if the text contains anything else. Then the caller must use another
-    reader.
+    Returns the numbers, shape (n, count), or None if the text contains anything else. Then use numbers_by_line().
     """
     if text.translate(None, _PLAIN) or not text.strip(b"\n"):
         return None
@@ -84,16 +83,12 @@ def numbers_in(text: bytes, count: int) -> Array | None:
 
 
 def columns_of_text(text: str, separator: str, width: int, most: int = 0) -> tuple[list[Cells], int]:
-    """Read CSV without a header.
+    """Read CSV without a header. Raises InputError for a table that is too large.
 
     A damaged row is left out. A row is damaged if its line is too long, or if it has more than `most` cells. If `most`
     is 0, a row may have `width` cells, or as many as the first row. The missing cells of a short row are empty.
 
-    Returns:
-        columns: the cells of each column.
-        left_out: number of damaged rows.
-
-    Raises InputError for a table that is too large.
+    Returns the cells of each column, and the number of damaged rows.
     """
     left_out = 0
 
@@ -144,10 +139,7 @@ def columns_of(rows: Iterable[Sequence[str]], width: int) -> list[Cells]:
 
 
 def numbers_of(cells: Cells) -> NDArray[Any]:
-    """Convert the cells of a column to numbers: integers if all are integers, otherwise floats.
-
-    A cell that is not a number becomes NaN.
-    """
+    """Convert the cells of a column to numbers: integers if all are integers, otherwise floats, NaN for text."""
     if cells.dtype.kind in "iuf":
         return cells
     numbers = [_number(str(cell)) for cell in cells.tolist()]
@@ -162,7 +154,7 @@ def filled(cells: Cells) -> Bools:
 
 
 def as_text(cells: Cells) -> list[str]:
-    """The cells as text, "" for an empty cell."""
+    """Return the cells as text, "" for an empty cell."""
     return ["" if cell != cell else str(cell) for cell in cells.tolist()]
 
 
@@ -227,7 +219,7 @@ def check_text(log: str, content: bytes, lines_before: int) -> None:
 
 
 def header_names(log: str, line: str) -> list[str]:
-    """The names of the columns. Raises InputError if one is missing or present twice."""
+    """Return the names of the columns. Raises InputError if one is missing or present twice."""
     try:
         names = [name.strip() for name in cells_of(line)]
     except csv.Error as error:
@@ -283,15 +275,13 @@ def numbers_by_line(
 ) -> Array:
     """Convert the text of n rows to numbers. An empty cell in an optional column becomes NaN.
 
-    Args:
-        log: the log's name in messages.
-        width: number of cells per row.
-        places: index of each column in a row, by its name.
-        lines_before: number of lines before the text.
-        before_us: time of the previous sample, None for the first.
-
-    Returns the columns in the order of places, shape (n, number of places). Raises InputError for the first mistake
-    and names its line.
+    log: the log's name in messages.
+    width: number of cells per row.
+    places: index of each column in a row, by its name.
+    lines_before: number of lines before the text.
+    before_us: time of the previous sample, None for the first.
+    Returns the columns in the order of places, shape (n, number of places). Raises InputError for the first mistake and
+    names its line.
     """
     columns = [(index, name, _LIMITS[name]) for name, index in places.items()]
     values = []
@@ -343,9 +333,8 @@ _LINES = 15_000  # rows formatted at once
 
 
 def csv_lines(table: Array, digits: Sequence[int]) -> Iterator[bytes]:
-    """Yield the lines of a table, many lines at a time.
+    """Yield the lines of a table, shape (n, m), many lines at a time. NaN becomes an empty cell.
 
-    table: the numbers, shape (n, m). NaN becomes an empty cell.
     digits: number of decimals of each of the m columns.
     """
     line = _line_form(digits)
@@ -366,14 +355,12 @@ def write_lines(path: Path, names: Sequence[str], lines: Iterable[bytes]) -> Non
 def write_lean(
     out: Path, columns: Sequence[str], digits: Sequence[int], times: Iterator[str], parts: Iterable[Array]
 ) -> int:
-    """Write a LEAN.csv with the log's own times as the first column.
+    """Write a LEAN.csv with the log's own times as the first column. Returns the number of samples. Raises InputError.
 
     columns: names of the other columns.
     digits: number of decimals of each of these columns.
     times: the log's own time of each sample, as text.
     parts: values of successive samples, shape (n, number of columns).
-
-    Returns the number of samples. Raises InputError.
     """
     count, line = 0, "%s," + _line_form(digits)
 
@@ -390,5 +377,5 @@ def write_lean(
 
 
 def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Write a CSV file of texts and numbers that need no quotation marks. See write_lines(). Raises InputError."""
+    """Write a CSV file of texts and numbers that need no quotation marks. See write_lines()."""
     write_lines(path, columns, (",".join(map(str, row)).encode("ascii") + b"\n" for row in rows))

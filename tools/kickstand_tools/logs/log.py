@@ -36,10 +36,7 @@ class Table:
         return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
 
     def part(self, which: slice | Bools) -> Self:
-        """Select samples.
-
-        which: a slice, or an array of n booleans. With a slice, the result's arrays are views of this table's arrays.
-        """
+        """Select samples by a slice or n booleans. With a slice, the result's arrays are views of these arrays."""
         return replace(self, **{name: values[which] for name, values in self.columns().items()})
 
     def to_pandas(self) -> "DataFrame":
@@ -52,7 +49,7 @@ class Table:
 
 
 def float_schema(units: Mapping[str, str], fine: Container[str], about: dict[str, str]) -> "Schema":
-    """The schema of a Parquet file.
+    """Return the schema of a Parquet file.
 
     units: the unit of each column, by the column's name.
     fine: names of the columns that are 64-bit floats. All other columns are 32-bit floats.
@@ -73,7 +70,6 @@ class Sparse:
     """A column of n numbers of which few are known. It uses memory for the known numbers only.
 
     rows: indices of the known numbers, increasing.
-    values: the known numbers.
     """
 
     def __init__(self, rows: Ints, values: Array, n: int) -> None:
@@ -106,16 +102,12 @@ class Log(Table):
     speed_mps: speed in m/s, shape (n), optional.
     temperature_c: temperature in degrees Celsius, shape (n), optional.
     start_s: the recorder's own time at the first sample, in s.
-    name: the log's name in messages.
-    notices: remarks about the log.
     lat_deg, lon_deg: latitude and longitude in degrees, shape (n), optional.
     utc_s: Universal Time in s since 1970, shape (n), optional.
     own_times: False if reading the log has changed its times.
 
-    Optional arrays are NaN in samples without a new value.
-
-    t_s may start at any value. The first value is added to start_s and subtracted from t_s. Raises InputError for
-    wrong shapes and for times that do not increase.
+    Optional arrays are NaN in samples without a new value. t_s may start at any value, which is added to start_s.
+    Raises InputError for wrong shapes and for times that do not increase.
 
     >>> import numpy as np
     >>> t_s = np.arange(300) / 100.0
@@ -167,7 +159,6 @@ class Log(Table):
         """Make a log from readings in the chip's order.
 
         readings: acceleration (3 columns, g), temperature (deg C) and rate (3 columns, deg/s), shape (n, 7).
-        rate_hz: samples per second.
         """
         table = np.asarray(readings, dtype=float)
         return cls(np.arange(len(table)) / rate_hz, table[:, :3], table[:, 4:], temperature_c=table[:, 3], name=name)
@@ -189,8 +180,7 @@ class Log(Table):
 
     @property
     def start_utc_s(self) -> float | None:
-        """Universal Time at the first sample in s, None if unknown. The median is used, because the receiver sends some
-        times late."""
+        """Universal Time at the first sample in s, None if unknown: the median, as a receiver sends some times late."""
         has_time = np.isfinite(self.utc_s)
         return float(np.median((self.utc_s - self.t_s)[has_time])) if np.any(has_time) else None
 
@@ -235,13 +225,10 @@ class Log(Table):
             yield span, part if np.all(selected[span]) else part.part(selected[span])
 
     def rows(self) -> Iterator[FirmwareRow]:
-        """Yield each sample for a replay by the firmware's modules.
+        """Yield the time in us, the reading, and the speed in m/s of each sample, for the firmware's modules.
 
-        Yields:
-            time: in us.
-            reading: list of acceleration (3 values, g), temperature (deg C) and rate (3 values, deg/s). A missing
-                temperature is replaced by ROOM_TEMP_C.
-            speed: in m/s, NaN if missing.
+        The reading has acceleration (3 values, g), temperature (deg C) and rate (3 values, deg/s). A missing
+        temperature is replaced by ROOM_TEMP_C.
         """
         readings = self.readings
         readings[:, 3] = np.nan_to_num(readings[:, 3], nan=ROOM_TEMP_C)
@@ -257,15 +244,13 @@ class Log(Table):
 
 @dataclass
 class Stretch:
-    """A part of a log.
+    """A part of a log, between two times in s since the log's first sample.
 
-    source: the log.
-    from_s, to_s: its limits, in s since the log's first sample. A negative value counts back from the log's last
-        sample. None means the log's start or end.
+    A negative time counts back from the log's last sample. None means the log's start or end.
 
     A Stretch can be used like a log. If it is read as a log, its times count from the first sample of the stretch.
-    Functions that compute the lean read the whole log, because the lean depends on earlier readings. These functions
-    return only the samples of the stretch, with times that count from the start of the whole log.
+    Functions that compute the lean read the whole log, because the lean depends on earlier readings. They return only
+    the samples of the stretch, with times that count from the start of the whole log.
 
     >>> import numpy as np
     >>> from kickstand_tools.api import Log, read_log
@@ -280,7 +265,6 @@ class Stretch:
 
     @property
     def name(self) -> str:
-        """The log's name."""
         return name_of(self.source)
 
 
@@ -293,27 +277,18 @@ GAP_BINS = 3  # number of successive bins without samples that make a gap; fewer
 
 @dataclass
 class LogBins:
-    """n successive bins of BIN_S. Vectors are along the sensor's axes.
+    """The last hour of a log in n successive bins of BIN_S. Vectors are along the sensor's axes."""
 
-    bins: the bins as averaged. Means are force and rate, three columns each.
-    force: mean forces, shape (n, 3), in g; 0 where unknown.
-    rate: mean rates, shape (n, 3), in deg/s; 0 where unknown.
-    valid: False in gaps, shape (n).
-    speeds: the first speed of each second, shape (m, 2): time in s, speed in m/s.
-    positions: the first position of each second, shape (m, 3): time in s, latitude and longitude in degrees.
-    """
-
-    bins: Bins
-    force: Array
-    rate: Array
-    valid: Bools
-    speeds: Array
-    positions: Array
+    bins: Bins  # means of force and rate, three columns each
+    force: Array  # mean forces, shape (n, 3), in g; 0 where unknown
+    rate: Array  # mean rates, shape (n, 3), in deg/s; 0 where unknown
+    valid: Bools  # False in gaps, shape (n)
+    speeds: Array  # the first speed of each second, shape (m, 2): time in s, speed in m/s
+    positions: Array  # the first position of each second, shape (m, 3): time in s, latitude and longitude in degrees
 
     def integrals(self, time_s: Array) -> Array:
-        """Integrate from the first bin to each of k times.
+        """Integrate from the first bin to each of k times, in s.
 
-        time_s: the times, shape (k), in s.
         Returns seven columns, shape (k, 7): the integral of the force (3, in g s), the integral of the rate (3, in
         degrees), and the duration of valid bins (s).
         """
@@ -355,10 +330,7 @@ def log_bins(log: Log) -> LogBins | None:
 
 
 def _once_a_second(first_s: float, time_s: Array, *columns: Array) -> Array:
-    """Return the first row of each second in which all columns have a value, with the time in front.
-
-    first_s: earlier rows are not used.
-    """
+    """Return the first row of each second from first_s on in which all columns have a value, with the time in front."""
     rows = np.flatnonzero(~np.isnan(columns[0]))
     values = np.column_stack([column[rows] for column in (time_s, *columns)])
     values = values[np.all(np.isfinite(values), axis=1) & (values[:, 0] >= first_s)]

@@ -38,14 +38,12 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None)
     """Read a log: CSV with the columns t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps and optionally
     speed_mps,lat_deg,lon_deg,utc_s,temp_c.
 
-    Repeated times are spread evenly. An incomplete last line is left out. Units and axes are not checked: functions
-    that use a log check it (see check_log()).
+    Repeated times are spread evenly. An incomplete last line is left out. Units and axes are not checked: see
+    check_log().
 
-    Args:
-        source: a path (of a gzip file if it ends in .gz), an open file of text or bytes, a Log, or a Stretch of these.
-        minimum: least number of samples.
-        progress: called with the number of bytes read and the size of the file.
-
+    source: a path (of a gzip file if it ends in .gz), an open file of text or bytes, a Log, or a Stretch of these.
+    minimum: least number of samples.
+    progress: called with the number of bytes read and the size of the file.
     Raises InputError, which names the file and the line of a mistake.
 
     >>> import io
@@ -69,10 +67,7 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None)
 
 
 def read_with_rows(source: Source, progress: Progress | None = None) -> tuple[Log, slice]:
-    """Read the whole log of a source, and find the rows of the stretch: all rows unless the source is a Stretch.
-
-    Raises InputError as read_log(), also if the stretch has no sample.
-    """
+    """Read the whole log of a source, and find the rows of the stretch: all rows unless the source is a Stretch."""
     if not isinstance(source, Stretch):
         return read_log(source, progress=progress), slice(None)
     log = read_log(source.source, progress=progress)
@@ -89,7 +84,6 @@ def check_first_line(log: Path) -> None:
 
 
 def is_log(path: Path) -> bool:
-    """Return True if a file begins with the header of a log and has another line."""
     try:
         check_first_line(path)
         return True
@@ -98,8 +92,7 @@ def is_log(path: Path) -> bool:
 
 
 def text_rows(file: Path | str, progress: Progress | None = None) -> Iterator[tuple[tuple[str, ...], list[str]]]:
-    """Yield the names of the columns and many rows of a log as CSV, one string per sample of read_log(). A cut last row
-    is included."""
+    """Yield the names of the columns and many rows of a log, one string per sample of read_log() and cut last row."""
     pieces, total = chunks(file, CHUNK_BYTES, []), total_bytes(file)
     first, position = next(pieces, (b"", 0))
     names, rest = _header(str(file), first)
@@ -110,10 +103,7 @@ def text_rows(file: Path | str, progress: Progress | None = None) -> Iterator[tu
 
 
 def time_texts(source: Source, log: Log, rows: slice = slice(None)) -> Iterator[str]:
-    """Yield the times of these rows of a log as texts. Times that reading has not changed are copied from the file.
-
-    source: the source of the log.
-    """
+    """Yield the times of these rows of a log as texts. Times that reading has not changed are copied from the file."""
     file = source.source if isinstance(source, Stretch) else source
     if not isinstance(file, (Path, str)) or not log.own_times:
         return iter([f"{log.start_s + t:.6f}" for t in log.t_s[rows].tolist()])
@@ -133,28 +123,25 @@ class _Sparse:
         self._rows, self._values, self._length = [], [], 0
 
     def extend(self, values: Array) -> None:
-        """Append n values."""
         rows = np.flatnonzero(~np.isnan(values))
         self._rows.append(rows.astype(np.int32) + self._length)
         self._values.append(values[rows])
         self._length += len(values)
 
     def finished(self) -> Array | Sparse:
-        """Return all values."""
         rows, values = (np.concatenate(parts or [np.zeros(0, int)]) for parts in (self._rows, self._values))
         column = Sparse(rows, values, self._length)
         return column if 2 * len(rows) < self._length else column[:].copy()
 
 
 class _Column:
-    """A column that grows. A column without any value uses no memory."""
+    """A column that grows. Without any value, it uses no memory."""
 
     def __init__(self) -> None:
         self._values: Array | None = None
         self._length = 0
 
     def extend(self, values: Array) -> None:
-        """Append n values."""
         end = self._length + len(values)
         if self._values is None and not np.all(np.isnan(values)):
             self._values = np.full(2 * end, np.nan)
@@ -165,7 +152,6 @@ class _Column:
         self._length = end
 
     def finished(self) -> Array:
-        """Return all values."""
         if self._values is None:
             return np.broadcast_to(np.nan, self._length)
         self._values.resize(self._length, refcheck=False)
@@ -258,12 +244,10 @@ def _header(name: str, first: bytes) -> tuple[list[str], bytes]:
 
 
 def _numbers(name: str, text: bytes, names: list[str], index: dict[str, int], line: int, last_us: int | None) -> Array:
-    """Convert the text of n rows to numbers.
+    """Convert the text of n rows to numbers, in the order of `index`, shape (n, number of columns).
 
     line: number of lines before the text.
     last_us: time of the previous sample, None for the first.
-
-    Returns the columns in the order of `index`, shape (n, number of columns).
     """
     table = numbers_in(text, len(names))
     if table is not None and is_plausible(table[:, list(index.values())], list(index), last_us):
@@ -284,12 +268,10 @@ def _last_marked(parts: Iterator[tuple[bytes, int]]) -> Iterator[tuple[bytes, in
 
 
 def _without_cut_line(text: bytes, names: list[str], index: dict[str, int]) -> tuple[bytes, bytes]:
-    """Remove the last line of a log if it was cut.
+    """Return the text without the last line, and this line, if it was cut; otherwise the text, and an empty line.
 
     The last line was cut if it has fewer cells than the log has columns. A last line without a line end was also cut in
     two other cases: it cannot be read, or its last number has fewer decimals than the last number of the previous line.
-
-    Returns the text without the cut line, and the cut line, empty if no line was cut.
     """
     lines, _, last = text.rstrip().rpartition(b"\n")
     if not last or last.count(b'"'):
@@ -310,7 +292,7 @@ def _readable(line: bytes, names: list[str], index: dict[str, int]) -> bool:
 
 
 def _digits(line: bytes) -> int:
-    """The number of decimals in the last cell; 0 for an empty cell."""
+    """Return the number of decimals in the last cell; 0 for an empty cell."""
     return len(line.rpartition(b",")[2].strip().partition(b".")[2])
 
 
@@ -344,14 +326,9 @@ def cut_log(
     to_s: float | None = None,
     progress: Progress | None = None,
 ) -> tuple[int, float]:
-    """Copy the lines of a stretch of a log to the file `out`, gzipped if its name ends in .gz. Raises InputError.
+    """Copy the lines of a stretch (see Stretch) of a log to the file `out`, as write_log() does.
 
-    After an error, no incomplete file remains.
-
-    Args:
-        from_s, to_s: limits of the stretch, see Stretch.
-        progress: called with the bytes read and the bytes of the file.
-
+    progress: called with the bytes read and the bytes of the file.
     Returns the number of samples, and the time from the first to the last sample in s.
 
     >>> import tempfile

@@ -157,10 +157,7 @@ def _layout(charts: Charts, narrow: bool, linked: bool) -> dict[str, Any]:
 
 
 def _annotations(chart: Chart, x: str, y: str, narrow: bool) -> list[dict[str, Any]]:
-    """Return all words on a chart.
-
-    These are the title, the names of the traces in their colours, and the words in corners, at points and in spans.
-    """
+    """Return the title, the names of the traces in their colours, and the words in corners, at points and in spans."""
     within = {"xref": f"{x} domain", "yref": f"{y} domain"}
     names = [
         f"<span style='color:{trace.colour}'>{trace.name}</span>"

@@ -1,7 +1,7 @@
 """Writes the ride as one HTML page with charts that you can zoom, which needs no other file, and as a picture.
 
 If the log has positions, a map is beside the charts. If you point at a moment in the map or in a chart, the page marks
-this moment in the map and in the charts.
+it in both.
 """
 
 from importlib.resources import files
@@ -51,10 +51,7 @@ def draw_ride(overview: Overview, directory: Path, tiles: bool = False) -> list[
 
 
 def draw(path: Path, overview: Overview, tiles: bool = False) -> None:
-    """Write the page, with a map beside the charts if the log has positions.
-
-    tiles: show streets in the map. The page loads them from a server.
-    """
+    """Write the page. tiles: show streets in the map, which the page loads from a server."""
     library = files("plotly").joinpath("package_data/plotly.min.js").read_text(encoding="utf-8")
     text = page(overview, f"<script>{library}</script>", source_hash(library), tiles, warnings=True)
     path.write_text(text, encoding="utf-8")
@@ -64,8 +61,8 @@ def page(overview: Overview, library: str, allowed: str, tiles: bool = False, wa
     """Return the page's HTML.
 
     The content security policy allows only the page's own scripts, and images of the map's tiles. It also allows
-    'unsafe-eval' and inline styles. plotly.js needs both: it compiles functions from text for charts with many points,
-    and sets styles.
+    'unsafe-eval' and inline styles, because plotly.js compiles functions from text for charts with many points, and
+    sets styles.
 
     library: the element that loads plotly.js.
     allowed: the source of plotly.js in the policy.

@@ -27,22 +27,14 @@ _COLOURS = [[0.0, "#0d3a73"], [0.25, LEFT_COLOUR], [0.5, "#c9c9c9"], [0.75, RIGH
 
 @dataclass
 class MapPoints:
-    """m points of a track, sorted by time.
+    """m points of a track, sorted by time."""
 
-    t_s: seconds since the log's first sample, shape (m).
-    east_m, north_m: distances from the position lat_deg, lon_deg, shape (m). Each gap in the positions has one point
-        that is NaN.
-    lean_deg: lean, shape (m); NaN where the display shows no lean.
-    speed_kmh: speed in km/h, shape (m); NaN if the log has no speed.
-    lat_deg, lon_deg: position of the map's origin.
-    """
-
-    t_s: Array
-    east_m: Array
-    north_m: Array
-    lean_deg: Array
-    speed_kmh: Array
-    lat_deg: float
+    t_s: Array  # seconds since the log's first sample, shape (m)
+    east_m: Array  # distance from lat_deg, lon_deg, shape (m). Each gap in the positions has one point that is NaN.
+    north_m: Array  # as east_m
+    lean_deg: Array  # lean, shape (m); NaN where the display shows no lean
+    speed_kmh: Array  # speed in km/h, shape (m); NaN if the log has no speed
+    lat_deg: float  # position of the map's origin
     lon_deg: float
 
 
@@ -142,10 +134,7 @@ def _mercator(lat_deg: Array) -> Array:
 
 
 def _moved(east: Array, north: Array) -> Ints:
-    """Return the indexes of the points to keep.
-
-    These are the points over SAME_M from the last kept point, the first in each gap, and the first after each gap.
-    """
+    """Return the indexes of the points over SAME_M from the last one, the first in each gap, and the first after it."""
     selected, (last_x, last_y) = [0], (east[0], north[0])
     for k, (x, y) in enumerate(zip(east.tolist(), north.tolist())):
         begins_or_ends_gap = (x != x) != (last_x != last_x)
