@@ -163,7 +163,7 @@ def _recordings_among(files: list[RecordingFile]) -> Iterator[tuple[str, list[Re
     matches = recordings(files)
     used = {id(file) for _, group in matches for file in group}
     for app, group in matches:
-        yield group[0].name if len(group) == 1 else _in_folder(f"{app.NAME} recording", group), group
+        yield group[0].name if len(group) == 1 else _in_folder(f"{app.name} recording", group), group
     remaining = [file for file in files if id(file) not in used]
     table = mapped.table_in(remaining) if len(remaining) > 1 else None
     if table is not None and table.joined and not table.lacking:
@@ -180,7 +180,7 @@ def _add(inputs: RideFiles, log: str, names: list[str], files: list[RecordingFil
         inputs.refused |= dict.fromkeys(names, mapped.unknown(files, log))
         return
     inputs.rides.append(FilesOfRide(log, names, table=table))
-    inputs.kinds |= dict.fromkeys(names, f"of {parts[0][0].NAME}" if parts else "table")
+    inputs.kinds |= dict.fromkeys(names, f"of {parts[0][0].name}" if parts else "table")
 
 
 def _by_number(name: str) -> list[tuple[int, str]]:
