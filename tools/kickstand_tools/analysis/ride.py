@@ -299,7 +299,7 @@ class RideReading:
         self._slow = False
 
     def parts(self) -> Iterator[Channels]:
-        """Yield the channels of successive samples. Frozen readings become gaps. Raises InputError if all are frozen."""
+        """Yield the channels of successive samples. Frozen readings become gaps. Raises InputError if all froze."""
         ride, has_readings = self._ride, False
         first, last, _ = ride.checked.rows.indices(len(ride.log.t_s))
         for span, log, lean in self._leans():
