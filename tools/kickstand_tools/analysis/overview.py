@@ -269,22 +269,14 @@ def overview(ride: Ride, progress: Progress | None = None, keep: Callable[[Array
     total.frozen_s = min(frozen_s, total.missing_s) if ride.is_stretch else frozen_s
     still = standing(course)
     alignment = quality(course, still)
-    moved_s = min(total.riding_s, _riding_s(course, still, whole_ride=not ride.is_stretch))
+    # In a stretch, a vehicle may go straight ahead, or keep the same turn, from start to end
+    moved = ride.is_stretch or _has_moved(course)
+    moved_s = min(total.riding_s, float(np.count_nonzero(~still)) * spacing_s(course)) if moved else 0.0
     notices = [replace(n, roll_deg=alignment.roll_deg) if isinstance(n, ForwardExchanged) else n for n in notices]
     result = Overview(ride, total, course, [], alignment, moved_s, notices)
     if not result.exchanged:
         result.stops = stops_of(course, still)
     return result
-
-
-def _riding_s(ride: Channels, standing: Bools, whole_ride: bool = True) -> float:
-    """Return the time for which a vehicle was moving, in s. For ride and standing see quality().
-
-    whole_ride: False for a stretch, in which a vehicle may go straight ahead, or keep the same turn, from start to end.
-    """
-    if whole_ride and not _has_moved(ride):
-        return 0.0
-    return float(np.count_nonzero(~standing)) * spacing_s(ride)
 
 
 def _has_moved(ride: Channels) -> bool:

@@ -115,7 +115,6 @@ def _has_force_at_rest(ride: Channels, n: int) -> Bools:
     return np.abs(size - weight) < (MAX_OFF_G if len(rests) else UNCALIBRATED_G)
 
 
-SMOOTH_S = 0.2  # averaging time of the acceleration a(t) in fitted_speed()
 LEAD_S = 4.0  # the fit also uses the logged speeds in this time before the braking
 DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # delays of the speed to try, in s
 # A delay is searched only with at least ENOUGH_SPEEDS speeds, one per second. The standard deviation of the changes

@@ -80,11 +80,8 @@ def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
 def speed_in_radians(leaning: Leaning) -> float | None:
     """Return the speed in bends, in m/s, that these rates would mean in deg/s; None if not surely in rad/s."""
     wrong = leaning.share > SHARE and leaning.sigmas > SIGMAS and leaning.correlation > CORRELATION
-    return float(np.degrees(leaning.speed)) if wrong and leans(leaning) else None
-
-
-def leans(leaning: Leaning) -> bool:
-    return float(np.sqrt(np.mean(leaning.rolled**2))) > LEAST_LEAN
+    leans = np.sqrt(np.mean(leaning.rolled**2)) > LEAST_LEAN
+    return float(np.degrees(leaning.speed)) if wrong and leans else None
 
 
 def leaned(rolled: Array, yaw: Array, speed: Array | float) -> Array:

@@ -13,7 +13,7 @@
   can make the change of speed seem too small, but never too large.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from kickstand.drive_alignment.quality import speed_unit_problem
@@ -21,8 +21,8 @@ from kickstand.units import AXES, STANDARD_GRAVITY
 
 from ..common.messages import InputError, Message, RefusedInput, Remedy, kind
 from ..logs.csv_text import MOST_DPS, MOST_G
-from ..logs.log import Log, LogBins, Source, log_bins
-from ..logs.reader import read_log, read_with_rows
+from ..logs.log import Log, LogBins, Source, Stretch, log_bins
+from ..logs.reader import read_log
 from ..logs.source import Progress
 from ..signals import Array, Bools, best_lag, bin_numbers, intervals, runs
 from .axes import wrong_axes
@@ -296,10 +296,9 @@ def check_log(log: Log, axes: bool = True, sensor: bool = True) -> CheckedLog:
 
 def read_checked(source: Source, progress: Progress | None = None) -> CheckedLog:
     """Read and check the whole log of a source, of which a Stretch selects the rows. See read_log() and check_log()."""
-    log, rows = read_with_rows(source, progress)
-    checked = check_log(log)
-    checked.rows = rows
-    return checked
+    log = read_log(source.source if isinstance(source, Stretch) else source, progress=progress)
+    rows = log.rows_between(source.from_s, source.to_s) if isinstance(source, Stretch) else slice(None)
+    return replace(check_log(log), rows=rows)
 
 
 def read_with_notices(source: Source, axes: bool = True, sensor: bool = False) -> Log:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ..checks.leaning import WINDOW_S, averaged
-from ..signals import STANDING_MPS, Array, Bools, Ints, bin_numbers, moving_spread, rotated
+from ..checks.leaning import WINDOW_S, averaged, moving_deviation
+from ..signals import STANDING_MPS, Array, Bools, Ints, bin_numbers, rotated
 
 GAP_S = 0.17  # if the time between two samples is longer, readings are missing
 
@@ -145,35 +145,21 @@ TURNS_S = 40.0  # the speed is computed from the bends within this time
 USUAL_MPS, USUAL_RADPS = 10.0, 0.14
 
 
-def motionless(
-    rate: Array, force: Array, n: int, most_rate: float, most_force: float, speed_mps: Array | None = None
-) -> Bools:
-    """Find the windows around which the readings hardly change, so that the bike seems to stand still, shape (m).
-
-    A constant rate counts as a standstill, because it may be a bias. In a steady bend the rate is constant too, so the
-    caller must also check the mean rate.
-
-    rate, force: means of each window, shape (m, 3).
-    n: number of windows around each window.
-    most_rate, most_force: largest standard deviation of each component.
-    speed_mps: speed in each window, shape (m), in m/s; NaN if unknown.
-    """
-    speed = np.full(len(rate), np.nan) if speed_mps is None else speed_mps
-    allowed = np.where(speed < STANDING_MPS, STANDS, 1.0)
-    calm = np.max(moving_spread(rate, n), axis=1) < allowed * most_rate
-    calm &= np.max(moving_spread(force, n), axis=1) < allowed * most_force
-    return calm & ~(speed >= STANDING_MPS)
-
-
 def standing(w: Windows) -> Bools:
     """Find the windows in which the bike stands still, shape (n), for zero-velocity updates."""
     return calm(w) & (np.linalg.norm(averaged(w.rate, STILL_S), axis=1) < BIAS_RADPS)
 
 
 def calm(w: Windows) -> Bools:
-    """Return True for the windows around which the readings hardly change, shape (n)."""
-    count = 2 * round(0.5 * STILL_S / WINDOW_S) + 1
-    return ~w.gap & motionless(w.rate, w.force, count, STILL_RADPS, STILL_G, w.known_speed)
+    """Find the windows around which the readings hardly change, so that the bike seems to stand still, shape (n).
+
+    A constant rate is calm, because it may be a bias. In a steady bend the rate is constant too, so the caller must
+    also check the mean rate.
+    """
+    speed = w.known_speed
+    allowed, still = np.where(speed < STANDING_MPS, STANDS, 1.0), ~w.gap & ~(speed >= STANDING_MPS)
+    still &= moving_deviation(w.rate, STILL_S) < allowed * STILL_RADPS
+    return still & (moving_deviation(w.force, STILL_S) < allowed * STILL_G)
 
 
 def in_hand(w: Windows) -> tuple[Bools, Bools]:
