@@ -47,5 +47,7 @@ def test_a_log_without_usable_readings_is_too_short(accel_g):
 )
 def test_standstill_is_where_nothing_changes(shaking, speed, expected):
     chance = np.random.default_rng(1).normal(size=(100, 3))
-    assert np.mean(calm(windows(100, np.radians(shaking * chance), speed=speed))) == pytest.approx(expected, abs=0.1)
+    assert np.mean(calm(windows(100, np.radians(shaking * chance), speed=speed))) == pytest.approx(
+        float(expected), abs=0.1
+    )
     assert not calm(windows(100, force=chance)).any()

@@ -322,7 +322,6 @@ def _twice_the_sine(matrix: Array) -> Array:
 
 STANDING_MPS = 0.3  # speed under which a vehicle counts as standing, because a receiver's speed is never exactly 0
 
-
 # Distances on the Earth.
 
 EARTH_M = 6_371_000.0

@@ -27,6 +27,9 @@ from ..signals import Array, Bools, Ints, bin_numbers, run_latest, run_means, ru
 _LAST = ("lat_deg", "lon_deg", "utc_s")
 GAP_S = 5.0  # longest time between two positions over which positions are interpolated
 
+SMOOTH_US = 300_000  # time constant of the display's force, as in kickstand.lean.meter
+_MAX_SIGMA_DEG = 3.0  # a smoothed lean with a larger standard deviation is not trusted
+
 
 @dataclass(eq=False)
 class Channels(Table):
@@ -220,10 +223,6 @@ class LogTrack:
 def track(part: Channels | Log) -> LogTrack:
     valid = np.isfinite(part.lat_deg) & np.isfinite(part.lon_deg)
     return LogTrack(part.t_s[valid], part.lat_deg[valid], part.lon_deg[valid])
-
-
-SMOOTH_US = 300_000  # time constant of the display's force, as in kickstand.lean.meter
-_MAX_SIGMA_DEG = 3.0  # a smoothed lean with a larger standard deviation is not trusted
 
 
 SmoothSlow = kind(

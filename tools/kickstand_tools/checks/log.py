@@ -51,6 +51,19 @@ NAMES = tuple(f"{sensor} {axis}" for sensor in ("accelerometer", "gyro") for axi
 
 _SENSORS = slice(0, 3), slice(3, 6)
 
+FIRST = 15_000  # number of samples by which the units of force and time are judged
+LEAST_G = 0.4  # gravity is missing if the median force is smaller than this; an offset of 0.6 g leaves more
+MPS2_G = 5.0, 20.0  # a median force between these is in m/s2; larger values are not readings, and are left out
+MILLISECONDS_S = 4.0  # samples this far apart have times in ms that were read as s, at 250 samples per second or fewer
+# Largest ratio of the logged change of speed to the change that the force explains. Speeds in knots give 1.94, and
+# speeds in m/s at most 1.1.
+MOST_RATIO = 1.5
+PUSH_G = 0.15  # a smaller force is not used, because an ordinary road's slope causes such forces
+ENOUGH = 10  # least number of seconds with this force: two or three braking events
+SIGMAS = 5.0  # the correlation of force and change of speed must exceed chance by this many standard deviations
+LAGS_S = np.arange(0.0, 2.1, 0.25)  # possible delays of a satellite receiver's speed
+SHORTEST_S, LONGEST_S = 0.5, 2.2  # least and largest time between two speeds
+
 
 def _frozen_words(message) -> str:
     line = f"the readings froze from {message.begin_s:.1f} to {message.end_s:.1f} s"
@@ -221,20 +234,6 @@ def _clipped(name: str, time_s: Array, force: Array, step: float) -> list[Messag
             ends.append((float(most), int(np.count_nonzero(clipped)), float(time_s[np.argmax(clipped)])))
     ends = [end for end in ends if end[1] >= CLIPPED_SAMPLES]
     return [AccelClipped(name, ends[0][0], sum(end[1] for end in ends), min(end[2] for end in ends))] if ends else []
-
-
-FIRST = 15_000  # number of samples by which the units of force and time are judged
-LEAST_G = 0.4  # gravity is missing if the median force is smaller than this; an offset of 0.6 g leaves more
-MPS2_G = 5.0, 20.0  # a median force between these is in m/s2; larger values are not readings, and are left out
-MILLISECONDS_S = 4.0  # samples this far apart have times in ms that were read as s, at 250 samples per second or fewer
-# Largest ratio of the logged change of speed to the change that the force explains. Speeds in knots give 1.94, and
-# speeds in m/s at most 1.1.
-MOST_RATIO = 1.5
-PUSH_G = 0.15  # a smaller force is not used, because an ordinary road's slope causes such forces
-ENOUGH = 10  # least number of seconds with this force: two or three braking events
-SIGMAS = 5.0  # the correlation of force and change of speed must exceed chance by this many standard deviations
-LAGS_S = np.arange(0.0, 2.1, 0.25)  # possible delays of a satellite receiver's speed
-SHORTEST_S, LONGEST_S = 0.5, 2.2  # least and largest time between two speeds
 
 
 def _speed_unit_remedy(message) -> Remedy:

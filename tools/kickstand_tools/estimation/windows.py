@@ -11,6 +11,18 @@ from ..signals import STANDING_MPS, Array, Bools, Ints, bin_numbers, rotated
 
 GAP_S = 0.17  # if the time between two samples is longer, readings are missing
 
+STILL_S = 1.6  # least length of a standstill; a shorter standstill looks like smooth riding
+STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # largest standard deviations over STILL_S on a standing bike
+STANDS = 4.0  # factor on both limits if the speed is under STANDING_MPS
+BIAS_RADPS = np.radians(4.0)  # largest bias of the gyro since its calibration; a higher mean rate is a bend
+MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # largest angle between up and the mean force over MOUNTED_S, for a mounted sensor
+BETWEEN_S = 20.0  # a shorter time between two movements in a hand also counts as time in the hand
+SURELY_S = 4.0  # a movement longer than this is certainly in a hand; a shorter movement may be riding or a fall
+SLOW_S = 4.0  # changes of lean slower than this are computed from the yaw rate, faster changes from the roll rate
+TURNS_S = 40.0  # the speed is computed from the bends within this time
+# The prior of the speed from the bends is USUAL_MPS. The prior has the weight of bends with the yaw rate USUAL_RADPS.
+USUAL_MPS, USUAL_RADPS = 10.0, 0.14
+
 
 @dataclass
 class Windows:
@@ -130,19 +142,6 @@ def _rolled_back(vectors: Array, roll: Array) -> Array:
     """Express vectors (left, up, forward) in the axes that the bike had before it rolled to the right, by rad."""
     (left, up, forward), c, s = vectors.T, np.cos(roll), np.sin(roll)
     return np.column_stack((c * left - s * up, s * left + c * up, forward))
-
-
-STILL_S = 1.6  # least length of a standstill; a shorter standstill looks like smooth riding
-STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # largest standard deviations over STILL_S on a standing bike
-STANDS = 4.0  # factor on both limits if the speed is under STANDING_MPS
-BIAS_RADPS = np.radians(4.0)  # largest bias of the gyro since its calibration; a higher mean rate is a bend
-MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # largest angle between up and the mean force over MOUNTED_S, for a mounted sensor
-BETWEEN_S = 20.0  # a shorter time between two movements in a hand also counts as time in the hand
-SURELY_S = 4.0  # a movement longer than this is certainly in a hand; a shorter movement may be riding or a fall
-SLOW_S = 4.0  # changes of lean slower than this are computed from the yaw rate, faster changes from the roll rate
-TURNS_S = 40.0  # the speed is computed from the bends within this time
-# The prior of the speed from the bends is USUAL_MPS. The prior has the weight of bends with the yaw rate USUAL_RADPS.
-USUAL_MPS, USUAL_RADPS = 10.0, 0.14
 
 
 def standing(w: Windows) -> Bools:

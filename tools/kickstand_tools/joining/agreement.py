@@ -38,6 +38,12 @@ _LEAST_CORRELATION = 0.8  # least correlation of the rates: two sensors on one b
 _MOST_APART_DEG = 15.0  # largest contradiction between the calibrations, which are exact to a few degrees
 _ROUNDS = 8
 
+GRID_S = 0.02
+_RIDING_MPS = 3.0
+_GAP_S = 0.2  # the lean is unknown between samples that are further apart
+_LEAST_S = 20.0  # least time of riding to compare
+_LEANED_DEG = 3.0  # delay and slope are computed only for a larger rms of the lean
+
 
 @dataclass
 class Clocks:
@@ -163,13 +169,6 @@ def _interpolated_at(t_s: Array, values: Array, at_s: Array) -> Array:
 
 def _dot(p: Array, q: Array, weight: Array) -> float:
     return float(weight @ np.sum(p * q, axis=1))
-
-
-GRID_S = 0.02
-_RIDING_MPS = 3.0
-_GAP_S = 0.2  # the lean is unknown between samples that are further apart
-_LEAST_S = 20.0  # least time of riding to compare
-_LEANED_DEG = 3.0  # delay and slope are computed only for a larger rms of the lean
 
 
 @dataclass

@@ -31,6 +31,8 @@ CHUNK_BYTES = 1 << 20  # bytes of text that are converted at once, about 15000 s
 MOST_SAMPLES = 10_000_000  # most samples of a log: 14 hours at 200 Hz, which use 1 GB of memory
 REPORTED_S = 0.002  # smallest change of a time, in s, that is reported in a notice
 
+_DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
+
 CutLine = kind("cut-line", "line_number", "line {line_number}, the last one, was cut: it is left out")
 
 
@@ -243,9 +245,6 @@ def _readable(line: bytes, names: list[str], index: dict[str, int]) -> bool:
 def _digits(line: bytes) -> int:
     """Return the number of decimals in the last cell; 0 for an empty cell."""
     return len(line.rpartition(b",")[2].strip().partition(b".")[2])
-
-
-_DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
 
 
 def write_log(path: Path | str, log: Log) -> None:
