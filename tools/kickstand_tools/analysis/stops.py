@@ -354,7 +354,6 @@ def _stop(part: Channels, standstill: int, delay_s: float, from_rest: bool) -> S
 
     part: the ride up to some time after the beginning of the standstill.
     standstill: index in `part` at which the standstill begins.
-    delay_s: delay of the log's speed.
     from_rest: True if `part` begins at the end of the previous standstill.
     """
     time = part.t_s

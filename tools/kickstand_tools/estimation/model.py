@@ -173,7 +173,6 @@ class Hypotheses:
     def weighted(self, blocks: Reduced, prior: Prior, parameters: Array, unbalance: float) -> "Hypotheses":
         """Compute the posterior weights, and drop hypotheses of negligible weight.
 
-        blocks: the normal equations of the windows.
         parameters: the values at which the equations were linearised, shape (B, PARAMETERS).
         unbalance: see Noise. A value over 1 reduces the weight of the likelihood.
         """

@@ -87,7 +87,6 @@ class Windows:
 def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array, aligned: bool = False) -> Windows:
     """Average samples over windows. Each sample represents the time up to half way to its neighbours.
 
-    t_s: times of the samples, in s.
     force: shape (samples, 3), in g.
     rate: shape (samples, 3), in rad/s.
     speed: shape (samples), in m/s; NaN for no new value.

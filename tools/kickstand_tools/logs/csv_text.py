@@ -269,7 +269,6 @@ def numbers_by_line(
 ) -> Array:
     """Convert the text of n rows to numbers. An empty cell in an optional column becomes NaN.
 
-    log: the log's name in messages.
     width: number of cells per row.
     places: index of each column in a row, by its name.
     lines_before: number of lines before the text.
@@ -341,8 +340,7 @@ def write_lean(
 ) -> int:
     """Write a LEAN.csv with the log's own times as the first column. Returns the number of samples. Raises InputError.
 
-    columns: names of the other columns.
-    digits: number of decimals of each of these columns.
+    columns, digits: names of the other columns, and their numbers of decimals.
     times: the log's own time of each sample, as text.
     parts: values of successive samples, shape (n, number of columns).
     """

@@ -57,7 +57,6 @@ def float_schema(units: Mapping[str, str], fine: Container[str], about: dict[str
 
     units: the unit of each column, by the column's name.
     fine: names of the columns that are 64-bit floats. All other columns are 32-bit floats.
-    about: the file's metadata.
     """
     import pyarrow
 
