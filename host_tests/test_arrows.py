@@ -27,7 +27,7 @@ FIRMWARE = {
     "drive_alignment": set(),  # the app passes the calibrations to it
     "speed": {"board"},
     "rides": {"board", "calibration"},  # each block of a ride contains the record of its calibration
-    "live": {"calibration.parameters"},
+    "live": set(),
     "ui": {"board.button", "board.display", "lean", "calibration", "drive_alignment"},
     "settings": {"setting_table", "board", "imu", "diagnosis"},  # also opens the parts
     "setting_table": {"board", "imu.mpu6050"},  # for the ranges that can be set

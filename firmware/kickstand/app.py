@@ -189,6 +189,8 @@ class App:
             self._pass_on(n, dt_us, now_ms)
         if self.drive:
             self._poll_speed(now_ms)
+        if self.screen.wizard:
+            self.screen.guide(n, dt_us, now_ms)
         # The times are compared twice in this method, because a local variable would put the method's stack frame on
         # the heap
         if ticks_diff(now_ms, self._page_ms) >= 0:
@@ -202,9 +204,7 @@ class App:
             self.screen.press(event, now_ms)
             if self.user:
                 self.user.call("on_press", event)
-        if self.screen.wizard:
-            self.screen.guide(n, dt_us, now_ms)
-        # Begin another ride before the next samples and speeds. So a saved calibration meets none of the earlier ones.
+        # Begin another ride before the next samples and speeds, so that the earlier ride gets none of them
         if self.calibration.changed:
             self.rides.split()
         if ticks_diff(now_ms, self._page_ms) >= 0:

@@ -11,7 +11,8 @@ import time
 from pathlib import Path
 
 import pytest
-from kickstand_tools.common import installation, markup, messages, output, progress
+from kickstand_tools.cli import common
+from kickstand_tools.common import installation, markup, messages, output
 from kickstand_tools.common.messages import InputError, Message, Plain, RefusedInput, Remedy, WrongAxes
 from support.watched_stderr import Watched
 
@@ -207,18 +208,17 @@ def test_bar_appears_after_its_patience(patience_s, wait_s, shown, monkeypatch):
     now_s = [10.0]
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
-    with contextlib.redirect_stderr(Watched()) as terminal, progress.Bar("riding", 4, patience_s) as bar:
+    with contextlib.redirect_stderr(Watched()) as terminal, common.Bar("riding", 4, patience_s) as bar:
         assert ("riding" in terminal.getvalue() and "0%" in terminal.getvalue()) is (patience_s == 0.0)
-        bar.describe("walking")
         now_s[0] += wait_s
-        bar.advance(1)
+        bar.reach_in("walking", 1, 4)
     assert ("walking" in terminal.getvalue()) is shown
 
 
 def test_lines_of_progress_come_after_their_interval(monkeypatch):
     now_s = [10.0]
     monkeypatch.setattr(time, "monotonic", lambda: now_s[0])
-    with contextlib.redirect_stderr(io.StringIO()) as lines, progress.Bar("riding", 4, lines_s=10.0) as bar:
+    with contextlib.redirect_stderr(io.StringIO()) as lines, common.Bar("riding", 4, lines_s=10.0) as bar:
         for wait_s in (9.0, 2.0, 9.0, 1.0):
             now_s[0] += wait_s
             bar.advance(1)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from kickstand_tools.common import installation
 from kickstand_tools.deploy import firmware_files
-from kickstand_tools.web.documents import documents
+from kickstand_tools.web import documents
 from support import command
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -20,7 +20,15 @@ TO_A_STOP = [[10.0, -1.5, 0.0], [6.0, 0.0, 0.0]]
 
 
 class Chip:
-    who_am_i, accel_range_g, accel_lsb_per_g, gyro_lsb_per_dps = 0x68, 8, 4096.0, 65.5
+    """short: True if the memory is too short to use a calibration."""
+
+    who_am_i, accel_range_g, gyro_lsb_per_dps, short = 0x68, 8, 65.5, False
+
+    @property
+    def accel_lsb_per_g(self):
+        if self.short:
+            raise MemoryError("memory allocation failed")
+        return 4096.0
 
 
 class Receiver:
@@ -49,7 +57,8 @@ class Vehicle:
         self.receiver = Receiver()
         self.meter = LeanMeter(Calibration(), leans)
         self.active = ActiveCalibration(self.meter)
-        self.active.chip_started(Chip())
+        self.chip = Chip()
+        self.active.chip_started(self.chip)
         if yaw_deg is not None:
             self.align(yaw_deg, trim_deg)
         self.background = BackgroundAlignment(leans, Speed(self.receiver), self.meter, self.active)
@@ -140,6 +149,14 @@ def test_each_verdict_has_its_reaction(yaw_deg, message, reason, result, error_d
     assert list(bike.active.value.gyro_bias) == pytest.approx([0.5, -1.0, 0.3], abs=0.03)
     bike.go([[3.0, 2.0, 0.0]])
     assert bike.message is None and (bike.meter.suppressed_reason or "") == (message or "")
+
+
+def test_without_memory_for_its_alignment_a_drive_says_so_and_goes_on():
+    bike = Vehicle().go(around(6))
+    bike.chip.short = True
+    bike.go(TO_A_STOP)
+    assert bike.message == "no-memory" and not bike.active.aligned
+    assert bike.go([[3.0, 2.0, 0.0]]).message is None
 
 
 @pytest.mark.parametrize("yaw_deg", [11.0, 60.0])

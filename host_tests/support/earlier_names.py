@@ -22,6 +22,7 @@ MOVED = {
     "kickstand_tools.rides.block_reader": "kickstand_tools.rides.ride_log",
     "kickstand_tools.rides.record": "kickstand_tools.rides.stream",
     "kickstand_tools.common.errors": "kickstand_tools.common.messages",
+    "kickstand_tools.common.progress": "kickstand_tools.cli.common",
     "kickstand_tools.common.times": "kickstand_tools.common.markup",
     "kickstand_tools.deploy.board_console": "kickstand_tools.deploy.connection",
     "kickstand_tools.deploy.bytecode": "kickstand_tools.deploy.firmware_files",

@@ -42,6 +42,7 @@ def test_an_alignment_takes_both_poses_and_is_saved():
     [
         (7.5, -7.5, ("Aligned!   7.5°", "Little, 8° best")),
         (1.0, -1.0, ("Tilt only 1.0°", "Need 5° or more")),
+        (65.0, -65.0, ("Tilt 65°: over", "60°, do it again")),
         (0.0, 0.0, ("Same pose twice", "Stand, then up")),
         (12.0, -24.0, ("Tilt 12°, gyro", "says 24°: redo")),
     ],
@@ -57,6 +58,7 @@ def test_results_and_refusals_of_an_alignment(lean_deg, turn_deg, lines):
     assert result == lines
     if not lines[0].startswith("Aligned"):
         assert panel.hold(10.0) == result and panel.press(SHORT) == STAND
+        assert not Panel(aligned=False).app.calibration.aligned  # nothing is in flash
 
 
 def test_a_pose_that_is_not_still_is_taken_again():

@@ -7,7 +7,7 @@ Flash is written only at standstill.
 
 from time import ticks_add, ticks_diff
 
-from ..errors import Notice, Refusal
+from ..errors import Notice, Refusal, attempt
 from ..rotation import matrix
 from ..units import const
 from . import alignment
@@ -43,8 +43,8 @@ class BackgroundAlignment:
         state: the state to show (see alignment.py).
         shown: True if the progress has its own page (ui/pages.py).
         result: the Notice or Refusal at the end of the last drive, or None.
-        message: a Refusal or Notice to show before everything else, or None. The message is shown
-            until answer() is called or the vehicle drives off.
+        message: a Refusal or Notice to show before everything else, or None. The message is shown until answer() is
+            called or the vehicle drives off.
     """
 
     def __init__(self, leans, speed, meter, calibration):
@@ -112,7 +112,9 @@ class BackgroundAlignment:
             self.fresh_speed(now_ms)
             if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > _LOOK_MS:
                 self._begin_again()  # begin again now, because after 6 days without a reading ticks_diff() is negative
-            self._look(now_ms)
+            notice = attempt(None, self._look, now_ms)
+            if notice:
+                self._say(notice)
         return speed
 
     def fresh_speed(self, now_ms):

@@ -41,6 +41,7 @@ class LeanMeter:
         fallen             True if the bike has fallen
         max_..._deg, _g    the maxima since reset_maxima()
         suppressed_reason  the reason from distrust() why the lean is not shown, or None
+        transform          the Transform of the calibration in use
     """
 
     def __init__(self, calibration, leans=True, delay_s=DELAY_S):
@@ -64,7 +65,7 @@ class LeanMeter:
         transform, kept = Transform(calibration), [0.0] * 9
         measured = gyro_variances(calibration.gyro_sigma, calibration.vehicle_from_sensor)
         self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg), posed, measured, calibration.six_done)
-        self._transform = transform
+        self.transform = transform
         self._kept = kept  # the part of the gyro's errors that keep_trim() has removed
         if calibration is not self.calibration:
             self.suppressed_reason = None
@@ -181,7 +182,7 @@ class LeanMeter:
             dt_us: microseconds since the previous samples, an integer; 0 for the first samples.
         """
         self._reading, self._n = sums, n
-        self._transform.apply_sum(sums, n, self.force, self.rate)
+        self.transform.apply_sum(sums, n, self.force, self.rate)
         self._follow(dt_us)
 
     def _follow(self, dt_us):

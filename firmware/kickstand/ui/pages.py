@@ -188,7 +188,7 @@ def drive(background, now_ms):
     return "Brake%3d +-%4.1f%s" % (drive.counted, min(drive.quality_deg, 99.9), DEGREE), waiting
 
 
-def sensor_info(sensor, lost, meter, seconds):
+def sensor_info(sensor, meter, seconds):
     """The page with information about the sensor. The page changes every two seconds.
 
     The first line has the chip's name and temperature. The second line shows these in turn:
@@ -201,7 +201,6 @@ def sensor_info(sensor, lost, meter, seconds):
 
     Args:
         sensor: the Sensor.
-        lost: number of lost samples.
         meter: the LeanMeter.
         seconds: any time in seconds.
     """
@@ -213,7 +212,7 @@ def sensor_info(sensor, lost, meter, seconds):
     facts = (
         "6pos %-3s ali %s" % (yes[calibration.six_done], yes[calibration.aligned]),
         "%d gaps %d starts" % (min(chip.overflows, 99), min(sensor.restarts, 9)),
-        "samples lost%4d" % min(lost, 9999),
+        "samples lost%4d" % min(sensor.clock.lost, 9999),
         "I2C address 0x%02x" % chip.address,
     )
     line1 = "%-9s%5.1f%sC" % (chip.name[:9], chip.temperature_c(meter.reading[3]), DEGREE)
@@ -314,7 +313,7 @@ class Screen:
             count = len(self._menu)
             return ARROW + self.entry, "next %d/%d hold=ok" % (count - self._menu.index(_LEAVE), count)
         if view == "info":
-            return sensor_info(app.sensor, app.clock.lost, app.meter, now_ms // 1000)
+            return sensor_info(app.sensor, app.meter, now_ms // 1000)
         page = self._page
         if view == "own":
             return page()
@@ -349,7 +348,7 @@ class Screen:
         """Return the module glance if the display draws and the module can be loaded, else None."""
         if self._app.lcd.draws and self._glance is None:
             self._glance = False
-            attempt(self._load)
+            attempt(None, self._load)
         return self._app.lcd.draws and self._glance
 
     def _load(self):
@@ -367,7 +366,7 @@ class Screen:
             now_ms: ticks_ms().
         """
         self.tick(now_ms)
-        self._attempt(self._press, event, now_ms)
+        attempt(self._app.notices, self._press, event, now_ms)
         self.tick(now_ms)
 
     def guide(self, n, dt_us, now_ms):
@@ -379,16 +378,9 @@ class Screen:
             dt_us: microseconds since the previous samples.
             now_ms: ticks_ms().
         """
-        if self._attempt(self.wizard.follow, n, dt_us, now_ms):
+        if attempt(self._app.notices, self.wizard.follow, n, dt_us, now_ms):
             self.wizard = None
             self._update()
-
-    def _attempt(self, function, *arguments):
-        """Call a function as attempt() does, and show its Notice."""
-        notice = attempt(function, *arguments)
-        if notice:
-            self._app.notices.append(notice)
-        return notice
 
     def _press(self, event, now_ms):
         if self.notice:  # the press ends the notice and is for the view below

@@ -1,8 +1,7 @@
 """The commands `kickstand emulate` and `bench`, which the entry points in pyproject.toml add."""
 
 import click
-from kickstand_tools.cli.common import DISPLAY, JSON, show
-from kickstand_tools.common.progress import spinner
+from kickstand_tools.cli.common import DISPLAY, JSON, show, spinner
 
 CHIP = click.option(
     "--chip",

@@ -11,13 +11,12 @@ from rich.live import Live
 
 from ..common import installation
 from ..common.messages import InputError
-from ..common.progress import Bar
-from ..deploy.check import check, verdict
+from ..deploy.check import check
 from ..deploy.flash import flash
 from ..deploy.status import status
 from ..rides.pull import PulledRide, pull
 from ..rides.stream import LiveReading, record
-from .common import OUT, PATH, PORT, echo, warning
+from .common import OUT, PATH, PORT, Bar, echo, warning
 
 _NAMED_ONE_BY_ONE = 5
 
@@ -57,10 +56,7 @@ def flash_command(port: str | None, config: bool, yes: bool) -> None:
 
 
 def _agree(lines: list[str]) -> None:
-    """Ask the user for permission to rename files on the board. Raises InputError if the user refuses.
-
-    lines: one line of text for each file.
-    """
+    """Ask the user for permission to rename files on the board. Raises InputError if the user refuses."""
     if not sys.stdin.isatty():
         raise InputError(f"{'; '.join(lines)}: run kickstand flash --yes for that")
     for line in lines:
@@ -84,7 +80,7 @@ def check_command(port: str | None) -> None:
 
     Each figure is printed with its limit. Keep the sensor still. The exit status is 1 if a figure exceeds its limit."""
     checked = check(port, echo)
-    echo(verdict(checked.findings))
+    echo(checked.verdict)
     if checked.faults:
         raise click.exceptions.Exit(1)
 
@@ -149,10 +145,7 @@ def _live_line() -> Iterator[Callable[[str], None]]:
 
 
 def _live_text(reading: LiveReading) -> str:
-    """Format a reading as one line of text.
-
-    The line shows the lean as a bar to the left or right, in a car the forces, and the duration of the recording.
-    """
+    """Format a reading as one line, with the lean as a bar to the left or right, or in a car with the forces."""
     how_long = f"{reading.rate_hz:3.0f} readings/s  {reading.seconds // 60:.0f}:{reading.seconds % 60:04.1f}"
     lean, forward_g, left_g = reading.moments[-1][1:] if reading.moments else (None, None, None)
     if left_g is not None:  # only an aligned car has this value

@@ -25,10 +25,9 @@ from ..calibration.poses import (
 from ..checks.log import check_log
 from ..common.messages import OPPOSITE_SIGN
 from ..common.output import check_output
-from ..common.progress import Bar
 from ..estimation.alignment import RideFit, fit_ride
 from ..logs.reader import read_log
-from .common import OUT, PATH, RIGHT_HANDED, VEHICLES, echo, file_argument, known_to, print_lines, warn
+from .common import OUT, PATH, RIGHT_HANDED, VEHICLES, Bar, echo, file_argument, known_to, print_lines, warn
 
 
 @click.group(no_args_is_help=False)

@@ -1,8 +1,6 @@
 """Finds what is installed: the firmware's files, the packages that add parts to the tools, and MicroPython.
 
-The files are those of a checkout or of a wheel. Other packages add parts by entry points. This project's
-kickstand_fleet and kickstand_emulator do so too, and kickstand_tools works without them. MicroPython is the unix port
-in a package from PyPI, which has it for Linux on x86-64 and for macOS on Apple silicon.
+Packages add parts by entry points. kickstand_tools also works without this project's other packages.
 """
 
 import importlib.util
@@ -39,9 +37,8 @@ def firmware() -> Path:
 def config() -> Path:
     """Return the path of the user's config.py.
 
-    In a checkout as the current directory, this is the checkout's file. For tools that were installed as a package, it
-    is config.py in the current directory, if there is one. Without such a file, it is the config.py that belongs to
-    these tools.
+    This is the file of the checkout that is the current directory. For tools that were installed as a package, it is
+    config.py in the current directory. If there is none, it is the config.py that belongs to these tools.
     """
     checkout = Path("firmware").resolve()
     if (checkout / "kickstand").is_dir() and (checkout / "config.py").is_file():
@@ -66,10 +63,7 @@ def extra(name: str) -> str:
 
 
 def leaf(folder: str) -> str:
-    """Return the command that installs a package beside the core.
-
-    folder: its name below tools/, such as "fleet", or with an extra "fleet[s3]".
-    """
+    """Return the command that installs a package beside the core, such as "fleet", or with an extra "fleet[s3]"."""
     return _pip_install(f"kickstand-{folder}", f"{TOOLS}/{folder}")
 
 
@@ -122,7 +116,7 @@ def not_installed(name: str) -> InputError:
     return InputError(f"{name} is in the package kickstand-{folder}, which is not installed: {leaf(folder)}")
 
 
-# MicroPython's unix port
+# MicroPython's unix port, in a package from PyPI for Linux on x86-64 and for macOS on Apple silicon
 
 
 def has_micropython() -> bool:
@@ -130,10 +124,7 @@ def has_micropython() -> bool:
 
 
 def micropython(script: str, *arguments: str) -> tuple[list[str], dict[str, str]]:
-    """Return the command line that runs a script under MicroPython, and the environment for it.
-
-    The environment puts firmware and tools on MicroPython's path.
-    """
+    """Return the command line that runs a script under MicroPython, and an environment with firmware and tools."""
     # `python -m micropython_unix` does not return the exit status, so its function is called.
     start = "import sys, micropython_unix; sys.exit(micropython_unix.main())"
     environment = os.environ | {"MICROPYPATH": f"{search_path()}:.frozen"}

@@ -1,8 +1,8 @@
 """Makes HTML, CSS and SVG: files from Jinja templates, SVG drawings from elements, and the times in them.
 
 A template is a file beside the module that fills it. It includes another template by its path in kickstand_tools:
-`{% include "common/theme.css" %}`. SVG elements are written as text, because a template would take longer than their
-millisecond per drawing, and a fleet has thousands of drawings.
+`{% include "common/theme.css" %}`. SVG elements are written as text, which takes a millisecond per drawing. A fleet
+has thousands of drawings.
 """
 
 import base64
@@ -33,8 +33,7 @@ def _environment() -> Any:
 def filled(template: Path, **values: Any) -> str:
     """Fill a template with values. Raises jinja2.UndefinedError for a missing value.
 
-    In a template, a value is escaped unless it has the filter `| safe`. The filter `| tojson` writes JSON for an HTML
-    element.
+    In a template, a value is escaped unless it has the filter `| safe`, or `| tojson` for JSON in an HTML element.
     """
     return _environment().from_string(template.read_text(encoding="utf-8")).render(values)
 

@@ -19,14 +19,10 @@ OPPOSITE_SIGN = f"do all accelerations have the opposite sign? {AT_REST.capitali
 
 @dataclass(frozen=True)
 class Remedy:
-    """What the user can do, in words for a terminal and in words for a page.
-
-    terminal: may name commands and options.
-    page: must not name them, because a page has no commands. None if both versions are the same.
-    """
+    """What the user can do, in words for a terminal and in words for a page, which has no commands and options."""
 
     terminal: str = ""
-    page: str | None = None
+    page: str | None = None  # None if both versions are the same
 
     def words(self, page: bool = False) -> str:
         """Return the text for a page or for a terminal; "" if the user can do nothing."""
@@ -47,16 +43,11 @@ NOTHING_TO_DO = Remedy()
 @dataclass_transform(frozen_default=True)
 @dataclass(frozen=True)
 class Message:
-    """A notice, or the reason for a refusal. Its fields are the values in its text.
+    """A notice, or the reason for a refusal. Its fields are the values in its text."""
 
-    code: a short name of the message, for programs.
-    text: template of the sentence, in which {name} is a field, or a function of the message.
-    todo: template of the remedy, or a function of the message.
-    """
-
-    code: ClassVar[str] = ""
-    text: ClassVar[Any] = ""
-    todo: ClassVar[Any] = NOTHING_TO_DO
+    code: ClassVar[str] = ""  # a short name of the message, for programs
+    text: ClassVar[Any] = ""  # template of the sentence, in which {name} is a field, or a function of the message
+    todo: ClassVar[Any] = NOTHING_TO_DO  # template of the remedy, or a function of the message
 
     def __init_subclass__(cls) -> None:
         dataclass(frozen=True)(cls)
@@ -64,7 +55,7 @@ class Message:
     if TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """The fields of a kind(), which a type checker does not know."""
+            """A field of a kind(), which a type checker does not know."""
 
     def sentence(self) -> str:
         """Return one line that says what happened, without a full stop."""
@@ -72,7 +63,6 @@ class Message:
         return text.format(**vars(self)) if isinstance(text, str) else text(self)
 
     def remedy(self) -> Remedy:
-        """The remedy for the user."""
         todo: Any = type(self).todo
         return todo.filled(**vars(self)) if isinstance(todo, Remedy) else todo(self)
 
@@ -90,7 +80,6 @@ class Message:
 
     @property
     def values(self) -> tuple[Any, ...]:
-        """The values of the fields, in the order of the fields."""
         return tuple(getattr(self, field.name) for field in fields(self))
 
 
@@ -99,12 +88,9 @@ class WrongAxes(Message):
 
 
 class WrongMount(Message):
-    """The calibration belongs to another mount.
+    """The calibration belongs to another mount."""
 
-    judged: True if the log still shows how far the alignment is off.
-    """
-
-    judged: ClassVar[bool] = False
+    judged: ClassVar[bool] = False  # True if the log still shows how far the alignment is off
 
 
 def kind(
@@ -178,7 +164,7 @@ class InputError(Exception):
         return self.line()
 
     def line(self, page: bool = False) -> str:
-        """See Message.line()."""
+        """Return the text, see Message.line()."""
         return self.message.line(page)
 
 
@@ -197,7 +183,6 @@ class RefusedInput(InputError):
 
     @property
     def code(self) -> str:
-        """The code of the reason."""
         return self.message.code
 
     def at(self, where: str) -> "RefusedInput":
@@ -205,7 +190,6 @@ class RefusedInput(InputError):
         return RefusedInput(self.message, where, self.advice)
 
     def line(self, page: bool = False) -> str:
-        """See Message.line()."""
         line = f"{self.message.line(page)}{self.advice}"
         return f"{self.where}: {line}" if self.where else line
 

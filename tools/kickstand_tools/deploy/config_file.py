@@ -41,10 +41,9 @@ LONGEST_S = 60.0  # longest run time of a config.py, on a busy computer
 
 
 def cleaned(data: bytes) -> bytes:
-    """Convert a config.py to UTF-8 without a byte order mark, because MicroPython reads nothing else. Notepad and
-    PowerShell write byte order marks and UTF-16.
+    """Convert a config.py to UTF-8 without a byte order mark, because MicroPython reads nothing else.
 
-    Raises InputError for other encodings.
+    Notepad and PowerShell write byte order marks and UTF-16. Raises InputError for other encodings.
 
     >>> cleaned("\ufeffSIDE = 1".encode("utf-16")), cleaned(b"\xef\xbb\xbfSIDE = 1")
     (b'SIDE = 1', b'SIDE = 1')
@@ -80,8 +79,7 @@ def values(text: str) -> dict[str, str]:
 def with_values(text: str, wanted: dict[str, str | None]) -> str:
     """Write values into the text of a config.py, and return the new text. The rest of the text is kept.
 
-    wanted: New value of each setting, as written. None restores the default.
-
+    wanted: new value of each setting, as written. None restores the default.
     Raises InputError if a form cannot show the file (see values()), and if a value is invalid.
 
     >>> before = '# SIDE = "left"   # or "right"\\nRECORD = True\\n'
@@ -155,14 +153,10 @@ def _check(name: str, value: str) -> None:
 
 @dataclass(frozen=True)
 class Judged:
-    """The result of a check of a config.py.
+    """The result of a check of a config.py."""
 
-    fault: the reason why a board would refuse the file, with its line, or None.
-    unused: settings behind a '#' although their values differ from the defaults, each with its line.
-    """
-
-    fault: str | None
-    unused: list[str]
+    fault: str | None  # the reason why a board would refuse the file, with its line
+    unused: list[str]  # settings behind a '#' although their values differ from the defaults, each with its line
 
 
 def judge(path: Path, port: str, machine: str) -> Judged:
@@ -266,10 +260,7 @@ def default_settings() -> "Settings":
 
 
 def _unused(path: Path, port: str) -> list[tuple[int, str]]:
-    """Find lines "# NAME = value" whose value is not the default. The '#' was probably left in them by mistake.
-
-    Returns the number and the text of each line. port: the board's sys.platform.
-    """
+    """Find lines "# NAME = value" whose value is not the default. Returns the number and the text of each line."""
     defaults = default_settings()
     names = []
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
@@ -294,9 +285,7 @@ def _line_of(name: str, source: str) -> int | None:
 
 @contextlib.contextmanager
 def posed(port: str, machine: str) -> Iterator[None]:
-    """A context in which this process poses as a board. It cannot pose as another board later, because settings.py is
-    imported once.
-    """
+    """A context in which this process poses as a board, always the same one, because settings.py is imported once."""
     platform = sys.platform
     vars(sys.implementation)["_machine"] = machine
     # The simulated board provides the module `machine`

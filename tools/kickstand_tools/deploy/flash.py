@@ -22,23 +22,15 @@ _CHUNK = 2048  # bytes per transfer. With mpremote's default of 256 bytes, copyi
 
 @dataclass(frozen=True)
 class FlashResult:
-    """The result of flash().
+    """The result of flash()."""
 
-    board, port: the board with its version of MicroPython, and its port.
-    config: the config.py that was checked before copying, or None.
-    others: one line per file of another project that was kept under another name.
-    unused: settings in the user's config.py that are behind a '#'.
-    why_sources: the reason why the firmware was not compiled, or None.
-    update: the steps that were carried out.
-    """
-
-    board: str
+    board: str  # its name and its version of MicroPython
     port: str
-    config: Path | None
-    others: list[str]
-    unused: list[str]
-    why_sources: str | None
-    update: Update
+    config: Path | None  # the config.py that was checked before copying
+    others: list[str]  # one line per file of another project that was kept under another name
+    unused: list[str]  # settings in the user's config.py that are behind a '#'
+    why_sources: str | None  # the reason why the firmware was not compiled
+    update: Update  # the steps that were carried out
 
 
 def describe_supported(transport: SerialTransport, name: str) -> str:
@@ -70,11 +62,9 @@ def flash(
     """Update a board's files, verify them, and restart the board.
 
     replace_config: also replace the user's config.py.
-    progress: called with the progress.
     compiler: compiles a module; None uses cross_compiled().
     judge: checks a config.py; None uses config_file.judge(), which starts a process.
     agree: called with one line per file of another project that will be renamed. It may raise InputError.
-
     Raises InputError if the board cannot be updated. If the board has too little room, nothing is changed.
     """
     with connected(port) as (transport, name):
@@ -113,7 +103,6 @@ def install(transport: SerialTransport, update: Update, progress: Progress | Non
 
     main.py is removed first. The new main.py gets its name only after all files are verified. So after an interruption,
     the board starts nothing and can be flashed again. The board never runs a mixture of versions.
-
     Raises InputError if a file reads back differently, and OSError or TransportError if the connection fails.
     """
     for path, to in update.moves.items():

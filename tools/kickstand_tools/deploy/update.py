@@ -1,11 +1,10 @@
 """Lists the files on a board's flash, and plans an update: which files of another project to rename, which files and
 folders to remove and to create, and whether the free space is enough.
 
-The free space is computed from the rules of the file system littlefs. A file takes whole flash blocks. The blocks are
-freed when the file is removed, or when its replacement is closed. Each block after the first begins with pointers of
-4 bytes to earlier blocks (littlefs, DESIGN.md, "CTZ skip-lists"). A small file may be stored in the blocks of its
-folder. The limit for this is an eighth of a block, or less on some boards. A folder takes two blocks, and two more if
-its entries do not fit.
+The free space is computed from the rules of the file system littlefs. A file takes whole flash blocks, which are freed
+when the file is removed, or when its replacement is closed. Each block after the first begins with pointers of 4 bytes
+to earlier blocks (littlefs, DESIGN.md, "CTZ skip-lists"). A small file, up to an eighth of a block, may be stored in
+the blocks of its folder. A folder takes two blocks, and two more if its entries do not fit.
 """
 
 import ast
@@ -61,22 +60,16 @@ print((s[0], s[3]))
 """
 _RIDES = "/rides"  # folder of the rides in flash, see kickstand.rides.ride_files.directory()
 
-Fingerprint = tuple[int, bytes]
+Fingerprint = tuple[int, bytes]  # size in bytes and SHA-256 of a file
 
 
 @dataclass(frozen=True)
 class BoardFiles:
-    """The files on a board's flash.
+    """The files on a board's flash."""
 
-    files: size in bytes and SHA-256 of each file in the root and in the package, by path.
-    folders: the package's folder and the folders below it.
-    block, free_blocks: bytes of a flash block, and the number of free blocks.
-    has_rides: True if the flash contains rides.
-    """
-
-    files: dict[str, Fingerprint]
-    folders: frozenset[str]
-    block: int
+    files: dict[str, Fingerprint]  # of each file in the root and in the package, by path
+    folders: frozenset[str]  # the package's folder and the folders below it
+    block: int  # bytes of a flash block
     free_blocks: int
     has_rides: bool
 
@@ -123,18 +116,12 @@ _CORRECT_OR_REPLACE = Remedy(
 
 @dataclass(frozen=True)
 class Others:
-    """The files that were on a board, and the decisions about them.
+    """The files that were on a board, and the decisions about them."""
 
-    files: files and folders of the board, after renaming.
-    moves: new path of each file to rename, by its present path.
-    config: content that the user's config.py should have. None if there is none, or if it is renamed.
-    mended: True if `config` differs from the present content.
-    """
-
-    files: BoardFiles
-    moves: dict[str, str]
-    config: bytes | None
-    mended: bool
+    files: BoardFiles  # after renaming
+    moves: dict[str, str]  # new path of each file to rename, by its present path
+    config: bytes | None  # content that the user's config.py should have; None if there is none, or if it is renamed
+    mended: bool  # True if `config` differs from the present content
 
     def words(self) -> list[str]:
         """Return one line of text for each file to rename."""
@@ -157,9 +144,10 @@ def read_contents(transport: SerialTransport) -> Contents:
 
 
 def find_others(there: Contents, judge: Callable[[Path], Judged], replace_config: bool) -> Others:
-    """Decide which files to rename. judge: checks a config.py. replace_config: True if the user's will be replaced.
+    """Decide which files to rename. Raises InputError if the user's config.py would stop the firmware.
 
-    Raises InputError if the user's config.py would stop the firmware.
+    judge: checks a config.py.
+    replace_config: True if the user's config.py will be replaced.
     """
     installed = PACKAGE in there.files.folders
     leave = []
@@ -252,26 +240,16 @@ def least_blocks(size: int, block: int) -> int:
 
 @dataclass(frozen=True)
 class Update:
-    """The steps of an update, in their order. A board that is up to date needs none.
+    """The steps of an update, in their order after the moves. A board that is up to date needs none."""
 
-    moves: new paths of files of another project, by their present paths. They are renamed.
-    remove: files to remove, main.py first. obsolete: those that belong to no module of this version.
-    remove_folders: folders to remove, which are empty by then.
-    make_folders: folders to create.
-    copy: contents of the files to copy, by path, main.py last.
-
-    keep: files that stay unchanged.
-    config_differs: True if the user's config.py is kept and differs from this version's.
-    """
-
-    remove: list[str]
-    remove_folders: list[str]
+    remove: list[str]  # files to remove, main.py first
+    remove_folders: list[str]  # these are empty by then
     make_folders: list[str]
-    copy: dict[str, bytes]
-    obsolete: list[str]
-    keep: list[str]
-    config_differs: bool
-    moves: dict[str, str] = field(default_factory=dict)
+    copy: dict[str, bytes]  # contents of the files to copy, by path, main.py last
+    obsolete: list[str]  # the removed files that belong to no module of this version
+    keep: list[str]  # files that stay unchanged
+    config_differs: bool  # True if the user's config.py is kept and differs from this version's
+    moves: dict[str, str] = field(default_factory=dict)  # see Others
 
 
 def plan(
@@ -282,8 +260,8 @@ def plan(
     Files to replace are removed first, which frees their blocks. An interruption is harmless, because a board without
     main.py starts nothing and can be flashed again.
 
-    wanted: contents of the wanted files, by path. board: the files that are on the board.
-    replace_config: also replace the user's config.py. moves: see Update.
+    wanted: contents of the wanted files, by path.
+    replace_config: also replace the user's config.py.
     Raises InputError if a file of the user is in the way.
     """
     copy = {path: data for path, data in wanted.items() if board.files.get(path) != fingerprint(data)}
@@ -351,9 +329,7 @@ def _folders(path: str) -> list[str]:
 
 
 def _refuse_in_the_way(wanted: dict[str, bytes], folders: set[str], kept: set[str]) -> None:
-    """Raise InputError if MicroPython would import a user's file: lean/ instead of lean.py, or lean.py instead of
-    lean.mpy.
-    """
+    """Raise InputError if MicroPython would import the user's lean/ or lean.py instead of lean.mpy."""
     modules = {_module(path) for path in wanted}
     for path in sorted(kept):
         if path in folders or modules.intersection(_folders(path)):

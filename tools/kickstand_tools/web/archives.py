@@ -1,8 +1,7 @@
 """Collects what the pages need: packages for browsers from npm, and tools in ZIP files.
 
-npm/package-lock.json has the versions and hashes of MicroPython, CPython and the other packages. install_archive()
-packs the files with which browser_board.py talks to a board, rides_archive() those with which browser_rides.py shows a
-ride. The same content always gives the same ZIP file.
+npm/package-lock.json has the versions and hashes of MicroPython, CPython and the other packages. The same content
+always gives the same ZIP file.
 """
 
 import hashlib
@@ -99,7 +98,7 @@ def zipped(contents: Mapping[str, bytes]) -> bytes:
 def install_archive() -> bytes:
     """Pack what the browser needs to install the firmware and to read a board, in these folders:
 
-    tools/: the tools of `kickstand flash`, `record` and `pull`.
+    tools/: browser_board.py, with the tools of `kickstand flash`, `record` and `pull`.
     firmware/, compiled/: the firmware's sources, and compiled for every architecture in ARCHITECTURES.
     mpremote/, serial/: mpremote, and a replacement of pyserial.
     """
@@ -117,8 +116,7 @@ def firmware() -> bytes:
 def _compiled() -> dict[str, bytes]:
     """Compile the firmware for every architecture. Returns {compiled/ARCHITECTURE/... .mpy: content}.
 
-    The first architecture has all files, the others only those with machine code. Without a compiler the result is
-    empty, and the board gets the sources.
+    All but the first only have the files with machine code. Without a compiler, the board gets the sources.
     """
     sources = sorted(installation.PACKAGE.rglob("*.py"))
     first, *remaining = ARCHITECTURES
@@ -139,7 +137,7 @@ def _compiled() -> dict[str, bytes]:
 
 
 def rides_archive() -> bytes:
-    """Pack what the browser needs for `kickstand report` and `plot`: tools, the firmware's package, and libraries.
+    """Pack what browser_rides.py needs: tools, the firmware's package, and libraries.
 
     Markupsafe's compiled module is left out, because it also has this module in Python. Raises InputError if fitdecode
     or gpxpy is not installed.
@@ -157,10 +155,7 @@ def rides_archive() -> bytes:
 
 
 def numpy_archive(conda: bytes) -> tuple[bytes, bytes]:
-    """Extract numpy from its conda package of emscripten-forge.
-
-    Returns a ZIP file from which numpy can be imported, and the text of its licences.
-    """
+    """Return numpy from its conda package of emscripten-forge as an importable ZIP file, and its licences."""
     members, licences = {}, b""
     with tarfile.open(fileobj=io.BytesIO(conda)) as package:
         for entry in package:

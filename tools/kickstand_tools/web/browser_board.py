@@ -168,7 +168,7 @@ class Installation:
         """Install the firmware on the board. A config.py that the form cannot change is kept.
 
         wanted: the settings that check() accepted, in the same form.
-        progress: function that is called with (what, done, total). The numbers done and total are in bytes.
+        progress: called with (what, done, total), in bytes.
         Returns:
             board: the board in words.
             copied: number of files that were copied.
@@ -208,8 +208,7 @@ def status(line, name):
 def check(line, name, say):
     """Run `kickstand check`. say: called with each line of text during the check. Returns its output as "text"."""
     checked = board_check.check(BrowserBoard(line, name), say)
-    lines = [board_check.line(finding) for finding in checked.findings]
-    return {"text": "\n".join([*lines, board_check.verdict(checked.findings)])}
+    return {"text": "\n".join([*(finding.line for finding in checked.findings), checked.verdict])}
 
 
 # Rides. Modules that need numpy are imported in the functions, because the page Install has no numpy
@@ -246,13 +245,10 @@ class LiveStream:
         return {"notes": notes, "changed": stream.CHANGED in notes}
 
     def stop(self):
-        """End run()."""
         self._stopped.set()
 
     def files(self):
-        """Return [(name, content)] of the log and its calibration, as `kickstand record` writes them. Empty before the
-        first readings.
-        """
+        """Return [(name, content)] of the log and its calibration. Empty before the first readings."""
         from ..calibration.file import write_calibration
         from ..rides import ride_log
 

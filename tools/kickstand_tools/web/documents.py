@@ -13,13 +13,13 @@ from pathlib import Path
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
-from ...common import installation
-from ...common.markup import filled
+from ..common import installation
+from ..common.markup import filled
 
 FOLDER = "docs/"  # in the site
 ALL = "all.html"
 _BETWEEN = "--"  # separates a document's name from an anchor, on the page with all documents
-_TEMPLATE = Path(__file__).with_name("document.html")
+_TEMPLATE = Path(__file__).parent / "templates" / "document.html"
 _BIKE = "settings displays rides live cars your-own-code how-it-works what-it-costs limits".split()
 _COMPUTER = "recordings file-formats tracks-and-videos accuracy pages simulation fleets python security".split()
 # The documents in reading order: (title of the group, paths in the project)
@@ -42,8 +42,6 @@ Link = Callable[[str], str | None]
 
 @dataclass
 class Entry:
-    """A line in the list of documents."""
-
     title: str
     page: str
     path: str
@@ -51,8 +49,6 @@ class Entry:
 
 @dataclass
 class Heading:
-    """A heading of a document."""
-
     level: int  # 1 for the title
     name: str  # its anchor
     text: str  # its text without markup
@@ -60,8 +56,6 @@ class Heading:
 
 @dataclass
 class Document:
-    """A converted document."""
-
     title: str  # text of the first heading
     about: str  # text of the first paragraph
     headings: list[Heading]  # all headings except the title
@@ -78,11 +72,9 @@ def page_of(path: str) -> str:
 
 
 def document_files(home: str) -> dict[str, bytes]:
-    """Build the pages of all documents, one page with all of them together, and their pictures.
+    """Return {path in the site: content} of the documents' pages, one page with all of them, and their pictures.
 
-    home: the project's address, or "" if it is unknown. Then links to the project's other files and issues are left
-        out.
-    Returns {path in the site: content}.
+    home: the project's address. "" leaves out links to the project's other files and issues.
     """
     root = installation.documents()
     documents = {path: _converted(root, path, home) for path in PATHS}
@@ -159,8 +151,8 @@ def anchor(text: str) -> str:
 def converted(text: str, link: Link, picture: Callable[[str], str], deeper: int = 1, name: str = "") -> Document:
     """Convert a document in Markdown.
 
-    link(target): returns the address of a link, or None to keep only its words. picture(source): the address of a
-    picture.
+    link(target): returns the address of a link, or None to keep only its words.
+    picture(source): returns the address of a picture.
     deeper: is added to the levels of headings, because the site has its own first heading.
     name: prefix of all anchors if several documents share a page.
     """
@@ -200,7 +192,6 @@ def converted(text: str, link: Link, picture: Callable[[str], str], deeper: int 
 
 
 def _words(inline: Token) -> str:
-    """Return the text of an inline token, without markup."""
     return "".join(
         " " if token.type == "softbreak" else token.content
         for token in inline.children or []
