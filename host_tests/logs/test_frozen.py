@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from kickstand_tools.api import Log, replay
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.checks.log import check_log
-from kickstand_tools.checks.sensor import find_faulty, without_frozen
+from kickstand_tools.checks.log import check_log, find_faulty, without_frozen
 from kickstand_tools.common import installation
 from kickstand_tools.common.messages import sentence
 from kickstand_tools.logs.reader import read_log

@@ -60,7 +60,7 @@ def test_report_and_lean_are_those_of_the_commands(page, ride, calibration, tmp_
 def test_the_charts_are_those_of_the_command(page, ride, calibration):
     """The frame of the charts has no rights, and needs no scroll bar. The saved page needs no other file."""
     page.show(ride, calibration)
-    drawn = interactive.figure(charts.charts(overview(api.open_ride(ride, calibration, smoothed=True))))["data"]
+    drawn = interactive.charts_figure(charts.charts(overview(api.open_ride(ride, calibration, smoothed=True))))["data"]
     inside = page.page.frame_locator("#plot")
     chart = inside.locator("#chart")
     chart.locator(".main-svg").first.wait_for()

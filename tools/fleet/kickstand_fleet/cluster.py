@@ -84,7 +84,7 @@ class Cluster:
         keys = Security.temporary() if self._address is None else None
 
         class Undisturbed(WorkerPlugin):
-            """Makes workers ignore Ctrl-C in a terminal. The main process ends the workers instead."""
+            """Makes workers ignore Ctrl-C in a terminal. The main process ends them."""
 
             def setup(self, worker: Any) -> None:
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -236,9 +236,9 @@ class Cluster:
 
 @contextlib.contextmanager
 def _without_interrupts() -> Iterator[None]:
-    """A context that defers Ctrl-C to its end. Processes that are started in the context never receive Ctrl-C.
+    """A context that defers Ctrl-C to its end, because Dask would print pages of errors.
 
-    Without this context, an interrupt while Dask starts or connects would make Dask print pages of errors.
+    Processes that are started in the context never receive Ctrl-C.
     """
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield

@@ -155,9 +155,7 @@ def blocks(logs: list[Intervals]) -> Blocks:
 def fits(square: Array, product: Array) -> tuple[Array, Array]:
     """Solve k systems of normal equations with t terms.
 
-    Args:
-        square: See Blocks, shape (k, t, t).
-        product: See Blocks, shape (k, t, 3).
+    square, product: See Blocks, shapes (k, t, t) and (k, t, 3).
 
     Returns:
         coefficients: level, forward, left and, if t is 4, arm, shape (k, t, 3).
@@ -182,13 +180,9 @@ def frames(coefficients: Array, varied: Array) -> Array:
 def alignment(square: Array, product: Array) -> tuple[Array, Array]:
     """Compute the alignment from m blocks, and its variance by a jackknife: from the alignments without each block.
 
-    Args:
-        square: See Blocks, shape (m, t, t).
-        product: See Blocks, shape (m, t, 3).
-
-    Returns:
-        frame: rotation from sensor to vehicle axes, shape (3, 3), with the rows left, up, forward.
-        variance: of pitch, yaw and roll, shape (3), in degrees^2.
+    square, product: See Blocks, shapes (m, t, t) and (m, t, 3).
+    Returns the rotation from sensor to vehicle axes, shape (3, 3), with the rows left, up, forward, and the variances
+    of pitch, yaw and roll, shape (3), in degrees^2.
     """
     squares, products, count = np.sum(square, axis=0), np.sum(product, axis=0), len(square)
     frame = frames(*fits(squares, products))
@@ -210,9 +204,8 @@ def frame_of(up: Array, ahead: Array) -> Array:
 def handedness(coefficients: Array, varied: Array) -> float:
     """Divide the lateral force measured in bends by the lateral force computed from speed and yaw rate.
 
-    The ratio is about 1. The ratio is about -1 if the gyro's signs or the axes are mirrored. The ratio is 0 without
-    bends, and for a motorcycle, because a motorcycle leans into bends. The arguments are the two results of fits(),
-    with k left out.
+    The ratio is about 1, or -1 if the gyro's signs or the axes are mirrored. It is 0 without bends, and for a
+    motorcycle, which leans into bends. The arguments are the two results of fits() for one system.
     """
     if varied[1] < 0.05:
         return 0.0
@@ -224,12 +217,11 @@ def handedness(coefficients: Array, varied: Array) -> float:
 def _without_road(log: Intervals) -> tuple[Array, Array]:
     """Return the terms and the force with the slope and camber of the road filtered out.
 
-    Slope and camber stay similar for some hundred metres. Slope and camber tilt the measured level, so neighbouring
-    intervals share an error. An ordinary regression would mistake the slope during braking for a part of forward.
-
-    Therefore a filter follows the road, modelled as a first-order Gauss-Markov process in distance. The filter predicts
-    each value from the earlier intervals. The function returns the differences from the predictions, divided by their
-    standard deviations. The differences are uncorrelated, so ordinary least squares can be used on them.
+    Slope and camber stay similar for some hundred metres, and tilt the measured level. An ordinary regression would
+    mistake the slope during braking for a part of forward. Therefore a filter follows the road, modelled as a
+    first-order Gauss-Markov process in distance, and predicts each value from the earlier intervals. The results are
+    the differences from the predictions, divided by their standard deviations. They are uncorrelated, so ordinary least
+    squares can be used on them.
     """
     rows = np.hstack((log.terms, log.force))
     driven_m = log.speed * np.diff(log.t_s, prepend=log.t_s[0])

@@ -15,7 +15,7 @@ from kickstand_tools.calibration.drive import DriveFit, fit_logs, usable
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.calibration.refusals import Uncertain, of_firmware
 from kickstand_tools.checks.axes import LeftHanded
-from kickstand_tools.checks.sensor import AccelClipped, AxisDead, FrozenReadings, GyroSaturated
+from kickstand_tools.checks.log import AccelClipped, AxisDead, FrozenReadings, GyroSaturated
 from kickstand_tools.common.messages import InputError, RefusedInput, cause
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import CutLine

@@ -181,8 +181,8 @@ class Lcd:
         return True
 
     def read_byte(self):
-        """Read the eight pins. While R/W and E are high, D7..D4 have the busy flag and address counter, high nibble
-        first."""
+        """Read the eight pins. While R/W and E are high, D7..D4 carry the busy flag and the address counter. The high
+        nibble comes first."""
         port = self._port
         if self.wiring != 1:
             return self._raw

@@ -88,7 +88,7 @@ def commands(legs: list[Leg], rate_hz: float) -> RiderCommands:
 
 
 def _fill_in(legs: list[Leg], name: str) -> list[float]:
-    """Return one value per leg, and the previous leg's value, or 0, in place of None."""
+    """Return one value per leg. None is replaced by the previous leg's value, in the first leg by 0."""
     filled, current = [], 0.0
     for leg in legs:
         value = getattr(leg, name)

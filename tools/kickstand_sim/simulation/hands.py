@@ -30,7 +30,7 @@ def seven(chance: np.random.Generator, chip: Chip, temp_c: float) -> list[NDArra
 def ups(chance: np.random.Generator) -> Iterator[NDArray[np.float64]]:
     """Yield the vertical in each of seven poses, as a unit vector in the sensor's axes, shape (3).
 
-    The first six poses have each side up once, in random order and tilted by up to 4 degrees. The seventh is slanted.
+    The first six poses have each side up once, in random order and tilted a little. The seventh is slanted.
     """
     for side in chance.permutation(6):
         up = chance.standard_normal(3)

@@ -17,7 +17,7 @@ from kickstand.lean.meter import HELD_US
 from kickstand.units import GAP_US, LOST_US
 
 from ..calibration.mount import ForwardExchanged
-from ..checks.sensor import FrozenReadings
+from ..checks.log import FrozenReadings
 from ..common.messages import Message
 from ..logs.source import Progress
 from ..signals import Array, Bools, smoothed

@@ -9,8 +9,7 @@ import numpy as np
 from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE, DriveAlignment, compare, yaw_deg
 from kickstand.errors import Refusal
 
-from ..checks.log import read_with_notices
-from ..checks.sensor import without_frozen
+from ..checks.log import read_with_notices, without_frozen
 from ..common.messages import InputError, Message, RefusedInput
 from ..logs.log import Log, Source
 from ..logs.source import Progress

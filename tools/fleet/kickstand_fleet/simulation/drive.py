@@ -80,12 +80,10 @@ def random_route(
 
 
 class _Legs:
-    """Collects the legs of a route. knots: time and speed at the end of each leg, and its lateral acceleration."""
-
     def __init__(self, chance: np.random.Generator, handling: Handling) -> None:
         self.chance, self._handling = chance, handling
         self.seconds = self.speed = 0.0
-        self.knots = [(0.0, 0.0, 0.0)]
+        self.knots = [(0.0, 0.0, 0.0)]  # time and speed at the end of each leg, and its lateral acceleration
 
     def leg(self, seconds: float, speed: float | None = None, lateral_mps2: float = 0.0) -> None:
         self.seconds += seconds
@@ -200,11 +198,7 @@ def drive_log(
 
 
 def _readings(chance: np.random.Generator, kind: str, route: Route) -> tuple[Array, Array]:
-    """Compute the readings of a sensor without errors, along the vehicle's left, up and forward.
-
-    Returns:
-        force: specific force, shape (n, 3), in m/s2.
-        rate: angular rate, shape (n, 3), in rad/s.
+    """Compute a perfect sensor's forces in m/s2 and rates in rad/s along left, up and forward, shape (n, 3) each.
 
     Two simplifications make this function hundreds of times faster than kickstand_sim.simulation.physics. Pitch and
     slope are treated as small angles, because both are under 5 degrees. The sensor is on the axis about which the body

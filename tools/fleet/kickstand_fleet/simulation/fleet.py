@@ -78,15 +78,10 @@ def make_fleet(
     One third of the vehicles are cars, one third buses, and one third motorcycles. Each vehicle has one to three
     drives. The same seed always gives the same fleet.
 
-    Args:
-        out: The directory.
-        vehicles: Number of vehicles.
-        seed: Seed of the random numbers.
-        seconds: Approximate duration of each drive.
-        rate_hz: Samples per second.
-        troubles: The fault of each vehicle, a key of TROUBLES, or "". None draws faults at random, with the shares of
-            TROUBLES.
-        progress: Function that is called with the number of finished vehicles and the number of all.
+    seconds: Approximate duration of each drive.
+    rate_hz: Samples per second.
+    troubles: The fault of each vehicle, a key of TROUBLES, or "". None draws faults with the shares of TROUBLES.
+    progress: Function that is called with the number of finished vehicles and the number of all.
 
     Raises InputError if the directory cannot be written.
     """

@@ -65,7 +65,7 @@ class Bike:
         return replace(bike, squat_deg_per_g=0.46 * bike.dive_deg_per_g)
 
     def dive(self, acceleration: Signal, rate_hz: float) -> Signal:
-        """Compute the pitch of the chassis on its springs in rad, nose up positive, from the acceleration in m/s2."""
+        """Compute the pitch of the chassis on its springs in rad, nose up positive, from its forward acceleration."""
         per_g = np.where(acceleration < 0.0, self.dive_deg_per_g, self.squat_deg_per_g)
         pushed = np.radians(per_g) * acceleration / STANDARD_GRAVITY
         return second_order(pushed, self.dive_hz, self.dive_damping, rate_hz)

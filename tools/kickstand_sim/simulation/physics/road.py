@@ -113,9 +113,8 @@ def vibration(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Simulate the engine's vibration along left, up and forward: force in m/s2 and rates in rad/s, shape (n, 3) each.
 
-    running: 1 while the engine runs, otherwise 0, shape (n). rms_g: along each axis at 6000/min, before the chip's
-        filter.
-    shift_rpm: engine speed at which the rider changes up.
+    running: 1 while the engine runs, otherwise 0, shape (n).
+    rms_g: along each axis at 6000/min, before the chip's filter.
     """
     rpm = crank_rpm(speed, shift_rpm, rate_hz)
     turns = integral(rpm / 60.0, rate_hz)

@@ -59,7 +59,10 @@ def second_order(x: Signal, natural_hz: float, damping: float, rate_hz: float) -
 
 
 def band_noise(chance: np.random.Generator, n: int, low_hz: float, high_hz: float, rate_hz: float) -> Signal:
-    """Return n samples of normal noise with an rms of 1, filtered with second order outside the two frequencies."""
+    """Return n samples of normally distributed noise between two frequencies, with an rms of 1.
+
+    Outside these frequencies, the amplitude falls as with a second-order filter.
+    """
 
     def transfer(f: Signal) -> NDArray:
         low = (f / low_hz) ** 2

@@ -36,10 +36,7 @@ _ENGINE_SHARE = 0.5  # share of vibration_g that comes from the engine
 
 
 class Segment:
-    """A part of the ride, in which lean, speed, slope, sway and engine change smoothly to new values.
-
-    A value of None stays unchanged.
-    """
+    """A part of the ride, in which lean, speed, slope, sway and engine change smoothly to values that are not None."""
 
     def __init__(self, phase, seconds, lean_deg=None, speed_mps=None, slope_deg=None, sway_deg=None, engine=None):
         self.phase = phase
@@ -48,10 +45,7 @@ class Segment:
 
 
 def kickstand(seconds, lean_deg=KICKSTAND_DEG, slope_deg=None):
-    """Lean the bike onto its kickstand and leave it there, with the engine off.
-
-    lean_deg: lean on the kickstand, positive if the kickstand is on the right.
-    """
+    """Lean the bike onto its kickstand and leave it there, with the engine off."""
     return Segment("moving", MOVE_S, lean_deg, 0.0, slope_deg, 0.0, 0.0), Segment("kickstand", seconds)
 
 
@@ -84,14 +78,10 @@ def brake(speed_mps, seconds):
 
 
 def yaw_rate_in_balance(lean, lift_mps2, speed_mps):
-    """Return the yaw rate that balances a lean, in rad/s about the road's normal. The yaw rate is negative in a right
-    turn.
+    """Return the yaw rate that balances a lean in rad, in rad/s about the road's normal.
 
-    Below RIDING_MPS the feet help to balance, so the yaw rate is smaller. Below WALKING_MPS the yaw rate is 0.
-
-    lean: Lean in rad, positive to the right.
     lift_mps2: Specific force perpendicular to the road.
-    speed_mps: Speed.
+    Below RIDING_MPS the feet help to balance, so the yaw rate is smaller. Below WALKING_MPS the yaw rate is 0.
     """
     if speed_mps <= WALKING_MPS:
         return 0.0
@@ -129,8 +119,7 @@ class Ride:
     """A scripted ride. It starts with the values of its first segment.
 
     segments: Results of the functions above, in order from t = 0.
-    vibration_g: Vibration of road and engine together along the up axis at 10 m/s or more, rms, before the chip's
-        filter.
+    vibration_g: Vibration along the up axis at 10 m/s or more, rms, before the chip's filter.
     """
 
     def __init__(self, segments, vibration_g=0.05):

@@ -30,10 +30,7 @@ def scrambled(number):
 
 
 def normal(number):
-    """Compute a random number from a 32-bit hash, as the sum of its four bytes.
-
-    The distribution of these numbers is nearly normal, with the mean 0 and the rms 1.
-    """
+    """Compute a nearly normal number with the mean 0 and the rms 1 from the four bytes of a hash."""
     total = (number & 255) + (number >> 8 & 255) + (number >> 16 & 255) + (number >> 24)
     return (total - 510) / 147.8
 
@@ -97,10 +94,7 @@ class Sensor:
             self.gyro_scale = tuple([1.0 + chance.uniform(-error, error) for _ in range(3)])
 
     def read(self, motion, t_s):
-        """Return the reading at the time t_s, the seven numbers of world().
-
-        motion: true specific force along left, up, forward in g, and rates about these axes in deg/s.
-        """
+        """Return the seven numbers of world() at t_s. motion: what a perfect sensor measures, see Ride.motion()."""
         m = self.vehicle_from_sensor
         left, up, forward, w_left, w_up, w_forward = motion
         instant = self._seed + int(t_s / _NOISE_STEP_S + 0.5) * 6

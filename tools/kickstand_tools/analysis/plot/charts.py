@@ -1,6 +1,6 @@
 """The charts of a ride as data: traces, units, colours and ranges.
 
-picture.py draws the charts with matplotlib. interactive.py passes the same charts to plotly.
+page.py draws the charts with matplotlib. interactive.py passes the same charts to plotly.
 """
 
 from dataclasses import dataclass, field
