@@ -130,7 +130,7 @@ def _turn_between(a: NDArray, b: NDArray) -> NDArray:
 
 
 def _rotation_vector(m: NDArray) -> NDArray:
-    """Convert a rotation matrix to a rotation vector in rad, by its quaternion, which is exact for half turns, too."""
+    """Convert a rotation matrix to a rotation vector in rad, by its quaternion, also for a turn by 180 degrees."""
     symmetric = [
         [m[0, 0] - m[1, 1] - m[2, 2], m[1, 0] + m[0, 1], m[2, 0] + m[0, 2], m[2, 1] - m[1, 2]],
         [m[1, 0] + m[0, 1], m[1, 1] - m[0, 0] - m[2, 2], m[2, 1] + m[1, 2], m[0, 2] - m[2, 0]],
