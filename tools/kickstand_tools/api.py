@@ -9,7 +9,8 @@
     stops = api.find_stops(api.vehicle_channels("RIDE.csv.gz", two.calibration))
 
 A log is a path, an open file of text or bytes, a Log made of arrays, or a Stretch of any of these. to_pandas() converts
-a table. Slow functions accept `progress`, a function that is called with (done, total).
+a table. Slow functions accept `progress`, a function that is called with (done, total). The examples use the names of
+this module, and numpy as np.
 
 The text of an InputError is one line: what is wrong with the input, and what to do. Its subclass RefusedInput has the
 reason as a Message. Notices are Messages too. A Message has a code and named fields, and sentence() returns its text.

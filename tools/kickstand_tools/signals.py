@@ -1,7 +1,4 @@
-"""Functions on arrays of samples: means, integrals, bins of time, lag and correlation, rotations, and distances.
-
-The functions use only numpy, neither logs nor files.
-"""
+"""Functions on arrays of samples: means, bins of time, lags, rotations and distances. They use only numpy."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -213,10 +210,7 @@ def best_lag(
 
 
 def peak_offset(three: Array) -> float:
-    """Find the maximum of the parabola through three neighbouring values.
-
-    Returns its distance from the middle value, in steps, from -0.5 to 0.5.
-    """
+    """Find the maximum of the parabola through three neighbouring values, in steps from the middle one, -0.5 to 0.5."""
     first, middle, last = three
     bend = first - 2.0 * middle + last
     return float(np.clip(0.5 * (first - last) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
@@ -248,8 +242,7 @@ def correlations(first: Array, first_good: Bools, second: Array, second_good: Bo
 def log_likelihood_ratio(correlation: Array, count: Array, per_sample: float) -> Array:
     """Compute the evidence that two signals belong together, as the natural logarithm of a likelihood ratio.
 
-    The ratio is the likelihood of two normal signals with this correlation, divided by the likelihood of two
-    independent signals. The result is 0 for a negative correlation.
+    It compares two normal signals with this correlation to two independent signals. It is 0 for a negative correlation.
 
     correlation, count: see correlations().
     per_sample: number of independent values per sample.
@@ -321,10 +314,7 @@ EARTH_M = 6_371_000.0
 
 
 def distance_m(lat: Array, lon: Array, next_lat: Array, next_lon: Array) -> tuple[Array, Array]:
-    """Return how far east and north the next positions are, in m. It is exact enough for some kilometres.
-
-    lat, lon, next_lat, next_lon: positions, shape (n), in degrees.
-    """
+    """Return how far east and north the next positions, in degrees, are, in m; exact enough for some kilometres."""
     apart_deg = (next_lon - lon + 180.0) % 360.0 - 180.0  # correct also across the meridian of 180 degrees
     east = np.radians(apart_deg) * np.cos(np.radians(lat)) * EARTH_M
     return east, np.radians(next_lat - lat) * EARTH_M

@@ -1,34 +1,25 @@
 """Writes a ride in the format of another program, or with Kickstand's own columns as CSV or Apache Parquet.
 
 The own columns are the calibrated log in the vehicle's axes, and the lean that the display shows. In Parquet, the
-metadata of each field has its unit. pandas.read_parquet opens the file:
-https://arrow.apache.org/docs/python/parquet.html
+metadata of each field has its unit.
 
-GPX 1.1 is for maps, route planners and programs that put data on videos: https://www.topografix.com/GPX/1/1/. Each
-position of the log becomes a track point. GPX 1.1 has no element for the speed, so the speed is written in Garmin's
+GPX 1.1, https://www.topografix.com/GPX/1/1/: each position of the log becomes a track point. The speed is in Garmin's
 TrackPointExtension, https://www8.garmin.com/xmlschemas/TrackPointExtensionv2.xsd. A lean that the meter trusts, > 0 to
-the right, is written in Kickstand's own element.
+the right, is in Kickstand's own element.
 
-CSV v3 is the table that RaceChrono exports and related programs read. The file has metadata, a blank line, and three
-heading lines: names, units, and sources. A cell is empty if its source has no new value. Names and units are the same
-as in RaceChrono's own files: see https://github.com/ClassicMiniDIY/UltraLog/pull/85 and
-https://apexlog.io/blog/what-to-do-with-racechrono-data. Also https://racechrono.com/article/2572 gives acc in G and
-gyro in deg/s. As in RaceChrono's files, lateral_acc is positive in a left turn, and longitudinal_acc when speeding up.
+CSV v3 is the table that RaceChrono exports. The file has metadata, a blank line, and three heading lines: names, units,
+and sources. A cell is empty if its source has no new value. Names and units are those of RaceChrono's own files: see
+https://github.com/ClassicMiniDIY/UltraLog/pull/85, https://apexlog.io/blog/what-to-do-with-racechrono-data, and
+https://racechrono.com/article/2572 (acc in G, gyro in deg/s). As there, lateral_acc is positive in a left turn, and
+longitudinal_acc when speeding up.
 
 VBO is Racelogic's, which Circuit Tools opens and RaceChrono imports. Sections and standard channels follow
 https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.html. All other channels have units.
 Columns and signs follow https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and the user guide
-of the VBOX HD Lite:
-
-* time: HHMMSS.SS; velocity: km/h
-* latitude and longitude: minutes, north and west positive
-* heading: degrees clockwise from north
-* long accel: positive forward; lat accel: positive to the left
-* other channels: with mantissa and exponent
-
-A log does not contain the number of satellites. The file says 4, because a position needs at least 4. Without a
-position, satellites and position are written as 0. VBO requires a velocity. If the log has no speed, it is 0, and a
-comment in the file says so.
+of the VBOX HD Lite: time HHMMSS.SS; velocity in km/h; latitude and longitude in minutes, north and west positive;
+heading in degrees clockwise from north; long accel positive forward, lat accel positive to the left. A log does not
+contain the number of satellites. The file says 4, which a position needs, or 0 without a position. VBO requires a
+velocity. If the log has no speed, it is 0, and a comment in the file says so.
 """
 
 import gzip
@@ -225,7 +216,7 @@ class _Heading:
         self._last = np.full((3, 1), np.nan)  # latitude, longitude and heading of the last row of the previous block
 
     def of(self, lat_deg: Array, lon_deg: Array) -> Array:
-        """Return the heading from the previous row to each row, shape (n), in degrees clockwise from north.
+        """Return the heading from the previous row to each row, in degrees clockwise from north.
 
         If two rows have the same position, the heading of the previous row is kept. The first row with a position has
         the heading of the second row.
@@ -288,7 +279,6 @@ _FINE = ("t_s", "lat_deg", "lon_deg", "utc_s")  # 64-bit floats, because a 32-bi
 
 
 def write_csv(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """Write CSV, gzipped if the name ends in .gz."""
     opened = gzip.open if path.suffix == ".gz" else open
     digits = [digit for digit, _ in COLUMNS.values()]
     with opened(path, "wb") as file:
@@ -325,8 +315,6 @@ def export(ride: Ride, form: str, out: Path | str, progress: Progress | None = N
     """Write a ride of open_ride() to a file. Returns the number of rows. See export_with_notices().
 
     >>> import tempfile
-    >>> import numpy as np
-    >>> from kickstand_tools.api import CalibrationFile, Log, open_ride
     >>> log = Log(np.arange(300) / 100.0, np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3)))
     >>> with tempfile.TemporaryDirectory() as directory:
     ...     export(open_ride(log, CalibrationFile(aligned=True)), "csv", f"{directory}/ride.csv")
@@ -344,7 +332,6 @@ def export_with_notices(
     gives. A board without a receiver has no clock. Its ride is assumed to end when the log's file was last written.
 
     form: "csv" (gzipped if `out` ends in .gz), "gpx", "parquet", "racechrono" or "vbo".
-    progress: called with (done, total) of the log's samples.
     Returns the number of rows, and remarks about the log. Raises InputError.
     """
     name, library = _NEEDS.get(form, ("", ""))

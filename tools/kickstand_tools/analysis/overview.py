@@ -46,41 +46,29 @@ class Peak:
 
 @dataclass
 class Summary:
-    """A ride in numbers. Call add() block by block.
-
-    The maxima of lean and force count only while the display would show the lean.
-
-    duration_s: time from the first to the last sample.
-    left_deg, right_deg: largest lean to each side that lasted for HELD_S.
-    brake_g, accel_g: largest forces, smoothed as on the display.
-    riding_s: time in which the lean filter finds no rest. Unlike Overview.riding_s, it includes stops with a shaking
-        engine.
-    beyond_s: time at or above each lean. The key is the lean in degrees.
-    histogram_s: time at the leans of each bin of BINS_DEG, while riding with a trusted lean.
-    not_sure_s: time in which the display would not show the lean.
-    missing_s: total length of the gaps in the readings. A gap is longer than LOST_US and 4 usual steps.
-    frozen_s: the part of missing_s with frozen readings.
-    """
+    """A ride in numbers. Call add() block by block. Maxima of lean and force count only where a lean is shown."""
 
     samples: int = 0
-    duration_s: float = 0.0
-    left_deg: Peak = field(default_factory=Peak)
-    right_deg: Peak = field(default_factory=Peak)
-    brake_g: Peak = field(default_factory=Peak)
-    accel_g: Peak = field(default_factory=Peak)
+    duration_s: float = 0.0  # time from the first to the last sample
+    left_deg: Peak = field(default_factory=Peak)  # largest lean to the left that lasted for HELD_S
+    right_deg: Peak = field(default_factory=Peak)  # largest lean to the right that lasted for HELD_S
+    brake_g: Peak = field(default_factory=Peak)  # largest force backward, smoothed as on the display
+    accel_g: Peak = field(default_factory=Peak)  # largest force forward, smoothed as on the display
     speed_mps: Peak = field(default_factory=Peak)
+    # time in which the lean filter finds no rest. Unlike Overview.riding_s, it includes stops with a shaking engine.
     riding_s: float = 0.0
+    # time at or above each lean in degrees
     beyond_s: dict[float, float] = field(default_factory=lambda: dict.fromkeys(LEANS_DEG, 0.0))
+    # time at the leans of each bin of BINS_DEG, while riding with a trusted lean
     histogram_s: Array = field(default_factory=lambda: np.zeros(len(BINS_DEG) - 1))
-    not_sure_s: float = 0.0
-    missing_s: float = 0.0
-    frozen_s: float = 0.0
+    not_sure_s: float = 0.0  # time in which the display would not show the lean
+    missing_s: float = 0.0  # total length of the gaps in the readings, each longer than LOST_US and 4 usual steps
+    frozen_s: float = 0.0  # the part of missing_s with frozen readings
     _begin_s: float = 0.0
     _last_t_s: Array = field(default_factory=lambda: np.zeros(0))  # the last samples of the previous block
     _last_deg: Array = field(default_factory=lambda: np.zeros(0))
 
     def add(self, block: Channels) -> None:
-        """Add the next part of the ride."""
         t = block.t_s
         self._begin_s = t[0] if not self.samples else self._begin_s
         step = np.diff(t, prepend=self._begin_s + self.duration_s)
@@ -124,8 +112,6 @@ class Summary:
 def summary(channels: Channels) -> Summary:
     """Summarise a ride in numbers, from its channels (see vehicle_channels).
 
-    >>> import numpy as np
-    >>> from kickstand_tools.api import CalibrationFile, Log, vehicle_channels
     >>> log = Log(np.arange(251) / 100.0, np.tile([0.0, 1.0, 0.0], (251, 1)), np.zeros((251, 3)))
     >>> total = summary(vehicle_channels(log, CalibrationFile(aligned=True)))
     >>> total.samples, total.duration_s, total.speed_mps.time_s
@@ -174,12 +160,7 @@ class LeanCost:
 
 
 def lean_cost(quality: Quality) -> LeanCost:
-    """Return the errors of a motorcycle's shown lean that these errors of the axes cause.
-
-    >>> cost = lean_cost(Quality(0.2, None, 5.1, 1.0, 60.0, np.zeros(1), np.zeros(1)))
-    >>> cost.roll_deg, cost.pitch_deg, round(cost.yaw_deg, 2)
-    (0.0, None, 0.27)
-    """
+    """Return the errors of a motorcycle's shown lean that these errors of the axes cause."""
 
     roll, pitch, yaw = quality.roll_deg, quality.pitch_deg, quality.yaw_deg
     return LeanCost(
@@ -195,11 +176,7 @@ def yaw_cost_deg(yaw_deg: float) -> float:
 
 
 def quality(ride: Channels, standing: Bools) -> Quality:
-    """Compute the Quality from a whole ride.
-
-    ride: evenly spaced samples (see downsampled()).
-    standing: True where the vehicle stands still, shape (n).
-    """
+    """Compute the Quality from a whole ride of evenly spaced samples, and where the vehicle stands still in it."""
     step_s = spacing_s(ride)
     n = min(max(1, round(SMOOTH_S / step_s)), len(ride.t_s))
     count = len(ride.t_s) // n
@@ -241,24 +218,17 @@ MOVES_MPS = 1.0
 
 @dataclass
 class Overview:
-    """The data of a ride for its report and its pictures.
-
-    summary: summary of all samples.
-    course: channels averaged over RATE_S. Columns that neither report nor pictures need are NaN; vehicle_channels() has
-        them.
-    stops: stops as in a brake test; empty if forward and backward are exchanged.
-    quality: how far the aligned axes seem to be off.
-    riding_s: time without the standstills of standing(), in s, as shown by `report`.
-    notices: remarks about the log, and contradictions to the calibration.
-    """
+    """The data of a ride for its report and its pictures."""
 
     ride: Ride
-    summary: Summary
+    summary: Summary  # of all samples
+    # channels averaged over RATE_S. Columns that neither report nor pictures need are NaN; vehicle_channels() has
+    # them.
     course: Channels
-    stops: list[Stop]
-    quality: Quality
-    riding_s: float
-    notices: list[Message]
+    stops: list[Stop]  # as in a brake test; empty if forward and backward are exchanged
+    quality: Quality  # how far the aligned axes seem to be off
+    riding_s: float  # time without the standstills of standing(), in s, as shown by `report`
+    notices: list[Message]  # remarks about the log, and contradictions to the calibration
 
     @property
     def exchanged(self) -> Message | None:
@@ -272,14 +242,10 @@ class Overview:
 
 
 def overview(ride: Ride, progress: Progress | None = None, keep: Callable[[Array], None] | None = None) -> Overview:
-    """Read a ride of open_ride() part by part, so the memory hardly grows with the ride's length.
+    """Read a ride of open_ride() part by part, so the memory hardly grows with the ride's length. Raises InputError.
 
-    progress: called with (done, total) of the log's samples.
     keep: called with the smoothed lean of successive samples, see Ride.read().
-    Raises InputError.
 
-    >>> import numpy as np
-    >>> from kickstand_tools.api import CalibrationFile, Log, open_ride
     >>> log = Log(np.arange(251) / 100.0, np.tile([0.0, 1.0, 0.0], (251, 1)), np.zeros((251, 3)))
     >>> seen = overview(open_ride(log, CalibrationFile(aligned=True)))
     >>> seen.summary.duration_s, seen.stops

@@ -261,6 +261,5 @@ def peak_words(peak: Peak, form: str) -> tuple[str, str]:
 
 
 def angles(quality: Quality) -> list[str]:
-    """Return the known angles in words."""
     named = {"roll": quality.roll_deg, "pitch": quality.pitch_deg, "yaw": quality.yaw_deg}
     return [f"{name} {value:+z.1f}°" for name, value in named.items() if value is not None]

@@ -1,7 +1,7 @@
 """A recorded ride, which is a log with its calibration, in the vehicle's axes, part by part.
 
-The lean of each sample is the displayed lean or the smoothed lean. numpy computes everything that does not depend on
-earlier samples. A test compares these values with the firmware's values.
+The lean of each sample is the displayed or the smoothed lean. numpy computes everything that does not depend on earlier
+samples. A test compares these values with the firmware's values.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -75,10 +75,7 @@ class Channels(Table):
 
     @property
     def trusted(self) -> Bools:
-        """True where the display shows the lean and updates its maxima, shape (n).
-
-        A smoothed lean is trusted if its standard deviation is small, and the lean is under FALLEN_DEG.
-        """
+        """True where the display shows the lean and updates its maxima: a sure lean under FALLEN_DEG."""
         return (self.sure > 0.0) & ~(np.abs(self.lean_deg) >= FALLEN_DEG)
 
     @property
@@ -154,7 +151,6 @@ def thinned(course: Channels, step_s: float) -> Channels:
 
 
 def spacing_s(course: Channels) -> float:
-    """Return the median time between samples, in s."""
     return float(np.median(np.diff(course.t_s))) if len(course.t_s) > 1 else 1.0
 
 
@@ -184,7 +180,6 @@ def rounded_to(t_s: Array, step_s: float) -> Array:
 
 
 def _stretches(t_s: Array, step_s: float, rounded: bool = False) -> Array:
-    """Return the number of each sample's stretch."""
     return np.floor(t_s / step_s + 0.5 * rounded + 1e-6)
 
 
@@ -235,7 +230,6 @@ class LogTrack:
 
 
 def track(part: Channels | Log) -> LogTrack:
-    """Return the positions in a ride, in a part of it, or in a log."""
     valid = np.isfinite(part.lat_deg) & np.isfinite(part.lon_deg)
     return LogTrack(part.t_s[valid], part.lat_deg[valid], part.lon_deg[valid])
 
@@ -260,7 +254,7 @@ AbsurdReadings = kind(
 
 @dataclass
 class Ride:
-    """A checked log and its calibration. smoothed: True to use the smoothed lean, False for the displayed lean."""
+    """A checked log and its calibration. smoothed: True to use the smoothed lean, False for the displayed."""
 
     checked: CheckedLog
     calibration: CalibrationFile
@@ -268,17 +262,14 @@ class Ride:
 
     @property
     def log(self) -> Log:
-        """The whole log, even if the ride is a stretch of it."""
         return self.checked.log
 
     @property
     def name(self) -> str:
-        """The log's name, with its path if it has one."""
         return self.log.name
 
     @property
     def stem(self) -> str:
-        """The name without path and suffixes."""
         return log_stem(self.name)
 
     @property
@@ -292,7 +283,6 @@ class Ride:
     def read(self, progress: Progress | None = None, keep: Callable[[Array], None] | None = None) -> "RideReading":
         """Compute the channels of the ride.
 
-        progress: called with (done, total) of the log's samples.
         keep: called with the values of estimation.smooth.COLUMNS of successive samples, if the lean is smoothed.
         """
         return RideReading(self, progress, keep)
@@ -309,10 +299,7 @@ class RideReading:
         self._slow = False
 
     def parts(self) -> Iterator[Channels]:
-        """Yield the channels of successive samples. Frozen readings are left out, so they become gaps.
-
-        Raises InputError if all readings are frozen.
-        """
+        """Yield the channels of successive samples. Frozen readings become gaps. Raises InputError if all froze."""
         ride, has_readings = self._ride, False
         first, last, _ = ride.checked.rows.indices(len(ride.log.t_s))
         for span, log, lean in self._leans():
@@ -359,7 +346,6 @@ class RideReading:
             yield span, part, lean | {"shown_g": pushes.of(part, self._ride.calibration)}
 
     def _displayed(self, log: Log) -> dict[str, Array]:
-        """Run the firmware's meter over a part of the log."""
         names = ("lean_deg", "shown_g", "variance", "resting", "rolling", "odd", "sure")
         rows = [
             (
@@ -416,10 +402,7 @@ def _largest(log: Log) -> int:
 
 
 def calibration_beside(log: Path) -> Path:
-    """Return the path of the calibration beside a log.
-
-    Raises InputError if the calibration or the log does not exist, or if the file is not a log.
-    """
+    """Return the path of the calibration beside a log. Raises InputError without one, or if it is not a log."""
     if not log.is_file():
         problem = "is a directory: give the name of a ride in it" if log.is_dir() else "there is no such file"
         raise InputError(f"{log}: {problem}")
@@ -441,14 +424,10 @@ def open_ride(
 ) -> Ride:
     """Read and check a log with its calibration.
 
-    log: see read_log.
     calibration: an object or a file. None: NAME.cal.json beside the log.
     smoothed: use the lean of smooth() instead of the firmware's lean. It has no effect for a car, which has no lean.
-    progress: called with the bytes read and the bytes of the file.
     Raises InputError, also for a calibration that is not aligned, because lean and braking are then unknown.
 
-    >>> import numpy as np
-    >>> from kickstand_tools.api import CalibrationFile, Log
     >>> log = Log(np.arange(300) / 100.0, np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3)))
     >>> open_ride(log, CalibrationFile(aligned=True)).car
     False
@@ -469,13 +448,8 @@ def open_ride(
 def vehicle_channels(
     log: Source, calibration: CalibrationFile | File | None = None, progress: Progress | None = None
 ) -> Channels:
-    """Return the whole ride in the vehicle's axes, with the firmware's lean.
+    """Return the whole ride in the vehicle's axes, with the firmware's lean. Raises InputError as open_ride().
 
-    log, calibration: see open_ride(), which raises the same errors.
-    progress: called with (done, total) of the log's samples.
-
-    >>> import numpy as np
-    >>> from kickstand_tools.api import CalibrationFile, Log
     >>> log = Log(np.arange(300) / 100.0, np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3)))
     >>> channels = vehicle_channels(log, CalibrationFile(aligned=True))
     >>> bool(abs(channels.lean_deg).max() < 0.1), float(channels.up_g[-1])

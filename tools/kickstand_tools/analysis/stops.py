@@ -5,13 +5,10 @@ speed v0. The speed falls to vb = 0.8 v0 after the distance sb, and to ve = 0.1 
 
     dm = (vb^2 - ve^2) / (25.92 (se - sb))       dm in m/s2, speeds in km/h, distances in m
 
-At the standstill, the force shows the slope of the road, and the gyro reads only its bias. Speed and pitch are
-integrated backwards from the standstill. Because the pitch is known, the dive of the fork does not look like braking:
+At the standstill, the force shows the slope of the road, and the gyro reads only its bias. Speed v and pitch q are
+integrated backwards from it. Because the pitch is known, the dive of the fork does not look like braking:
 
     dq/dt = w_y sin t - w_x cos t,   dv/dt = f_z - g sin q       (as in kickstand.lean.bike_model)
-
-The symbols are lean t (positive to the right), pitch q (positive if the nose is up), speed v, rates w, and specific
-force f. The axes are left (x), up (y) and forward (z).
 
 If the log has a speed, the integrated speed is fitted to it (fitted_speed()). Otherwise the result must be plausible,
 because integration from a wrong standstill can give any speed and distance.
@@ -132,10 +129,7 @@ SIGMA_WALK_MPS2, KNOT_S = 0.1, 0.5
 
 
 def speed_delay_s(ride: Channels) -> float:
-    """Find the delay at which the changes of the log's speed best match the integrated longitudinal force.
-
-    Returns the delay in s; 0 if the ride does not show a delay.
-    """
+    """Find the delay in s at which the changes of the log's speed best match the integrated force; 0 if none."""
     valid = np.flatnonzero(~np.isnan(ride.speed_mps))
     valid = valid[np.unique(np.floor(ride.t_s[valid]), return_index=True)[1]]  # one speed per second
     time, changes = ride.t_s[valid], np.diff(ride.speed_mps[valid])
@@ -159,9 +153,8 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
         u(t) = (1 + k) v(t) + integral of b from t to the end - d a(t)
 
     v is the integrated speed, and a the measured acceleration. The unknowns are the scale error k, the acceleration
-    error b (m/s2) and the delay error d (s). Slopes and fork dive that the gyro did not measure cause the error b. The
-    model of b is a random walk backwards in time. It is nearly 0 at standstill, and linear between knots. Its basis
-    functions are hat functions (linear B-splines).
+    error b (m/s2), which slopes and fork dive cause, and the delay error d (s). The model of b is a random walk
+    backwards in time. It is nearly 0 at standstill, and linear between knots (linear B-splines).
 
     part: the ride up to a standstill.
     begin: index at which braking begins.
@@ -270,7 +263,6 @@ def find_stops(ride: Channels) -> list[Stop]:
 
     ride: a whole ride, from vehicle_channels(). pandas.DataFrame accepts the returned list.
 
-    >>> from kickstand_tools.api import CalibrationFile, Log, simulate_ride, vehicle_channels
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)
     >>> log = Log.from_readings(ride.readings, ride.rate_hz)
     >>> log.speed_mps[::200] = ride.truth["speed_mps"][::200]  # once per second
@@ -288,7 +280,6 @@ def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
 
     The firmware's lean filter takes most of the time. It runs only for motorcycles, because a car has no lean.
 
-    >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)
     >>> log = Log.from_readings(ride.readings, ride.rate_hz)
     >>> log.speed_mps[::200] = ride.truth["speed_mps"][::200]  # once per second
@@ -302,7 +293,6 @@ def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
 
 
 def _car_channels(ride: Ride) -> Iterator[Channels]:
-    """Yield the channels of a car's ride, without a lean."""
     for _, part in ride.log.parts(ride.checked.measured):
         lean: dict[str, Array] = {name: np.zeros(len(part.t_s)) for name in ("shown_g", "resting", "sure")}
         if len(part.t_s):
@@ -310,11 +300,7 @@ def _car_channels(ride: Ride) -> Iterator[Channels]:
 
 
 def stops_of(ride: Channels, still: NDArray[np.bool_]) -> list[Stop]:
-    """Find the stops of a whole ride.
-
-    ride: means over RATE_S each.
-    still: True where the vehicle stands still, shape (n).
-    """
+    """Find the stops of a whole ride of means over RATE_S. still: True where the vehicle stands still, shape (n)."""
     delay_s = speed_delay_s(ride)
     stops, earlier_end = [], 0
     for start, end in intervals(still):
@@ -331,9 +317,7 @@ def stops_of(ride: Channels, still: NDArray[np.bool_]) -> list[Stop]:
 
 
 def mfdd_mps2(speed_mps: Array, distance_m: Array) -> float:
-    """Return the mean fully developed deceleration, dm in the module's docstring.
-
-    Speeds are in m/s instead of km/h, so the factor 25.92 becomes 2.
+    """Return the mean fully developed deceleration, dm in the module's docstring, with a factor of 2 for speeds in m/s.
 
     speed_mps: falls from the initial speed to at most a tenth of it, shape (n).
     distance_m: distances from the start of braking, shape (n).
@@ -347,11 +331,7 @@ def mfdd_mps2(speed_mps: Array, distance_m: Array) -> float:
 
 
 def closes(speed_mps: float, seconds: float) -> bool:
-    """True if a speed integrated backwards from a standstill is close enough to 0 at the previous standstill.
-
-    speed_mps: the integrated speed at the previous standstill.
-    seconds: time between both standstills.
-    """
+    """True if a speed integrated backwards is close enough to 0 at the previous standstill, some seconds before."""
     return seconds > SHOWING_S or abs(speed_mps) < OPEN_MPS + OPEN_MPS2 * seconds
 
 

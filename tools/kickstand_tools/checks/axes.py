@@ -8,15 +8,14 @@ follows from the velocity V in the sensor's rotating axes:
 
 The term rate x V matters: in a long bend the force keeps its direction along the bike, although the bike turns. V is a
 speed along one constant direction, plus a little across it for a phone in a hand. Least squares estimate `up` (1 g
-long), V, the direction and the gyro's bias, with a prior for V and the bias. The residual shows how well the rates fit
-the forces. The hypotheses are the 48 signed permutations of the gyro's axes: left-handed axes in both sensors look like
-a gyro of the opposite sign, because a rate is an axial vector. A log is accused only if another permutation explains
-the forces clearly better than the log's own axes. The permutation is named only if no third one explains them nearly as
-well: a long bend, or a ride with few bends, does not tell the permutations apart.
+long), V, the direction and the gyro's bias. The hypotheses are the 48 signed permutations of the gyro's axes:
+left-handed axes in both sensors look like a gyro of the opposite sign, because a rate is an axial vector. A log is
+accused only if another permutation explains the forces clearly better than its own axes. The permutation is named only
+if no third one explains them nearly as well: a long bend does not tell the permutations apart.
 
 Sign of the accelerations. If only the accelerations have the opposite sign, the log is an exact mirror image of the
-ride, with left and right exchanged. The motion of the sensor cannot show this, but the track can: the gyro's rate about
-up and the rate at which the course changes must have the same sign.
+ride, with left and right exchanged. The track can show this: the gyro's rate about up and the rate at which the course
+changes must have the same sign.
 """
 
 import itertools
@@ -79,10 +78,7 @@ def liveliest(force: Array, rate: Array, valid: Bools, bin_s: float) -> tuple["T
 
 
 def bias_dps(force: Array, rate: Array, valid: Bools, bin_s: float) -> Array | None:
-    """Find the gyro's bias in a log without a standstill, shape (3), in deg/s; None if the log is too short.
-
-    For the parameters see liveliest().
-    """
+    """Find the gyro's bias in a log without a standstill, in deg/s; None if the log is too short. See liveliest()."""
     lively = liveliest(force, rate, valid, bin_s)
     if lively is None:
         return None
@@ -202,7 +198,6 @@ class _Model:
         return _Fit(along_up, coefficients, inverse, up, squares / self.means, cost)
 
     def along_fit(self, force: Array) -> _Fit:
-        """Fit the velocity along one direction."""
         return self.fit(force, self.fit(force))
 
     def bias_change(self, force: Array, fit: _Fit) -> Array:
@@ -267,9 +262,9 @@ def _turn(rate: Array, bin_s: float) -> Array:
 
 
 def _knots(bins: int, bin_s: float) -> tuple[Array, Array]:
-    """Return the functions of the velocity, one per knot, and their derivatives, each of shape (knots, bins).
+    """Return the functions of the velocity and their derivatives, each of shape (knots, bins).
 
-    Each function is 1 at its own knot and 0 at the other knots. Between knots each function is linear.
+    Each function is 1 at its own knot and 0 at the other knots. Between knots it is linear.
     """
     time = (np.arange(bins) + 0.5) * bin_s
     count = round(bins * bin_s / KNOT_S) + 1
@@ -365,7 +360,7 @@ Mirrored = kind(
 def wrong_axes(bins: LogBins) -> Message | None:
     """Return a notice if the axes, their signs or the unit of the rates seem wrong.
 
-    Returns None if they seem right, or if the log is not enough to judge them. So do the checks that it calls.
+    Returns None if they seem right, or if the log is not enough to judge, as the checks that it calls.
     """
     mirrored = Mirrored() if course_agrees(bins) is False else None
     return handedness(bins) or bends(bins) or mirrored
@@ -400,8 +395,7 @@ def fit_permutations(turning: Turning, guesses: list[Array]) -> dict[int, Turnin
     If the log's own axes seem wrong, they are fitted again from more guesses, because the fit may have ended at the
     rate of a long bend instead of the bias. If they still seem wrong, more permutations are fitted, to name it.
 
-    guesses: guesses of the gyro's bias, each of shape (3), in deg/s. The bias is the same for each permutation, so the
-        bias of the best fit is tried for all.
+    guesses: guesses of the gyro's bias, which is the same for each permutation, in deg/s.
     Returns the fits by their index in PERMUTATIONS.
     """
     fits: dict[int, TurningFit] = {}
@@ -452,10 +446,9 @@ def _penalty(permutation: Array) -> float:
 
 
 def course_agrees(bins: LogBins) -> bool | None:
-    """Compare the signs of the rate about up and of the rate at which the course changes.
+    """Return True if the rate about up has the sign of the rate at which the course changes, False if the opposite.
 
-    Returns True if the signs are equal, and False if they are opposite. Returns None if the log has too few bends to
-    both sides.
+    Returns None if the log has too few bends to both sides.
     """
     if len(bins.positions) < ENOUGH_TURNS:
         return None
@@ -485,6 +478,5 @@ def course_agrees(bins: LogBins) -> bool | None:
 
 
 def log_agrees(log: Log) -> bool | None:
-    """Call course_agrees() for a log."""
     bins = log_bins(log)
     return None if bins is None else course_agrees(bins)

@@ -78,25 +78,17 @@ def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
 
 
 def speed_in_radians(leaning: Leaning) -> float | None:
-    """Return the impossible speed in bends, in m/s, that rates in rad/s would mean if they were labelled deg/s.
-
-    Returns None if the rates are not surely in rad/s.
-    """
+    """Return the speed in bends, in m/s, that these rates would mean in deg/s; None if not surely in rad/s."""
     wrong = leaning.share > SHARE and leaning.sigmas > SIGMAS and leaning.correlation > CORRELATION
     return float(np.degrees(leaning.speed)) if wrong and leans(leaning) else None
 
 
 def leans(leaning: Leaning) -> bool:
-    """True if the bike leans at all: the rms of the lean is over LEAST_LEAN."""
     return float(np.sqrt(np.mean(leaning.rolled**2))) > LEAST_LEAN
 
 
 def leaned(rolled: Array, yaw: Array, speed: Array | float) -> Array:
-    """Return the lean, shape (n), in rad.
-
-    Changes faster than SLOW_S come from `rolled`. Slower changes come from the lean at which a bike with this speed and
-    yaw rate is in balance.
-    """
+    """Return the lean in rad: `rolled`, and for changes slower than SLOW_S the balance at this speed and yaw rate."""
     balanced = np.arctan(-speed * yaw / STANDARD_GRAVITY)
     return rolled + balanced - without_drift(balanced)
 
@@ -117,7 +109,6 @@ def moving_deviation(values: Array, over_s: float) -> Array:
 
 
 def _windows(seconds: float) -> int:
-    """Return the odd number of windows that last about this many seconds."""
     return 2 * max(1, round(seconds / WINDOW_S / 2.0)) + 1
 
 

@@ -1,20 +1,16 @@
 """Checks a whole log without data about the vehicle: its units, and readings that were not measured.
 
-Readings that were not measured:
-
 * Noise changes the readings of a working sensor from sample to sample, even at rest. If all six axes stay the same to
   the last digit for half a second, a sensor hangs, or a phone repeats its last reading. In a log with few digits,
-  rounding may hide the noise of a vehicle at rest. In such a log, equal readings are kept if the values beside them are
-  about the same.
+  rounding may hide the noise of a vehicle at rest. There, equal readings are kept if the values beside them are about
+  the same.
 * An axis is dead if it stays the same to the last digit while other axes of its sensor change.
 * If a rate above SATURATED_DPS stays the same, the gyro is at the end of its range, so the true rate is unknown.
 * Vibration may clip the accelerometer. The force between the shocks is nearly right, so the readings are used, with a
   remark.
-
-The first samples show the usual mistakes of units: m/s2 instead of g, ms instead of s. A wrong unit of the speed is
-found by its changes, which are compared with the specific force that caused them. The mounting of the sensor does not
-matter: forward is the direction in which force and change of speed correlate best. Turns, slopes and a moving rider add
-to the force only. They can make the change of speed seem too small, but never too large.
+* A wrong unit of the speed is found by its changes, which are compared with the specific force that caused them.
+  Forward is the direction in which both correlate best. Turns, slopes and a moving rider add to the force only. They
+  can make the change of speed seem too small, but never too large.
 """
 
 from dataclasses import dataclass, field
@@ -90,10 +86,7 @@ AccelClipped = kind(
 
 
 def find_faulty(log: Log) -> tuple[Bools, list[Message]]:
-    """Find the readings of a log that were not measured.
-
-    Returns True where the readings must be left out, shape (n), and the notices about them and about clipped readings.
-    """
+    """Return True for the readings that were not measured, shape (n), and notices about them and clipped readings."""
     axes = _axes(log)
     steps = _steps(axes)
     frozen, notices = _frozen(log.t_s, axes, steps)
@@ -115,7 +108,6 @@ def without_frozen(log: Log) -> Log:
 
 
 def _axes(log: Log) -> list[Array]:
-    """Return the six axes of a log. They are used one by one, to save memory."""
     return [*log.accel_g.T, *log.gyro_dps.T]
 
 
@@ -126,7 +118,7 @@ def _steps(axes: list[Array]) -> Array:
 
 
 def _frozen(time_s: Array, axes: list[Array], steps: Array) -> tuple[Bools, list[Message]]:
-    """Return True for frozen readings, shape (n), and their notice. The first of equal readings counts as measured."""
+    """Return True for frozen readings, and their notice. The first of equal readings counts as measured."""
     same = np.ones(max(0, len(time_s) - 1), dtype=bool)
     for values in axes:
         same &= values[1:] == values[:-1]
@@ -283,8 +275,6 @@ def check_log(log: Log, axes: bool = True, sensor: bool = True) -> CheckedLog:
     Raises InputError for accelerations without gravity or in m/s2, and for times in ms. Raises its subclass
     RefusedInput for a speed that is not in m/s.
 
-    >>> import numpy as np
-    >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("street", seed=1, seconds=90.0)
     >>> log = Log.from_readings(ride.readings, ride.rate_hz)
     >>> log.gyro_dps = -log.gyro_dps
@@ -333,7 +323,6 @@ def _bins(log: Log, measured: Bools) -> LogBins | None:
 
 
 def _check_units(log: Log) -> None:
-    """Raise InputError for accelerations without gravity or in m/s2, and for times in ms."""
     time_s, force = log.t_s[:FIRST], log.accel_g[:FIRST]
     if not len(time_s):
         return

@@ -100,8 +100,7 @@ class Axes:
 def axes(w: Windows) -> Axes:
     """Find the vehicle's axes, within some degrees, and the gyro's bias, from windows along the sensor's axes.
 
-    In balance, the specific force points along the bike's own up, so the mean force while riding shows "up". For
-    forward and the handedness see checks/leaning.py.
+    In balance, the specific force points along the bike's own up. For forward and the handedness see checks/leaning.py.
 
     Raises RefusedInput if the ride is not a motorcycle's, or has too little lean.
     """
@@ -132,7 +131,6 @@ def _rough_bias(w: Windows) -> Array:
 
 
 def _tilt(w: Windows, riding: Bools) -> float:
-    """Return the usual angle between force and rate while riding, in rad."""
     force, rate = averaged(w.force, 2.0)[riding], averaged(w.rate, 2.0)[riding]
     return float(np.arctan2(np.linalg.norm(np.cross(force, rate)), np.linalg.norm(np.sum(force * rate, axis=1))))
 
@@ -141,7 +139,6 @@ def _refuse_no_motorcycle(found: Leaning, sideways: Array, tilt: float, riding: 
     """Raise RefusedInput if the ride is not a motorcycle's, or does not show lean and side.
 
     sideways: the force to the left without its slow changes, shape (n), in g.
-    tilt: see _tilt().
     """
     in_radians_mps = speed_in_radians(found)
     if in_radians_mps is not None:
@@ -278,12 +275,10 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
     bends, and along which it speeds up. The lean in bends distinguishes left from right. Scale errors of the
     accelerometer are not observable from a ride.
 
-    log: see read_log. A speed improves the result, but is optional.
+    log: a speed improves the result, but is optional.
     phone: the phone's mounting, "portrait", "landscape" or "flat" (see PHONES); None if unknown.
-    progress: called with (steps done, all steps).
     Raises InputError. Raises its subclass RefusedInput, with a Message, if the ride does not determine the mounting.
 
-    >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("city", seed=3, seconds=240.0)
     >>> fit = fit_ride(Log.from_readings(ride.readings, ride.rate_hz))
     >>> fit.yaw_deg < 2.0, fit.roll_deg < 2.0, fit.calibration.vehicle_from_sensor.shape
@@ -416,10 +411,7 @@ def _checked(
 
 
 def _mounting(phone: str, estimated: Array) -> Array:
-    """Return the matrix (3, 3) of PHONES[phone] that is nearest to `estimated`.
-
-    Raises RefusedInput if the two differ by over PHONE_MAX_DEG.
-    """
+    """Return the matrix (3, 3) of PHONES[phone] nearest to `estimated`; refuse over PHONE_MAX_DEG between them."""
     off, nearest = min(((_off_deg(estimated, matrix), i) for i, matrix in enumerate(PHONES[phone])))
     if off > PHONE_MAX_DEG:
         mirrored = estimated * [[1.0], [-1.0], [-1.0]]  # the result if the accelerations have the opposite sign

@@ -65,10 +65,7 @@ class Estimate:
     """
 
     def __init__(self, windows: Windows, prior: Prior, hypotheses: Hypotheses) -> None:
-        """Run the estimation. Raises LinAlgError if the equations have no solution.
-
-        hypotheses: see model.py. The first steps use only the first hypothesis.
-        """
+        """Run the estimation. Raises LinAlgError if the equations have no solution."""
         self._length = min(BLOCK, len(windows))
         self._windows = windows = windows.padded(self._length)
         self._grid = len(windows) // self._length, self._length
@@ -119,7 +116,6 @@ class Estimate:
         return rotation[-1] - rotation[0]
 
     def _start(self, still: Bools) -> None:
-        """Start the estimation again. still: True where the bike stands, shape (n)."""
         self._likely = self._hypotheses.first()
         self.noise = Noise(self._windows, still)
         lean, speed = lean_and_speed(self._windows, still)
@@ -151,7 +147,7 @@ class Estimate:
                 break
 
     def _learn_misfit(self) -> bool:
-        """Estimate the misfit of accelerations. Returns True if some accelerations in the ride are not the bike's."""
+        """Return True if some accelerations in the ride are not the bike's."""
         self.noise.estimate_misfit(self._residuals())
         return bool(np.max(self.noise.misfit) > 1.0)
 
@@ -199,14 +195,12 @@ class Estimate:
         self.matrix, self._windows = turn @ self.matrix, self._windows.turned(turn)
 
     def _middle(self) -> Array:
-        """Return unknowns() in the middle of each window."""
         return self.unknowns(np.arange(len(self._windows)), 0.5 * (self.states[1:] + self.states[:-1]))
 
     def _residuals(self) -> Array:
         """Return the residuals of each window, shape (n, ROWS).
 
-        The first STATES columns are the changes of the states minus the changes that the process model predicts. The
-        other columns are the measurements.
+        The changes of the states minus the predicted changes come first, then the measurements.
         """
         x = self._middle()
         self.noise.lean, self.noise.pitch, self.noise.speed = x[LEAN], x[PITCH], x[FORWARD]
@@ -230,8 +224,7 @@ class Estimate:
     def _derivatives(self, rows: slice, x: Array, residuals: Array, sigma: Array) -> Array:
         """Return the derivatives of the residuals of some windows, divided by sigma; see reduce_windows().
 
-        x: unknowns() in the middle of these windows.
-        residuals, sigma: their residuals and standard deviations, shape (windows, ROWS).
+        residuals, sigma: residuals of these windows, and their standard deviations, shape (windows, ROWS).
         """
         windows, s, unknown = self._windows, STATES, self.prior.unknown
         windows = replace(

@@ -112,9 +112,8 @@ class Prior:
 
     @classmethod
     def of_pose(cls, six_done: bool, gyro_sigma: Array | None = None) -> "Prior":
-        """Return the prior for a sensor that was aligned by poses.
+        """Return the prior for a sensor that was aligned by poses, and perhaps calibrated by six positions.
 
-        six_done: True if six positions calibrated the accelerometer.
         gyro_sigma: standard errors of the gyro's scale and axes after the six positions, along left, up and forward,
             shape (3, 3). None or zeros if the gyro was not measured.
         """
@@ -135,8 +134,6 @@ class Prior:
 
         The upright pose was measured with a biased accelerometer. Therefore the prior is about the sum of misalignment
         and bias, which is the lean and pitch that the sensor reads in the pose.
-
-        sigma: the prior's, some perhaps enlarged by a hypothesis.
         """
         matrix = np.diag(np.divide(1.0, sigma**2, out=np.zeros(PARAMETERS), where=sigma > 0.0))
         if self.posed:
@@ -158,13 +155,11 @@ class Hypotheses:
     weight: Array  # posterior weights, whose sum is 1
 
     def select(self, index: Ints, weight: Array) -> "Hypotheses":
-        """Return the hypotheses with these indices, with new posterior weights."""
         return Hypotheses(
             self.turning[index], self.rolling[index], self.pushed[index], self.minus_two_log_prior[index], weight
         )
 
     def first(self) -> "Hypotheses":
-        """Return only the first hypothesis, with weight 1."""
         return self.select(np.zeros(1, dtype=np.intp), np.ones(1))
 
     def weighted(self, blocks: Reduced, prior: Prior, parameters: Array, unbalance: float) -> "Hypotheses":

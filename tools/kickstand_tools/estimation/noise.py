@@ -78,11 +78,9 @@ LEAST_WINDOWS = 50  # with fewer windows of balanced riding, the unbalance stays
 
 
 class Noise:
-    """The standard deviations of n windows. All fields but unbalance have the shape (n).
+    """The standard deviations of n windows. Set lean, pitch and speed, in rad and m/s, before you call sigma().
 
-    lean, pitch, speed: estimates in rad and m/s. Set them before you call sigma().
-    riding: True where the bike may be riding.
-    still: True where the bike stands.
+    riding, still: True where the bike may be riding, and where it stands.
     roughness: factor on the noise of vibration; 1 for a rough ride.
     misfit: factor on the noise of the velocities; 1 if the accelerations are the bike's.
     doubtful: True where the bike is riding and the misfit is at its limit.
@@ -107,8 +105,8 @@ class Noise:
     def sigma(self) -> Array:
         """Return the standard deviations in each window, shape (n, ROWS).
 
-        The first STATES columns are the process noise over the window. The other columns are the measurement noise,
-        infinite where there is no measurement.
+        The process noise over the window comes first, then the measurement noise, infinite where there is no
+        measurement.
         """
         w, riding, balanced = self._windows, self.riding, self._is_balanced
         speed, roughness = np.maximum(self.speed, 0.0), self.roughness
@@ -211,7 +209,6 @@ class Noise:
         return self.riding & (self.speed > BALANCE_MIN_MPS)
 
     def _of_balance(self) -> Array:
-        """Return the standard deviation of BALANCED in an average ride, shape (n), in g."""
         return np.hypot(BALANCE_G, BALANCE_LEANED_G * np.sin(self.lean))
 
 

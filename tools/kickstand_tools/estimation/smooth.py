@@ -93,14 +93,11 @@ class SmoothedRide(Table):
 def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None = None) -> SmoothedRide:
     """Compute the lean of a motorcycle from all readings of its ride, with a standard deviation for each sample.
 
-    The method is least squares over the whole ride, see model.py.
+    The method is least squares over the whole ride, see model.py. Raises InputError.
 
-    log: see read_log. A speed improves the result, but is optional.
+    log: a speed improves the result, but is optional.
     calibration: an aligned calibration of a motorcycle.
-    progress: called with (done, total) of the log.
-    Raises InputError.
 
-    >>> from kickstand_tools.api import CalibrationFile, Log, simulate_ride
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)
     >>> calibration = CalibrationFile(vehicle_from_sensor=ride.vehicle_from_sensor, aligned=True)
     >>> smoothed = smooth(Log.from_readings(ride.readings, ride.rate_hz), calibration)
@@ -144,10 +141,7 @@ class Smoother:
         self._doubtful_s = self._riding_s = self._leaned = self._odd = 0.0
 
     def rows(self, progress: Progress | None = None) -> Iterator[Array]:
-        """Yield the values of COLUMNS for successive samples of the stretch, NaN for frozen readings.
-
-        Raises InputError for under SLOWEST_HZ samples per second.
-        """
+        """Yield the values of COLUMNS for samples of the stretch, NaN for frozen readings. Raises InputError."""
         log = self._ride.log
         first, last, _ = self._ride.rows.indices(len(log.t_s))
         for span, values in self.batches(progress):

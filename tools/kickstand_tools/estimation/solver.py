@@ -192,8 +192,7 @@ def minus_two_log_likelihood(blocks: Reduced, walks: RandomWalks) -> Array:
 def solve(blocks: Reduced, walks: RandomWalks, weight: Array) -> tuple[Array, Array]:
     """Compute the posterior mean over the hypotheses, whose weights have the shape (G). Raises LinAlgError.
 
-    Returns the changes of the states, shape (B, K + 1, s), and of the parameters, shape (B, m). The state between two
-    blocks is in both blocks.
+    Returns the changes of the states, shape (B, K + 1, s), and of the parameters, shape (B, m).
     """
     mean = np.zeros(1)
     for g, share in enumerate(weight):

@@ -166,10 +166,7 @@ def motionless(
 
 
 def standing(w: Windows) -> Bools:
-    """Find the windows in which the bike stands still, shape (n), for zero-velocity updates.
-
-    Rates and forces do not change, the mean rate is under BIAS_RADPS, and the speed, if known, agrees.
-    """
+    """Find the windows in which the bike stands still, shape (n), for zero-velocity updates."""
     return calm(w) & (np.linalg.norm(averaged(w.rate, STILL_S), axis=1) < BIAS_RADPS)
 
 
@@ -182,10 +179,8 @@ def calm(w: Windows) -> Bools:
 def in_hand(w: Windows) -> tuple[Bools, Bools]:
     """Find the windows in which a hand moves the sensor, or the bike has fallen: up is far from its usual direction.
 
-    On a balanced bike, the force points along the bike's own up at any lean.
-
-    Returns True where this is certain, shape (n); and also in the seconds around, because the bike may not be riding
-    there.
+    On a balanced bike, the force points along the bike's own up at any lean. Returns True where this is certain, and
+    also in the seconds around, because the bike may not be riding there, both of shape (n).
     """
     valid = ~w.gap
     mean = averaged(w.force * valid[:, None], MOUNTED_S)

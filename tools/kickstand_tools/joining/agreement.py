@@ -193,22 +193,15 @@ class Difference:
 
 @dataclass
 class Agreement:
-    """The agreement of rides A and B.
-
-    live: Difference of the displayed leans while both devices show a lean. None without such a time.
-    smoothed: Difference of the smoothed leans.
-    t_s: seconds since A's first sample, shape (n).
-    leans: the leans at these times in degrees, shape (n), NaN if unknown.
-    names: the names of A's and B's logs.
-    """
+    """The agreement of rides A and B."""
 
     clocks: Clocks
-    live: Difference | None
-    smoothed: Difference
-    t_s: Array
-    leans: dict[str, Array]
+    live: Difference | None  # of the displayed leans while both devices show a lean; None without such a time
+    smoothed: Difference  # of the smoothed leans
+    t_s: Array  # seconds since A's first sample, shape (n)
+    leans: dict[str, Array]  # the leans at these times in degrees, shape (n), NaN if unknown
     notices: dict[str, list[Message]] = field(default_factory=dict)
-    names: tuple[str, str] = ("", "")
+    names: tuple[str, str] = ("", "")  # the names of A's and B's logs
 
     def as_data(self) -> dict[str, Any]:
         """Return all fields except the leans, for JSON."""
@@ -226,11 +219,8 @@ def compare_rides(
 ) -> Agreement:
     """Compare two recordings of one ride by two devices. The clocks of the devices may differ by any time.
 
-    a, b: see read_log.
-    progress: called with (done, total) of the samples, ride by ride.
     Raises InputError, also if the recordings are of different rides.
 
-    >>> from kickstand_tools.api import Log, simulate_ride
     >>> made = simulate_ride("street", seed=1, seconds=90.0)
     >>> axes, log = made.vehicle_from_sensor, Log.from_readings(made.readings, made.rate_hz)
     >>> calibration = CalibrationFile(vehicle_from_sensor=axes, aligned=True)
@@ -262,7 +252,6 @@ def compare_rides(
 
 
 def words(found: Agreement) -> Iterator[str]:
-    """Yield the result in words, line by line."""
     of = found.clocks
     side = "after" if of.later_s >= 0.0 else "before"
     yield (
@@ -297,7 +286,6 @@ def words(found: Agreement) -> Iterator[str]:
 
 
 def check_picture(path: Path) -> None:
-    """Raise InputError if no picture can be drawn."""
     if not find_spec("matplotlib"):
         raise InputError(f"a picture needs matplotlib: {extra('rides')}")
     if path.suffix != ".png":

@@ -179,14 +179,9 @@ class Joined:
 def join_track(ride: Source, track: Path | str | Track, progress: Progress | None = None) -> Joined:
     """Find the time of a phone's or watch's track in a ride, from the yaw and the acceleration of ride and track.
 
-    The clocks of ride and track may differ by any time, and drift.
+    The clocks of ride and track may differ by any time, and drift. The ride needs neither a calibration nor a speed.
+    The track is a .gpx or .fit file. Raises InputError if the track is another ride's, or if the match is not certain.
 
-    ride: see read_log; it needs neither a calibration nor a speed.
-    track: a .gpx or .fit file.
-    progress: called with (done, total) of the ride's bytes.
-    Raises InputError if the track is another ride's, or if the match is not certain.
-
-    >>> from kickstand_tools.api import simulate_ride
     >>> ride = simulate_ride("hills", seed=1, seconds=120.0)
     >>> course = np.cumsum(np.radians(ride.truth["yaw_rate_dps"])) / ride.rate_hz  # to the left of east
     >>> north, east = (np.cumsum(ride.truth["speed_mps"] * way(course)) / ride.rate_hz for way in (np.sin, np.cos))
@@ -212,10 +207,7 @@ def join_track(ride: Source, track: Path | str | Track, progress: Progress | Non
 def write_joined(out: Path | str, joined: Joined, progress: Progress | None = None) -> int:
     """Write the lines of the ride, with the track's values in the nearest rows. Returns the number of positions.
 
-    The file is gzipped if its name ends in .gz, and written whole or not at all.
-
-    progress: called with (done, total) of the ride.
-    Raises InputError.
+    The file is gzipped if its name ends in .gz, and written whole or not at all. Raises InputError.
 
     >>> import tempfile
     >>> log = Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2)
@@ -242,10 +234,7 @@ def write_joined(out: Path | str, joined: Joined, progress: Progress | None = No
 def _lines(
     file: Path | str, columns: list[str], count: int, ends: dict[int, str], progress: Progress | None
 ) -> Iterator[bytes]:
-    """Yield the lines of a log of `count` samples with the new columns at their end.
-
-    ends: the cells of the new columns, by the number of the sample.
-    """
+    """Yield the lines of a log of `count` samples with the new cells `ends`, by sample, at their end."""
     begin, empty = 0, "," * (len(columns) - 1)
     for names, lines in text_rows(file, progress):
         own = [k for k, name in enumerate(names) if name not in columns]

@@ -53,10 +53,7 @@ class BinMotion:
 
 
 def motion(ride: CheckedLog) -> BinMotion:
-    """Return the BinMotion of a checked log.
-
-    Raises InputError if all readings are frozen, or for a ride that is too long.
-    """
+    """Return the BinMotion of a checked log. Raises InputError if all readings are frozen, or for a too long ride."""
     log, measured = ride.log, ride.measured
     if log.t_s[-1] > _LONGEST_S:
         raise InputError(f"{log.name} is longer than {_LONGEST_S / 3600:.0f} hours: cut it first")
@@ -93,10 +90,9 @@ class Comparison:
         self._edges_s = np.arange(len(motion.valid) + 1) * STEP_S
 
     def turned(self, shift_s: float, drift: float = 0.0, axes: int = 3) -> Array:
-        """Return the ride's rotation about its up and about two axes across it, to compare with Segments.turned_deg.
+        """Return the ride's rotation about its up and about two axes across it, in degrees, as Segments.turned_deg.
 
         drift: seconds per second that the ride's clock loses against the track's.
-        Returns degrees, shape (axes, p, STEPS).
         """
         return self._means(range(axes), shift_s, drift, self.given.course_weight)
 
@@ -225,10 +221,7 @@ def _try_shifts(compared: Comparison, rough_s: float) -> tuple[float, float, flo
 
 
 def _costs(compared: Comparison, shift_s: float, drift: float, along: Array) -> Array:
-    """Return the cost of each segment at each of _SHIFTS around a shift, shape (shifts, p).
-
-    along: coefficients of the ride's rotations about the three axes.
-    """
+    """Return the cost of each segment at each of _SHIFTS around a shift, for a rotation about the axes `along`."""
     track = compared.given
     return np.array(
         [
@@ -254,7 +247,6 @@ class _Step:
 
 
 def _refine(compared: Comparison, shift_s: float, drift: float, evidence: float) -> TrackFit:
-    """Find the best fit by Gauss-Newton steps. Each step down-weights outliers."""
     track = compared.given
     forward = _least(compared.sped_up(shift_s, drift), track.speed_mps, track.speed_weight)
     now = np.array([shift_s, drift, 0.0, 0.0, *forward])

@@ -32,19 +32,13 @@ _FEWEST_STEPS = 8  # least number of steps in a segment
 
 @dataclass(eq=False)
 class Track(Table):
-    """n points in chronological order.
+    """n points in chronological order."""
 
-    utc_s: s since 1970, increasing.
-    lat_deg, lon_deg: north and east.
-    speed_mps: from the file, NaN if missing.
-    name: the file's name.
-    """
-
-    utc_s: Array
+    utc_s: Array  # s since 1970, increasing
     lat_deg: Array
     lon_deg: Array
-    speed_mps: Array
-    name: str
+    speed_mps: Array  # from the file, NaN if missing
+    name: str  # the file's name
 
     def speeds_mps(self) -> Array:
         """Return the file's speeds, shape (n), or without any speed the mean speeds over the neighbouring points.
@@ -159,12 +153,9 @@ Point = tuple[float, float, float, float]
 
 
 def read_track(path: Path | str, progress: Progress | None = None) -> Track:
-    """Read a .gpx or .fit file.
+    """Read a .gpx or .fit file. Raises InputError.
 
     Points without a time or a position are left out. If several points have the same time, the first is kept.
-
-    progress: called with the bytes read and the bytes of the file.
-    Raises InputError.
 
     >>> import tempfile
     >>> point = '<trkpt lat="48.1" lon="11.{0:02}"><time>2026-05-17T09:30:{0:02}Z</time></trkpt>'

@@ -1,12 +1,11 @@
 """Reads and writes CSV: logs and the tables of other apps.
 
 Each line is one row, so an unclosed quotation mark does not affect the following lines. In a log, the first mistake
-raises an error that names the line (numbers_by_line()). In another app's table, damaged rows are left out and counted
-(columns_of_text()).
+raises an error that names the line. In another app's table, damaged rows are left out and counted. Memory is limited: a
+log is read in blocks (see source.chunks()), and a table has a maximum number of cells.
 
-Memory is limited in both cases. A log is read in blocks (see source.chunks()), and a table has a maximum number of
-cells. Kickstand's own logs contain only plain numbers. numbers_in() reads an hour of such a log at 200 Hz in 0.7 s,
-where numbers_by_line(), which reads any log, takes 1.7 s.
+Kickstand's own logs contain only plain numbers. numbers_in() reads an hour of such a log at 200 Hz in 0.7 s, where
+numbers_by_line(), which reads any log, takes 1.7 s.
 """
 
 import csv
@@ -63,10 +62,7 @@ def number_of(cell: str) -> float | None:
 
 
 def numbers_in(text: bytes, count: int) -> Array | None:
-    """Convert n lines of `count` plain numbers, as float() does. An empty cell becomes NaN.
-
-    Returns the numbers, shape (n, count), or None if the text contains anything else. Then use numbers_by_line().
-    """
+    """Convert n lines of `count` plain numbers, as float() does, NaN for an empty cell; None if there is more."""
     if text.translate(None, _PLAIN) or not text.strip(b"\n"):
         return None
     if max(map(len, text.split(b"\n"))) > LONGEST_LINE:
@@ -83,12 +79,11 @@ def numbers_in(text: bytes, count: int) -> Array | None:
 
 
 def columns_of_text(text: str, separator: str, width: int, most: int = 0) -> tuple[list[Cells], int]:
-    """Read CSV without a header. Raises InputError for a table that is too large.
+    """Read CSV without a header. Returns the cells of each column, and the number of damaged rows, which are left out.
 
-    A damaged row is left out. A row is damaged if its line is too long, or if it has more than `most` cells. If `most`
-    is 0, a row may have `width` cells, or as many as the first row. The missing cells of a short row are empty.
-
-    Returns the cells of each column, and the number of damaged rows.
+    A row is damaged if its line is too long, or if it has more than `most` cells. If `most` is 0, a row may have
+    `width` cells, or as many as the first row. The missing cells of a short row are empty. Raises InputError as
+    columns_of().
     """
     left_out = 0
 
@@ -154,7 +149,6 @@ def filled(cells: Cells) -> Bools:
 
 
 def as_text(cells: Cells) -> list[str]:
-    """Return the cells as text, "" for an empty cell."""
     return ["" if cell != cell else str(cell) for cell in cells.tolist()]
 
 
@@ -333,10 +327,7 @@ _LINES = 15_000  # rows formatted at once
 
 
 def csv_lines(table: Array, digits: Sequence[int]) -> Iterator[bytes]:
-    """Yield the lines of a table, shape (n, m), many lines at a time. NaN becomes an empty cell.
-
-    digits: number of decimals of each of the m columns.
-    """
+    """Yield the lines of a table, many lines at a time, with these numbers of decimals. NaN becomes an empty cell."""
     line = _line_form(digits)
     for begin in range(0, len(table), _LINES):
         text = "".join([line % tuple(row) for row in table[begin : begin + _LINES].tolist()])

@@ -1,8 +1,7 @@
 """Makes the times of a log even again if the recorder rounded them.
 
-A sensor takes samples at even intervals. However, some recorders round times to hundredths or thousandths of a second.
-Others write the same time for several samples that they received together. Each time is replaced by the mean of the
-recorded times around it.
+A sensor takes samples at even intervals. Some recorders round times, or write the same time for several samples that
+they received together. Each time is replaced by the mean of the recorded times around it.
 """
 
 from collections.abc import Callable
@@ -41,16 +40,14 @@ TimesSpread = kind(
 
 
 def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
-    """Make the times of n samples even if rounding has made them uneven or equal.
+    """Make the times of n samples, in s, even if rounding has made them uneven or equal.
 
     Each result is within 0.6 ticks of the recorded time. The tick is the largest step of which all recorded steps are
-    multiples. If many times are repeated, the tick is at least the usual step between different times. All steps of
-    the result are over 0. Gaps remain, and times with a fine tick are not changed.
+    multiples. If many times are repeated, it is at least the usual step between different times. All steps of the
+    result are over 0. Gaps remain, and times with a fine tick are not changed.
 
-    t_s: recorded times in s, shape (n).
     name: the log's name in messages.
-    Returns the new times in s, shape (n). Raises InputError for a time that decreases or is not a number, and for a
-    clock that has stopped.
+    Raises InputError for a time that decreases or is not a number, and for a clock that has stopped.
 
     >>> even_times([0.0, 0.01, 0.01, 0.02, 0.03, 0.03, 0.04]).round(4).tolist()
     [0.0007, 0.0071, 0.0136, 0.02, 0.0264, 0.0329, 0.0393]
@@ -110,10 +107,9 @@ def _spread_repeated(recorded: Array, starts: Ints, counts: Ints, period_s: floa
 
 
 def _smooth(recorded: Array, times: Array, tick_s: float, period_s: float) -> Array:
-    """Replace each time by the mean of the recorded times around it, but never across a gap.
+    """Replace each time by the mean around it, never across a gap, and by at most ALLOWED ticks.
 
-    The result differs from the recorded time by at most ALLOWED ticks. A sample alone between two gaps keeps its time
-    in `times`.
+    A sample alone between two gaps keeps its time in `times`.
     """
     half = max(AROUND, round(TICKS * tick_s / period_s)) // 2
     cuts = np.flatnonzero(np.diff(recorded) > GAP * period_s + tick_s) + 1

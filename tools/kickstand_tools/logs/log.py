@@ -67,10 +67,7 @@ def float_schema(units: Mapping[str, str], fine: Container[str], about: dict[str
 
 
 class Sparse:
-    """A column of n numbers of which few are known. It uses memory for the known numbers only.
-
-    rows: indices of the known numbers, increasing.
-    """
+    """A column of n numbers of which few are known, in increasing rows. It uses memory for the known numbers only."""
 
     def __init__(self, rows: Ints, values: Array, n: int) -> None:
         self._rows, self._values, self._n = rows, values, n
@@ -99,17 +96,15 @@ class Log(Table):
     t_s: time in s since the first sample, increasing, shape (n).
     accel_g: specific force in g, shape (n, 3).
     gyro_dps: angular rate in deg/s, shape (n, 3).
-    speed_mps: speed in m/s, shape (n), optional.
-    temperature_c: temperature in degrees Celsius, shape (n), optional.
-    start_s: the recorder's own time at the first sample, in s.
+    speed_mps, temperature_c: speed in m/s and temperature in degrees Celsius, shape (n), optional.
     lat_deg, lon_deg: latitude and longitude in degrees, shape (n), optional.
     utc_s: Universal Time in s since 1970, shape (n), optional.
+    start_s: the recorder's own time at the first sample, in s.
     own_times: False if reading the log has changed its times.
 
     Optional arrays are NaN in samples without a new value. t_s may start at any value, which is added to start_s.
     Raises InputError for wrong shapes and for times that do not increase.
 
-    >>> import numpy as np
     >>> t_s = np.arange(300) / 100.0
     >>> log = Log(t_s, accel_g=np.tile([0.0, 1.0, 0.0], (300, 1)), gyro_dps=np.zeros((300, 3)))
     >>> float(log.t_s[-1]), log.accel_g.shape
@@ -175,7 +170,6 @@ class Log(Table):
 
     @property
     def has_temperature(self) -> bool:
-        """True if a sample has a temperature."""
         return bool(np.any(~np.isnan(self.temperature_c)))
 
     @property
@@ -212,11 +206,10 @@ class Log(Table):
     def parts(
         self, selected: Bools, rows: slice = slice(None), most: int = PART_SAMPLES
     ) -> Iterator[tuple[slice, Self]]:
-        """Yield the log in parts of at most `most` samples, so that memory does not grow with the log.
+        """Yield the rows of successive parts of at most `most` samples, and the selected samples of these rows.
 
         selected: True for the samples to use, shape (n).
         rows: the part of the log to yield.
-        Yields the rows of each part in the log, and the selected samples of these rows.
         """
         begin, end, _ = rows.indices(len(self.t_s))
         for start in range(begin, end, most):
@@ -246,14 +239,11 @@ class Log(Table):
 class Stretch:
     """A part of a log, between two times in s since the log's first sample.
 
-    A negative time counts back from the log's last sample. None means the log's start or end.
+    A negative time counts back from the log's last sample. None means the log's start or end. Read as a log, its times
+    count from the first sample of the stretch. Functions that compute the lean read the whole log, because the lean
+    depends on earlier readings, and return the samples of the stretch with times that count from the start of the whole
+    log.
 
-    A Stretch can be used like a log. If it is read as a log, its times count from the first sample of the stretch.
-    Functions that compute the lean read the whole log, because the lean depends on earlier readings. They return only
-    the samples of the stretch, with times that count from the start of the whole log.
-
-    >>> import numpy as np
-    >>> from kickstand_tools.api import Log, read_log
     >>> log = Log(np.arange(300) / 100.0, np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3)))
     >>> len(read_log(Stretch(log, 1.0, 2.0)).t_s), len(read_log(Stretch(log, from_s=-0.5)).t_s)
     (101, 51)
@@ -287,11 +277,7 @@ class LogBins:
     positions: Array  # the first position of each second, shape (m, 3): time in s, latitude and longitude in degrees
 
     def integrals(self, time_s: Array) -> Array:
-        """Integrate from the first bin to each of k times, in s.
-
-        Returns seven columns, shape (k, 7): the integral of the force (3, in g s), the integral of the rate (3, in
-        degrees), and the duration of valid bins (s).
-        """
+        """Integrate force (3 columns, g s), rate (3, degrees) and valid time (s) from the first bin to k times."""
         edges_s = (self.bins.first + np.arange(len(self.valid) + 1)) * BIN_S
         return np.column_stack([np.interp(time_s, edges_s, sums) for sums in self._sums])
 
@@ -306,7 +292,7 @@ class LogBins:
         """Average groups of `over` bins. Missing values are NaN.
 
         Returns the mean force of each group, shape (k, 3), in g; the mean rate, shape (k, 3), in deg/s; and the first
-        speed in each group, shape (k), in m/s.
+        speed, shape (k), in m/s.
         """
         merged = self.bins.merged(over)
         return merged.means[:, :3], merged.means[:, 3:], merged.latest[:, 0]

@@ -43,7 +43,6 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None)
 
     source: a path (of a gzip file if it ends in .gz), an open file of text or bytes, a Log, or a Stretch of these.
     minimum: least number of samples.
-    progress: called with the number of bytes read and the size of the file.
     Raises InputError, which names the file and the line of a mistake.
 
     >>> import io
@@ -67,7 +66,7 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None)
 
 
 def read_with_rows(source: Source, progress: Progress | None = None) -> tuple[Log, slice]:
-    """Read the whole log of a source, and find the rows of the stretch: all rows unless the source is a Stretch."""
+    """Read the whole log of a source, and find the rows of the stretch: all rows unless it is a Stretch."""
     if not isinstance(source, Stretch):
         return read_log(source, progress=progress), slice(None)
     log = read_log(source.source, progress=progress)
@@ -117,8 +116,6 @@ def _too_long(name: str) -> InputError:
 
 
 class _Sparse:
-    """A Sparse that grows."""
-
     def __init__(self) -> None:
         self._rows, self._values, self._length = [], [], 0
 
@@ -169,7 +166,6 @@ def _parsed(file: File, progress: Progress | None) -> Log:
 def _columns(
     pieces: Iterator[tuple[bytes, int]], name: str, notices: list[Message], total: int, progress: Progress | None
 ) -> dict[str, Any]:
-    """Convert the text of a log to its columns."""
     first, position = next(pieces, (b"", 0))
     names, rest = _header(name, first)
     index = {column: names.index(column) for column in COLUMNS + OPTIONAL if column in names}
@@ -195,7 +191,6 @@ def _columns(
 
 
 def _log(name: str, columns: dict[str, Any], notices: list[Message]) -> Log:
-    """Make a log of its columns, with even times."""
     time_us = np.rint(columns.pop("t_s") * 1e6)
     start_s = float(time_us[0]) / 1e6 if len(time_us) else 0.0
     t_s = (time_us - round(start_s * 1e6)) * 1e-6
@@ -257,7 +252,6 @@ def _numbers(name: str, text: bytes, names: list[str], index: dict[str, int], li
 
 
 def _last_marked(parts: Iterator[tuple[bytes, int]]) -> Iterator[tuple[bytes, int, bool]]:
-    """Yield each part, with True added for the last part."""
     previous = next(parts, None)
     for part in parts:
         if previous:
@@ -307,7 +301,7 @@ def write_log(path: Path | str, log: Log) -> None:
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as directory:
-    ...     write_log(Path(directory, "log.csv"), Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2))
+    ...     write_log(f"{directory}/log.csv", Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2))
     ...     print(Path(directory, "log.csv").read_text().splitlines()[1])
     0.000000,0.000000,1.000000,0.000000,0.000000,0.000000,0.000000
     """
@@ -328,7 +322,6 @@ def cut_log(
 ) -> tuple[int, float]:
     """Copy the lines of a stretch (see Stretch) of a log to the file `out`, as write_log() does.
 
-    progress: called with the bytes read and the bytes of the file.
     Returns the number of samples, and the time from the first to the last sample in s.
 
     >>> import tempfile

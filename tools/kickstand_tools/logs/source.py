@@ -96,7 +96,6 @@ def errors_of(name: str) -> Iterator[None]:
 
 
 def total_bytes(source: object) -> int:
-    """The number of bytes that chunks() will read, 0 if unknown."""
     if isinstance(source, (Path, str)):
         return os.path.getsize(source) if os.path.isfile(source) else 0
     return 0

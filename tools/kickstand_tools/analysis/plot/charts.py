@@ -1,7 +1,4 @@
-"""The charts of a ride as data: traces, units, colours and ranges.
-
-page.py draws the charts with matplotlib. interactive.py passes the same charts to plotly.
-"""
+"""The charts of a ride as data: traces, units, colours and ranges, which page.py and interactive.py draw."""
 
 from dataclasses import dataclass, field
 
@@ -136,7 +133,6 @@ def shown_lean_deg(overview: Overview) -> Array:
 
 
 def title(overview: Overview) -> str:
-    """Return one line with name, length and maxima of the ride."""
     total = overview.summary
     parts = [overview.ride.stem, clock(total.duration_s)]
     if not overview.ride.car:

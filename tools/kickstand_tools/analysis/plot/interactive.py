@@ -89,7 +89,6 @@ def charts_figure(charts: Charts, linked: bool = False) -> dict[str, Any]:
 
 
 def time_axes(charts: Charts) -> list[str]:
-    """Return plotly's names of the axes of time."""
     return [_axes(k)["xaxis"] for k in range(len(charts.over_time))]
 
 

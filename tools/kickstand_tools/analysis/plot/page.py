@@ -148,12 +148,10 @@ _SIDES: dict[str, Any] = {  # position of the words beside a point
 
 
 def draw_picture(path: Path, overview: Overview) -> None:
-    """Write a PNG."""
     figure_of(overview).savefig(path, dpi=100)
 
 
 def figure_of(overview: Overview) -> Any:
-    """Draw the picture as a Figure of matplotlib."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -183,10 +181,7 @@ def figure_of(overview: Overview) -> Any:
 
 
 def _fonts(text: str) -> tuple[list[str], str]:
-    """Choose the font families for a text.
-
-    Returns the families, and the text in which a code replaces each letter that no font has.
-    """
+    """Return the font families for a text, and the text in which a code replaces each letter that no font has."""
     from matplotlib import font_manager
 
     families = ["DejaVu Sans"]
@@ -204,7 +199,6 @@ def _fonts(text: str) -> tuple[list[str], str]:
 
 
 def draw_chart(axes: Any, chart: Chart) -> None:
-    """Draw one chart on axes of matplotlib."""
     axes.set(title=chart.title, xlabel=chart.x_title, ylabel=chart.y_title, xlim=chart.x_range, ylim=chart.y_range)
     if chart.square:
         axes.set_aspect("equal")
