@@ -37,6 +37,20 @@ def test_an_alignment_takes_both_poses_and_is_saved():
     assert Panel(aligned=False).app.calibration.aligned  # from flash
 
 
+@pytest.mark.parametrize("recording", [False, True])
+def test_the_lean_begins_with_the_poses_unless_a_ride_is_recorded(recording):
+    """A replay of the ride does not know the poses."""
+    panel, saved = on_the_stand(), []
+    panel.app.calibration.save = lambda calibration, posed=False: saved.append(posed)
+    if recording:
+        panel.app.rides.start()
+    take_stand(panel)
+    panel.turn(-12.0, (0, 1, 0))
+    panel.press(SHORT)
+    panel.hold(3.6)
+    assert saved == [not recording]
+
+
 @pytest.mark.parametrize(
     ("lean_deg", "turn_deg", "lines"),
     [

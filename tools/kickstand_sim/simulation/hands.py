@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from kickstand_tools.signals import rotation_matrix, rotation_vector
+from kickstand_tools.signals import rotation_matrix
 from numpy.typing import NDArray
 
 from .physics.chip import RATE_HZ, Chip
@@ -98,7 +98,7 @@ def procedure(
     for first, second in pairwise(ups):
         heading = np.radians(chance.uniform(-hand.heading_deg, hand.heading_deg))
         next_attitude = rotation_matrix(np.array([0.0, 0.0, heading])) @ attitude @ _turn_between(second, first)
-        rotation = rotation_vector(next_attitude @ attitude.T)
+        rotation = _rotation_vector(next_attitude @ attitude.T)
         turned = np.linalg.norm(rotation)
         n = max(2, int(chance.uniform(*hand.turn_s) * (0.25 + 0.75 * turned / (np.pi / 2)) ** 0.7 * RATE_HZ))
         u = np.arange(n + 1) / n
@@ -127,3 +127,17 @@ def _turn_between(a: NDArray, b: NDArray) -> NDArray:
         size = np.linalg.norm(axis)
         return rotation_matrix((np.pi if a @ b < 0.0 else 0.0) * axis / size)
     return rotation_matrix(np.arctan2(size, a @ b) * axis / size)
+
+
+def _rotation_vector(m: NDArray) -> NDArray:
+    """Convert a rotation matrix to a rotation vector in rad, by its quaternion, also for a turn by 180 degrees."""
+    symmetric = [
+        [m[0, 0] - m[1, 1] - m[2, 2], m[1, 0] + m[0, 1], m[2, 0] + m[0, 2], m[2, 1] - m[1, 2]],
+        [m[1, 0] + m[0, 1], m[1, 1] - m[0, 0] - m[2, 2], m[2, 1] + m[1, 2], m[0, 2] - m[2, 0]],
+        [m[2, 0] + m[0, 2], m[2, 1] + m[1, 2], m[2, 2] - m[0, 0] - m[1, 1], m[1, 0] - m[0, 1]],
+        [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], np.trace(m)],
+    ]
+    _, vectors = np.linalg.eigh(np.array(symmetric))
+    q = vectors[:, -1] * (1.0 if vectors[3, -1] >= 0.0 else -1.0)
+    size = np.linalg.norm(q[:3])
+    return q[:3] * (2.0 * np.arctan2(size, q[3]) / size if size > 1e-12 else 2.0)

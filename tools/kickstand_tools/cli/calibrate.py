@@ -27,7 +27,7 @@ from ..common.messages import OPPOSITE_SIGN
 from ..common.output import check_output
 from ..estimation.alignment import RideFit, fit_ride
 from ..logs.reader import read_log
-from .common import OUT, PATH, RIGHT_HANDED, VEHICLES, Bar, echo, file_argument, known_to, print_lines, warn
+from .common import OUT, PATH, RIGHT_HANDED, VEHICLES, echo, file_argument, known_to, print_lines, warn, with_bar
 
 
 @click.group(no_args_is_help=False)
@@ -85,10 +85,11 @@ def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None,
     check_output(out, list(logs))
     earlier = read_calibration(calibration) if calibration else None
     several = len(logs) > 1
-    with Bar("driving") as bar:
-        fit = fit_drive(
-            logs, earlier, vehicle, method, bar.reach, lambda event: print_lines(_event_lines(event, several))
-        )
+
+    def tell(event: events.DriveEvent) -> None:
+        print_lines(_event_lines(event, several))
+
+    fit = with_bar("driving", fit_drive, logs, earlier, vehicle, method, on_event=tell)
     for name, notice in fit.notices:
         warn(name, [notice])
     warn(logs[0], of_calibration(fit.calibration))
@@ -112,8 +113,7 @@ def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None,
 def ride(log: Path, phone: str | None, out: Path) -> None:
     """Align to a motorcycle, from riding with bends. No poses and no speed are needed."""
     check_output(out, [log])
-    with Bar("aligning") as bar:
-        fit = fit_ride(log, phone, bar.reach)
+    fit = with_bar("aligning", fit_ride, log, phone)
     warn(log, fit.notices)
     print_lines(_ride_lines(fit))
     _write(out, fit.calibration)

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from inspect import cleandoc
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 from rich.console import Console
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ..estimation.alignment import RideFit
 
 Command = Callable[..., Any]
+_Result = TypeVar("_Result")
 _PATIENCE_S = 1.0  # work that takes less time shows no progress
 _WIDTH = 110  # width in columns of a table that is not printed to a terminal
 
@@ -207,6 +208,12 @@ class Bar:
     def __exit__(self, *_: object) -> None:
         if self._shown:
             self._progress.stop()
+
+
+def with_bar(what: str, function: Callable[..., _Result], *arguments: Any, **options: Any) -> _Result:
+    """Call a function that has the parameter `progress`, and show a progress bar meanwhile."""
+    with Bar(what) as bar:
+        return function(*arguments, progress=bar.reach, **options)
 
 
 @contextlib.contextmanager

@@ -30,7 +30,7 @@ from ..logs.reader import copy_rows, is_log, read_log
 from ..overlay.overlay import overlay
 from ..replay.replay import replay_to_csv
 from . import common
-from .common import Bar, spinner
+from .common import Bar, spinner, with_bar
 
 
 @click.command()
@@ -99,11 +99,9 @@ def join_command(ride: Path, track: Path, out: Path) -> None:
     check_output(out, [ride, track])
     with spinner("reading the track"):
         points = read_track(track)
-    with Bar("reading") as bar:
-        joined = join_track(ride, points, bar.reach)
+    joined = with_bar("reading", join_track, ride, points)
     common.warn(ride, joined.notices)
-    with Bar("writing") as bar:
-        count = write_joined(out, joined, bar.reach)
+    count = with_bar("writing", write_joined, out, joined)
     common.print_lines(_joined_lines(joined))
     common.echo(f"written: {out}, {count} positions")
     if calibration_path(ride).is_file() and not calibration_path(out).exists():
@@ -131,8 +129,7 @@ def compare_command(
         agreement.check_picture(picture)
         check_output(picture, [a, b, *paths])
     of_a, of_b = (read_calibration(path) for path in paths)
-    with Bar("comparing") as bar:
-        agreed = agreement.compare_rides(a, b, of_a, of_b, bar.reach)
+    agreed = with_bar("comparing", agreement.compare_rides, a, b, of_a, of_b)
     for log, notices in zip((a, b), agreed.notices.values()):
         common.warn(log, notices)
     if picture is not None:
@@ -156,8 +153,7 @@ def replay_command(ride: Path, calibration: Path | None, engine: str, out: Path,
     """Run the firmware's own lean meter over a recorded log."""
     _check_output(out, ride, calibration)
     log, parameters = _log_of(ride, calibration)
-    with Bar("replaying") as bar:
-        count, notices = replay_to_csv(_stretch(log, **stretch), parameters, engine, out, bar.reach)
+    count, notices = with_bar("replaying", replay_to_csv, _stretch(log, **stretch), parameters, engine, out)
     common.warn(ride, notices)
     if not parameters.aligned:
         common.warning(
@@ -176,8 +172,7 @@ def smooth_command(ride: Path, calibration: Path | None, out: Path, **stretch: f
     """Compute the lean afterwards from the whole ride. Each sample has a standard deviation."""
     _check_output(out, ride, calibration)
     log, parameters = _log_of(ride, calibration)
-    with Bar("smoothing") as bar:
-        count, notices = smooth_to_csv(_stretch(log, **stretch), parameters, out, bar.reach)
+    count, notices = with_bar("smoothing", smooth_to_csv, _stretch(log, **stretch), parameters, out)
     common.warn(ride, notices)
     common.echo(f"written: {out}, {count} samples")
 
@@ -195,9 +190,7 @@ def export_command(ride: Path, form: str, calibration: Path | None, live: bool, 
     The programs are maps (gpx), Circuit Tools (vbo), RaceChrono, and data frames (parquet, csv).
     """
     _check_output(out, ride, calibration)
-    opened = _opened(ride, calibration, live)
-    with Bar("exporting") as bar:
-        count, notices = export_with_notices(opened, form, out, bar.reach)
+    count, notices = with_bar("exporting", export_with_notices, _opened(ride, calibration, live), form, out)
     common.warn(ride, notices)
     common.echo(f"written: {out}, {count} rows")
 
@@ -250,9 +243,9 @@ def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) 
         raise click.UsageError("Give --from, --to or both: seconds from the beginning of the log.")
     check_output(out, [log])
     with Bar("cutting") as bar:
-        whole = read_log(log, 1, bar.reach)
-        rows = whole.rows_between(from_s, to_s)
-        part = whole.between(from_s, to_s)
+        recording = read_log(log, 1, bar.reach)
+        rows = recording.rows_between(from_s, to_s)
+        part = recording.between(from_s, to_s)
         notices = check_log(part).notices
         copy_rows(log, out, rows)
     common.warn(log, notices)
@@ -291,8 +284,7 @@ def overlay_command(
     """
     _check_output(out, ride, calibration, *([video] if video else []))
     rate = float(fps) if fps else None
-    with Bar("reading and drawing") as bar:
-        drawn = overlay(ride, out, calibration, video, fps=rate, progress=bar.reach, **options)
+    drawn = with_bar("reading and drawing", overlay, ride, out, calibration, video, fps=rate, **options)
     common.warn(ride, drawn.notices)
     if drawn.correlation is not None:
         common.echo(
@@ -331,8 +323,7 @@ def _imported(source: Path, calibration: Path | None) -> tuple[Path | Log, Path 
     if path is not None:
         parameters = read_calibration(path)
     else:
-        with Bar("aligning") as bar:
-            fit = fit_ride(imported.log, None, bar.reach)
+        fit = with_bar("aligning", fit_ride, imported.log)
         parameters = fit.calibration
         line += f"; aligned by its bends, {common.known_to(fit)}"
     common.echo(line, err=True)
@@ -342,8 +333,7 @@ def _imported(source: Path, calibration: Path | None) -> tuple[Path | Log, Path 
 def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> Ride:
     """Open a ride, which may have to be imported."""
     log, parameters = _imported(source, calibration)
-    with Bar("reading") as bar:
-        return open_ride(_stretch(log, **stretch), parameters, smoothed=not live, progress=bar.reach)
+    return with_bar("reading", open_ride, _stretch(log, **stretch), parameters, smoothed=not live)
 
 
 def _log_of(source: Path, calibration: Path | None) -> tuple[Path | Log, CalibrationFile]:
@@ -356,9 +346,7 @@ def _log_of(source: Path, calibration: Path | None) -> tuple[Path | Log, Calibra
 
 def _overview(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> Overview:
     """Return the overview of a ride from _opened(). Print all its notices."""
-    opened = _opened(source, calibration, live, **stretch)
-    with Bar("computing the lean") as bar:
-        ride_overview = overview(opened, bar.reach)
+    ride_overview = with_bar("computing the lean", overview, _opened(source, calibration, live, **stretch))
     common.warn(source, ride_overview.notices)
     return ride_overview
 
