@@ -12,7 +12,7 @@ from ..checks.log import check_log
 from ..common.messages import OPPOSITE_SIGN, InputError, Message
 from ..common.output import write_packed
 from ..logs.log import Log, Source
-from ..logs.reader import read_log, text_rows, write_log
+from ..logs.reader import DIGITS, read_log, text_rows, write_log
 from ..logs.source import File, Progress, name_of
 from ..signals import Array, Bools, Ints, correlations, log_likelihood_ratio, moving_mean, peaks
 from .motion import AROUND_S, STEP_S, BinMotion, TrackFit, cost_of_one_shift, fitted, motion
@@ -37,7 +37,6 @@ _LONGER = "a longer ride with more bends is needed, or a track with a point ever
 _OTHER = "is it the track of another ride or another day?"
 
 SPEED = "speed_mps"
-_FORMAT = {SPEED: "%.3f", "lat_deg": "%.7f", "lon_deg": "%.7f", "utc_s": "%.3f"}
 
 
 @dataclass
@@ -224,7 +223,7 @@ def write_joined(out: Path | str, joined: Joined, progress: Progress | None = No
         return len(points)
     ends = {}
     for row, values in zip(rows.tolist(), zip(*(column[points].tolist() for column in columns.values()))):
-        ends[row] = ",".join([_FORMAT[name] % value for name, value in zip(columns, values)]).replace("nan", "")
+        ends[row] = ",".join([f"{value:.{DIGITS[name]}f}" for name, value in zip(columns, values)]).replace("nan", "")
     write_packed(out, _lines(joined.ride, list(columns), len(log.t_s), ends, progress))
     return len(points)
 
