@@ -57,10 +57,7 @@ class Match:
 
 
 def match(motion: BinMotion, track: Track) -> Match:
-    """Return the Match of a track with a ride. Callers put both names in front of the error's text.
-
-    Raises InputError if the track does not belong to the ride, or if this is uncertain.
-    """
+    """Return the Match of a track with a ride. Raises InputError, before whose text callers put both names."""
     track = track.once_a_second()
     steps = course(track)
     parts = segments(steps)
@@ -129,10 +126,7 @@ def _rough_shifts(motion: BinMotion, steps: Course) -> tuple[bool, list[float]]:
 
 
 def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
-    """Return the change of course within _SPAN_S every _GRID_S, and True where it is known.
-
-    The change is in degrees, as the gyro of a leaning bike would measure it.
-    """
+    """Return the change of course within _SPAN_S every _GRID_S, as a leaning bike's gyro reads it; where it is known."""
     middle_s, at_s = (steps.begin_s + steps.end_s) / 2.0, np.arange(0.0, steps.end_s[-1], _GRID_S)
     half = _SPAN_S / 2.0
     heading = np.cumsum(steps.turn_deg)
@@ -145,7 +139,7 @@ def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
 
 
 def _changes_of_ride(motion: BinMotion) -> tuple[Array, Bools]:
-    """Return the ride's rotation about its up within _SPAN_S every _GRID_S, and True where it is known."""
+    """Return the ride's rotation about its up within _SPAN_S every _GRID_S, and where it is known."""
     at_s, half = np.arange(0.0, motion.seconds, _GRID_S), _SPAN_S / 2.0
     edges_s = np.arange(len(motion.valid) + 1) * STEP_S
     turned = np.append(0.0, np.cumsum(motion.rate_dps @ motion.up)) * STEP_S
