@@ -126,7 +126,7 @@ def _rough_shifts(motion: BinMotion, steps: Course) -> tuple[bool, list[float]]:
 
 
 def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
-    """Return the change of course within _SPAN_S every _GRID_S, as a leaning bike's gyro reads it; where it is known."""
+    """Return the change of course within _SPAN_S every _GRID_S, as a leaning bike's gyro reads it; where known."""
     middle_s, at_s = (steps.begin_s + steps.end_s) / 2.0, np.arange(0.0, steps.end_s[-1], _GRID_S)
     half = _SPAN_S / 2.0
     heading = np.cumsum(steps.turn_deg)
