@@ -321,9 +321,9 @@ def printed_lines(
         else:
             transport.wait(_POLL_S)
         output, end, error = received.partition(_END)
-        *whole, output = output.split(b"\n")
+        *complete, output = output.split(b"\n")
         received = output + end + error
-        for line in whole:
+        for line in complete:
             yield line.strip()
     # Let the board print its prompt again. mpremote waits for the prompt, which this function has already read
     serial.write(_CTRL_A)
