@@ -87,7 +87,8 @@ def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
     seconds: emulated time of each of five runs.
     chip: "rp2040" or "esp32".
 
-    Returns the figures by name, which ends with the figure's unit. Raises GuestError if the program on the board fails.
+    Returns the figures by name. A name ends with the figure's unit. Raises GuestError if the program on the board
+    fails.
     """
     plain = loop(seconds, chip)
     modes = {name: loop(seconds, chip, chosen) for name, chosen in _MODES.items()}
@@ -139,9 +140,9 @@ def _mode_text(mode: dict[str, Any]) -> str:
 
 
 def start(chip: str, compiled: bool = True) -> Boot:
-    """Measure the parts of the start. The bike is upright and at rest. compiled: True to install .mpy files.
+    """Measure the parts of the start. The bike is upright and at rest.
 
-    Raises NotReached if a part takes over 10 s.
+    compiled: True to install .mpy files. Raises NotReached if a part takes over 10 s.
     """
     kind = device_class(chip)
     files = firmware_files.contents(kind.MPY if compiled else None) | _calibration()
@@ -156,7 +157,7 @@ def start(chip: str, compiled: bool = True) -> Boot:
 
 
 def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Measure the costs of the app's loop. Returns the figures by name, which ends with the figure's unit.
+    """Measure the costs of the app's loop. Returns the figures by name. A name ends with the figure's unit.
 
     seconds: emulated time of the run. chip: "rp2040" or "esp32". chosen: values of settings, by name.
     """
