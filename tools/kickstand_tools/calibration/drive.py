@@ -29,14 +29,10 @@ UP_DEG = 1.1
 
 @dataclass
 class PoseCheck:
-    """The alignment from two poses, compared with the drive.
+    """The alignment from two poses, compared with the drive."""
 
-    verdict: a constant of kickstand.drive_alignment.alignment.
-    yaw_deg: yaw error of the alignment from the poses.
-    """
-
-    verdict: int
-    yaw_deg: float
+    verdict: int  # a constant of kickstand.drive_alignment.alignment
+    yaw_deg: float  # yaw error of the alignment from the poses
 
 
 @dataclass
@@ -110,8 +106,7 @@ def fit_drive(
     method: "improved", or "published" for ViriCiti's published method.
     progress: called with (done, total). Each sample counts twice, because the logs are read twice.
     on_event: called with each DriveEvent as it happens, even if the drive is refused later.
-    Raises InputError. Raises its subclass RefusedInput, with a Message, if the drive does not determine the sensor's
-    mounting.
+    Raises InputError, RefusedInput if the drive does not determine the sensor's mounting.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("city", seed=3, seconds=240.0)

@@ -59,17 +59,13 @@ class DriveEvent:
 
 
 class DriveWatch:
-    """Emits a DriveEvent for each change of an alignment's state.
-
-    events: all events so far.
-    ready_s: seconds of all logs together until the alignment was first READY; 0 if never.
-    """
+    """Emits a DriveEvent for each change of an alignment's state."""
 
     def __init__(
         self, alignment: DriveAlignment | PublishedAlignment, on_event: Callable[[DriveEvent], None] | None
     ) -> None:
         self.events: list[DriveEvent] = []
-        self.ready_s = 0.0
+        self.ready_s = 0.0  # seconds of all logs together until the alignment was first READY
         self._alignment, self._on_event = alignment, on_event
         self._log = ""
         self._counts = (0, 0)  # used, turned
@@ -83,17 +79,14 @@ class DriveWatch:
         self._add(0.0, LOG_BEGINS)
 
     def end(self, t_s: float) -> None:
-        """End a log. Emit the pending events, or LOG_WITHOUT_EVENTS if the log had no event.
-
-        t_s: time of the log's last sample.
-        """
+        """End a log, whose last sample is at t_s: emit the pending events, or LOG_WITHOUT_EVENTS."""
         self.look(t_s)
         if self.events[-1].what == LOG_BEGINS:
             self._add(t_s, LOG_WITHOUT_EVENTS)
         self._elapsed_s += t_s
 
     def look(self, t_s: float) -> None:
-        """Emit an event for each change of the alignment's state since the last call. t_s: the time in this log."""
+        """Emit an event for each change since the last call. t_s: the time in this log."""
         alignment = self._alignment
         counts = alignment.counted, alignment.turned
         if counts[0] > self._counts[0]:
@@ -124,37 +117,26 @@ _CHUNK = 1000  # least number of samples between two calls of progress
 
 @dataclass
 class Bin:
-    """Successive samples that are passed to DriveAlignment as sums.
+    """Successive samples that are passed to DriveAlignment as sums."""
 
-    begins: True if the samples do not continue the previous bin.
-    start_mps: if `begins`, the speed at the start of the bin; None without a new speed.
-    force: mean force along the sensor's axes, 3 values in g.
-    rate: mean rate along the sensor's axes, 3 values in deg/s.
-    first_us: duration of all samples but the last.
-    last_us: duration of the last sample; 0 if the bin is not full.
-    speeds: the speeds during first_us, each as (microseconds before the end of first_us, m/s).
-    end_mps: speed of the last sample; None without a new speed.
-    end_us: time of the last sample in the log.
-    samples: number of samples.
-    """
-
-    begins: bool
-    start_mps: float | None
-    force: list[float]
-    rate: list[float]
-    first_us: int
-    last_us: int
+    begins: bool  # True if the samples do not continue the previous bin
+    start_mps: float | None  # if `begins`, the speed at the start of the bin; None without a new speed
+    force: list[float]  # mean force along the sensor's axes, 3 values in g
+    rate: list[float]  # mean rate along the sensor's axes, 3 values in deg/s
+    first_us: int  # duration of all samples but the last
+    last_us: int  # duration of the last sample; 0 if the bin is not full
+    # The speeds during first_us, each as (microseconds before the end of first_us, m/s)
     speeds: list[tuple[int, float]]
-    end_mps: float | None
-    end_us: int
+    end_mps: float | None  # speed of the last sample; None without a new speed
+    end_us: int  # time of the last sample in the log
     samples: int
 
 
 def drive_bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterator[Bin]:
     """Split the samples of a log into the shortest bins that last at least length_us.
 
-    The last bin before a gap or before the end of the log may be shorter. If length_us is 0, each bin has one sample,
-    but the first bin of each stretch has two samples.
+    The last bin before a gap or the end may be shorter. If length_us is 0, each bin has one sample, but the first bin
+    of each stretch has two.
     """
     time_us = log.time_us
     step_us = np.diff(time_us, prepend=time_us[0])
@@ -202,10 +184,7 @@ def drive_bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterat
 
 
 def standing(logs: Sequence[Log], calibration: CalibrationFile, steps: "Steps") -> StandingVertical:
-    """Return the StandingVertical from the stops in all logs.
-
-    Only stops are computed, so this is much faster than an alignment.
-    """
+    """Return the StandingVertical from the stops in all logs, much faster than by an alignment."""
     standing = StandingVertical()
     speed_mps, silent_us = -1.0, 0  # no speed yet
     for log in logs:
@@ -283,7 +262,6 @@ class Steps:
         self._progress, self._done, self._said, self._total = progress, 0, 0, total
 
     def more(self, samples: int) -> None:
-        """Add samples to the count, and call the callback if enough of them are new."""
         self._done += samples
         if self._progress and (self._done - self._said >= _CHUNK or self._done == self._total):
             self._said = self._done
