@@ -40,6 +40,8 @@ MOUNTS = {"firm": 0.5, "holder": 0.1, "aliasing": 0.1, "clipping": 0.1, "driftin
 ROUGH = {"track": (4e-6, 32e-6)}
 USUALLY_ROUGH = 8e-6, 512e-6
 WAVES_PER_M = 0.03, 4.0
+# Legs of a bike that stops, stands with the engine running and sets off again
+STOP = [(8.0, 0.0, 0.0), (24.0, 0.0, 0.0), (6.0, 0.0, 12.0)]
 
 
 @dataclass
@@ -97,12 +99,13 @@ def hills(chance):
 DRAWN = {**KINDS, "street": street, "city": city, "hills": hills}
 
 
-def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
+def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False, stop_s=None):
     """Return a DrawnRide. The same arguments give the same ride.
 
     seconds: longest duration.
     mounts: one mount per device on the bike. None: one device with a random mount.
     kind: a key of DRAWN. None: a random kind.
+    stop_s: time from which the bike stops and stands for a while, before it rides on. None: no such stop.
     sheet: True for a sensor with all errors of its data sheet, calibrated by one log of the six positions and by two
         poses. False for a sensor that only has the errors that remain after a calibration.
     """
@@ -115,6 +118,9 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
         total += leg[0]
         if total > seconds - 8.0 and len(selected) > 3:
             break
+        if stop_s and total > stop_s:
+            selected += STOP
+            stop_s = None
         selected.append(leg)
     time, lean, v = course_of([*selected, (8.0, 0.0, 15.0)])
     n = len(time)
